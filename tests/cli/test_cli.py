@@ -221,13 +221,13 @@ def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_built_in_grasp_builds_its_fmus(
+def test_the_built_in_grasp_leaves_nothing_in_the_current_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert cli.main(["run", "--stop", "0.01", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["steps"] == 100
-    assert {p.stem for p in (tmp_path / "fmus/build").glob("*.fmu")} == set(blocks())
+    assert not list(tmp_path.iterdir())
 
 
 def test_inspect_shows_the_interface(command: Run, fmus: Path) -> None:
@@ -250,30 +250,24 @@ def test_inspect_of_what_is_no_fmu(command: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_doctor_finds_nothing_wrong_with_ours(command: Run, fmus: Path) -> None:
-    code, out, err = command("doctor", str(fmus / "ProximitySensor.fmu"), "--json")
+def test_inspect_finds_nothing_wrong_with_ours(command: Run, fmus: Path) -> None:
+    code, out, err = command("inspect", "--load", str(fmus / "ProximitySensor.fmu"), "--json")
     assert (code, err) == (0, "")
     found = {f["check"]: f["status"] for f in json.loads(out)["findings"]}
     assert found["trial"] == "ok"
     assert "problem" not in found.values()
 
 
-def test_doctor_finds_what_is_missing(command: Run, fmus: Path, tmp_path: Path) -> None:
+def test_inspect_finds_what_is_missing(command: Run, fmus: Path, tmp_path: Path) -> None:
     bare = tmp_path / "bare.fmu"
     with zipfile.ZipFile(fmus / "ProximitySensor.fmu") as whole, zipfile.ZipFile(bare, "w") as part:
         for name in whole.namelist():
             if not name.startswith("binaries/linux64"):
                 part.writestr(name, whole.read(name))
-    code, out, _ = command("doctor", str(bare))
+    code, out, _ = command("inspect", str(bare))
     assert code == 1
     assert re.search(r"^problem +binary +has a binary for win64 only; ", out, re.MULTILINE)
     assert "fix: " in out
-
-
-def test_doctor_without_an_fmu_looks_at_the_machine(command: Run) -> None:
-    code, out, _ = command("doctor")
-    assert code == 0
-    assert re.search(r"^ok +python +3\.1\d", out)
 
 
 def test_a_missing_file_without_a_name_is_told(
@@ -288,9 +282,8 @@ def test_a_missing_file_without_a_name_is_told(
     assert said in err
 
 
-@pytest.mark.parametrize("verb", ["inspect", "doctor"])
-def test_a_folder_is_no_fmu(command: Run, tmp_path: Path, verb: str) -> None:
-    code, out, err = command(verb, str(tmp_path))
+def test_a_folder_is_no_fmu(command: Run, tmp_path: Path) -> None:
+    code, out, err = command("inspect", str(tmp_path))
     assert (code, out) == (2, "")
     assert err == f"grasp-cosim: {tmp_path}: is a folder; must be an FMU, a file\n"
 

@@ -73,7 +73,7 @@ def test_a_component_in_a_process(installed: list[str], everything: Path, system
     [
         "run {SYSTEM} --stop 0.001",
         "qualify {FMUS}/GripperPlant.fmu --as plant --system {SYSTEM} --stop 0.001",
-        "doctor {FMUS}/GripperPlant.fmu",
+        "inspect {FMUS}/GripperPlant.fmu --load",
         "inspect {FMUS}/GripperPlant.fmu",
         "sweep {SYSTEM} --stop 0.001 --vary plant.object_width=0.05,0.06 --out {OUT} --workers 2",
         "ssp {SYSTEM} -o {OUT}.ssp",

@@ -133,7 +133,7 @@ def test_build_makes_native_ones_too(
 def test_inspect_tells_the_processor(other_machine: Run, foreign: Path) -> None:
     found = json.loads(other_machine("inspect", foreign / "GripperPlant.fmu", "--json")[1])
     assert (found["platforms"], found["this_machine"]) == (["linux64 (RISC-V)", "win64"], HERE)
-    code, out, _ = other_machine("doctor", foreign / "GripperPlant.fmu")
+    code, out, _ = other_machine("inspect", foreign / "GripperPlant.fmu")
     assert code == 1
     assert "GripperPlant.so is RISC-V, 64 bit; must be " in out
     assert "or as a native FMU: grasp-cosim build --native" in out

@@ -10,7 +10,6 @@ from grasp_cosim.ssp.write import write_ssp
 
 FMU = [
     ("inspect", "{}"),
-    ("doctor", "{}"),
     ("proxy", "{}", "-o", "p.fmu"),
     ("serve", "{}"),
     ("run", "--swap", "plant={}"),

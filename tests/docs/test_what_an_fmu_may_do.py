@@ -71,8 +71,8 @@ def test_what_only_reads(folder: Path) -> None:
 @pytest.mark.slow
 @needs_gcc
 def test_what_loads_it_in_another_process(folder: Path) -> None:
-    assert "| `doctor FMU` |" in PAGE
-    assert loaded(folder, "doctor", "a.fmu") - {os.getpid()}
-    assert os.getpid() not in loaded(folder, "doctor", "a.fmu")
+    assert "| `inspect --load FMU` |" in PAGE
+    assert loaded(folder, "inspect", "--load", "a.fmu") - {os.getpid()}
+    assert os.getpid() not in loaded(folder, "inspect", "--load", "a.fmu")
     isolated = loaded(folder, "run", "system.toml", "--set", "components.a.isolation=process")
     assert len(isolated - {os.getpid()}) == len(isolated) == 1

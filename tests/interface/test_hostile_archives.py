@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.errors import InputError
-from grasp_cosim.inspection.doctor import examine, unpack
 from grasp_cosim.inspection.inspection import inspect_fmu
+from grasp_cosim.inspection.loading import examine, unpack
 from grasp_cosim.interface import document, read
 from grasp_cosim.interface.read import describe, read_interface
 from support.slow import slow

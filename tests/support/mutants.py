@@ -341,7 +341,7 @@ def make(kind: str, seed: int, fmus: Path, folder: Path, archive: bytes) -> Iter
         system = folder / "system.toml"
         system.write_text(system_text(fmus), "utf-8")
         yield ["inspect", str(path)]
-        yield ["doctor", str(path)]
+        yield ["inspect", str(path), "--load"]
         yield ["run", str(system), "--swap", f"{role}={path}", "--stop", "0.001",
                "--set", f"components.{role}.isolation=process", "--out", "out"]  # fmt: skip
     else:
@@ -415,7 +415,7 @@ def complaints(code: int | None, said: str, changed: list[str]) -> list[str]:
 def main(kind: str, first: int, count: int, fmus: Path, folder: Path) -> None:
     """Try seeds and print what came of it."""
     from grasp_cosim import System
-    from grasp_cosim.cli.commands import doctor, inspect, run, ssp  # noqa: F401
+    from grasp_cosim.cli.commands import inspect, run, ssp  # noqa: F401
     from grasp_cosim.ssp.write import write_ssp
 
     folder.mkdir(parents=True)

@@ -16,7 +16,7 @@ from .frame import EVERYWHERE, told
 SECTIONS = {
     "Simulate": ("run", "sweep", "evaluate", "identify"),
     "Look at recorded runs": ("report", "compare"),
-    "Make and check FMUs and systems": ("init", "build", "inspect", "doctor", "qualify", "ssp"),
+    "Make and check FMUs and systems": ("init", "build", "inspect", "qualify", "ssp"),
     "Hardware in the loop": ("proxy", "serve", "relay"),
 }
 """Where the help lists a command; one that is in none of these is among the others."""

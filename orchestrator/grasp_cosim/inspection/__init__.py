@@ -1,5 +1,4 @@
-"""The commands inspect and doctor.
+"""What an FMU is: its interface as a table, and whether this machine loads it.
 
-The interface of an FMU as a table, and the checks that tell whether this machine will load it.
 Imports interface and the ground floor.
 """

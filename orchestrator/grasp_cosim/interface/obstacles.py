@@ -1,6 +1,6 @@
 """Obstacles to running an FMU here, by what it declares, and what to ask its vendor for.
 
-The one place that says so: reading a system, loading an instance and `doctor` ask it.
+The one place that says so: reading a system, loading an instance and `inspect` ask it.
 """
 
 import platform

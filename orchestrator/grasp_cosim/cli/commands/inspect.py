@@ -2,26 +2,35 @@
 
 import shutil
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import click
 
+from ...inspection import loading
 from ...inspection.inspection import as_text, inspect_fmu
-from ..frame import PATH, json_option, show
+from ..frame import NEGATIVE, PATH, json_option, show, waiting
 
 
 @click.command()
 @click.argument("fmu", type=PATH)
+@click.option("--load", is_flag=True, help="Try whether it loads, in a process of its own.")
 @json_option
-def inspect(fmu: Path, as_json: bool) -> int:
-    """Show the interface of any FMU.
+def inspect(fmu: Path, load: bool, as_json: bool) -> int:
+    """Show the interface of any FMU, and whether it loads here.
 
-    It prints the variables, with units, ranges and dependencies, and the capabilities.
+    The command prints the capabilities and the variables, with units, ranges and dependencies. It
+    says whether this machine loads the FMU, as far as the file tells, why not, and the fix. None of
+    the FMU's code runs, unless --load tries. The exit code is 1 where it does not load.
 
     \b
-    Example: grasp-cosim inspect fmus/build/GripperPlant.fmu
+    Example: grasp-cosim inspect vendor.fmu --load
     """
     report = inspect_fmu(fmu)
+    with waiting(f"examining {fmu}"):
+        findings = loading.examine(fmu, load)
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    show(as_json, report, as_text(report, width))
-    return 0
+    text = f"{as_text(report, width)}\n\n{loading.as_text(findings, load)}"
+    verdict = {"loads": loading.loads(findings), "findings": [asdict(f) for f in findings]}
+    show(as_json, report | verdict, text)
+    return 0 if verdict["loads"] else NEGATIVE

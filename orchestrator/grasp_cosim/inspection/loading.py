@@ -1,4 +1,6 @@
-"""Finds out if this machine loads an FMU: what would crash a host, before it does, and the fix."""
+"""Whether this machine loads an FMU, as far as its file says, and the fix; or by a trial."""
+
+from __future__ import annotations
 
 import os
 import re
@@ -7,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.machinery import ModuleSpec
 from pathlib import Path
@@ -69,27 +71,45 @@ class Finding:
     fix: str | None
 
 
-def examine(fmu: Path | None) -> list[Finding]:
-    """Check this machine and, unless it is None, the FMU, which is also loaded in a child process.
+def examine(fmu: Path, load: bool = False) -> list[Finding]:
+    """Check an FMU as far as its file says, which runs none of its code.
 
+    With `load` it is loaded in a child process, too, and what it needs of this machine is checked.
     InputError where fmu is no readable FMU.
     """
-    if fmu is None:
-        return list(_machine(python=True))
     with ScratchFolder() as scratch:
         unpacked = unpack(fmu, Path(scratch.name))
+        if not load:
+            return _findings(unpacked, CHECKS)
+        unpacked = replace(unpacked, linked=_linked(unpacked.binary))
         tried = trial(unpacked)
         unpacked = replace(unpacked, loads=tried[0] == "ok")
-        verdicts = {name: check(unpacked) for name, check in CHECKS.items()} | {"trial": tried}
-        found = [Finding(name, *verdict) for name, verdict in verdicts.items() if verdict]
-        return [*_machine(unpacked.python), *found]
+        found = _findings(unpacked, CHECKS | TRIED)
+        return [*_machine(unpacked.python), *found, Finding("trial", *tried)]
 
 
-def as_text(findings: Iterable[Finding]) -> str:
-    """One line each, a fix below its finding."""
+def _findings(
+    fmu: Unpacked, checks: Mapping[str, Callable[[Unpacked], Verdict | None]]
+) -> list[Finding]:
+    verdicts = {name: check(fmu) for name, check in checks.items()}
+    return [Finding(name, *verdict) for name, verdict in verdicts.items() if verdict]
+
+
+def loads(findings: Iterable[Finding]) -> bool:
+    """True if none of the findings is a problem."""
+    return not any(f.status == "problem" for f in findings)
+
+
+def as_text(findings: Sequence[Finding], tried: bool) -> str:
+    """The verdict, then one line for each finding, a fix below it."""
+    said = "" if tried else ", as far as the file says; --load tries"
+    verdict = f"loads on this machine: {'yes' if loads(findings) else 'no'}{said}"
     return "\n".join(
-        f"{f.status:8s} {f.check:12s} {f.text}" + (f"\n{'':21s} fix: {f.fix}" if f.fix else "")
-        for f in findings
+        [verdict]
+        + [
+            f"{f.status:8s} {f.check:12s} {f.text}" + (f"\n{'':21s} fix: {f.fix}" if f.fix else "")
+            for f in findings
+        ]
     )
 
 
@@ -213,10 +233,10 @@ class Unpacked:
     folder: Path
     declared: Interface
     binary: Path
-    linked: str
-    """Words of the dynamic linker on the binary outside of Python; empty if it cannot tell."""
     python: bool
     """True if pythonfmu made it, in any version."""
+    linked: str = ""
+    """Words of the dynamic linker on the binary outside of Python; empty if it cannot tell."""
     loads: bool = False
     """True if the trial has loaded it."""
 
@@ -241,30 +261,39 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
         folder,
         found,
         binary=binary,
-        linked=_run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1] if LINUX else "",
         python=any(p.exists() for p in made)
         or (binary.is_file() and b"/slavemodule.txt" in binary.read_bytes()),
     )
 
 
+def _linked(binary: Path) -> str:
+    """Words of the dynamic linker on a binary outside of Python; empty where it cannot tell."""
+    return _run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1] if LINUX else ""
+
+
 def description(fmu: Unpacked) -> Verdict:
-    """FMI version and kind, and whether FMPy accepts the description."""
+    """FMI version and kind."""
     source = "needs Python" if fmu.python else "native, needs no Python"
     kind = ", ".join([f"FMI {fmu.declared.version}", *fmu.declared.kinds])
     text = f"{kind}, made by {fmu.tool}; {source}"
     if obstacle := of_kind(fmu.declared):
         return "problem", f"{text}; {obstacle.what}", obstacle.remedy
-    try:
-        fmpy.read_model_description(fmu.folder)
-    except Exception as error:  # FMPy raises whatever it likes
-        text = f"FMPy refuses modelDescription.xml: {' '.join(str(error).split())}"
-        fix = "correct the description where the FMU is made"
-        return "warning" if fmu.loads else "problem", f"{kind}; {text}", fix
     if "CoSimulation" not in fmu.declared.kinds:
         text += "; run here by a solver, elsewhere ask the vendor for an export for co-simulation"
     if tied := of_loading(fmu.declared, ""):
         return "warning", f"{text}; {tied.what}", tied.remedy
     return "ok", text, None
+
+
+def by_fmpy(fmu: Unpacked) -> Verdict | None:
+    """Whether FMPy accepts the description, which hosts by it need."""
+    try:
+        fmpy.read_model_description(fmu.folder)
+    except Exception as error:  # FMPy raises whatever it likes
+        text = f"FMPy refuses modelDescription.xml: {' '.join(str(error).split())}"
+        fix = "correct the description where the FMU is made"
+        return "warning" if fmu.loads else "problem", text, fix
+    return None
 
 
 def binary(fmu: Unpacked) -> Verdict:
@@ -415,10 +444,14 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
 
 
 CHECKS: dict[str, Callable[[Unpacked], Verdict | None]] = {
-    "fmu": description, "binary": binary, "sources": sources, "host": host, "libraries": libraries,
-    "script": script, "modules": modules,
+    "fmu": description, "binary": binary, "sources": sources, "script": script, "modules": modules,
 }  # fmt: skip
-"""The checks of an FMU before or after the trial; None where one does not apply."""
+"""The checks of the file of an FMU; None where one does not apply."""
+
+TRIED: dict[str, Callable[[Unpacked], Verdict | None]] = {
+    "FMPy": by_fmpy, "host": host, "libraries": libraries,
+}  # fmt: skip
+"""Further ones, of an FMU that is loaded as well."""
 
 
 def _spec(name: str) -> ModuleSpec | None:

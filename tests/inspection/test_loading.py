@@ -1,4 +1,4 @@
-"""What doctor says of this machine and of an FMU, sound or damaged, and that it is right."""
+"""What is said of this machine and of an FMU, sound or damaged, and that it is right."""
 
 import dataclasses
 import json
@@ -17,8 +17,8 @@ import pytest
 from conftest import UnpackIn
 from fmpy.fmi2 import FMU2Slave
 from grasp_cosim.errors import InputError
-from grasp_cosim.inspection import doctor
-from grasp_cosim.inspection.doctor import Finding, Unpacked, Verdict, examine, unpack
+from grasp_cosim.inspection import loading
+from grasp_cosim.inspection.loading import Finding, Unpacked, Verdict, unpack
 from support import native_fmus
 from support.models import build_model
 from support.slow import slow
@@ -41,7 +41,7 @@ class Stock(Fmi2Slave):
         return True
 """
 LINUX64 = "binaries/linux64/Stock.so"
-FMU_CHECKS = ["fmu", "binary", "host", "libraries", "script", "modules", "trial"]
+FMU_CHECKS = ["fmu", "binary", "script", "modules", "host", "libraries", "trial"]
 MACHINE_CHECKS = ["python", "temp folder", "libpython", "python3", "environment"]
 
 NATIVE = """\
@@ -85,9 +85,15 @@ def opened(stock: Path, tmp_path: Path) -> Opened:
 
     def open_(changes: Changes | None = None) -> Unpacked:
         folder = Path(tempfile.mkdtemp(dir=tmp_path))
-        return unpack(altered(stock, tmp_path / "altered.fmu", changes or {}), folder)
+        fmu = unpack(altered(stock, tmp_path / "altered.fmu", changes or {}), folder)
+        return dataclasses.replace(fmu, linked=loading._linked(fmu.binary))
 
     return open_
+
+
+def linked(fmu: Path, folder: Path) -> Unpacked:
+    found = unpack(fmu, folder)
+    return dataclasses.replace(found, linked=loading._linked(found.binary))
 
 
 def status(verdict: Verdict | None) -> str:
@@ -103,11 +109,15 @@ def patched(fmu: Path, offset: int, value: int) -> bytes:
     return bytes(data)
 
 
-def test_this_machine() -> None:
-    findings = examine(None)
-    assert [f.check for f in findings] == MACHINE_CHECKS
-    assert findings[0].status == findings[1].status == "ok"
-    assert sys.executable in findings[0].text
+def examine(fmu: Path) -> list[Finding]:
+    return loading.examine(fmu, load=True)
+
+
+def test_of_the_file_alone_nothing_is_run(fmus: Path, monkeypatch) -> None:
+    monkeypatch.setattr(loading, "_run", None)
+    findings = loading.examine(fmus / "GripperPlant.fmu")
+    assert [f.check for f in findings] == ["fmu", "binary", "script", "modules"]
+    assert {f.status for f in findings} == {"ok"}
 
 
 def test_our_fmu_loads_here(fmus: Path) -> None:
@@ -132,7 +142,8 @@ def test_a_stock_fmu_loads_here(stock: Path) -> None:
 
 def test_text_is_one_line_each_with_the_fix_below() -> None:
     findings = [Finding("a", "ok", "fine", None), Finding("b c", "problem", "broken", "mend it")]
-    assert doctor.as_text(findings).splitlines() == [
+    assert loading.as_text(findings, tried=True).splitlines() == [
+        "loads on this machine: no",
         "ok       a            fine",
         "problem  b c          broken",
         "                      fix: mend it",
@@ -155,57 +166,57 @@ def test_json_has_four_keys() -> None:
     ],
 )
 def test_python_is_new_and_64_bit(version: tuple[int, ...], largest: int, expected: str) -> None:
-    assert status(doctor.interpreter(version, largest)) == expected
+    assert status(loading.interpreter(version, largest)) == expected
 
 
 @pytest.mark.parametrize("name", ["a#b", "a+b", "a%b", "é", "a,b", "a:b", "(a)"])
 def test_a_temporary_folder_that_crashes_python_fmus(name: str) -> None:
-    verdict, text, fix = doctor.temporary_folder(Path("/tmp", name), False, True)
+    verdict, text, fix = loading.temporary_folder(Path("/tmp", name), False, True)
     assert (verdict, fix) == ("problem", "export TMPDIR=/tmp")
     assert f"/tmp/{name}" in text
-    assert status(doctor.temporary_folder(Path("/tmp", name), False, False)) == "ok"
+    assert status(loading.temporary_folder(Path("/tmp", name), False, False)) == "ok"
 
 
 @pytest.mark.parametrize("name", ["a b", "a_b", "a-b.c~1"])
 def test_a_temporary_folder_that_does_not(name: str) -> None:
-    assert status(doctor.temporary_folder(Path("/tmp", name), False, True)) == "ok"
+    assert status(loading.temporary_folder(Path("/tmp", name), False, True)) == "ok"
 
 
 @pytest.mark.parametrize("python", [False, True])
 def test_a_temporary_folder_from_which_nothing_loads(python: bool) -> None:
-    assert status(doctor.temporary_folder(Path("/tmp"), True, python)) == "problem"
+    assert status(loading.temporary_folder(Path("/tmp"), True, python)) == "problem"
 
 
 def test_libpython_is_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    listed = f"\t{doctor.LIBPYTHON} (libc6,x86-64) => /lib/{doctor.LIBPYTHON}\n\tlibz.so => /z\n"
+    listed = f"\t{loading.LIBPYTHON} (libc6,x86-64) => /lib/{loading.LIBPYTHON}\n\tlibz.so => /z\n"
     monkeypatch.setattr(sys, "base_prefix", str(tmp_path))
-    monkeypatch.setattr(doctor, "_run", lambda *_: (0, listed))
-    assert doctor.find_libpython() == f"/lib/{doctor.LIBPYTHON}"
-    monkeypatch.setattr(doctor, "_run", lambda *_: (0, "\tlibz.so => /z\n"))
-    assert doctor.find_libpython() is None
+    monkeypatch.setattr(loading, "_run", lambda *_: (0, listed))
+    assert loading.find_libpython() == f"/lib/{loading.LIBPYTHON}"
+    monkeypatch.setattr(loading, "_run", lambda *_: (0, "\tlibz.so => /z\n"))
+    assert loading.find_libpython() is None
     (tmp_path / "lib").mkdir()
-    (tmp_path / "lib" / doctor.LIBPYTHON).touch()
-    assert doctor.find_libpython() == str(tmp_path / "lib" / doctor.LIBPYTHON)
+    (tmp_path / "lib" / loading.LIBPYTHON).touch()
+    assert loading.find_libpython() == str(tmp_path / "lib" / loading.LIBPYTHON)
 
 
 def test_no_libpython_is_a_warning_with_a_fix() -> None:
-    assert status(doctor.libpython("/lib/libpython.so")) == "ok"
-    verdict, _, fix = doctor.libpython(None)
+    assert status(loading.libpython("/lib/libpython.so")) == "ok"
+    verdict, _, fix = loading.libpython(None)
     assert verdict == "warning"
-    assert f"libpython{doctor.VERSION}" in (fix or "")
+    assert f"libpython{loading.VERSION}" in (fix or "")
 
 
 def test_python3_on_the_path(tmp_path: Path) -> None:
-    assert status(doctor.python_on_path(sys.executable)) == "ok"
+    assert status(loading.python_on_path(sys.executable)) == "ok"
     other = tmp_path / "python3"
     other.write_text("#!/bin/sh\necho 3.1.4\n")
     other.chmod(0o755)
-    verdict, text, fix = doctor.python_on_path(str(other))
+    verdict, text, fix = loading.python_on_path(str(other))
     assert verdict == "warning"
     assert text.startswith("3.1.4 on the PATH")
     assert str(Path(sys.executable).parent) in (fix or "")
     for missing in (None, str(tmp_path / "none")):
-        assert status(doctor.python_on_path(missing)) == "warning"
+        assert status(loading.python_on_path(missing)) == "warning"
 
 
 @pytest.mark.parametrize(
@@ -220,14 +231,14 @@ def test_python3_on_the_path(tmp_path: Path) -> None:
     ],
 )
 def test_the_environment_of_python(environ: dict[str, str], fix: str | None) -> None:
-    verdict = doctor.environment(environ)
+    verdict = loading.environment(environ)
     assert (verdict[0], verdict[2]) == ("warning" if fix else "ok", fix)
 
 
 def test_the_environment_of_another_python(tmp_path: Path) -> None:
     folder = tmp_path / "python3.1"
     folder.mkdir()
-    assert status(doctor.environment({"PYTHONPATH": str(folder)})) == "warning"
+    assert status(loading.environment({"PYTHONPATH": str(folder)})) == "warning"
 
 
 @pytest.mark.parametrize(
@@ -303,7 +314,7 @@ def test_both_kinds_are_a_cosimulation(tmp_path: Path) -> None:
         text = DESCRIPTION.format(version="2.0", kinds=kinds)
         archive.writestr("modelDescription.xml", text)
     fmu = unpack(tmp_path / "n.fmu", tmp_path)
-    assert status(doctor.description(fmu)) == "ok"
+    assert status(loading.description(fmu)) == "ok"
     assert fmu.binary.stem == "C"
 
 
@@ -311,11 +322,11 @@ def test_a_description_that_fmpy_refuses(opened: Opened) -> None:
     fmu = opened()
     file = fmu.folder / "modelDescription.xml"
     file.write_text(file.read_text().replace('causality="output"', 'causality="parameter"'))
-    verdict, text, _ = doctor.description(fmu)
+    verdict, text, _ = loading.by_fmpy(fmu)
     assert verdict == "problem"
     assert 'illegal combination of causality="parameter" and variability="continuous"' in text
     assert len(text.splitlines()) == 1
-    loaded = doctor.description(dataclasses.replace(fmu, loads=True))
+    loaded = loading.by_fmpy(dataclasses.replace(fmu, loads=True))
     assert loaded[0] == "warning"  # this master reads it, and others may not
 
 
@@ -347,7 +358,7 @@ SOURCES = "<b><SourceFileSet><SourceFile name='N.c'/></SourceFileSet></b>"
 def test_sources_can_be_compiled(
     files: dict[str, str], expected: str | None, text: str, opened: Opened
 ) -> None:
-    verdict = doctor.sources(opened({f"sources/{n}": t.encode() for n, t in files.items()}))
+    verdict = loading.sources(opened({f"sources/{n}": t.encode() for n, t in files.items()}))
     assert (verdict and verdict[0]) == expected
     assert text in (verdict[1] if verdict else "")
 
@@ -366,7 +377,7 @@ def test_a_native_fmu_of_either_version_is_tried(version: str, tmp_path: Path) -
 
 def test_no_binary_but_sources(opened: Opened) -> None:
     fmu = opened({LINUX64: None, "sources/all.c": b""})
-    assert "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU" in (doctor.binary(fmu)[2] or "")
+    assert "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU" in (loading.binary(fmu)[2] or "")
 
 
 @pytest.mark.parametrize(
@@ -382,10 +393,10 @@ def test_a_binary_for_another_processor(
     offset: int, value: int, text: str, stock: Path, opened: Opened
 ) -> None:
     fmu = opened({LINUX64: patched(stock, offset, value)})
-    verdict = doctor.binary(fmu)
+    verdict = loading.binary(fmu)
     assert verdict[0] == "problem"
     assert text in verdict[1]
-    assert doctor.trial(fmu)[0] == "warning"
+    assert loading.trial(fmu)[0] == "warning"
 
 
 LOADER = "\tlibc.so.6 => /lib/libc.so.6 (0x1)\n"
@@ -412,19 +423,19 @@ def test_libpython_in_other_hosts(
     folder = tmp_path / "a b"
     folder.mkdir()
     (folder / "libpython0.so").touch()
-    monkeypatch.setattr(doctor, "find_libpython", lambda: str(folder / doctor.LIBPYTHON))
-    verdict = doctor.host(dataclasses.replace(opened(), linked=linked))
+    monkeypatch.setattr(loading, "find_libpython", lambda: str(folder / loading.LIBPYTHON))
+    verdict = loading.host(dataclasses.replace(opened(), linked=linked))
     assert verdict is not None
     assert verdict[0] == expected
-    assert fix.format(folder, doctor.LIBPYTHON) in (verdict[2] or "")
+    assert fix.format(folder, loading.LIBPYTHON) in (verdict[2] or "")
 
 
 @pytest.mark.skipif(
-    f"{doctor.LIBPYTHON}\n" not in Path("/proc/self/maps").read_text(), reason="a static Python"
+    f"{loading.LIBPYTHON}\n" not in Path("/proc/self/maps").read_text(), reason="a static Python"
 )
 def test_libpython_that_only_this_process_finds(opened: Opened) -> None:
-    linked = f"\t{doctor.LIBPYTHON} => not found\n{LOADER}"
-    assert status(doctor.host(dataclasses.replace(opened(), linked=linked))) == "warning"
+    linked = f"\t{loading.LIBPYTHON} => not found\n{LOADER}"
+    assert status(loading.host(dataclasses.replace(opened(), linked=linked))) == "warning"
 
 
 @pytest.mark.parametrize(
@@ -437,15 +448,15 @@ def test_libpython_that_only_this_process_finds(opened: Opened) -> None:
     ],
 )  # fmt: skip
 def test_libraries_that_are_missing(linked: str, text: str, opened: Opened) -> None:
-    verdict = doctor.libraries(dataclasses.replace(opened(), linked=linked))
+    verdict = loading.libraries(dataclasses.replace(opened(), linked=linked))
     assert verdict is not None
     assert verdict[:2] == ("problem", text)
 
 
 def test_libraries_besides_libpython_are_all_there(opened: Opened) -> None:
     linked = BOUND.format("9.so", "not found") + "undefined symbol: PyLong_AsLong\t(x.so)\n"
-    assert status(doctor.libraries(dataclasses.replace(opened(), linked=linked))) == "ok"
-    assert doctor.libraries(dataclasses.replace(opened(), linked="ldd: not found")) is None
+    assert status(loading.libraries(dataclasses.replace(opened(), linked=linked))) == "ok"
+    assert loading.libraries(dataclasses.replace(opened(), linked="ldd: not found")) is None
 
 
 @pytest.mark.parametrize(
@@ -461,7 +472,7 @@ def test_libraries_besides_libpython_are_all_there(opened: Opened) -> None:
 def test_a_script_that_is_not_there_or_no_python(
     changes: Changes, text: str, opened: Opened
 ) -> None:
-    verdict = doctor.script(opened(changes))
+    verdict = loading.script(opened(changes))
     assert verdict is not None
     assert verdict[0] == "problem"
     assert text in verdict[1]
@@ -470,7 +481,7 @@ def test_a_script_that_is_not_there_or_no_python(
 def test_an_fmu_of_python_without_its_resources(stock: Path, opened: Opened) -> None:
     with zipfile.ZipFile(stock) as archive:
         resources = [name for name in archive.namelist() if name.startswith("resources/")]
-    assert status(doctor.script(opened(dict.fromkeys(resources)))) == "problem"
+    assert status(loading.script(opened(dict.fromkeys(resources)))) == "problem"
 
 
 @pytest.mark.parametrize(
@@ -500,7 +511,7 @@ def test_what_a_script_imports_is_packed_or_installed(
     files: dict[str, str], missing: str | None, opened: Opened
 ) -> None:
     changes = {f"resources/{name}.py": text.encode() for name, text in files.items()}
-    verdict = doctor.script(opened({**changes}))
+    verdict = loading.script(opened({**changes}))
     assert verdict is not None
     if missing is None:
         assert verdict[0] == "ok"
@@ -514,19 +525,19 @@ def test_what_a_script_imports_is_packed_or_installed(
 def test_the_package_of_a_module_may_be_called_otherwise(
     opened: Opened, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(doctor, "_spec", lambda name: None)
-    verdict = doctor.script(opened({"resources/Stock.py": b"import yaml"}))
+    monkeypatch.setattr(loading, "_spec", lambda name: None)
+    verdict = loading.script(opened({"resources/Stock.py": b"import yaml"}))
     assert verdict is not None
     assert (verdict[2] or "").endswith(" pip install pyyaml")
 
 
 def test_an_extension_module_may_be_packed(opened: Opened) -> None:
     changes = {"resources/Stock.py": b"import fast", "resources/fast.abi3.so": b""}
-    assert status(doctor.script(opened({**changes}))) == "ok"
+    assert status(loading.script(opened({**changes}))) == "ok"
 
 
 def test_what_is_imported_is_named(opened: Opened) -> None:
-    verdict = doctor.script(opened({"resources/Stock.py": b"import numpy, math"}))
+    verdict = loading.script(opened({"resources/Stock.py": b"import numpy, math"}))
     assert verdict is not None
     assert verdict[1] == "resources/Stock.py imports, besides the standard library: numpy"
 
@@ -534,8 +545,8 @@ def test_what_is_imported_is_named(opened: Opened) -> None:
 def test_a_module_whose_name_another_has(
     opened: Opened, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert status(doctor.modules(opened())) == "ok"
-    verdict = doctor.modules(opened({"resources/statistics.py": b""}))
+    assert status(loading.modules(opened())) == "ok"
+    verdict = loading.modules(opened({"resources/statistics.py": b""}))
     assert verdict is not None
     assert verdict[0] == "warning"
     assert "'statistics', which is in the standard library too" in verdict[1]
@@ -544,10 +555,10 @@ def test_a_module_whose_name_another_has(
     other.touch()
     changes: list[Changes] = [{"resources/twin.py": b""}, {"resources/twin/__init__.py": b""}]
     for change in changes:
-        assert status(doctor.modules(opened(change))) == "ok"
+        assert status(loading.modules(opened(change))) == "ok"
     monkeypatch.syspath_prepend(other.parent)
     for change in changes:
-        verdict = doctor.modules(opened(change))
+        verdict = loading.modules(opened(change))
         assert verdict is not None
         assert verdict[0] == "warning"
         assert f"'twin', which is in {other} too" in verdict[1]
@@ -575,7 +586,7 @@ def test_a_temporary_folder_that_crashes_is_predicted_and_found(
     ],
 )  # fmt: skip
 def test_a_trial_that_fails(script: str, text: str, opened: Opened) -> None:
-    verdict = doctor.trial(opened({"resources/Stock.py": script.encode()}))
+    verdict = loading.trial(opened({"resources/Stock.py": script.encode()}))
     assert verdict[0] == "problem"
     assert text in verdict[1]
 
@@ -584,7 +595,7 @@ def test_a_trial_that_fails(script: str, text: str, opened: Opened) -> None:
 def test_a_trial_that_does_not_end(opened: Opened) -> None:
     script = b"import os, time\nopen('pid', 'w').write(str(os.getpid()))\ntime.sleep(60)\n"
     fmu = opened({"resources/Stock.py": script})
-    assert doctor.trial(fmu, timeout=2.0)[1] == "does not load and instantiate within 2 s"
+    assert loading.trial(fmu, timeout=2.0)[1] == "does not load and instantiate within 2 s"
     pid = fmu.folder / "pid"
     assert not pid.exists() or not Path("/proc", pid.read_text()).exists()
 
@@ -608,7 +619,7 @@ def native(folder: Path, instantiate: str = "", options: tuple[str, ...] = ()) -
 def test_a_native_fmu_loads_here(tmp_path: Path) -> None:
     found = {f.check: f for f in examine(native(tmp_path))}
     checks = ["python", "temp folder", "fmu", "binary", "libraries", "trial"]
-    assert list(found) == checks
+    assert [name for name in found if name in checks] == checks
     assert {f.status for f in found.values()} == {"ok"}
     assert "native" in found["fmu"].text
 
@@ -632,7 +643,7 @@ def test_a_native_fmu_without_a_library(tmp_path: Path) -> None:
     )
     packed = altered(fmu, tmp_path / "packed.fmu", {"binaries/linux64/liblost.so": b""})
     (tmp_path / "unpacked").mkdir()
-    verdict = doctor.libraries(unpack(packed, tmp_path / "unpacked"))
+    verdict = loading.libraries(linked(packed, tmp_path / "unpacked"))
     assert verdict is not None
     assert verdict[1] == "not found though packed: liblost.so"
     assert "$ORIGIN" in (verdict[2] or "")
@@ -642,6 +653,6 @@ def test_a_native_fmu_without_a_library(tmp_path: Path) -> None:
 def test_a_native_fmu_with_an_undefined_symbol(tmp_path: Path) -> None:
     fmu = native(tmp_path, "return lost() ? &model : 0")
     (tmp_path / "unpacked").mkdir()
-    verdict = doctor.libraries(unpack(fmu, tmp_path / "unpacked"))
+    verdict = loading.libraries(linked(fmu, tmp_path / "unpacked"))
     assert verdict is not None
     assert verdict[:2] == ("problem", "undefined symbols: lost")
