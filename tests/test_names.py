@@ -54,10 +54,10 @@ def test_a_short_list_is_named_whole(see: str) -> None:
 def test_every_extra_is_named_by_its_packages() -> None:
     extras = metadata("grasp-cosim").get_all("Provides-Extra") or []
     named = {extra: packages(extra) for extra in extras}
-    assert {"plot", "sweep", "native"} <= named.keys()
+    assert {"plot", "parquet", "native"} <= named.keys()
     assert named["plot"] == [named["plot"][0]]
     assert named["plot"][0].startswith("matplotlib>=")
-    assert [re.split("[>=]", what)[0] for what in named["sweep"]] == ["pyarrow", "scipy"]
+    assert [re.split("[>=]", what)[0] for what in named["parquet"]] == ["pyarrow"]
     assert all(named[extra] for extra in extras if extra != "fast")
     assert packages("no such extra") == []
 

@@ -55,19 +55,11 @@ def test_the_grasp_runs_as_without_a_file(fmus_here: Run) -> None:
 
 def test_the_folder_may_be_moved(fmus_here: Run, tmp_path: Path) -> None:
     shutil.copytree(tmp_path / "fmus", tmp_path / "here/fmus")
-    assert fmus_here("init", "here/my_system.toml", "--controller", "adaptive")[0] == 0
+    assert fmus_here("init", "here/my_system.toml")[0] == 0
     shutil.move(tmp_path / "here", tmp_path / "there")
     system = System.load(tmp_path / "there/my_system.toml")
-    assert system.component("controller", "test").fmu.name == "GraspControllerAdaptive.fmu"
+    assert system.component("controller", "test").fmu.name == "GraspController.fmu"
     assert all(c.fmu.is_relative_to(tmp_path / "there") for c in system.components)
-
-
-@pytest.mark.slow
-@needs_gcc
-def test_native_fmus(fmus_here: Run) -> None:
-    assert fmus_here("init", "native.toml", "--native")[0] == 0
-    system = System.load("native.toml")
-    assert not any(c.interface.python for c in system.components)
 
 
 WRONG = [
@@ -80,12 +72,8 @@ WRONG = [
     (("a.toml", "--fmu", "a.b=vendor.fmu"), "--fmu 'a.b=vendor.fmu': must be a name of its own"),
     (("a.toml", "--fmu", "a=vendor.fmu", "--fmu", "a=vendor.fmu"), "must be a name of its own"),
     (
-        ("a.toml", "--fmu", "a=vendor.fmu", "--native"),
-        "--fmu cannot be used with --as, --controller or",
-    ),
-    (
-        ("a.toml", "--as", "controller=vendor.fmu", "--controller", "adaptive"),
-        "--controller adaptive cannot be used with --as controller",
+        ("a.toml", "--fmu", "a=vendor.fmu", "--as", "plant=vendor.fmu"),
+        "--fmu cannot be used with --as",
     ),
 ]
 

@@ -87,4 +87,4 @@ def test_a_component_travels_without_what_it_has_read(grasp: System) -> None:
     again = pickle.loads(pickle.dumps(plant))
     assert again == plant
     assert "interface" not in vars(again)
-    assert again.interface is plant.interface
+    assert again.interface == plant.interface

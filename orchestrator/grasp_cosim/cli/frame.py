@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError
-from ..files import PICTURES, check_folder
+from ..files import check_folder
 from ..plain import on_one_line
 from ..progress import Progress, phase, write
 
@@ -41,15 +41,6 @@ def together(*options: Command) -> Command:
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-
-format_option = click.option(
-    "--format",
-    "suffix",
-    type=click.Choice(PICTURES),
-    default=PICTURES[0],
-    show_default=True,
-    help="Format of the pictures.",
-)
 
 title_option = click.option(
     "--title", default="", help="Title of the page. Default: system, case and controller."

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...drafting.text import with_paths
-from ...errors import InputError, SimulationError
-from ...files import NATIVE_FOLDER, check_folder, write_text
+from ...errors import InputError
+from ...files import check_folder, write_text
 from ...interface.read import read_interface
 from ...numerals import counted
 from ...system.description import System
@@ -41,22 +41,12 @@ MOST = 24
 @click.option(
     "--fmu", "fmus", multiple=True, metavar="NAME=FMU", help="Make a system of these FMUs alone."
 )
-@click.option(
-    "--controller",
-    type=click.Choice(("published", "adaptive")),
-    default="published",
-    show_default=True,
-    help="Take this one of our controllers.",
-)
-@click.option("--native", is_flag=True, help="Take our FMUs as C, which need no Python.")
 @click.option("--force", is_flag=True, help="Replace a file that is there already.")
 @json_option
 def init(
     file: Path,
     candidates: tuple[str, ...],
     fmus: tuple[str, ...],
-    controller: str,
-    native: bool,
     force: bool,
     as_json: bool,
 ) -> int:
@@ -72,8 +62,8 @@ def init(
     _check_file(file, force)
     foreign = _paired("--as", candidates)
     own = _paired("--fmu", fmus)
-    if own and (foreign or native or controller != "published"):
-        raise InputError("--fmu cannot be used with --as, --controller or --native")
+    if own and foreign:
+        raise InputError("--fmu cannot be used with --as")
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
@@ -81,7 +71,7 @@ def init(
 
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
     else:
-        text, drafts = _grasp(file.parent, foreign, controller, native)
+        text, drafts = _grasp(file.parent, foreign)
     write_text(file, text)
     open_lines = to_do(text)
     if not open_lines:
@@ -150,23 +140,16 @@ def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
     return fmus
 
 
-def _grasp(
-    folder: Path, foreign: Mapping[str, Path], controller: str, native: bool
-) -> tuple[str, dict[str, Draft]]:
+def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Draft]]:
     """The text of the built-in grasp, with foreign FMUs in the place of components."""
     from ...drafting.component import replacing
-    from ...grasp.controllers import CONTROLLERS
     from ...grasp.presets import SYSTEM, built_in_presets
     from ...grasp.system import built
 
-    if "controller" in foreign and controller != "published":
-        raise InputError(f"--controller {controller} cannot be used with --as controller")
-    fmus = _natives(folder) if native else built(folder)
+    fmus = built(folder)
     built_in = System.load(SYSTEM, fmus)
-    names = {c.fmu.name: c.fmu.name for c in built_in.components}
-    names[CONTROLLERS["published"]] = CONTROLLERS[controller]
     below = fmus.relative_to(folder)
-    paths = {old: (below / new).as_posix() for old, new in names.items()}
+    paths = {c.fmu.name: (below / c.fmu.name).as_posix() for c in built_in.components}
     text = with_paths(SYSTEM.read_text("utf-8"), paths)
     drafts = {}
     for name, fmu in foreign.items():
@@ -176,20 +159,6 @@ def _grasp(
         drafts[name] = replacing(built_in, name, fmu, shown(fmu, folder), preset)
         text = drafts[name].put_into(text)
     return text, drafts
-
-
-def _natives(folder: Path) -> Path:
-    """Where native FMUs are below a folder, built first."""
-    from c_compilers import CompilerError
-    from grasp_fmus.build import build_native
-
-    try:
-        build_native(folder / NATIVE_FOLDER)
-    except ValueError as error:
-        raise InputError(f"--native: {error}") from error
-    except CompilerError as error:
-        raise SimulationError(str(error)) from error
-    return folder / NATIVE_FOLDER
 
 
 def _found(draft: Draft) -> dict[str, Any]:
