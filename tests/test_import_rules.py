@@ -96,7 +96,7 @@ def test_the_orchestrator_builds_fmus_at_few_places_only() -> None:
         for f, module in modules(ROOT / "orchestrator/grasp_cosim")
         if module.startswith("grasp_fmus") and not module.startswith(LINK)
     }
-    builds = {"build.py", "controllers.py", "init.py", "native.py", "proxy.py", "system.py"}
+    builds = {"build.py", "controllers.py", "native.py", "proxy.py", "system.py"}
     assert builders == builds
 
 
