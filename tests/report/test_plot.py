@@ -3,11 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from grasp_cosim.errors import InputError
+from grasp_cosim.recording.result import Result
 from grasp_cosim.report import plot
+from grasp_cosim.report.page import page_html
 from matplotlib.figure import Figure
-from report.runs import ring_run
+from report.runs import grasp_run, ring_run
 
 
 @pytest.fixture
@@ -64,3 +67,37 @@ def test_another_suffix_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=rf"{name}: must end in \.png, \.svg, \.pdf$"):
         ring_run(["a"]).plot(tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+def many(count: int) -> Result:
+    """A run of so many signals, of which two are connected."""
+    run = grasp_run()
+    names = [f"m.x[{k}]" for k in range(count)]
+    signals = {name: np.sin(k + run.time) for k, name in enumerate(names)}
+    ends = {"from": names[count - 1], "to": names[count - 2], "factor": None, "offset": None}
+    component = {**next(iter(run.settings["components"].values())), "values": {}}
+    settings = {
+        **run.settings, "connections": [ends], "roles": {}, "components": {"m": component},
+        "faults": [], "changed": {},
+    }  # fmt: skip
+    return replace(
+        run, signals=signals, units=dict.fromkeys(names, "m"), descriptions={}, settings=settings
+    )
+
+
+def test_of_many_signals_a_picture_has_those_that_matter(tmp_path: Path) -> None:
+    run = many(1000)
+    figure = plot.plot_signals(run)
+    drawn = {line.get_label() for axes in figure.axes for line in axes.lines}
+    assert len(drawn) == plot.MOST_SIGNALS
+    assert {"m.x[999]", "m.x[998]", "m.x[0]"} <= drawn
+    assert "964 more signals: the page of `report`" in [t.get_text() for t in figure.texts][-1]
+    figure = plot.plot_signals(run, of=["m.x[500]"])
+    assert [line.get_label() for axes in figure.axes for line in axes.lines] == ["m.x[500]"]
+
+
+def test_a_page_of_many_signals_has_all_of_them_in_a_bounded_size() -> None:
+    html = page_html(many(2000))
+    assert html.count("data-signal=") == 2000
+    assert len(html) < 30e6
+    assert '"m.x[1998]", "m.x[1999]"]' in html  # the connected ones are shown first

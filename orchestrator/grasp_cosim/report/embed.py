@@ -18,6 +18,9 @@ LIMIT = 20_000_000
 """So many values at most go into a page, 25 MB if they are smooth, 200 if they are pure noise; of
 longer runs the extremes are kept."""
 
+MANY, LIMIT_OF_MANY = 500, 2_000_000
+"""Of more signals than so many, so many values at most go into a page, which a browser opens."""
+
 EFFORT = 4
 """Of zlib: 10 s for the most values that go into a page; 9 takes minutes to save a tenth."""
 
@@ -40,6 +43,7 @@ def fit(
 ) -> Shown:
     """Return the run as it is if it has at most `limit` values, else thinned to fit."""
     columns = 1 + len(signals)
+    limit = min(limit, LIMIT_OF_MANY) if columns > MANY else limit
     if len(time) * columns <= limit:
         return Shown(time, signals, None)
     pairs = max((limit // columns - 1) // 2, 1)

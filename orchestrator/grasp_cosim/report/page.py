@@ -30,6 +30,7 @@ from ..recording.result import Result
 from .caption import Caption, caption
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
+from .plot import that_matter
 from .tables import count, metrics_table, number, settings_html, summary, svg_button
 from .timing_html import timing_html
 
@@ -172,7 +173,7 @@ def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
             }
             for k, (name, values) in enumerate(result.signals.items())
         ],
-        "shown": list(scene.shown if scene else ()) or list(result.signals)[:AT_FIRST],
+        "shown": list(scene.shown if scene else ()) or that_matter(result, AT_FIRST),
         **looks(scene),
         "header": ",".join(map(quoted, ("time", *result.signals))),
         "csv": "signals.csv" if shown.rows_per_pair is None else "signals_thinned.csv",

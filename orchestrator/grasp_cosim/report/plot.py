@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import StringIO
 from itertools import cycle
@@ -37,6 +37,9 @@ DPI = 130
 MOST_LINES = 6
 """So many lines at most are in one panel."""
 
+MOST_SIGNALS = 36
+"""So many signals at most are in a picture where none are asked for by name."""
+
 DASHES = {1: "-", 2: "--"}
 """How finger 1 and 2 are drawn: they can be told apart in grey."""
 
@@ -44,14 +47,17 @@ LINE_HEIGHT, LETTER = 11.5 / 72.0, 4.4 / 72.0
 """In inches: a line of what a picture says below its title, and the width of a letter there."""
 
 
-def plot_signals(run: Result, path: Path | None = None) -> Figure:
-    """Draw all signals of any run but Strings over time, those of the same unit together, at most
+def plot_signals(run: Result, path: Path | None = None, of: Sequence[str] = ()) -> Figure:
+    """Draw signals of any run but Strings over time, those of the same unit together, at most
     MOST_LINES in a panel.
 
-    With a `path` the figure is written there, see save(). InputError without matplotlib, or where
-    there are no signals.
+    They are those `of` these names; by default all, or of more than MOST_SIGNALS those that are
+    connected, then those of components in a role, then the first. With a `path` the figure is
+    written there, see save(). InputError without matplotlib, or where there are no signals;
+    KeyError where there is none of a name.
     """
-    panels = _panels(run)
+    names = [name for name in of if run[name] is not None] or that_matter(run)
+    panels = _panels(run, names)
     if not panels:
         place = run.settings["system"] if path is None else path
         raise InputError(
@@ -59,22 +65,38 @@ def plot_signals(run: Result, path: Path | None = None) -> Figure:
         )
     figure = new_figure(9.0, 0.9 + 2.2 * len(panels))
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (unit, names) in zip(rows, panels, strict=True):
+    for axes, (unit, of_unit) in zip(rows, panels, strict=True):
         factor, shown = in_milli(unit)
-        for name, style, color in zip(names, cycle(STYLES), cycle(COLORS), strict=False):
+        for name, style, color in zip(of_unit, cycle(STYLES), cycle(COLORS), strict=False):
             values = factor * run.signals[name]
             axes.plot(run.time, values, style, color=color, linewidth=1.0, label=name)
         finish(axes, f"in {shown}" if shown else "no unit", legend=False)
         beside(axes)
     figure.axes[-1].set_xlabel("time in s")
-    headed(figure, caption(run))
+    left = len(run.numbers) - len(names)
+    headed(figure, caption(run), *([f"{left} more signals: the page of `report`"] if left else ()))
     return kept(figure, path)
 
 
-def _panels(run: Result) -> list[tuple[str, list[str]]]:
+def that_matter(run: Result, most: int = MOST_SIGNALS) -> list[str]:
+    """So many signals at most that say most of a run, in the order in which they were recorded."""
+    if len(run.numbers) <= most:
+        return [*run.numbers]
+    ends = {c[end] for c in run.settings.get("connections", ()) for end in ("from", "to")}
+    players = set(run.roles.values())
+
+    def rank(name: str) -> int:
+        return 0 if name in ends else 1 if name.partition(".")[0] in players else 2
+
+    chosen = set(sorted(run.numbers, key=rank)[:most])
+    return [name for name in run.numbers if name in chosen]
+
+
+def _panels(run: Result, names: Sequence[str]) -> list[tuple[str, list[str]]]:
     """The unit and the signals of each panel."""
-    units = list(dict.fromkeys(run.units[name] or "" for name in run.numbers))
-    of = {u: [name for name in run.numbers if (run.units[name] or "") == u] for u in units}
+    of: dict[str, list[str]] = {}
+    for name in names:
+        of.setdefault(run.units[name] or "", []).append(name)
     return [
         (unit, names[k : k + MOST_LINES])
         for unit, names in of.items()

@@ -34,6 +34,12 @@ function connect() {
     const kept = chosen.filter((name) => ticked.includes(name));
     choose([...kept, ...ticked.filter((name) => !kept.includes(name))]); // new ones come last
   });
+  find("search").addEventListener("input", () => {
+    const wanted = find("search").value.toLowerCase();
+    for (const box of find("signals").querySelectorAll("input[data-signal]")) {
+      box.parentElement.hidden = !box.dataset.signal.toLowerCase().includes(wanted);
+    }
+  });
   for (const button of document.querySelectorAll("button[data-from]")) {
     button.addEventListener("click", () => zoom(Number(button.dataset.from), Number(button.dataset.to)));
   }
