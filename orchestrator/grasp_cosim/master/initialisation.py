@@ -46,13 +46,13 @@ class Order(NamedTuple):
     loops: Sequence[Sequence[Port]]
 
 
-def order_ports(system: System, instances: Sequence[Instance]) -> Order:
+def order_ports(system: System) -> Order:
     """The order in which values are passed on in initialisation mode.
 
     An output depends on the inputs that its FMU declares for the initialisation, or else in
     general, or else on all.
     """
-    graph = _graph(system, instances)
+    graph = _graph(system)
     inputs = {connection.target for connection in system.connections}
     cuts: list[Port] = []
     loops: list[tuple[Port, ...]] = []
@@ -68,22 +68,23 @@ def order_ports(system: System, instances: Sequence[Instance]) -> Order:
             graph[entry] = []
 
 
-def _graph(system: System, instances: Sequence[Instance]) -> dict[Port, list[Port]]:
+def _graph(system: System) -> dict[Port, list[Port]]:
     """For each port those it depends on, in the order of the system: the same in every process."""
     sources = {connection.target: connection.source for connection in system.connections}
     graph: dict[Port, list[Port]] = {}
-    for instance in instances:
-        inputs = tuple(v.name for v in instance.interface.of("input"))
+    for component in system.components:
+        name, interface = component.name, component.loaded
+        inputs = tuple(v.name for v in interface.of("input"))
         ports_of: dict[tuple[str, ...], list[Port]] = {}  # the elements of an array share theirs
-        connected = [p for name in inputs if (p := Port(instance.name, name)) in sources]
+        connected = [p for i in inputs if (p := Port(name, i)) in sources]
         graph |= {port: [sources[port]] for port in connected}
-        for v in instance.interface.of("output"):
+        for v in interface.of("output"):
             declared = v.dependencies if v.initial_dependencies is None else v.initial_dependencies
             needed = inputs if declared is None else declared
             if needed not in ports_of:
-                ports = (Port(instance.name, name) for name in needed)
+                ports = (Port(name, i) for i in needed)
                 ports_of[needed] = [port for port in ports if port in sources]
-            graph[Port(instance.name, v.name)] = ports_of[needed]
+            graph[Port(name, v.name)] = ports_of[needed]
     return graph
 
 
@@ -97,11 +98,11 @@ class Propagation:
         faults: Mapping[Port, Callable[[float, int], float]],
     ) -> None:
         self.system = system
-        self.order = order_ports(system, instances)
+        self.order = system.once(order_ports)
         self.values: dict[Port, Value] = {}
         self._instances = {instance.name: instance for instance in instances}
         self._connections = {connection.target: connection for connection in system.connections}
-        self._transforms = transforms(system)
+        self._transforms = system.once(transforms)
         self._faults = faults
 
     def run(self) -> list[str]:

@@ -101,7 +101,7 @@ class Planner:
         self.drives = drives
         self.pacer = pacer
         self.stamps = 0
-        self.transforms = transforms(system)
+        self.transforms = system.once(transforms)
         self.made = Plan(values, np.zeros(2))
 
     def plan(self) -> Plan:

@@ -43,6 +43,9 @@ MOST = 2**62
 LOOK = 0.1
 """s of wall time between two looks at the progress bar and at Ctrl-C."""
 
+GROWTH = 8
+"""Times as many steps as before one look that there are at most before the next."""
+
 
 class Session:
     """A run that its user advances. A context manager: leaving it ends and frees the FMUs.
@@ -88,7 +91,7 @@ class Session:
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
         self._stack = ExitStack()
-        self._known = (*system.notes, *remarks(system))
+        self._known = (*system.notes, *system.once(remarks))
         self._tell(self._known)
         try:
             with interruptible(), _folder_kept():
@@ -414,7 +417,7 @@ def _drive(session: Session, progress: bool | str) -> None:
         while not session.halt.is_set() and session.step(steps):
             show()
             now = time.perf_counter()
-            steps = max(1, min(2 * steps, int(steps * LOOK / (now - start))))
+            steps = max(1, min(GROWTH * steps, int(steps * LOOK / (now - start))))
             start = now
         if session.pacer:
             bar.set_postfix_str(session.pacer.live(settled=True))

@@ -42,10 +42,10 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     that of SI.
     """
     asked = tuple(metrics)
-    read = readings(system)
+    read = system.once(readings)
     found = {str(port): r for port, r in read.items()}
     expected = {n: e for n, e in _expected(system, asked).items() if n in found}
-    others = {str(port): u for port, u in in_other_units(system, read).items()} if expected else {}
+    others = {str(port): u for port, u in system.once(in_other_units).items()} if expected else {}
     doubts = {n: d for n, e in expected.items() if (d := _doubt(n, found[n], expected, others))}
     if doubts:
         raise InputError(_refusal(system, doubts, found, expected))

@@ -48,7 +48,7 @@ class Dispatcher:
         self._goes_on = system.diverging == "continue"
         self.log: list[str] = []
         """A line for each signal that ran away in a run that went on."""
-        self._energy = ExchangeEnergy(bonds(system), slots, transforms(system))
+        self._energy = ExchangeEnergy(system.once(bonds), slots, system.once(transforms))
         self.signals = (*outputs.values(), *self._energy.signals)
         self._block = np.empty((len(self.signals), 0))
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None

@@ -1,7 +1,6 @@
 """The system description: components, connections and the experiment, checked once."""
 
 from collections.abc import Callable, Mapping
-from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ from .structure import Structure, experiment
 from .swap import with_entries
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class System(Structure):
     """A checked system: every name exists, every input has one source or keeps a value."""
 
@@ -239,10 +238,12 @@ class System(Structure):
     def _with_parameters(self, components: tuple[Component, ...]) -> "System":
         """A copy with components that differ in values of parameters, which nothing else goes by.
 
-        These are checked already, so that a thousand runs do not check the rest as often.
+        These are checked already, so that a thousand runs do not check the rest as often, nor work
+        out again what follows from it.
         """
-        made = copy(self)
-        object.__setattr__(made, "components", components)
+        self.recorded, self._known  # noqa: B018 - there from now on, and shared
+        made = object.__new__(type(self))
+        vars(made).update(vars(self), components=components)
         return made
 
 

@@ -6,7 +6,7 @@ declares. An output without one is in the unit of the inputs that take its value
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from math import isclose
 from typing import NamedTuple
 
@@ -53,13 +53,13 @@ def readings(system: Structure) -> dict[Port, Reading]:
     }
 
 
-def in_other_units(system: Structure, found: Mapping[Port, Reading]) -> dict[Port, Unit]:
-    """The units other than of SI that are told for variables of any kind; found are readings().
+def in_other_units(system: Structure) -> dict[Port, Unit]:
+    """The units other than of SI that are told for variables of any kind.
 
     An input without a unit has that of the output which it takes, times the factor of its
     connection where that is one between units. It has no exponents where the output has no unit.
     """
-    told: dict[Port, Unit | None] = {port: r.unit for port, r in found.items()}
+    told: dict[Port, Unit | None] = {port: r.unit for port, r in system.once(readings).items()}
     for component in system.components:
         interface = component.interface
         for v in interface.of(*SETTABLE):

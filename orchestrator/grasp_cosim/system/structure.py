@@ -1,8 +1,9 @@
 """The parts of a system, as its checks and its readers see it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, Literal, TypeVar, get_args
 
 from ..checks import choice
 from ..errors import InputError, nearest
@@ -17,8 +18,10 @@ Diverging = Literal["stop", "continue"]
 DIVERGING: tuple[str, ...] = get_args(Diverging)
 """What a run does where a signal runs away."""
 
+Made = TypeVar("Made")
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True)
 class Structure:
     """Components, their connections, and the experiment.
 
@@ -55,7 +58,7 @@ class Structure:
         """The number of communication steps from 0 to the stop time."""
         return self.stop_ns // self.step_ns
 
-    @property
+    @cached_property
     def recorded(self) -> dict[Port, Variable]:
         """The outputs that a run records, in the order of the system: no arrays, no binaries."""
         return {
@@ -64,6 +67,24 @@ class Structure:
             for v in component.interface.of("output")
             if v.supported
         }
+
+    def once(self, work: Callable[[Any], Made]) -> Made:
+        """What a function makes of the system, worked out once, so it must not be changed.
+
+        Copies with other values of parameters share it: the function must not go by these.
+        """
+        if work not in self._known:
+            self._known[work] = work(self)
+        found: Made = self._known[work]
+        return found
+
+    @cached_property
+    def _known(self) -> dict[Callable[[Any], Any], Any]:
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What it was made of alone: other processes work out the rest themselves."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def period(self, name: str) -> int:
         """The own step of the component of that name, in communication steps of the system."""
