@@ -175,18 +175,18 @@ class _Ledger:
         """The energies at each of the rows, which are those of the steps from first on."""
         n = self._count
         earned = np.zeros((n, len(rows)))
-        moved = np.concatenate((self._moved, rows[:, self._mover].T), axis=1)
+        moved = _joined(self._moved, rows[:, self._mover].T)
         held, position = moved[:n], moved[n:]
         _add_last(earned, held[:, 1:] * (position[:, 1:] - position[:, :-1]))
         # A source with a step of its own answers for what it saw at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
-        answered = np.concatenate((self._answered, self._in_units(rows[ends, self._answerer].T)), 1)
+        answered = _joined(self._answered, self._in_units(rows[ends, self._answerer].T))
         force, seen = answered[:n], answered[n:]
         mean = -0.5 * (force[:, 1:] + force[:, :-1])
         _add_last(earned[:, ends], mean * (seen[:, 1:] - seen[:, :-1]))
         self._moved, self._answered = moved[:, -1:], answered[:, -1:]
         # One sum after the other from the carried total on: the same bits for any blocks.
-        total = np.cumsum(np.concatenate((self._total, self._scale * earned), axis=1), axis=1)
+        total = np.cumsum(_joined(self._total, self._scale * earned), axis=1)
         self._total = total[:, -1:]
         return total[:, 1:]
 
@@ -198,6 +198,12 @@ class _Ledger:
         factor, offset = self._of_force
         per_factor, from_offset = self._of_seen
         return np.concatenate((factor * force + offset, (seen - from_offset) / per_factor))
+
+
+def _joined(before: Floats, after: Floats) -> Floats:
+    """Columns after others, with each row in one piece, which is fast."""
+    shape = len(before), before.shape[1] + after.shape[1]
+    return np.concatenate((before, after), axis=1, out=np.empty(shape))
 
 
 def _add_last(sums: Floats, changes: Floats) -> None:
