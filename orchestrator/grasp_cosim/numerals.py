@@ -5,6 +5,9 @@ from math import degrees
 MOST = 1e9
 """The size from which a number in a table is written with a power of ten."""
 
+NOISE = 1e-10
+"""What is smaller is 0 but for rounding errors, in any unit in which a table shows it."""
+
 MILLI = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "N.s": (1e3, "mN.s"), "rad": (degrees(1), "deg")}
 """How values are shown in tables and pictures, by unit: times a factor, in another."""
 
@@ -29,12 +32,13 @@ def fixed(
     digits: int = 4,
     rounded: bool = False,
 ) -> str:
-    """Return `value` with so many decimals; where it has no place there, like 4.04e+41 or 6.3e-15.
+    """Return `value` with so many decimals; where it has no place there, like 4.04e+41 or 6.3e-5.
 
     That is from `most` on and, unless it is `rounded` to 0, where all its decimals would be 0; it
     then has up to so many digits. `width` and `sign` ("+" for both) are those of a format.
     """
     least = 0.0 if rounded else 0.5 * 10.0**-decimals
+    value = 0.0 if abs(value) < NOISE else value
     if not value or least <= abs(value) < most:
         return f"{value:{sign}{width}.{decimals}f}"
     return f"{value:{sign}{width}.{digits}g}"

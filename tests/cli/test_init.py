@@ -254,3 +254,15 @@ def test_many_lines_to_do_are_counted(fmus_here: Run, tmp_path: Path) -> None:
         f"    and {more} lines more",
         "    when no TODO is left: grasp-cosim run 'my file.toml'",
     ]
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_the_inputs_of_a_written_file_can_be_driven(fmus_here: Run, tmp_path: Path) -> None:
+    build_model("feedthrough", tmp_path, "2.0", file="through")
+    assert fmus_here("init", "alone.toml", "--fmu", "through=through.fmu")[0] == 0
+    system = System.load("alone.toml")
+    name = next(v.name for v in system.components[0].interface.of("input") if v.kind == "Real")
+    Path("drive.csv").write_text(f"time,through.{name}\n0,1.5\n1,1.5\n", "utf-8")
+    code, _, err = fmus_here("run", "alone.toml", "--input", "drive.csv", "--out", "out")
+    assert (code, f"drive.csv drives through.{name}" in err) == (0, True)

@@ -40,7 +40,7 @@ def test_what_is_wrong_is_one_line(command: Run, tmp_path: Path) -> None:
         (["--input", "none.csv"], "none.csv: no such input file"),
         (
             ["--input", "drive.csv", "--set", "a.u_Real=1"],
-            "a.u_Real has two sources, drive.csv and",
+            "--set a.u_Real: does nothing, as drive.csv drives it",
         ),
         (["--input", "wrong.csv"], "wrong.csv: line 1, column 3, b.w: no component 'b'; valid: a"),
     ):

@@ -152,6 +152,9 @@ def chosen_system(given: Mapping[str, Any]) -> System:
         way = settings.pop("input.interpolation", "linear")
         stimuli = read_stimuli(settings.pop("input.file"), way, "--set input.interpolation")
         stimuli = replace(stimuli, partial=True)  # FMUs may yet be swapped
+        for port in stimuli.columns:
+            if str(port) in settings:
+                raise InputError(f"--set {port}: does nothing, as {stimuli.file} drives it")
     loaded = load_system(given.get("system"), step, stop, stimuli)
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
     system = with_controller(loaded, given.get("controller"), swapped)

@@ -28,12 +28,11 @@ def driven(system: Structure) -> tuple[Port, ...]:
 def check_stimuli(system: Structure, whole: bool = False) -> None:
     """InputError at the first column that does not fit an input, or has one with another source.
 
-    whole says that all columns count, also where FMUs may yet be swapped.
+    A value is no source: the column goes before it. whole says that all columns count, also where
+    FMUs may yet be swapped.
     """
     stimuli = system.input
     sources = {c.target: f"a connection, from {c.source}" for c in system.connections}
-    for component in system.components:
-        sources |= {Port(component.name, n): "a value" for n in component.values}
     for event in system.events:
         sources |= dict.fromkeys(event.set, "an event")
     for port in stimuli.columns if stimuli and whole else driven(system):
@@ -49,10 +48,9 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
                 "Enumeration to be driven"
             )
         if port in sources:
-            without = ": take the value out" if sources[port] == "a value" else ""
             raise InputError(
                 f"{place}: {port} has two sources, {stimuli.file} and {sources[port]}; must have "
-                f"one{without}"
+                "one"
             )
         _check_samples(stimuli, port, interface)
 
