@@ -19,8 +19,8 @@ def test_usual_sizes_have_their_decimals(
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (4.6e40, "4.6e+40"), (-4.03977e41, "-4.04e+41"), (1.306e-13, "0.000"), (6.3e-8, "6.3e-08"), (4e-4, "0.0004"),
-        (0.0, "0.000"), (0.0006, "0.001"), (math.inf, "inf"), (math.nan, "nan"),
+        (4.6e40, "4.6e+40"), (-4.03977e41, "-4.04e+41"), (1.306e-13, "0.000"), (6.3e-8, "6.3e-08"),
+        (4e-4, "0.0004"), (0.0, "0.000"), (0.0006, "0.001"), (math.inf, "inf"), (math.nan, "nan"),
     ],
 )  # fmt: skip
 def test_others_have_a_power_of_ten(value: float, text: str) -> None:
