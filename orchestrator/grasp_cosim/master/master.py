@@ -30,7 +30,7 @@ from .plan import Planner, slots_of
 from .rejection import finish_step
 from .scenario import Scenario
 
-CHUNK = 2048
+CHUNK = 4096
 """The most steps between two times that rows are handed on."""
 
 ROOM = 1 << 15
@@ -68,7 +68,7 @@ class Master:
         self.log: list[str] = []
         self.ends: list[str] = []
         """The requests to end the simulation before the stop time, a line each."""
-        self.slots = slots_of(system, instances)
+        self.slots = system.once(slots_of)
         strings = (port for port, v in system.recorded.items() if v.kind == "String")
         self.texts = {port: Texts() for port in strings}
         self.values = np.zeros(len(self.slots) + (pacer.width if pacer else 0))

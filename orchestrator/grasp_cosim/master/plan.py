@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fmi.instance import Call, Instance, dtype
-from ..interface.interface import Variable
+from ..interface.interface import Interface, Variable
 from ..realtime.pacer import Pacer
 from ..recording.listener import Texts
 from ..system.checks import transforms
@@ -51,24 +51,24 @@ class Plan:
     """Errors of the Python calls that returned RAISED: they must not pass through compiled code."""
 
 
-def slots_of(system: System, instances: Sequence[Instance]) -> dict[Port, int]:
+def slots_of(system: System) -> dict[Port, int]:
     """The place of each output, and of each number that is an input with a source; Strings last.
 
     With an element of an array all others have one, too: an array is passed whole.
     """
     connected = {*(connection.target for connection in system.connections), *driven(system)}
-    for instance in instances:
-        for array in instance.interface.arrays.values():
-            elements = {Port(instance.name, name) for name in array.names}
+    for component in system.components:
+        for array in component.loaded.arrays.values():
+            elements = {Port(component.name, name) for name in array.names}
             if not connected.isdisjoint(elements):
                 connected |= elements
     ports = [
-        Port(instance.name, v.name)
+        Port(component.name, v.name)
         for causality in ("output", "input")
-        for instance in instances
-        for _, variables in _by_type(instance, causality)
+        for component in system.components
+        for _, variables in _by_type(component.loaded, causality)
         for v in variables
-        if causality == "output" or Port(instance.name, v.name) in connected
+        if causality == "output" or Port(component.name, v.name) in connected
     ]
     ports += [port for port, v in system.recorded.items() if v.kind == "String"]
     return {port: slot for slot, port in enumerate(ports)}
@@ -216,7 +216,7 @@ class Planner:
     def _transfer(self, name: str, causality: str, phase: int) -> None:
         """Pass all connected inputs, or fetch all outputs, a call per FMI type."""
         instance, period = self.instances[name], self.system.period(name)
-        for fmi_type, variables in _by_type(instance, causality):
+        for fmi_type, variables in _by_type(instance.interface, causality):
             taken = [v for v in variables if Port(name, v.name) in self.slots]
             if not taken:
                 continue
@@ -258,10 +258,10 @@ class Planner:
             self.made.operations.append((kind, first, last, period, phase))
 
 
-def _by_type(instance: Instance, causality: str) -> list[tuple[str, list[Variable]]]:
+def _by_type(interface: Interface, causality: str) -> list[tuple[str, list[Variable]]]:
     """The scalar numbers of a causality, by FMI type, those of float64 first."""
     found: dict[str, list[Variable]] = {}
-    for v in instance.interface.of(causality):
+    for v in interface.of(causality):
         if v.is_number:
             found.setdefault(v.type, []).append(v)
     return sorted(found.items(), key=lambda item: item[0] not in ("Real", "Float64"))

@@ -30,7 +30,6 @@ from ..system.description import System
 from ..system.native import needed_twins
 from ..system.parts import NANOSECONDS, Component, Port
 from ..system.realtime import Realtime
-from ..system.settings import run_settings
 from .engine import Engine
 from .master import Master
 
@@ -260,7 +259,7 @@ class Session:
     def _result(self) -> Result:
         master, signals, asked = self._master, self._dispatch.signals, self._privileges
         return Result(
-            run_settings(self.system),
+            self._dispatch.settings,
             self._memory.time,
             self._memory.signals,
             {s.name: s.unit for s in signals},

@@ -52,7 +52,8 @@ class Dispatcher:
         self.signals = (*outputs.values(), *self._energy.signals)
         self._block = np.empty((len(self.signals), 0))
         self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
-        experiment = Experiment.of(run_settings(system))
+        self.settings = run_settings(system)
+        experiment = Experiment.of(self.settings)
         with ExitStack() as begun:
             for listener in self._listeners:
                 listener.begin(experiment, self.signals)
