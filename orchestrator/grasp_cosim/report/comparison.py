@@ -123,6 +123,7 @@ def _state(
     worst = [s.name for s in c.signals[:AT_FIRST]]
     return {
         "rows": len(shown.time),
+        "names": list(c.names),
         "signals": [
             {
                 "name": s.name,

@@ -28,9 +28,9 @@ async function pair(name) { // the signal of A, and all that is drawn with it
 function overlaid(one, i) { // several signals of a panel differ in the width of A and the dashes of B
   const { first, second, tube, style } = one, which = i % 3;
   return [
-    { ...one, ...first, tube, label: `A ${one.label}`,
+    { ...one, ...first, tube, label: `${page.names[0]} ${one.label}`,
       style: { ...style, dash: 0, width: [5, 2.5, 8][which] } },
-    { ...one, ...second, tube: null, label: `B ${one.label}`,
+    { ...one, ...second, tube: null, label: `${page.names[1]} ${one.label}`,
       style: { ...style, dash: 1 + which } },
   ];
 }
