@@ -97,7 +97,20 @@ def recorder(folder: Path) -> Do:
             raise SystemExit(f"{shlex.join(words)}: exit code {code}")
         return load_run(out)
 
-    return lambda line: run(*shlex.split(line))
+    return lambda line: run(*_once(shlex.split(line)))
+
+
+def _once(words: Sequence[str]) -> list[str]:
+    """The words of a line; a place or option that a row of a table sets goes before the line's."""
+    kept: dict[str, list[str]] = {}
+    for k, word in enumerate(words):
+        if word == "--set":
+            kept[words[k + 1].partition("=")[0]] = [word, words[k + 1]]
+        elif word == "--controller":
+            kept[word] = [word, words[k + 1]]
+        elif k == 0 or words[k - 1] not in ("--set", "--controller"):
+            kept[f"{k} {word}"] = [word]
+    return [word for pair in kept.values() for word in pair]
 
 
 # Columns

@@ -8,8 +8,8 @@
     result.plot("grasp.png")
 
 Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
-when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.recording.listener`,
-`grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`.
+when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.sweeps.sweep`,
+`grasp_cosim.recording.listener`, `grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`.
 """
 
 from __future__ import annotations

@@ -52,8 +52,8 @@ def test_a_name_that_is_none(pictures: Any) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("hand", "loop", "evaluation", "report", "reflectance_map"),
-        pytest.param("colour_map", marks=only_whole("takes more than a minute")),
+        *("hand", "loop", "evaluation", "report"),
+        pytest.param("maps", marks=only_whole("takes more than a minute")),
     ],
 )
 def test_it_is_the_one_that_the_command_makes(pictures: Any, tmp_path: Path, name: str) -> None:

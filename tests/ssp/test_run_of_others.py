@@ -66,7 +66,7 @@ def test_it_follows_the_solution(path: Path) -> None:
 
 def test_our_archive_of_it_runs_the_same(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own = path.with_name("own.ssp")
-    assert main(["ssp", str(path), "-o", str(own), "--step", "0.01"]) == 0
+    assert main(["ssp", str(path), "-o", str(own), "--set", "experiment.step=0.01"]) == 0
     with zipfile.ZipFile(own) as file:
         assert sum(name.endswith(".fmu") for name in file.namelist()) == 1
     first, second = simulate(System.load(path, step=0.01)), simulate(System.load(own))

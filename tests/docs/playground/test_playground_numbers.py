@@ -17,6 +17,15 @@ from support.native_fmus import needs_gcc
 
 pytestmark = [needs_gcc, pytest.mark.slow]
 
+
+@pytest.fixture(autouse=True)
+def _built(tmp_path: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The FMUs are where the commands of the page have them."""
+    (tmp_path / "here/fmus").mkdir(parents=True)
+    (tmp_path / "here/fmus/build").symlink_to(fmus)
+    monkeypatch.chdir(tmp_path / "here")
+
+
 VISIT = """
 const seen = [];
 for (const at of %s) {
