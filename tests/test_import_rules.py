@@ -167,7 +167,7 @@ FLOORS = (
     ("realtime",),
     ("metrics",),
     ("recording",),
-    ("ssp", "inspection", "drafting"),
+    ("ssp", "inspection"),
     ("master",),
     ("sweeps", "comparison", "hil"),
     ("report",),

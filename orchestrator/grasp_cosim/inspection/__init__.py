@@ -1,4 +1,4 @@
-"""What an FMU is: its interface as a table, and whether this machine loads it.
+"""What an FMU is, whether this machine loads it, and a system file to start from with it.
 
 Imports interface and the ground floor.
 """

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...drafting.text import with_paths
 from ...errors import InputError
 from ...files import check_folder, write_text
+from ...inspection.text import with_paths
 from ...interface.read import read_interface
 from ...numerals import counted
 from ...system.description import System
@@ -21,7 +21,7 @@ from ...system.toml import to_do
 from ..frame import PATH, json_option, pair, say, show
 
 if TYPE_CHECKING:
-    from ...drafting.component import Draft
+    from ...inspection.component import Draft
 
 NAME = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -67,7 +67,7 @@ def init(
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
-        from ...drafting.alone import alone
+        from ...inspection.alone import alone
 
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
     else:
@@ -142,9 +142,9 @@ def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
 
 def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Draft]]:
     """The text of the built-in grasp, with foreign FMUs in the place of components."""
-    from ...drafting.component import replacing
     from ...grasp.presets import SYSTEM, built_in_presets
     from ...grasp.system import built
+    from ...inspection.component import replacing
 
     fmus = built(folder)
     built_in = System.load(SYSTEM, fmus)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from grasp_cosim.drafting.alike import Match, candidates, matches
+from grasp_cosim.inspection.alike import Match, candidates, matches
 from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.interface.read import read_interface
 from hypothesis import given
@@ -172,3 +172,9 @@ def test_any_style_in_any_order_with_and_without_units(
     }
     chosen = names(plant, *theirs.values(), certain=True)
     assert chosen == {name: v.name for name, v in theirs.items()}
+
+
+def test_no_force_is_proposed_for_a_position(plant: Interface) -> None:
+    theirs = foreign(*(output(name) for name in ("F_1", "F_2", "contactForce", "way", "x_1")))
+    assert [v.name for v in candidates(plant, "position[1]", theirs, [])] == ["way", "x_1"]
+    assert not {"position[1]", "position[2]"} & matches(plant, plant.by_name, theirs).keys()

@@ -1,1 +1,0 @@
-"""System files to start from, and a component of one filled in for a foreign FMU."""
