@@ -383,7 +383,8 @@ def fill_in(system: Path, block: str) -> None:
 
 def try_commands(block: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Do the commands of a block, which print first what the page shows below them."""
-    for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", block, re.MULTILINE | re.DOTALL):
+    whole = block.replace("\\\n", " ")
+    for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", whole, re.MULTILINE | re.DOTALL):
         command, _, shown = part.partition("\n")
         if "CASE" in command:
             continue  # the rows of a table
