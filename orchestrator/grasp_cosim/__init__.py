@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from .metrics.metric import Metric, metric
     from .recording.load import load_run
     from .recording.result import Result
-    from .report.page import Scene, write_page
+    from .report.page import Scene
+    from .report.written import write_report
     from .ssp.write import write_ssp
     from .sweeps.sweep import sweep
     from .system.description import System
@@ -63,7 +64,7 @@ __all__ = [
     "qualify",
     "simulate",
     "sweep",
-    "write_page",
+    "write_report",
     "write_ssp",
 ]
 
@@ -83,7 +84,7 @@ _HOMES = {
     "qualify": "comparison.qualify",
     "simulate": "master.simulation",
     "sweep": "sweeps.sweep",
-    "write_page": "report.page",
+    "write_report": "report.written",
     "write_ssp": "ssp.write",
 }
 

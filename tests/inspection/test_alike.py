@@ -178,3 +178,7 @@ def test_no_force_is_proposed_for_a_position(plant: Interface) -> None:
     theirs = foreign(*(output(name) for name in ("F_1", "F_2", "contactForce", "way", "x_1")))
     assert [v.name for v in candidates(plant, "position[1]", theirs, [])] == ["way", "x_1"]
     assert not {"position[1]", "position[2]"} & matches(plant, plant.by_name, theirs).keys()
+
+
+def test_three_fingers_are_not_those_of_two(plant: Interface) -> None:
+    assert names(plant, *(output(f"position{j}", "m") for j in (1, 2, 3))) == {}

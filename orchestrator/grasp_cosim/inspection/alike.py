@@ -78,11 +78,12 @@ class Match:
 
 
 class _Reading(NamedTuple):
-    """A name read as that of number 1 or 2, or of no number; certain if it is that for sure."""
+    """A name read as that of a number, of so many, or of no number; certain if that is for sure."""
 
     words: tuple[str, ...]
     number: int | None
     certain: bool
+    many: int = 1
 
 
 class _Score(NamedTuple):
@@ -169,7 +170,7 @@ def _score(
     if units[0] and units[1] and not units[0].measures(units[1]):
         return NOTHING
     known = bool(units[0] and units[1]) or v.kind != "Real"
-    pairs = ((a, b) for a in mine for b in readings if a.number == b.number)
+    pairs = ((a, b) for a in mine for b in readings if (a.number, a.many) == (b.number, b.many))
     found = (_of_names(a, b, v, w, known) for a, b in pairs)
     return max(found, key=lambda s: (s.value, not s.doubt), default=NOTHING)
 
@@ -220,17 +221,15 @@ def _readings(variables: Collection[Variable]) -> dict[str, list[_Reading]]:
             numbers.setdefault(rest, set()).add(reading.number or 0)
 
     def meant(rest: str, reading: _Reading) -> _Reading:
-        shifted = 0 in numbers[rest]
-        return (
-            reading._replace(number=(reading.number or 0) + 1, certain=False)
-            if shifted
-            else reading
-        )
+        least, many = min(numbers[rest]), len(numbers[rest])
+        if least:
+            return reading._replace(many=many)
+        return reading._replace(number=(reading.number or 0) + 1, certain=False, many=many)
 
     return {
         v.name: [
             _Reading(_words(v.name), None, True),
-            *(meant(rest, r) for rest, r in numbered[v.name] if len(numbers[rest] & {0, 1, 2}) > 1),
+            *(meant(rest, r) for rest, r in numbered[v.name] if len(numbers[rest]) > 1),
         ]
         for v in variables
     }
@@ -267,7 +266,8 @@ def _numbered(variable: Variable) -> Iterator[tuple[str, _Reading]]:
     for match in _WORD.finditer(text):
         for sides, _ in _SIDES:
             if (word := match[0].lower()) in sides:
-                yield f"text of {name}", _Reading(_words(name), 1 + sides.index(word), False)
+                said = f"{text[: match.start()]} {text[match.end() :]}"
+                yield f"text: {said}", _Reading(_words(name), 1 + sides.index(word), False)
     for match in _WORD.finditer(name):
         word, rest = match[0].lower(), f"{name[: match.start()]} {name[match.end() :]}"
         if len(word) > 1 and word[-1] in _GLUED:

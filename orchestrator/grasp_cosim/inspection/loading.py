@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.machinery import ModuleSpec
+from itertools import islice
 from pathlib import Path
 from shlex import quote
 from shutil import which
@@ -80,7 +81,9 @@ def examine(fmu: Path, load: bool = False) -> list[Finding]:
     with ScratchFolder() as scratch:
         unpacked = unpack(fmu, Path(scratch.name))
         if not load:
-            return _findings(unpacked, CHECKS)
+            here = islice(_machine(unpacked.python), 2)  # this Python, and where FMUs are unpacked
+            wrong = [finding for finding in here if finding.status == "problem"]
+            return [*wrong, *_findings(unpacked, CHECKS)]
         unpacked = replace(unpacked, linked=_linked(unpacked.binary))
         tried = trial(unpacked)
         unpacked = replace(unpacked, loads=tried[0] == "ok")
