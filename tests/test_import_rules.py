@@ -157,6 +157,7 @@ FLOORS = (
         "files",
         "scratch",
         "interruption",
+        "columns",
         "progress",
         "parallel",
         "extensions",

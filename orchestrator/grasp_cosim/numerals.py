@@ -42,3 +42,13 @@ def fixed(
     if not value or least <= abs(value) < most:
         return f"{value:{sign}{width}.{decimals}f}"
     return f"{value:{sign}{width}.{digits}g}"
+
+
+def significant(value: float | None, digits: int = 6, none: str = "none") -> str:
+    """Return a number with so many significant digits; `none` where there is none."""
+    return none if value is None else f"{value:.{digits}g}"
+
+
+def grouped(value: float, decimals: int = 0) -> str:
+    """Return a number in groups of three digits."""
+    return f"{value:,.{decimals}f}".replace(",", "\N{NARROW NO-BREAK SPACE}")

@@ -40,9 +40,9 @@ def test_a_study_in_any_order_of_the_steps() -> None:
     assert (found["never"].finest, found["never"].errors) == (None, (None, None))
     assert as_text(made).splitlines() == [
         "3 runs, 0 failed",
-        f"{'error against 0.1 ms':46s}       value      0.2 ms      0.4 ms   order",
-        f"{'t':46s}         1.1         0.1         0.3    1.00",
-        f"{'never':46s}           -           -           -       -",
+        "error against 0.1 ms    value  0.2 ms  0.4 ms  order",
+        "t                         1.1     0.1     0.3      1",
+        "never                       -       -       -      -",
     ]
 
 

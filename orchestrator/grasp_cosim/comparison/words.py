@@ -7,8 +7,10 @@ from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
 
+from ..columns import columns
 from ..errors import choices
 from ..metrics.metric import Metric
+from ..numerals import significant
 from ..system.parts import NANOSECONDS
 from .compare import Comparison
 from .interface_difference import SEVERITIES, Difference
@@ -247,32 +249,16 @@ def _table(name: str, compared: Sequence[Compared], runs: tuple[str, str]) -> li
     rows = [["x band", name, "deviation", "band", "unit", "at t in s", *runs]]
     for c in shown:
         time = "" if c.time is None else f"{c.time:.9g}"
-        values = [_number(v, 6) for v in (c.original, c.candidate)]
-        widths = [_number(v, 3) for v in (c.deviation, c.band.width)]
-        rows.append([_number(c.ratio, 3), c.name, *widths, c.unit or "", time, *values])
+        values = [significant(v, 6) for v in (c.original, c.candidate)]
+        widths = [significant(v, 3) for v in (c.deviation, c.band.width)]
+        rows.append([significant(c.ratio, 3), c.name, *widths, c.unit or "", time, *values])
     if name == "metric":
         rows = [[*row[:5], *row[6:]] for row in rows]
     left = len(compared) - len(shown)
     more = f"{len(outside) - len(shown)} more out of band, " if len(outside) > len(shown) else ""
     inside = len(compared) - len(outside) if outside else left
-    return [*_aligned(rows), *([f"{'':8}{more}{inside} more inside"] if left else [])]
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Columns side by side: texts to the left, numbers to the right."""
-    texts = {i for i, title in enumerate(rows[0]) if title in ("signal", "metric", "unit")}
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            cell.ljust(width) if i in texts else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "none" if value is None else f"{value:.{digits}g}"
+    texts = {i for i, head in enumerate(rows[0]) if head in ("signal", "metric", "unit")}
+    return [*columns(rows, texts), *([f"{'':8}{more}{inside} more inside"] if left else [])]
 
 
 def _compared_json(

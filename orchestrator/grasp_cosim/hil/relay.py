@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..columns import columns
 from ..errors import InputError
 from .address import Address, connected, is_loopback, resolved, text
 from .loop import Loop, received
@@ -80,8 +81,9 @@ class Relay(Loop):
         """Its counters as a table, a line for each direction."""
         rows = {direction: asdict(c) for direction, c in self.counters.items()}
         names = list(rows["request"])
-        lines = [" " * 8 + "".join(f"{name:>12s}" for name in names)]
-        lines += [f"{d:8s}" + "".join(f"{row[n]:12d}" for n in names) for d, row in rows.items()]
+        lines = columns(
+            [["", *names], *([d, *(str(r[n]) for n in names)] for d, r in rows.items())]
+        )
         return "\n".join(lines)
 
     def _send_due(self, now: int) -> None:

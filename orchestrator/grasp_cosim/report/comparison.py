@@ -27,12 +27,12 @@ from ..comparison.words import (
 )
 from ..files import write_text
 from ..metrics.metric import Metric
-from ..numerals import counted
+from ..numerals import counted, grouped
 from ..recording.result import Result
 from .caption import Caption, about, caption, changes
 from .embed import LIMIT, Shown, fit
 from .page import Scene, data_html, document, looks, moments, scripts, traces_html
-from .tables import bullets, count, number, origin_rows, scaled, summary, table
+from .tables import bullets, number, origin_rows, scaled, summary, table
 
 AT_FIRST = 4
 """So many of the worst signals are shown first."""
@@ -154,7 +154,7 @@ def _exactness(c: Comparison, shown: Shown, rows: int) -> str:
     )
     return (
         f"{c.names[0]} solid and pale, {c.names[1]} dashed over it; the tube is the band around "
-        f"{c.names[0]}. {count(rows)} rows of "
+        f"{c.names[0]}. {grouped(rows)} rows of "
         f"{counted(len(c.signals), 'signal')}.{kept}"
     )
 
@@ -190,7 +190,7 @@ def _summary(side: Side) -> str:
     if side.result:
         return summary(side.result.metrics)
     span = " to ".join(number(float(side.time[row])) for row in (0, -1))
-    return f"{count(len(side.time))} rows, {span} s"
+    return f"{grouped(len(side.time))} rows, {span} s"
 
 
 def _row(what: str, cells: Iterable[str]) -> str:

@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..files import write_text
+from ..numerals import grouped
 from ..recording.csv import quoted
 from ..recording.listener import Texts
 from ..recording.result import Result
@@ -31,7 +32,7 @@ from .caption import Caption, caption
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter
-from .tables import count, metrics_table, number, settings_html, summary, svg_button
+from .tables import metrics_table, number, settings_html, summary, svg_button
 from .timing_html import timing_html
 
 AT_FIRST = 6
@@ -224,9 +225,9 @@ def data_html(time: npt.NDArray[np.float64], columns: Mapping[str, npt.NDArray[A
 def exactness(shown: Shown, rows: int, columns: int) -> str:
     """Return how much of so many rows and signals is in the page, as HTML."""
     if shown.rows_per_pair is None:
-        return f"All {count(rows)} points of {columns} signals are in this page, to the last bit."
+        return f"All {grouped(rows)} points of {columns} signals are in this page, to the last bit."
     return (
-        f"<b>Of {count(rows)} points of {columns} signals this page keeps, of each "
+        f"<b>Of {grouped(rows)} points of {columns} signals this page keeps, of each "
         f"{shown.rows_per_pair}, the lowest and the highest value;</b> all are in signals.csv."
     )
 

@@ -9,7 +9,7 @@ from html import escape
 from typing import Any
 
 from ..metrics.metric import Metric
-from ..numerals import counted, fixed
+from ..numerals import counted, fixed, grouped, significant
 from ..recording.result import Result
 
 EXPERIMENT = (
@@ -25,7 +25,7 @@ def summary(run: Mapping[str, Any]) -> str:
     """One line on the run."""
     unfinished = run["wall_time"] is None
     text = escape(
-        f"{number(run['stop'])} s in {count(run['steps'])} steps of "
+        f"{number(run['stop'])} s in {grouped(run['steps'])} steps of "
         f"{number(1e3 * run['step'])} ms, {run['scheme']}"
         + (
             ""
@@ -184,15 +184,10 @@ def number(value: Any, digits: int = 6) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.{digits}g}"
+        return significant(value, digits)
     if value is None:
         return "none"
     return str(value)
-
-
-def count(value: float, decimals: int = 0) -> str:
-    """A number in groups of three digits."""
-    return f"{value:,.{decimals}f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
 def _how(component: Mapping[str, Any]) -> str:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ..numerals import counted, fixed
+from ..numerals import counted, fixed, significant
 from ..realtime.timing import Timing
 from ..recording.result import Result
 
@@ -92,4 +92,4 @@ def _advice(timing: Timing) -> list[str]:
 
 
 def _ms(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g}"
+    return significant(1e3 * seconds, 3)

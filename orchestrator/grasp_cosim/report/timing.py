@@ -13,11 +13,11 @@ from math import ceil, floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..numerals import grouped
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
 from .caption import Caption, caption
 from .plot import GREY, RED, as_svg, finish, headed, new_figure, save
-from .tables import count
 from .timing_words import (
     BACKLOG,
     QUANTILES,
@@ -258,14 +258,15 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
             axes.vlines(times_in_run, low, lates, color=color, linewidth=0.8, alpha=0.4)
         axes.plot(
             times_in_run, lates, MARKERS[dash], color=color, mfc="white" if dash else color,
-            markersize=5.0 if few else 3.0, clip_on=False, label=f"{count(times)} × {label(part)}",
+            markersize=5.0 if few else 3.0, clip_on=False,
+            label=f"{grouped(times)} × {label(part)}",
         )  # fmt: skip
     axes.set(yscale="log", ylim=(low, high))
     axes.yaxis.set_major_formatter(lambda seconds, _: duration(seconds))
     axes.minorticks_off()
     if rest := unlisted(timing):  # shade the part of the run whose overruns were counted only
         axes.axvspan(listed[-1].time, end, color=GREY, alpha=0.15, linewidth=0.0)
-        text = f"grey: {count(rest)} more, counted only"
+        text = f"grey: {grouped(rest)} more, counted only"
         axes.set_title(text, fontsize=9, loc="right", color=GREY)
     _legend(axes, title="what took too long", fontsize=9, title_fontsize=9)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from html import escape
 
 from ..errors import InputError
+from ..numerals import grouped
 from ..realtime.timing import Timing
-from .tables import bullets, count, number, svg_button, table
+from .tables import bullets, number, svg_button, table
 from .timing import timing_svg
 from .timing_words import QUANTILES, duration, kept, label, quantiles
 
@@ -49,8 +50,8 @@ def _pace(timing: Timing) -> str:
         "factor asked for": number(timing.factor),
         "times as fast as real time": number(timing.real_time_factor, 6),
         "after an overrun": timing.overrun,
-        "steps": count(timing.steps),
-        "overruns": count(timing.overruns),
+        "steps": grouped(timing.steps),
+        "overruns": grouped(timing.overruns),
     }
     return table("", (f"<td>{name}</td><td>{escape(text)}</td>" for name, text in rows.items()))
 
@@ -60,7 +61,7 @@ def _parts(timing: Timing) -> str:
     heads, rows = (*QUANTILES, "worst", "at t in s"), []
     for part in dict.fromkeys((*timing.parts, *timing.culprits)):
         row = f"<td>{escape(label(part))}</td>" + _figures(timing, part)
-        blamed = count(timing.culprits[part]) if part in timing.culprits else ""
+        blamed = grouped(timing.culprits[part]) if part in timing.culprits else ""
         rows.append(row + (f'<td class="n">{blamed}</td>' if timing.overruns else ""))
     if timing.overruns:
         heads = (*heads, "overruns")
@@ -74,7 +75,7 @@ def _figures(timing: Timing, part: str) -> str:
         return "<td></td>" * (len(QUANTILES) + 2)
     spread = timing.parts[part]
     cells = "".join(
-        f'<td class="n{" warn" if t > timing.period else ""}">{count(1e6 * t, 1)}</td>'
+        f'<td class="n{" warn" if t > timing.period else ""}">{grouped(1e6 * t, 1)}</td>'
         for t in quantiles(spread).values()
     )
     return f'{cells}<td class="n">{number(spread.worst_at)}</td>'
@@ -85,13 +86,13 @@ def _listed(timing: Timing) -> str:
     if not listed:
         return ""
     total = timing.overruns
-    title = f"The first {len(listed)} of {count(total)} overruns"
+    title = f"The first {len(listed)} of {grouped(total)} overruns"
     if total == len(listed):
         title = f"All {total} overruns" if total > 1 else "The overrun"
     rows = (
-        f'<td class="n">{number(o.time, 9)}</td><td class="n">{count(o.step)}</td>'
-        f'<td class="n">{count(1e6 * o.late, 1)}</td><td>{escape(label(o.culprit))}</td>'
-        f'<td class="n">{count(1e6 * o.took, 1)}</td>'
+        f'<td class="n">{number(o.time, 9)}</td><td class="n">{grouped(o.step)}</td>'
+        f'<td class="n">{grouped(1e6 * o.late, 1)}</td><td>{escape(label(o.culprit))}</td>'
+        f'<td class="n">{grouped(1e6 * o.took, 1)}</td>'
         for o in listed
     )
     heads = (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..numerals import grouped
 from ..realtime.timing import Spread, Timing
-from .tables import count
 
 QUANTILES = {"median": 0.5, "p99": 0.01, "p99.9": 0.001}
 """The share of the steps that took longer, by the name of a quantile."""
@@ -40,19 +40,19 @@ def unlisted(timing: Timing) -> int:
 
 def kept(timing: Timing) -> str:
     """A sentence: the period was kept, or how often it was not, by how much, and through what."""
-    steps, period = count(timing.steps), duration(timing.period)
+    steps, period = grouped(timing.steps), duration(timing.period)
     if not timing.overruns:
         return f"All {steps} steps ended within their period of {period}."
     blamed = [
-        f"{label(name)} ({count(times)})" for name, times in culprits(timing) if name != BACKLOG
+        f"{label(name)} ({grouped(times)})" for name, times in culprits(timing) if name != BACKLOG
     ]
     rest = len(blamed) - BLAMED
     names = blamed[:BLAMED] + ([f"{rest} other{'s' if rest > 1 else ''}"] if rest > 0 else [])
     if BACKLOG in timing.culprits:  # it follows from what the others did
-        names.append(f"{label(BACKLOG)} ({count(timing.culprits[BACKLOG])})")
-    some = f" of the first {count(len(timing.listed))}" if unlisted(timing) else ""
+        names.append(f"{label(BACKLOG)} ({grouped(timing.culprits[BACKLOG])})")
+    some = f" of the first {grouped(len(timing.listed))}" if unlisted(timing) else ""
     return (
-        f"{count(timing.overruns)} of {steps} steps ({percent(timing.overruns / timing.steps)}) "
+        f"{grouped(timing.overruns)} of {steps} steps ({percent(timing.overruns / timing.steps)}) "
         f"ended after their period of {period}. The worst{some} was "
         f"{duration(max(overrun.late for overrun in timing.listed))} late; "
         f"to blame: {', '.join(names)}."

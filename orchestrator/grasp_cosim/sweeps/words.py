@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from ..numerals import counted
+from ..columns import columns
+from ..numerals import counted, significant
 from .convergence import Convergence, convergence, is_study
 from .table import STATISTICS, Table
 
@@ -32,28 +33,26 @@ def as_text(table: Table) -> str:
         lines.append(f"the first that failed, {index}: {error}")
     if is_study(table):
         return "\n".join([*lines, *_study_lines(table, convergence(table))])
-    heads = "".join(f"{head:>11s}" for head in ("runs", *STATISTICS))
-    lines.append(f"{'':40s}{'':6s}{heads}")
+    rows = [["", "", "runs", *STATISTICS]]
     for name, row in table.summary().items():
         title, factor, unit = table.shown(name)
-        numbers = "".join(f"{_number(row[head], factor):>11s}" for head in STATISTICS)
-        lines.append(f"{title:40s}{unit:6s}{row['runs']:>11}{numbers}")
-    return "\n".join(lines)
+        numbers = [_scaled(row[head], factor) for head in STATISTICS]
+        rows.append([title, unit, str(row["runs"]), *numbers])
+    return "\n".join([*lines, *columns(rows, (0, 1))])
 
 
 def _study_lines(table: Table, found: Mapping[str, Convergence]) -> list[str]:
     """The errors of each metric against the finest step, by step, and the observed order."""
     first = next(iter(found.values()))
     finest = 1e3 * min(table["experiment.step"])
-    heads = "".join(f"{1e3 * step:>9.4g} ms" for step in first.steps)
-    lines = [f"{f'error against {finest:g} ms':40s}{'':6s}{'value':>12s}{heads}{'order':>8s}"]
+    heads = [f"{1e3 * step:.4g} ms" for step in first.steps]
+    rows = [[f"error against {finest:g} ms", "", "value", *heads, "order"]]
     for name, c in found.items():
         title, factor, unit = table.shown(name)
-        errors = "".join(f"{_number(e, factor):>12s}" for e in c.errors)
-        order = "-" if c.order is None else f"{c.order:.2f}"
-        lines.append(f"{title:40s}{unit:6s}{_number(c.finest, factor):>12s}{errors}{order:>8s}")
-    return lines
+        numbers = [_scaled(x, factor) for x in (c.finest, *c.errors)]
+        rows.append([title, unit, *numbers, significant(c.order, 3, "-")])
+    return columns(rows, (0, 1))
 
 
-def _number(value: float | None, factor: float) -> str:
-    return "-" if value is None else f"{factor * value:.4g}"
+def _scaled(value: float | None, factor: float) -> str:
+    return significant(None if value is None else factor * value, 4, "-")
