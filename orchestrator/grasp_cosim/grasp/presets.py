@@ -87,9 +87,7 @@ def with_si_values(system: System, values: Mapping[str, Value], place: str) -> S
     for key, value in values.items():
         port = _port(system, key)
         to_si = parameter_in_si(system, f"{place} {port}", port)
-        given[str(port)] = (
-            value if to_si == IDENTITY else (float(value) - to_si.offset) / to_si.factor
-        )
+        given[str(port)] = value if to_si == IDENTITY else to_si.back(float(value))
     return system.with_settings(given, f"{place} ".__add__)
 
 

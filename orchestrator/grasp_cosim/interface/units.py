@@ -22,6 +22,10 @@ class Conversion(NamedTuple):
         """Return `value`, a number or an array, in the target's unit."""
         return self.factor * value + self.offset
 
+    def back(self, value: float) -> float:
+        """Return a number in the target's unit in that of the source."""
+        return (value - self.offset) / self.factor
+
 
 IDENTITY = Conversion(1.0, 0.0)
 

@@ -16,6 +16,7 @@ from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
 from ..system.parts import Port
+from ..system.places import plain
 from ..system.readings import parameter_in_si
 
 Row = Mapping[str, Value]
@@ -104,18 +105,6 @@ def read_rows(path: Path) -> list[dict[str, Value]]:
     return [row for row in rows if row]
 
 
-def plain(text: str) -> Value:
-    """The value of a text, as a TOML file would have it without quotes."""
-    if text in ("true", "false"):
-        return text == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
-
-
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
     """The rows with the values in the units that the system's FMUs have.
 
@@ -162,7 +151,7 @@ def _in_si(value: Value, to_si: Conversion) -> Value:
 
 
 def _from_si(value: Value, to_si: Conversion) -> Value:
-    return value if to_si == IDENTITY else (float(value) - to_si.offset) / to_si.factor
+    return value if to_si == IDENTITY else to_si.back(float(value))
 
 
 def _to_si(system: System, place: str) -> Conversion:
