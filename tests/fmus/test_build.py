@@ -205,6 +205,7 @@ def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     ends: list[Callable[[], object]] = []
+    monkeypatch.setattr(builds, "_until_the_end", {})
     monkeypatch.setattr(cache, "writable", lambda _: None)
     monkeypatch.setattr("atexit.register", ends.append)
     folder = builds._kept(made_once, "a")
