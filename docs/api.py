@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import grasp_cosim
-from grasp_cosim.files import write_text
+from grasp_cosim.base.files import write_text
 from pdoc import doc, render
 
 MODULES = (

@@ -13,7 +13,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from grasp_cosim.files import write_text
+from grasp_cosim.base.files import write_text
 
 NOTEBOOK = Path(__file__).parent / "from_python.ipynb"
 

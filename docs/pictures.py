@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 import colour_studies
 import tutorials
 from grasp_cosim import cli
-from grasp_cosim.files import write_text
+from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.published.compared import compared
 from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system

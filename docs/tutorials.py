@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from grasp_cosim import cli
-from grasp_cosim.files import write_text
+from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import CLOSING, FINGERS
 from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
 from grasp_cosim.recording.load import load_run

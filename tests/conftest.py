@@ -119,7 +119,7 @@ def _used_hypothesis() -> None:
 @pytest.fixture(autouse=True)
 def _no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a loaded machine what is short may take 10 s, after which a line says that it goes on."""
-    monkeypatch.setattr("grasp_cosim.progress.EVERY", 3600.0)
+    monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 3600.0)
 
 
 _collections = -1

@@ -6,8 +6,8 @@ import sys
 from importlib.metadata import metadata
 
 import pytest
-from grasp_cosim.checks import install_command, packages
-from grasp_cosim.errors import FEW, MANY, nearest
+from grasp_cosim.base.checks import install_command, packages
+from grasp_cosim.base.errors import FEW, MANY, nearest
 
 PLANT = [
     *("force[1]", "force[2]", "gap[1]", "gap[2]", "finger_mass[1]", "finger_mass[2]"),

@@ -16,7 +16,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from grasp_cosim.files import write_text
+from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import FINGERS, METRICS
 from grasp_cosim.grasp.scene import scene_script, scene_style
 from grasp_cosim.report.page import page_style, traces_script

@@ -16,8 +16,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from c_compilers import BITS, LIBM, environment, find_zig
-from grasp_cosim.checks import install_command
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.checks import install_command
+from grasp_cosim.base.errors import InputError
 from grasp_fmus.native.blocks import translated
 from grasp_fmus.native.sources import native_sources
 from grasp_fmus.package import write_file

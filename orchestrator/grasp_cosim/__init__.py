@@ -20,7 +20,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from . import extensions
-from .errors import InputError, SimulationError
+from .base.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

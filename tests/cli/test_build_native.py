@@ -55,7 +55,7 @@ def test_what_is_built_is_said_before_the_compiler_runs(
     def ended(*_: object) -> None:
         raise CompilerError("out of patience")
 
-    monkeypatch.setattr("grasp_cosim.progress.EVERY", 0.0)
+    monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
     monkeypatch.setattr("grasp_fmus.build.build_native", ended)
     line = f"building for {here().tuple}, 0 s\ngrasp-cosim: out of patience\n"
     assert command("build", "--native") == (3, "", line)

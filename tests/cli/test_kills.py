@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from grasp_cosim.base.scratch import sweep
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.scratch import sweep
 from support import campaign
 from support.native_fmus import build, needs_gcc
 

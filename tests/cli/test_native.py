@@ -235,7 +235,7 @@ def test_the_first_compilation_is_announced(command: Run, monkeypatch: pytest.Mo
     monkeypatch.setenv("XDG_CACHE_HOME", str(Path("empty").absolute()))
     monkeypatch.setattr("grasp_fmus.package.shipped_model", slow)
     why = "grasp-cosim: native FMUs cannot be built: out of patience\n"
-    monkeypatch.setattr("grasp_cosim.progress.EVERY", 0.0)
+    monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
     for option, line in (("--quiet", ""), ("--native", ANNOUNCED)):
         shipped_twins.cache_clear()
         assert command("run", *SHORT, "--native", option)[2] == line + why

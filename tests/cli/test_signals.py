@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim.base.interruption import AT_ONCE
+from grasp_cosim.base.scratch import PREFIX
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.interruption import AT_ONCE
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.scratch import PREFIX
 from support.native_fmus import build, needs_gcc
 from support.slow import slow
 
@@ -210,7 +210,7 @@ def test_a_session_leaves_ctrl_c_as_it_was(grasp: System) -> None:
 
 HALF_IMPORTED = """
 import atexit, os, signal, sys
-from grasp_cosim import interruption
+from grasp_cosim.base import interruption
 from grasp_cosim.cli import entry
 from grasp_cosim.cli.group import cli
 

@@ -36,7 +36,7 @@ def shown(out: str) -> str:
 
 
 def test_what_is_said_is_what_was_asked_for(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("grasp_cosim.progress.EVERY", 0.0)
+    monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
     usual, quiet, verbose = (command(*RUN, *more) for more in ((), ("-q",), ("--verbose",)))
     assert {usual[0], quiet[0], verbose[0]} == {0}
     assert shown(usual[1]) == shown(quiet[1]) == shown(verbose[1])

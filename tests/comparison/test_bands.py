@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.comparison.bands import (
     BOTH,
     SHARE,
@@ -18,7 +19,6 @@ from grasp_cosim.comparison.bands import (
     signal_band,
 )
 from grasp_cosim.comparison.tube import Curve
-from grasp_cosim.errors import InputError
 
 TIME = np.linspace(0.0, 1.0, 101, dtype=np.float64)
 SINE = Curve(TIME, 2.0 + np.sin(2.0 * np.pi * TIME))

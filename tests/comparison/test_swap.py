@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 from comparison.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.comparison.interface_difference import capability_differences
 from grasp_cosim.comparison.swap import Swap, component_of, prepare_swap
-from grasp_cosim.errors import InputError
 from grasp_cosim.interface.interface import Interface, Variable, kind_of
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port

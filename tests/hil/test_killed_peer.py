@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import SimulationError, System, simulate
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.recording.result import Result
 from support.campaign import seeds

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import cli
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.hil.address import Address
 from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.relay import MOST_CLIENTS, Relay

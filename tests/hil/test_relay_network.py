@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.hil.network import DIRECTIONS, Conditions, Direction, Network, Outage
 from grasp_cosim.hil.traffic import Counters, Entry, Traffic
 from hypothesis import given

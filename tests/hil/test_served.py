@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.fmi.load import load_here
 from grasp_cosim.hil.driven import DrivenFmu
 from grasp_cosim.hil.protocol import exchanged, link_signature

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import cli
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.hil.protocol import link_signature
 from grasp_cosim.hil.served import ServedFmu, Service
 from grasp_cosim.hil.server import Server

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import fmpy
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection.inspection import COLUMNS, as_text, inspect_fmu
 from grasp_cosim.interface.capabilities import FLAGS
 from grasp_cosim.interface.obstacles import this_platform

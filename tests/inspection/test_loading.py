@@ -16,7 +16,7 @@ import fmpy
 import pytest
 from conftest import UnpackIn
 from fmpy.fmi2 import FMU2Slave
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.loading import Finding, Unpacked, Verdict, unpack
 from support import native_fmus

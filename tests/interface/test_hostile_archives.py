@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection.inspection import inspect_fmu
 from grasp_cosim.inspection.loading import examine, unpack
 from grasp_cosim.interface import document, read

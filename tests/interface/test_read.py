@@ -8,7 +8,7 @@ from typing import Any
 
 import fmpy
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.interface.interface import Interface, Value
 from grasp_cosim.interface.read import describe, read_interface
 from support.native_fmus import build, needs_gcc

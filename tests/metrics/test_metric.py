@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Metric, System, extensions, metric, simulate
+from grasp_cosim.base.parallel import run_all
 from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS, time_difference
 from grasp_cosim.metrics.metric import (
     RESERVED,
@@ -20,7 +21,6 @@ from grasp_cosim.metrics.metric import (
     measure,
     metrics_of,
 )
-from grasp_cosim.parallel import run_all
 from grasp_cosim.sweeps.run import Task, run_row
 
 TIME = np.array([0.0, 0.5, 1.0])

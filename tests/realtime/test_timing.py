@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.realtime.timing import Timing
 from report.timings import paced
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Result, SimulationError, System, simulate
-from grasp_cosim.files import in_one_piece
+from grasp_cosim.base.files import in_one_piece
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Rejection
 from grasp_cosim.system.settings import run_settings

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Result, load_run
-from grasp_cosim.checks import extra_module
+from grasp_cosim.base.checks import extra_module
 from hypothesis import given
 from hypothesis import strategies as st
 from report.runs import grasp_run, ring_run, write_run

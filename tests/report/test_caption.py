@@ -5,7 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.recording.folder import now
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.caption import about, caption, changes

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from grasp_cosim.recording.result import Result
 from grasp_cosim.report import plot
 from grasp_cosim.report.page import page_html

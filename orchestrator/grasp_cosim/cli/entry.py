@@ -9,9 +9,9 @@ from typing import NoReturn
 
 import click
 
-from .. import interruption
-from ..errors import InputError, SimulationError
-from ..files import FULL
+from ..base import interruption
+from ..base.errors import InputError, SimulationError
+from ..base.files import FULL
 from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us, leave

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import InputError
-from ..files import check_folder
-from ..plain import on_one_line
-from ..progress import Progress, phase, write
+from ..base.errors import InputError
+from ..base.files import check_folder
+from ..base.plain import on_one_line
+from ..base.progress import Progress, phase, write
 
 if TYPE_CHECKING:
     from ..metrics.metric import Metric

@@ -9,8 +9,8 @@ from tempfile import gettempdir
 
 import click
 
-from ..errors import InputError, nearest
-from ..scratch import sweep
+from ..base.errors import InputError, nearest
+from ..base.scratch import sweep
 from .frame import EVERYWHERE, told
 
 SECTIONS = {

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..system.description import System
 from ..system.places import plain
 from ..system.stimuli import read_stimuli

@@ -22,8 +22,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..checks import known, number, toml_table
-from ..errors import InputError, choices, nearest
+from ..base.checks import known, number, toml_table
+from ..base.errors import InputError, choices, nearest
 from .tube import Curve, deviation
 
 SHARE = 1e-3

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..extensions import readers
 from ..interface.units import Conversion
 from ..master.simulation import simulate

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 
-from ..errors import choices
+from ..base.errors import choices
 from ..interface.interface import Interface, Variable
 from ..system.description import System
 from ..system.parts import Port

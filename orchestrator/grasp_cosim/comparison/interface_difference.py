@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from math import isclose
 from typing import Any, Literal
 
-from ..checks import is_number
-from ..errors import choices, nearest
+from ..base.checks import is_number
+from ..base.errors import choices, nearest
 from ..interface.capabilities import KINDS
 from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
 from ..interface.units import IDENTITY, Conversion

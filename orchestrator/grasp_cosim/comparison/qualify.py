@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..checks import choice
-from ..errors import InputError, SimulationError
+from ..base.checks import choice
+from ..base.errors import InputError, SimulationError
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..master.simulation import simulate

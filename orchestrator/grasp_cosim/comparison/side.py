@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from si_units import known_unit
 
-from ..errors import InputError
-from ..files import check_nature
+from ..base.errors import InputError
+from ..base.files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals
 from ..recording.load import SETTINGS, SIGNALS, load_run, read_mdf

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
 
-from ..checks import known
-from ..errors import InputError
+from ..base.checks import known
+from ..base.errors import InputError
 from ..interface.expansion import values_of
 from ..interface.interface import Interface, Value
 from ..interface.read import describe

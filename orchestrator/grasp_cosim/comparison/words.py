@@ -7,10 +7,10 @@ from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
 
-from ..columns import columns
-from ..errors import choices
+from ..base.columns import columns
+from ..base.errors import choices
+from ..base.numerals import significant
 from ..metrics.metric import Metric
-from ..numerals import significant
 from ..system.parts import NANOSECONDS
 from .compare import Comparison
 from .interface_difference import SEVERITIES, Difference

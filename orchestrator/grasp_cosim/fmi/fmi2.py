@@ -21,8 +21,8 @@ from fmpy.fmi2 import (
     fmi2Terminated,
 )
 
+from ..base.scratch import ScratchFolder
 from ..interface.interface import Value
-from ..scratch import ScratchFolder
 from .instance import STEP_2, TRANSFER_2, Call, Native
 from .loaded import KEPT, LoadedInstance, keep_message, know_signatures
 from .variadic import formatted, logger_type

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from ..errors import choices
+from ..base.errors import choices
 from ..interface.interface import Value, Variable
 from ..system.parts import literal
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import SimulationError
+from ..base.errors import SimulationError
 from ..interface.interface import Interface, Value, Variable
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")

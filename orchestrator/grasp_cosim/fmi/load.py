@@ -1,6 +1,6 @@
 """From a component to a running instance of its FMU."""
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..interface.interface import Interface
 from ..system.parts import Component, Solver
 from .fmi2 import FmuInstance, SharedInstance

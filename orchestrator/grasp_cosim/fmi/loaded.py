@@ -26,12 +26,12 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
-from ..errors import InputError, SimulationError
-from ..files import FULL
+from ..base.errors import InputError, SimulationError
+from ..base.files import FULL
+from ..base.scratch import ScratchFolder, without_scratch
 from ..interface.arrays import Element
 from ..interface.interface import Interface, Value, Variable
 from ..interface.obstacles import of_binary, of_loading, this_machine
-from ..scratch import ScratchFolder, without_scratch
 from .inputs import Inputs
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 
-from ..errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import NANOSECONDS, Solver
 from .cvode import Cvode, CvodeError

@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError
+from ..base.scratch import ScratchFolder
 from ..interface.interface import Interface, Value, Variable
-from ..scratch import ScratchFolder
 from ..system.parts import Solver
 from .exchange import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, Exchange
 from .inputs import Inputs

@@ -13,8 +13,8 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
-from .. import interruption
-from ..errors import InputError, SimulationError
+from ..base import interruption
+from ..base.errors import InputError, SimulationError
 from .exchange import ANSWER, CALL, LOGGED, STEP, Exchange
 from .instance import EARLY, WARNING, Call, Instance
 from .load import load_here

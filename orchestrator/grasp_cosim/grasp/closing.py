@@ -1,6 +1,6 @@
 """A grasp that is run no longer than it takes."""
 
-from ..interruption import interrupts
+from ..base.interruption import interrupts
 from ..master.simulation import simulate
 from ..metrics.metric import resolved
 from ..recording.result import Result

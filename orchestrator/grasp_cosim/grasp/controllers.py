@@ -4,8 +4,8 @@ from collections.abc import Collection
 
 from grasp_fmus.build import shipped_fmus
 
-from ..checks import choice
-from ..errors import InputError
+from ..base.checks import choice
+from ..base.errors import InputError
 from ..metrics.metric import resolved
 from ..system.description import System
 

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..base.numerals import in_milli
 from ..metrics.metric import Metric, Signals, Value, metric
-from ..numerals import in_milli
 
 Floats = npt.NDArray[np.float64]
 

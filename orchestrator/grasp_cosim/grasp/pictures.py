@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..numerals import fixed
+from ..base.numerals import fixed
 from ..recording.result import Result
 from ..report.caption import caption
 from ..report.plot import BLUE, DASHES, GREY, RED, finish, headed, kept, new_figure, one_legend

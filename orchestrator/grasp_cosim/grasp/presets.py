@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..checks import known
+from ..base.checks import known
 from ..interface.interface import Value
 from ..interface.units import IDENTITY
 from ..metrics.metric import resolved

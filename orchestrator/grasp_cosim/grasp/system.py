@@ -4,8 +4,8 @@ from pathlib import Path
 
 from grasp_fmus.build import shipped_fmus
 
-from ..errors import InputError
-from ..files import FMU_FOLDER
+from ..base.errors import InputError
+from ..base.files import FMU_FOLDER
 from ..system.description import System
 from .controllers import with_controller
 from .presets import SYSTEM

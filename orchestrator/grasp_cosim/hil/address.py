@@ -5,7 +5,7 @@ import re
 import socket
 from collections.abc import Callable
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 Address = tuple[str, int]
 """IPv4 address and port."""

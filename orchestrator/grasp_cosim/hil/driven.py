@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from grasp_fmus.link.signature import LinkVariable, Signature
 
-from ..errors import SimulationError
+from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
 from ..fmi.load import load_here
 from ..interface.interface import Interface, Value, Variable

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, get_args
 
-from ..checks import number, whole
-from ..errors import InputError
+from ..base.checks import number, whole
+from ..base.errors import InputError
 from ..system.parts import NANOSECONDS
 
 Direction = Literal["request", "reply"]

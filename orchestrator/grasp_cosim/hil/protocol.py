@@ -8,7 +8,7 @@ from grasp_fmus.link.message import check_size, exposed, read_key
 from grasp_fmus.link.peer import ALIVE
 from grasp_fmus.link.signature import ORDER, LinkVariable, Signature
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface

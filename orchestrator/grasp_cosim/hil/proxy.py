@@ -13,8 +13,8 @@ from grasp_fmus.description import Experiment
 from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
 
-from ..errors import InputError, SimulationError
-from ..files import check_folder, write_text
+from ..base.errors import InputError, SimulationError
+from ..base.files import check_folder, write_text
 from ..interface.interface import Interface, Value, Variable
 from .protocol import exchanged, link_signature
 

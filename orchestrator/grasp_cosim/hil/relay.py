@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..columns import columns
-from ..errors import InputError
+from ..base.columns import columns
+from ..base.errors import InputError
 from .address import Address, connected, is_loopback, resolved, text
 from .loop import Loop, received
 from .network import Direction, Network

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from grasp_fmus.link.message import END, INITIALISE, VERSION
 from grasp_fmus.link.peer import TOO_LONG, Peer, Request
 
-from ..errors import InputError, SimulationError, nearest
+from ..base.errors import InputError, SimulationError, nearest
 from ..interface.interface import Interface, Value
 from ..system.parts import NANOSECONDS
 from .driven import DrivenFmu

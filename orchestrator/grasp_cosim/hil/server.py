@@ -4,7 +4,7 @@ import time
 
 from grasp_fmus.link.message import PORT
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .address import Address, text
 from .loop import Loop, received
 from .served import Say, ServedFmu

@@ -12,7 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Generic, Literal, NamedTuple, TypeVar
 
-from ..files import FULL
+from ..base.files import FULL
 from ..system.parts import NANOSECONDS
 from .network import DIRECTIONS, Direction, Network, Passage
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from si_units import known_unit
 
-from ..errors import choices
+from ..base.errors import choices
 from ..interface.interface import SETTABLE, Interface, Variable
 from ..system.parts import Component
 from ..system.structure import Structure

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import choices
+from ..base.errors import choices
 from ..interface.capabilities import KINDS
 from ..interface.interface import Variable
 from ..interface.obstacles import this_platform

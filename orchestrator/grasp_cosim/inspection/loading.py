@@ -19,8 +19,9 @@ from shutil import which
 from typing import Literal
 from xml.etree import ElementTree
 
-from ..checks import install_command
-from ..errors import choices
+from ..base.checks import install_command
+from ..base.errors import choices
+from ..base.scratch import ScratchFolder
 from ..fmi import fmpy
 from ..interface.document import unreadable
 from ..interface.interface import Interface
@@ -33,7 +34,6 @@ from ..interface.obstacles import (
     this_machine,
 )  # fmt: skip
 from ..interface.read import describe
-from ..scratch import ScratchFolder
 from .packed_imports import imports
 
 Status = Literal["ok", "warning", "problem"]

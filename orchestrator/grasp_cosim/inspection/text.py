@@ -11,9 +11,9 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
-from ..errors import choices
+from ..base.errors import choices
+from ..base.plain import on_one_line
 from ..interface.interface import Value, Variable
-from ..plain import on_one_line
 
 FEW = 6
 """Variables that a TODO names at most."""

@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-from ..errors import InputError
-from ..files import check_fmu_file
+from ..base.errors import InputError
+from ..base.files import check_fmu_file
 from .obstacles import HEAD
 
 NAME = "modelDescription.xml"

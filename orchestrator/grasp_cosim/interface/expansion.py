@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .arrays import (
     MOST_ELEMENTS,
     Array,

@@ -11,9 +11,9 @@ from typing import Any, Literal, Protocol, get_args
 
 from si_units import Unit, known_unit, spelt_like
 
-from ..checks import EXACT, integer, known, real
-from ..errors import InputError, choices
-from ..scratch import without_scratch
+from ..base.checks import EXACT, integer, known, real
+from ..base.errors import InputError, choices
+from ..base.scratch import without_scratch
 from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
 from .units import IDENTITY, Conversion, conversion
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import NamedTuple
 
-from ..errors import choices
+from ..base.errors import choices
 from .capabilities import KINDS
 from .interface import Interface
 

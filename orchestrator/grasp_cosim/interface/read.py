@@ -15,9 +15,9 @@ from xml.etree.ElementTree import Element
 
 from si_units import BASE, Unit, known_unit
 
-from ..checks import real
-from ..errors import InputError
-from ..files import check_fmu_file
+from ..base.checks import real
+from ..base.errors import InputError
+from ..base.files import check_fmu_file
 from .capabilities import capabilities_of, kinds_of
 from .document import read_document, unreadable
 from .interface import (

@@ -14,11 +14,11 @@ from typing import Any
 
 from c_compilers import CompilerError, Job, cache, compile_all, find_compiler
 
-from ..errors import InputError
+from ..base.errors import InputError
+from ..base.scratch import ScratchFolder
 from ..fmi import instance
 from ..fmi.instance import PYTHON, Native
 from ..realtime import meter, pacer
-from ..scratch import ScratchFolder
 from ..system.parts import NANOSECONDS
 from . import loop
 from .plan import Plan

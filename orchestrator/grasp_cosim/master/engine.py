@@ -9,8 +9,8 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, get_args
 
-from ..checks import choice
-from ..errors import InputError
+from ..base.checks import choice
+from ..base.errors import InputError
 from . import compiled, loop
 from .plan import Plan
 

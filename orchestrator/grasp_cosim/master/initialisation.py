@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
+from ..base.numerals import counted
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
-from ..numerals import counted
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.faults import INITIAL

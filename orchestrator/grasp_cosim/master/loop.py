@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from ctypes import c_float
 from typing import Any, NamedTuple
 
-from .. import checks
+from ..base import checks
 
 COPY, SCALE, STORE, LOAD, LOAD_LONG, DRIVE, CALL, STEP = range(8)  # calls last
 """Operations: over connections COPY and SCALE; over casts STORE into a buffer of another type, LOAD

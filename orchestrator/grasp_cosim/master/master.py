@@ -11,8 +11,8 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from ..checks import exact
-from ..errors import InputError, SimulationError
+from ..base.checks import exact
+from ..base.errors import InputError, SimulationError
 from ..fmi.instance import DISCARD, EARLY, Instance
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer

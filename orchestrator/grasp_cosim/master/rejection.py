@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import SimulationError
+from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, OK, WARNING, Instance
 
 SMALLEST = 1024

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from ..checks import exact
+from ..base.checks import exact
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System

@@ -10,14 +10,14 @@ from dataclasses import replace
 from numbers import Integral
 from typing import Any
 
-from ..errors import InputError, SimulationError, nearest
+from ..base.errors import InputError, SimulationError, nearest
+from ..base.interruption import interruptible, interrupts
+from ..base.numerals import counted
+from ..base.progress import Progress, phase
 from ..fmi.load import load
 from ..interface.interface import Value
-from ..interruption import interruptible, interrupts
 from ..metrics.metric import Function, Metric, chosen, metrics_of
 from ..metrics.units import in_si
-from ..numerals import counted
-from ..progress import Progress, phase
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.dispatch import Dispatcher

@@ -33,9 +33,9 @@ import numpy.typing as npt
 from si_units import refusal
 
 from .. import extensions
-from ..checks import known
-from ..errors import InputError, choices, nearest
-from ..errors import reason as reason_of
+from ..base.checks import known
+from ..base.errors import InputError, choices, nearest
+from ..base.errors import reason as reason_of
 from ..interface.units import Conversion
 
 Value = float | bool | None

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from si_units import Unit, known_unit
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..interface.units import Conversion
 from ..system.parts import Port
 from ..system.readings import Reading, in_other_units, naming, readings

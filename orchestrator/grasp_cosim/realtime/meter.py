@@ -12,7 +12,7 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..system.description import System
 from ..system.parts import NANOSECONDS
 from ..system.realtime import Realtime

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..system.realtime import Realtime
 
 CURRENT, FUTURE, ON_FAULT = 1, 2, 4

@@ -6,7 +6,7 @@ from itertools import pairwise
 from math import inf
 from typing import Any, NamedTuple, Self
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 
 class Overrun(NamedTuple):

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError, SimulationError
-from ..files import in_one_piece, unwritable
-from ..plain import to_cell
+from ..base.errors import InputError, SimulationError
+from ..base.files import in_one_piece, unwritable
+from ..base.plain import to_cell
 from .listener import Experiment, Signal, times
 
 PIECE = 1024

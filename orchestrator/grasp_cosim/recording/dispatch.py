@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import SimulationError
+from ..base.errors import SimulationError
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Port

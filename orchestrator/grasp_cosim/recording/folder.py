@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import extensions
-from ..errors import InputError
-from ..files import of_any_format, remove, unwritable, write_json
+from ..base.errors import InputError
+from ..base.files import of_any_format, remove, unwritable, write_json
 from ..metrics.units import in_si
 from ..system.description import System
 from ..system.parts import Component

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..checks import extra_module
+from ..base.checks import extra_module
 
 if TYPE_CHECKING:
     import pandas as pd

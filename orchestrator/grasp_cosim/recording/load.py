@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 from si_units import known_unit
 
-from ..checks import choice, is_number, real
-from ..errors import InputError, choices
-from ..files import check_nature
+from ..base.checks import choice, is_number, real
+from ..base.errors import InputError, choices
+from ..base.files import check_nature
+from ..base.numerals import counted
+from ..base.plain import from_cell
 from ..interface.units import Conversion
 from ..metrics.metric import Metric, Signals, metrics_of
-from ..numerals import counted
-from ..plain import from_cell
 from ..realtime.timing import Timing
 from .mdf import check_mdf
 from .result import UNITS, Rejection, Result

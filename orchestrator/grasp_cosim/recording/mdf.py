@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from ..checks import extra_module
-from ..errors import InputError, SimulationError
-from ..files import in_one_piece, unwritable
+from ..base.checks import extra_module
+from ..base.errors import InputError, SimulationError
+from ..base.files import in_one_piece, unwritable
 from .listener import Experiment, Signal, times
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError
 from .listener import Experiment, Signal, times
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import extensions
-from ..checks import is_number
-from ..errors import UnknownNameError, choices
-from ..files import in_one_piece, write_json
+from ..base.checks import is_number
+from ..base.errors import UnknownNameError, choices
+from ..base.files import in_one_piece, write_json
+from ..base.plain import on_one_line
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
-from ..plain import on_one_line
 from ..realtime.timing import Timing
 from ..system.parts import NANOSECONDS
 from .csv import CsvListener

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base.files import write_text
+from ..base.numerals import counted, grouped
 from ..comparison.compare import Comparison
 from ..comparison.judged import Compared
 from ..comparison.qualify import Qualification
@@ -25,9 +27,7 @@ from ..comparison.words import (
     reason,
     verdict,
 )
-from ..files import write_text
 from ..metrics.metric import Metric
-from ..numerals import counted, grouped
 from ..recording.result import Result
 from .caption import Caption, about, caption, changes
 from .embed import LIMIT, Shown, fit

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..files import write_text
-from ..numerals import grouped
+from ..base.files import write_text
+from ..base.numerals import grouped
 from ..recording.csv import quoted
 from ..recording.listener import Texts
 from ..recording.result import Result

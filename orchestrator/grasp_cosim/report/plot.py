@@ -12,10 +12,10 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from ..checks import extra_module
-from ..errors import InputError
-from ..files import PICTURES, in_one_piece
-from ..numerals import in_milli
+from ..base.checks import extra_module
+from ..base.errors import InputError
+from ..base.files import PICTURES, in_one_piece
+from ..base.numerals import in_milli
 from ..recording.result import Result
 from .caption import Caption, caption
 

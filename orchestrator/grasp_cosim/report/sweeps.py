@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
+from ..base.numerals import counted
 from ..metrics.metric import Metric
-from ..numerals import counted
 from ..sweeps.table import Table
 from .caption import Caption
 from .plot import BLUE, COLORS, STYLES, finish, headed, kept, new_figure

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from html import escape
 from typing import Any
 
+from ..base.numerals import counted, fixed, grouped, significant
 from ..metrics.metric import Metric
-from ..numerals import counted, fixed, grouped, significant
 from ..recording.result import Result
 
 EXPERIMENT = (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
-from ..errors import InputError
-from ..numerals import grouped
+from ..base.errors import InputError
+from ..base.numerals import grouped
 from ..realtime.timing import Timing
 from .tables import bullets, number, svg_button, table
 from .timing import timing_svg

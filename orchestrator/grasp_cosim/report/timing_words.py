@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..numerals import grouped
+from ..base.numerals import grouped
 from ..realtime.timing import Spread, Timing
 
 QUANTILES = {"median": 0.5, "p99": 0.01, "p99.9": 0.001}

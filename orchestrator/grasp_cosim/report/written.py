@@ -5,8 +5,8 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-from ..errors import InputError
-from ..files import check_folder, of_any_format, remove_parts
+from ..base.errors import InputError
+from ..base.files import check_folder, of_any_format, remove_parts
 from ..recording.load import load_run, run_folder
 from .page import write_page
 from .timing import TIMING, draw_result

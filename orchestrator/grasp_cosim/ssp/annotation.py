@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from ..errors import InputError, choices, nearest
+from ..base.errors import InputError, choices, nearest
 from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Solver

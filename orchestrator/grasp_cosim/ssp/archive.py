@@ -15,10 +15,10 @@ from pathlib import Path
 from threading import Lock
 from urllib.parse import unquote, urlsplit
 
-from ..errors import InputError, nearest
-from ..files import in_one_piece
+from ..base.errors import InputError, nearest
+from ..base.files import in_one_piece
+from ..base.scratch import ScratchFolder
 from ..interface.document import check_size
-from ..scratch import ScratchFolder
 from .notes import Notes
 
 STRUCTURE = "SystemStructure.ssd"

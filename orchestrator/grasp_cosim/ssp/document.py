@@ -8,7 +8,7 @@ from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..fmi import fmpy
 from .notes import Notes
 from .version2 import as_version_1

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..system.parts import NANOSECONDS, in_nanoseconds
 from .annotation import Extras
 from .document import at, child

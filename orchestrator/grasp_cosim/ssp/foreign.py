@@ -13,8 +13,8 @@ from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from ..checks import real
-from ..errors import InputError, choices
+from ..base.checks import real
+from ..base.errors import InputError, choices
 from ..system.parts import NANOSECONDS, in_nanoseconds
 from .document import add, at, children
 

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 from si_units import known_unit
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..interface.interface import Value
 from ..system.parts import Component, Solver
 from .annotation import Beside

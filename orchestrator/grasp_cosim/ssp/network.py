@@ -16,7 +16,7 @@ from functools import cached_property
 
 from si_units import Unit
 
-from ..errors import InputError, nearest
+from ..base.errors import InputError, nearest
 from ..interface.interface import Interface, Variable
 from .tree import Element, Hop, Node, Path
 from .units import change, same

@@ -7,8 +7,8 @@ from typing import Any
 
 from si_units import Unit, known_unit
 
-from ..checks import known
-from ..errors import InputError
+from ..base.checks import known
+from ..base.errors import InputError
 from .archive import STRUCTURE, Archive
 from .document import ROOTS, checked, child, parse
 from .notes import Notes

@@ -20,7 +20,7 @@ from typing import Any
 
 from si_units import Unit
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
 from .document import at, child, children, is_true, short
 from .network import Carried, Network

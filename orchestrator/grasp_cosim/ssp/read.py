@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..interface.expansion import expanded
 from ..interface.interface import Value
 from ..system.description import System

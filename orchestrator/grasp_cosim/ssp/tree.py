@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 from si_units import Unit
 
-from ..checks import known
-from ..errors import InputError, choices
+from ..base.checks import known
+from ..base.errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface
 from .archive import STRUCTURE, Archive

@@ -6,7 +6,7 @@ from typing import Any
 
 from si_units import BASE, Unit
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..interface.units import conversion
 from .document import add, at, child, children
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .notes import Notes
 
 _TYPES = {

@@ -12,11 +12,11 @@ from typing import Any
 
 from si_units import Unit
 
-from ..errors import InputError
+from ..base.errors import InputError
+from ..base.numerals import counted
 from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
-from ..numerals import counted
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
 
-from ..checks import extra_module
-from ..errors import InputError
+from ..base.checks import extra_module
+from ..base.errors import InputError
 
 CONNECT = 10.0
 """s, to find the scheduler and a worker."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from si_units import known_unit
 
-from ..errors import InputError, reason
+from ..base.errors import InputError, reason
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError
+from ..base.scratch import ScratchFolder
 from ..interface.interface import Value
 from ..master.simulation import simulate
 from ..metrics.metric import Metric
 from ..recording.result import UNITS
-from ..scratch import ScratchFolder
 from ..system.description import System
 from .rows import Row
 

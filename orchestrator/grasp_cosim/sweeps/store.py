@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ..errors import InputError, SimulationError
-from ..numerals import counted
+from ..base.errors import InputError, SimulationError
+from ..base.numerals import counted
 from .run import Outcome
 
 

@@ -12,12 +12,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError
+from ..base.numerals import counted
+from ..base.parallel import Crew, Lost
+from ..base.progress import Progress, phase
 from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of
 from ..metrics.units import in_si
-from ..numerals import counted
-from ..parallel import Crew, Lost
-from ..progress import Progress, phase
 from ..system.description import System
 from ..system.settings import settings
 from .cluster import said

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from ..columns import columns
-from ..numerals import counted, significant
+from ..base.columns import columns
+from ..base.numerals import counted, significant
 from .convergence import Convergence, convergence, is_study
 from .table import STATISTICS, Table
 

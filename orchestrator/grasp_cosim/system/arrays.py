@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Set
 from dataclasses import replace
 
-from ..checks import known
-from ..errors import InputError, choices
+from ..base.checks import known
+from ..base.errors import InputError, choices
 from ..interface.arrays import shape_text
 from .parts import Component, Connection, Port
 from .stimuli_checks import driven

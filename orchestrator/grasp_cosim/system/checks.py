@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from ..checks import choice, known, number, whole
-from ..errors import InputError, choices
+from ..base.checks import choice, known, number, whole
+from ..base.errors import InputError, choices
+from ..base.numerals import counted
 from ..interface.capabilities import KINDS
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion
-from ..numerals import counted
 from .arrays import as_written, unsourced
 from .parts import LOOPS, NANOSECONDS, Component, Connection, Port, seconds
 from .stimuli_checks import check_stimuli, driven, stimuli_remarks

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import extensions
-from ..checks import choice, known
-from ..errors import InputError, nearest
-from ..files import check_nature
+from ..base.checks import choice, known
+from ..base.errors import InputError, nearest
+from ..base.files import check_nature
 from ..interface.interface import Given
 from .arrays import as_written, by_element, check_arrays
 from .checks import (

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from ..checks import number
-from ..errors import InputError
+from ..base.checks import number
+from ..base.errors import InputError
 from .parts import LONGEST, NANOSECONDS, Fault, seconds
 
 INITIAL = -1

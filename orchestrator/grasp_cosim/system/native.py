@@ -9,8 +9,8 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-from ..errors import InputError, choices
-from ..files import NATIVE_FOLDER
+from ..base.errors import InputError, choices
+from ..base.files import NATIVE_FOLDER
 from ..interface.obstacles import of_binary
 from .parts import Component
 from .structure import Structure

@@ -9,8 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from ..checks import is_number, number
-from ..errors import InputError
+from ..base.checks import is_number, number
+from ..base.errors import InputError
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value, Variable
 from ..interface.obstacles import of_binary

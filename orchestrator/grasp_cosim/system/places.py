@@ -5,8 +5,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from ..checks import as_table, check_keys, integer, known, real
-from ..errors import InputError, nearest
+from ..base.checks import as_table, check_keys, integer, known, real
+from ..base.errors import InputError, nearest
 from ..interface.interface import SETTABLE
 from .parts import Initialisation
 from .realtime import Realtime

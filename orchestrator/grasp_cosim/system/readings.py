@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from si_units import Unit
 
-from ..errors import InputError, choices
+from ..base.errors import InputError, choices
 from ..interface.interface import SETTABLE, Interface, Variable
 from ..interface.units import IDENTITY, Conversion, between_units, conversion
 from .parts import Connection, Port

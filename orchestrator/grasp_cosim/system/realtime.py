@@ -6,8 +6,8 @@ from fractions import Fraction
 from numbers import Real
 from typing import Literal, get_args
 
-from ..checks import choice, whole
-from ..errors import InputError
+from ..base.checks import choice, whole
+from ..base.errors import InputError
 
 Overrun = Literal["catch-up", "continue", "stop"]
 OVERRUNS: tuple[str, ...] = get_args(Overrun)

@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..checks import as_table, check_keys, real
-from ..errors import InputError, nearest
+from ..base.checks import as_table, check_keys, real
+from ..base.errors import InputError, nearest
 from .faults import RANDOM
 from .parts import (
     NANOSECONDS,

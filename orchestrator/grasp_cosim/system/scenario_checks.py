@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..checks import choice, exact, known, whole
-from ..errors import InputError, choices, nearest
+from ..base.checks import choice, exact, known, whole
+from ..base.errors import InputError, choices, nearest
 from ..interface.interface import Interface, Value
 from .faults import FAULTS
 from .parts import RELATIONS, Condition, Event, Fault, Port, first_step, seconds

@@ -22,11 +22,11 @@ from typing import Literal, get_args
 
 from si_units import known_unit
 
-from ..checks import EXACT, choice, integer, real
-from ..errors import InputError
+from ..base.checks import EXACT, choice, integer, real
+from ..base.errors import InputError
+from ..base.numerals import counted
+from ..base.plain import from_cell
 from ..interface.units import conversion
-from ..numerals import counted
-from ..plain import from_cell
 from .parts import LONGEST, NANOSECONDS, Port
 
 Interpolation = Literal["linear", "held"]

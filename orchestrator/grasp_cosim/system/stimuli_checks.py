@@ -6,8 +6,8 @@ from array import array
 
 from si_units import known_unit
 
-from ..checks import exact, known
-from ..errors import InputError, choices
+from ..base.checks import exact, known
+from ..base.errors import InputError, choices
 from ..interface.interface import Interface, Value, Variable
 from ..interface.units import IDENTITY, Conversion, conversion
 from .parts import Port

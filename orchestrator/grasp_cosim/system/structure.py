@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
 
-from ..checks import choice
-from ..errors import InputError, nearest
+from ..base.checks import choice
+from ..base.errors import InputError, nearest
 from ..interface.interface import Given, Variable
 from .parts import Component, Connection, Event, Fault, Initialisation, Port, in_nanoseconds
 from .realtime import Realtime

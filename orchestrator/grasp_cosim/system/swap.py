@@ -8,8 +8,8 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from ..checks import choice, text
-from ..errors import InputError, nearest
+from ..base.checks import choice, text
+from ..base.errors import InputError, nearest
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import IDENTITY

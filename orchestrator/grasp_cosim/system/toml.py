@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..checks import as_table, check_keys, check_values, choice, is_number, text, toml_table
-from ..errors import InputError
+from ..base.checks import as_table, check_keys, check_values, choice, is_number, text, toml_table
+from ..base.errors import InputError
 from ..interface.interface import Given
 from ..interface.read import read_interface
 from .description import System

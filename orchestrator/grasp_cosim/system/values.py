@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..interface.expansion import values_of
 from ..interface.interface import Given, Value
 from .parts import Component

@@ -5,7 +5,7 @@ import zlib
 from pathlib import Path
 
 import pytest
-from grasp_cosim.errors import InputError
+from grasp_cosim.base.errors import InputError
 from playground import wasm
 from playground.page import playground_html
 from playground.system import PLANTS, page_system, shipped

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from ...errors import InputError, SimulationError
-from ...files import FMU_FOLDER, NATIVE_FOLDER, check_folder
+from ...base.errors import InputError, SimulationError
+from ...base.files import FMU_FOLDER, NATIVE_FOLDER, check_folder
 from ...interface.obstacles import of_binary
 from ...interface.read import describe
 from ..frame import PATH, json_option, say, show, waiting

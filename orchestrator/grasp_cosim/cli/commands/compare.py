@@ -4,10 +4,10 @@ from pathlib import Path
 
 import click
 
+from ...base.files import check_folder
 from ...comparison import words
 from ...comparison.bands import read_bands
 from ...comparison.compare import compare as compare_runs
-from ...files import check_folder
 from ...report.comparison import write_comparison
 from ..frame import NEGATIVE, PATH, chosen_metrics, json_option, metrics_option, say, show, waiting
 

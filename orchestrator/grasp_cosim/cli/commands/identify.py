@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from ...files import check_folder, write_text
+from ...base.files import check_folder, write_text
 from ...grasp.identification.identification import DEFAULT, GROUPS
 from ...grasp.identification.identification import identify as run_identification
 from ...grasp.system import grasp_system

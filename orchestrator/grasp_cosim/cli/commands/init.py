@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...errors import InputError
-from ...files import check_folder, write_text
+from ...base.errors import InputError
+from ...base.files import check_folder, write_text
+from ...base.numerals import counted
 from ...inspection.text import with_paths
 from ...interface.read import read_interface
-from ...numerals import counted
 from ...system.description import System
 from ...system.toml import to_do
 from ..frame import PATH, json_option, pair, say, show

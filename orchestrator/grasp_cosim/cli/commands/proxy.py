@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from grasp_fmus.proxy import DEFAULTS, Settings
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ..frame import PATH, json_option, say, show, waiting
 from .build import FIRST
 

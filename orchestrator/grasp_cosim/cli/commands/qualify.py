@@ -6,12 +6,12 @@ from typing import Any
 
 import click
 
+from ...base.files import check_folder
 from ...comparison.bands import read_bands
 from ...comparison.qualify import qualify as run_qualification
 from ...comparison.swap import component_of
 from ...comparison.words import qualification_json, qualification_text
 from ...extensions import readers
-from ...files import check_folder
 from ...interface.read import check_runs
 from ...report.comparison import write_qualification
 from ...system.places import SECTIONS

@@ -6,12 +6,12 @@ from typing import Any
 
 import click
 
-from ...errors import InputError
+from ...base.errors import InputError
+from ...base.interruption import interrupts
 from ...hil.address import is_loopback, read_address, text
 from ...hil.network import DIRECTIONS, Conditions, Network, Outage
 from ...hil.relay import Relay
 from ...hil.traffic import csv_log
-from ...interruption import interrupts
 from ..frame import PATH, json_option, say, show
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ...errors import InputError, SimulationError
+from ...base.errors import InputError, SimulationError
 from ...master.simulation import simulate
 from ...recording.folder import RunFolder
 from ...recording.mdf import check_mdf

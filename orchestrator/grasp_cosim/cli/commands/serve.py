@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
+from ...base.interruption import interrupts
 from ...hil.address import is_loopback, text
 from ...hil.protocol import LONGEST_SILENCE, exchanged, shared_key
 from ...hil.served import ServedFmu, Service
 from ...hil.server import DEFAULT_ADDRESS, Server
-from ...interruption import interrupts
 from ...system.parts import in_nanoseconds
 from ..frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from ...files import check_folder
+from ...base.files import check_folder
 from ..frame import PATH, json_option, say, show
 from ..options import chosen_system, set_option
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...interface.interface import Value
 from ...report.sweeps import draw_sweep
 from ...sweeps.cluster import cluster

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...checks import real
-from ...errors import InputError, SimulationError, choices
-from ...parallel import Crew
-from ...progress import Progress
+from ...base.checks import real
+from ...base.errors import InputError, SimulationError, choices
+from ...base.parallel import Crew
+from ...base.progress import Progress
 from ...system.description import System
 from ..closing import close
 from ..metrics import FINGERS

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import InputError, SimulationError
-from ...numerals import counted
+from ...base.errors import InputError, SimulationError
+from ...base.numerals import counted
 
 Vector = npt.NDArray[np.float64]
 

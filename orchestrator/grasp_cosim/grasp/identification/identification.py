@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError, nearest
-from ...numerals import counted
+from ...base.errors import InputError, nearest
+from ...base.numerals import counted
 from ...recording.load import load_log
 from ...system.description import System
 from ..metrics import FINGERS

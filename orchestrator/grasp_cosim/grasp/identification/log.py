@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, nearest
+from ...base.errors import InputError, nearest
+from ...base.numerals import counted
 from ...metrics.metric import Signals
-from ...numerals import counted
 from ...system.description import System
 from ..metrics import FINGERS
 from ..presets import start_in_si

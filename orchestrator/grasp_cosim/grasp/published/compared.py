@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...parallel import run_all
+from ...base.parallel import run_all
 from ...system.description import System
 from ..closing import close
 from ..presets import CASES, start_in_si, with_case, with_si_values

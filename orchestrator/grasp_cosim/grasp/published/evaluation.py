@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...files import check_folder, write_json, write_text
-from ...progress import Progress
+from ...base.files import check_folder, write_json, write_text
+from ...base.progress import Progress
 from ...recording.result import UNITS
 from ...report.plot import new_figure
 from ..metrics import METRICS

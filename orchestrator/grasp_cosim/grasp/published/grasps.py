@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...recording.result import Result
 from ...system.description import System
 from ..metrics import FINGERS, IMPACT_WINDOW, time_at_gap

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
-from grasp_cosim.files import in_one_piece, write_text
+from grasp_cosim.base.files import in_one_piece, write_text
 from recording.rows import full_disk
 
 

@@ -7,8 +7,8 @@ import threading
 from collections.abc import Callable
 
 import pytest
-from grasp_cosim import progress
-from grasp_cosim.progress import Progress, span, write
+from grasp_cosim.base import progress
+from grasp_cosim.base.progress import Progress, span, write
 
 
 class Terminal(io.StringIO):

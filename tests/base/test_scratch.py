@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 from conftest import UnpackIn
-from grasp_cosim.scratch import PREFIX, ScratchFolder, sweep
+from grasp_cosim.base.scratch import PREFIX, ScratchFolder, sweep
 
-KEEPS = "import sys; from grasp_cosim.scratch import ScratchFolder; a = ScratchFolder(); "
+KEEPS = "import sys; from grasp_cosim.base.scratch import ScratchFolder; a = ScratchFolder(); "
 FILL = "open(a.name + '/library.so', 'w').close(); print(a.name, flush=True); "
 
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from grasp_cosim.numerals import MOST, NOISE, counted, fixed
+from grasp_cosim.base.numerals import MOST, NOISE, counted, fixed
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -10,9 +10,9 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
-from grasp_cosim.errors import InputError, SimulationError
-from grasp_cosim.parallel import Crew, run_all
-from grasp_cosim.progress import Progress
+from grasp_cosim.base.errors import InputError, SimulationError
+from grasp_cosim.base.parallel import Crew, run_all
+from grasp_cosim.base.progress import Progress
 from support.processes import ends
 
 
@@ -77,7 +77,7 @@ def _endless(folder: Path) -> None:
 
 def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path: Path) -> None:
     code = (
-        "from pathlib import Path; from grasp_cosim.parallel import run_all; "
+        "from pathlib import Path; from grasp_cosim.base.parallel import run_all; "
         "from test_parallel import _endless; "
         f"run_all(_endless, [Path({str(tmp_path)!r})], 1, False, '')"
     )

@@ -3,8 +3,8 @@
 import re
 
 import pytest
-from grasp_cosim.checks import EXACT, exact, integer, real
-from grasp_cosim.errors import InputError, SimulationError
+from grasp_cosim.base.checks import EXACT, exact, integer, real
+from grasp_cosim.base.errors import InputError, SimulationError
 from hypothesis import example, given
 from hypothesis import strategies as st
 
