@@ -16,18 +16,11 @@ when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.swe
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from . import extensions
 from .base.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from matplotlib.figure import Figure
-
     from .comparison.compare import compare
     from .comparison.qualify import qualify
     from .grasp.identification.identification import identify
@@ -38,13 +31,11 @@ if TYPE_CHECKING:
     from .metrics.metric import Metric, metric
     from .recording.load import load_run
     from .recording.result import Result
-    from .report.page import Scene
     from .report.written import write_report
     from .ssp.write import write_ssp
     from .sweeps.sweep import sweep
     from .system.description import System
     from .system.realtime import Realtime
-    from .system.stimuli import Stimuli
 
 __all__ = [
     "InputError",
@@ -95,89 +86,3 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
     globals()[name] = value
     return value
-
-
-def _read_toml(
-    path: Path,
-    fmus: Path | None,
-    step: float | None,
-    stop: float | None,
-    stimuli: Stimuli | None,
-) -> System:
-    from .system.toml import read_toml
-
-    return read_toml(path, fmus, stimuli).with_experiment(step, stop)
-
-
-def _read_ssp(
-    path: Path,
-    fmus: Path | None,
-    step: float | None,
-    stop: float | None,
-    stimuli: Stimuli | None,
-) -> System:
-    from .ssp.read import read_ssp
-
-    if fmus is not None:
-        raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
-    return read_ssp(path, step, stop, stimuli)
-
-
-def _grasp_metrics() -> tuple[Metric, ...]:
-    from .grasp.metrics import METRICS
-
-    return METRICS
-
-
-def _is_grasp(result: Result) -> bool:
-    from .grasp.metrics import is_grasp
-
-    return is_grasp(result.by_role)
-
-
-def _draw_grasp(result: Result, path: Path | None) -> Figure:
-    from .grasp.pictures import draw_grasp
-
-    return draw_grasp(result, path)
-
-
-def _grasp_scene(result: Result) -> Scene | None:
-    from .grasp.scene import grasp_scene
-
-    return grasp_scene(result)
-
-
-def _grasp_traits(result: Result) -> Mapping[str, str]:
-    from .grasp.presets import case_of
-
-    return {"case": case_of(result.settings)}
-
-
-def _grasp_words(result: Result) -> Sequence[str]:
-    from .grasp.presets import words_of
-
-    return words_of(result.settings)
-
-
-def _draw_signals(result: Result, path: Path | None) -> Figure:
-    from .report.plot import plot_signals
-
-    return plot_signals(result, path)
-
-
-def _html(result: Result) -> str:
-    from .report.tables import result_html
-
-    return result_html(result)
-
-
-extensions.readers |= {".toml": _read_toml, ".ssp": _read_ssp}
-if find_spec(f"{__name__}.grasp"):
-    extensions.metrics["grasp"] = _grasp_metrics
-    extensions.drawings.append(
-        extensions.Drawing(
-            "grasp", _is_grasp, _draw_grasp, _grasp_scene, _grasp_traits, _grasp_words
-        )
-    )
-extensions.html.append(_html)
-extensions.drawings.append(extensions.Drawing("signals", lambda _: True, _draw_signals))

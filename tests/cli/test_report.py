@@ -28,7 +28,7 @@ def test_the_page_and_the_picture_are_beside_the_run(
     out, err = capsys.readouterr()
     html = (folder / "report.html").read_text("utf-8")
     for run in (load_run(folder), grasp_run()):
-        assert html == page_html(run, scene=run.drawing.scene(run))
+        assert html == page_html(run, scene=run.view.scene(run))
     assert 'id="scene"' in html
     assert (folder / "grasp.png").read_bytes().startswith(b"\x89PNG")
     assert out.splitlines()[0].startswith(f"{folder / 'report.html'}: ")

@@ -78,7 +78,7 @@ def test_without_a_plant_there_are_no_metrics_and_it_says_why(gripper: System) -
     assert result.measured.missing == LOST
     assert dict(result.measured.values) == {}
     assert set(result.metrics) == set(UNITS)
-    assert result.drawing.stem == "signals"
+    assert result.view.stem == "signals"
 
 
 def test_with_roles_they_are_the_same_to_the_bit(
@@ -91,7 +91,7 @@ def test_with_roles_they_are_the_same_to_the_bit(
     assert of_the_grasp(result.metrics) == of_the_grasp(original.metrics)
     assert result.measured.missing == ()
     assert None not in result.metrics["time_to_contact"]
-    assert result.drawing.stem == "grasp"
+    assert result.view.stem == "grasp"
 
 
 @pytest.mark.slow
@@ -107,7 +107,7 @@ def test_a_run_read_back_is_the_result_it_was(original: Result, fmus: Path, tmp_
     assert back.metric_units == result.metric_units
     assert back.measured.missing == result.measured.missing == ()
     assert (back.roles, back.units) == (result.roles, result.units)
-    assert back.drawing is result.drawing
+    assert back.view is result.view
     back.plot(tmp_path / "back.png")
     result.plot(tmp_path / "result.png")
     assert (tmp_path / "back.png").read_bytes() == (tmp_path / "result.png").read_bytes()
@@ -119,7 +119,7 @@ def test_what_a_run_lacks_is_read_back_too(gripper: System, tmp_path: Path) -> N
     result.to_json(tmp_path / "run.json")
     assert json.loads((tmp_path / "run.json").read_text())["missing_metrics"] == list(LOST)
     assert load_run(tmp_path).measured.missing == LOST
-    assert load_run(tmp_path).drawing.stem == "signals"
+    assert load_run(tmp_path).view.stem == "signals"
 
 
 @given(

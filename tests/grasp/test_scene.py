@@ -21,8 +21,8 @@ def test_only_a_grasp_has_the_scene() -> None:
     page = Elements(page_of(grasp_run()))
     assert {"scene", "fingers", "readings"} <= set(page.ids())
     assert len(page.ids()) == len(set(page.ids()))
-    assert ring_run(["a"]).drawing.scene(ring_run(["a"])) is None
-    assert grasp_run().drawing.scene(grasp_run()) == grasp_scene(grasp_run())
+    assert ring_run(["a"]).view.scene(ring_run(["a"])) is None
+    assert grasp_run().view.scene(grasp_run()) == grasp_scene(grasp_run())
 
 
 def test_signals_go_by_roles() -> None:

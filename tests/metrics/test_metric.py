@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Metric, System, extensions, metric, simulate
+from grasp_cosim import InputError, Metric, System, metric, simulate
 from grasp_cosim.base.parallel import run_all
 from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS, time_difference
 from grasp_cosim.metrics.metric import (
@@ -22,6 +22,7 @@ from grasp_cosim.metrics.metric import (
     metrics_of,
 )
 from grasp_cosim.sweeps.run import Task, run_row
+from support.groups import bring_group
 
 TIME = np.array([0.0, 0.5, 1.0])
 GAP = np.array([0.3, 0.2, 0.1])
@@ -301,7 +302,7 @@ def test_a_result_has_the_metrics_of_its_system(
     grasp: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     end = made("end", lambda run: run.time[-1])
-    monkeypatch.setitem(extensions.metrics, "ends", lambda: (end,))
+    bring_group(monkeypatch, "ends", end)
     for groups, names in (
         (("ends",), {"end"}),
         ((), set()),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from comparison.made import write_fmu
-from grasp_cosim import InputError, System, extensions, metric, simulate
+from grasp_cosim import InputError, System, metric, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.interface.units import Conversion
 from grasp_cosim.metrics.metric import Metric, Signals, measure
@@ -15,6 +15,7 @@ from grasp_cosim.metrics.units import InSi, in_si
 from grasp_cosim.sweeps.sweep import sweep
 from hypothesis import given
 from hypothesis import strategies as st
+from support.groups import bring_group
 
 OUTPUT = 'causality="output" | Real'
 INPUT = 'causality="input" | Real start="0"'
@@ -235,7 +236,7 @@ def test_every_way_to_run_a_system_refuses_it_first(
     load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """These FMUs have no binary: loading one would be another error."""
-    monkeypatch.setitem(extensions.metrics, "travels", lambda: (travel,))
+    bring_group(monkeypatch, "travels", travel)
     doubtful = load({}, {}, [*scaled(1e-3), '"room.y -> sink.b"'])
     doubtful = replace(doubtful, metrics=("travels",))
     ways: list[Callable[[], object]] = [
@@ -279,7 +280,7 @@ def test_a_signal_in_doubt_fails_the_metric_that_asks_for_it() -> None:
     measured = measure(run, [Metric("travel", travel.function), other])
     assert dict(measured.values) == {"other": 1.0}
     assert measured.failures == (
-        "metric 'travel': test_metrics_in_si.py, line 28: the unit of room.x is in doubt, as "
+        "metric 'travel': test_metrics_in_si.py, line 29: the unit of room.x is in doubt, as "
         "it has none and its connections scale it; must be named in the system file, under units",
     )
 

@@ -81,7 +81,7 @@ def test_nothing_sticks_out_of_a_narrow_or_wide_window(
     size: tuple[int, int], kind: str, tmp_path: Path
 ) -> None:
     run = replace(grasp_run(), timing=paced(steps=50))
-    scene = run.drawing.scene(run)
+    scene = run.view.scene(run)
     html = page_html(run, scene=scene) if kind == "run" else comparison_html(compare(run, run))
     act = """
       const scrolls = [...document.querySelectorAll(".cards, .cards td")].map((e) => e.scrollWidth);

@@ -65,7 +65,7 @@ def test_a_thinned_page_says_so_in_the_name_of_its_csv(tmp_path: Path) -> None:
 
 def test_each_panel_and_the_scene_are_saved_with_what_they_show(tmp_path: Path) -> None:
     run = grasp_run().titled("Before lunch")
-    html = page_html(run, scene=run.drawing.scene(run))
+    html = page_html(run, scene=run.view.scene(run))
     names = ["gap_in_mm", "contact_force_in_N", "velocity_in_mm_s", "target_position_in_mm"]
     buttons = [f".panel:nth-child({k + 1}) .save" for k in range(len(names))]
     found = saved(html, [*buttons, "[data-canvas]"], tmp_path)

@@ -32,7 +32,7 @@ def test_many_lines_of_a_unit_are_in_several_panels(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_finger_2_is_dashed_and_presses_with_a_positive_force(tmp_path: Path) -> None:
     run = grasp_run()
-    panels = in_browser(page_html(run, scene=run.drawing.scene(run)), PANELS, tmp_path)
+    panels = in_browser(page_html(run, scene=run.view.scene(run)), PANELS, tmp_path)
     force = next(panel for panel in panels if panel["title"] == "contact force in N")
     assert force["names"] == ["plant.contact_force[1]", "−plant.contact_force[2]"]
     assert force["last"] == [3.4, 3.4]
@@ -64,7 +64,7 @@ def test_what_is_far_away_says_how_far(width: int, tmp_path: Path) -> None:
       return all;
     """
     run = grasp_run()
-    html = page_html(run, scene=run.drawing.scene(run))
+    html = page_html(run, scene=run.view.scene(run))
     said = in_browser(html, act, tmp_path, size=(width, 800))
     of, away = ("", "") if width < 500 else ("contact of ", " away")
     far = {f"{gap} mm{away}" for gap in ("65.0", "85.0")}

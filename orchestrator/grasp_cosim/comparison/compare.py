@@ -8,12 +8,11 @@ from math import inf
 from pathlib import Path
 
 from ..base.errors import InputError, choices
-from ..extensions import readers
 from ..interface.units import Conversion
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
-from ..system.description import System
+from ..system.description import FILES, System
 from ..system.parts import NANOSECONDS
 from .bands import SHARE, Band, Bands
 from .judged import (
@@ -139,7 +138,7 @@ def _metrics(
 
 
 def _is_system(run: Result | str | Path) -> bool:
-    return not isinstance(run, Result) and Path(run).suffix.lower() in readers
+    return not isinstance(run, Result) and Path(run).suffix.lower() in FILES
 
 
 def _ran(system: Result | str | Path, other: Side | None) -> Side:

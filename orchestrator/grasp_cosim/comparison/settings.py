@@ -38,7 +38,7 @@ def differences(a: Result, b: Result) -> tuple[Difference, ...]:
 def _facts(run: Result) -> Iterator[tuple[str, str]]:
     """The settings, FMUs and versions of a run by name, each in words; equal for equal runs."""
     settings, fmus = run.settings, run.origin.get("fmus", {})
-    yield from run.drawing.traits(run).items()
+    yield from run.view.traits(run).items()
     for key in ("system", "scheme", "step", "stop"):
         yield key, _words(settings[key]) + (" s" if key in ("step", "stop") else "")
     yield from _nested("initialisation", settings["initialisation"])

@@ -32,10 +32,10 @@ import numpy as np
 import numpy.typing as npt
 from si_units import refusal
 
-from .. import extensions
 from ..base.checks import known
 from ..base.errors import InputError, choices, nearest
 from ..base.errors import reason as reason_of
+from ..base.higher import groups, higher
 from ..interface.units import Conversion
 
 Value = float | bool | None
@@ -172,8 +172,7 @@ class Metric:
         """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
             return _from_text, (*self.origin, self.name)
-        ours = extensions.metrics.get(self.group)
-        if ours and any(self is m for m in ours()):
+        if self.group in groups() and any(self is m for m in metrics_of([self.group])):
             return _of_group, (self.group, self.name)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
@@ -244,15 +243,15 @@ class Measured:
         return found
 
 
-def metrics_of(groups: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
+def metrics_of(names: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
     """The metrics of groups of ours, as a system names them, then `more`.
 
     InputError where there is no such group, or two metrics have one name.
     """
     found: dict[str, Metric] = {}
-    for group in groups:
-        known("metrics: no group", group, extensions.metrics)
-        found |= {m.name: m for m in extensions.metrics[group]()}
+    for group in names:
+        known("metrics: no group", group, groups())
+        found |= {m.name: m for m in higher(f"{group}.metrics").METRICS}
     for m in more:
         if m.name in found:
             raise InputError(f"metric {m.name!r}: is defined twice; must have another name")
@@ -262,17 +261,17 @@ def metrics_of(groups: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metr
 
 def chosen(
     wanted: Iterable[Metric | Function | str],
-    groups: Iterable[str],
+    of_groups: Iterable[str],
     names: Collection[str],
     roles: Mapping[str, str],
 ) -> tuple[Metric, ...]:
-    """Those of `wanted` that are not in `groups` anyway: metrics, functions, names of metrics.
+    """Those of `wanted` that are not in groups anyway: metrics, functions, names of metrics.
 
     A function is a metric of its own name, without a unit; a name is one of those in the groups.
     InputError where there is none of that name, or the signals of these `names` do
     not permit it.
     """
-    wanted, usual = tuple(wanted), {m.name: m for m in metrics_of(groups)}
+    wanted, usual = tuple(wanted), {m.name: m for m in metrics_of(of_groups)}
     for name in (item for item in wanted if isinstance(item, str)):
         if name not in usual:
             raise InputError(f"metrics: {name!r}: no such metric; {nearest(name, usual)}")

@@ -15,9 +15,9 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from .. import extensions
 from ..base.errors import InputError
 from ..base.files import of_any_format, remove, unwritable, write_json
+from ..base.higher import groups
 from ..metrics.units import in_si
 from ..system.description import System
 from ..system.parts import Component
@@ -26,6 +26,7 @@ from .listener import Experiment, Signal
 from .load import SETTINGS, SIGNALS, TEXT
 from .memory import TYPES
 from .result import Result, conversions_entry
+from .view import OF_ANY
 
 DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
 """The files that may be made of a run in its folder, beside its picture."""
@@ -138,8 +139,7 @@ class RunFolder:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._keep_others_out()
             if settings.is_file() and signals.is_file():
-                stems = (drawing.stem for drawing in extensions.drawings)
-                remove(self._folder, *DRAWN, *of_any_format(*stems))
+                remove(self._folder, *DRAWN, *of_any_format(OF_ANY.stem, *groups()))
             remove(self._folder, SETTINGS, SIGNALS)
             if self._signals:
                 self._csv.begin(self._experiment, self._signals)

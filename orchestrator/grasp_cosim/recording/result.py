@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from .. import extensions
 from ..base.checks import is_number
 from ..base.errors import UnknownNameError, choices
 from ..base.files import in_one_piece, write_json
+from ..base.higher import higher
 from ..base.plain import on_one_line
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
@@ -25,6 +25,7 @@ from .frames import as_pandas, as_xarray
 from .listener import Experiment, Listener, Signal
 from .mdf import MdfListener
 from .proxies import proxy_figures
+from .view import OF_ANY, View
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -111,7 +112,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def _repr_html_(self) -> str:
         """The run and its metrics, as notebooks show them."""
-        return extensions.html[0](self)
+        html: str = higher("report.tables").result_html(self)
+        return html
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.signals)
@@ -227,7 +229,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         where that is another one, or without matplotlib.
         """
         run = self.titled(title)
-        figure: Figure = self.drawing.draw(run, None if path is None else Path(path))
+        figure: Figure = self.view.draw(run, None if path is None else Path(path))
         return figure
 
     def titled(self, title: str) -> Result:
@@ -269,9 +271,10 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         yield f"  log      {choices(self.log, 1) if self.log else 'nothing to report'}"
 
     @property
-    def drawing(self) -> extensions.Drawing:
-        """The picture that plot() draws."""
-        return next(d for d in extensions.drawings if d.fits(self))
+    def view(self) -> View:
+        """How it is shown: of the first group of its metrics whose view fits, else any result's."""
+        views: Iterator[View] = (higher(f"{name}.view").VIEW for name in self.groups)
+        return next((view for view in views if view.fits(self)), OF_ANY)
 
     @cached_property
     def _steps(self) -> npt.NDArray[np.int64]:

@@ -31,7 +31,7 @@ def caption(result: Result, title: str = "") -> Caption:
     it is; of a run that was just done the date is that of today.
     """
     origin, settings = result.origin, result.settings
-    words = result.drawing.words(result)
+    words = result.view.words(result)
     made = ", ".join([PurePath(str(settings["system"])).stem, *words])
     date = str(origin.get("date", "" if result.folder else now().date().isoformat()))[:10]
     own = origin.get("versions", {}).get("grasp-cosim", "" if result.folder else None)

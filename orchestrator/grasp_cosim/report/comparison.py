@@ -73,7 +73,7 @@ def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[st
     time = np.union1d(*(run.part(c.begin, c.end).time for run in (c.a, c.b)))
     shown = fit(time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit)
     ids = {key: f"column{k}" for k, key in enumerate(shown.signals)}
-    scene = c.a.result.drawing.scene(c.a.result) if c.a.result else None
+    scene = c.a.result.view.scene(c.a.result) if c.a.result else None
     units = {s.name: s.unit for s in sorted(c.signals, key=lambda s: [*c.curves[0]].index(s.name))}
     texts = c.a.result.descriptions if c.a.result else {}
     sections = {

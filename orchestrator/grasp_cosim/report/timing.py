@@ -94,7 +94,7 @@ def draw_result(result: Result, folder: Path, suffix: str = "png") -> Iterator[P
 
     `suffix` is one of files.PICTURES.
     """
-    picture = folder / f"{result.drawing.stem}.{suffix}"
+    picture = folder / f"{result.view.stem}.{suffix}"
     result.plot(picture)
     yield picture
     if result.timing:

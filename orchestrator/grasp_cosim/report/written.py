@@ -27,8 +27,8 @@ def write_report(run: str | Path, out: str | Path | None = None, title: str = ""
     if recorded.wall_time is None:
         LOGGER.warning("%s: unfinished, to t = %.6g s", folder, recorded.time[-1])
     check_folder(page.parent)
-    remove_parts(page.parent, page.name, *of_any_format(recorded.drawing.stem, TIMING))
-    write_page(recorded, page, scene=recorded.drawing.scene(recorded))
+    remove_parts(page.parent, page.name, *of_any_format(recorded.view.stem, TIMING))
+    write_page(recorded, page, scene=recorded.view.scene(recorded))
     written = [page]
     try:
         written += draw_result(recorded, page.parent)

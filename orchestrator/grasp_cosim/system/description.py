@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from .. import extensions
 from ..base.checks import choice, known
 from ..base.errors import InputError, nearest
 from ..base.files import check_nature
+from ..base.higher import groups, higher
 from ..interface.interface import Given
 from .arrays import as_written, by_element, check_arrays
 from .checks import (
@@ -27,6 +27,11 @@ from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli
 from .structure import Structure, experiment
 from .swap import with_entries
+
+ARCHIVE = ".ssp"
+
+FILES = (".toml", ARCHIVE)
+"""The suffixes of files that have a system."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +61,7 @@ class System(Structure):
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
         for group in self.metrics:
-            known(f"{self.name}: metrics: no group", group, extensions.metrics)
+            known(f"{self.name}: metrics: no group", group, groups())
         if not self.as_read:  # copies keep it
             object.__setattr__(self, "as_read", made_of(self))
 
@@ -78,9 +83,14 @@ class System(Structure):
         """
         path = Path(path)
         check_nature(path, "system")
-        reader = extensions.readers.get(path.suffix.lower(), extensions.readers[".toml"])
-        stimuli = _stimuli(input)
-        system: System = reader(path, Path(fmus) if fmus else None, step, stop, stimuli)
+        system: System
+        if path.suffix.lower() != ARCHIVE:
+            toml = higher("system.toml")  # as it makes systems
+            system = toml.read_toml(path, Path(fmus) if fmus else None, _stimuli(input))
+            return system.with_experiment(step, stop)
+        if fmus is not None:
+            raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
+        system = higher("ssp.read").read_ssp(path, step, stop, _stimuli(input))
         return system
 
     def start(self, key: str) -> float:

@@ -11,9 +11,9 @@ from ...comparison.bands import read_bands
 from ...comparison.qualify import qualify as run_qualification
 from ...comparison.swap import component_of
 from ...comparison.words import qualification_json, qualification_text
-from ...extensions import readers
 from ...interface.read import check_runs
 from ...report.comparison import write_qualification
+from ...system.description import FILES
 from ...system.places import SECTIONS
 from ..frame import (
     NEGATIVE,
@@ -84,7 +84,7 @@ def qualify(
     """
     if out:
         check_folder(out.parent)
-    is_file = candidate.suffix.lower() in readers
+    is_file = candidate.suffix.lower() in FILES
     if not is_file:
         check_runs(candidate)
     of_system, of_component, values = _parted(given["settings"], component)

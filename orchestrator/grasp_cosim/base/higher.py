@@ -1,0 +1,25 @@
+"""What a lower room takes from a higher one: by name, when it is called for.
+
+Those are the reader of archives, the pictures and tables of a result, and a group: a folder of this
+package with what is its own of any system that names it, `metrics.py` with METRICS and `view.py`
+with a VIEW. A system file names groups as `metrics = ["grasp"]`.
+"""
+
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+PACKAGE = __name__.partition(".")[0]
+
+
+def higher(module: str) -> ModuleType:
+    """The module of that name in this package, like "report.plot"."""
+    return import_module(f"{PACKAGE}.{module}")
+
+
+@cache
+def groups() -> tuple[str, ...]:
+    """The names of the groups that there are."""
+    package = Path(__file__).parent.parent
+    return tuple(sorted(file.parent.name for file in package.glob("*/view.py")))

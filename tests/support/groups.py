@@ -1,0 +1,19 @@
+"""A group of metrics that is there for a test, as if its folder were in the package."""
+
+import sys
+from types import SimpleNamespace
+
+import pytest
+from grasp_cosim import Metric
+from grasp_cosim.metrics import metric
+from grasp_cosim.recording.view import OF_ANY
+from grasp_cosim.system import description
+
+
+def bring_group(monkeypatch: pytest.MonkeyPatch, name: str, *metrics: Metric) -> None:
+    for module in (description, metric):
+        monkeypatch.setattr(module, "groups", lambda: ("grasp", name))
+    has = {"metrics": SimpleNamespace(METRICS=metrics), "view": SimpleNamespace(VIEW=OF_ANY)}
+    for part, module in has.items():
+        monkeypatch.setitem(sys.modules, f"grasp_cosim.{name}.{part}", module)
+    monkeypatch.setitem(sys.modules, f"grasp_cosim.{name}", SimpleNamespace())
