@@ -183,12 +183,15 @@ def test_a_room_imports_from_rooms_below_it_and_nothing_goes_in_a_circle(
     assert not found, "\n".join(["", *found])
 
 
-def test_only_four_rooms_import_by_name(sources: dict[str, str]) -> None:
-    """The top its public names, the command line its commands, checks what an extra brings,
-    metrics the module in which a user has one.
-    """
-    known = {"__init__", "cli", "base", "metrics"}
-    assert {room(module) for module in calls(sources, BY_NAME)} <= known
+def test_only_three_rooms_import_by_name(sources: dict[str, str]) -> None:
+    """The top its public names, the command line its commands, base what an extra brings."""
+    assert {room(module) for module in calls(sources, BY_NAME)} == {"__init__", "cli", "base"}
+
+
+def test_three_rooms_take_by_name_what_is_higher(sources: dict[str, str]) -> None:
+    """A system the reader of its file, metrics their groups, a result its pictures."""
+    found = {room(module) for module in calls(sources, frozenset({"higher"}))}
+    assert found == {"system", "metrics", "recording"}
 
 
 def test_all_files_are_read(sources: dict[str, str]) -> None:
