@@ -154,7 +154,9 @@ def test_rows_of_single_steps_are_handed_on_together(
         session.step(2000)
         assert session.complete
     assert blocks.sizes == [1, 32, 32, 16, 920]
-    assert np.array_equal(blocks.signals["plant.gap[1]"], simulate(grasp, stop=0.1)["plant.gap[1]"])
+    assert np.array_equal(
+        blocks.columns()[1]["plant.gap[1]"], simulate(grasp, stop=0.1)["plant.gap[1]"]
+    )
 
 
 def test_rows_that_wait_are_handed_on_after_a_while(

@@ -110,7 +110,7 @@ def test_stop_ends_the_run_and_keeps_what_was_recorded(tmp_path: Path, engine: E
     error = r"^mock.toml: the step at t = 0\.3 s ended 50 ms late: b took 140 ms; must end within 1"
     with pytest.raises(SimulationError, match=error):
         run.to_the_end()
-    assert run.memory.time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
+    assert run.memory.columns()[0].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
     assert len(run.began["a"]) == 4
     assert culprits(run.timing()) == [(3, "b")]
 
@@ -140,7 +140,7 @@ def test_the_last_step_can_stop_the_run(tmp_path: Path, engine: Engine) -> None:
     run = Paced(tmp_path, {"a": {9: 150 * MS}}, Realtime(overrun="stop"), engine)
     with pytest.raises(SimulationError, match=r"the step at t = 0\.9 s ended 50 ms late: a took"):
         run.to_the_end()
-    assert len(run.memory.time) == 11
+    assert len(run.memory.columns()[0]) == 11
 
 
 def test_a_machine_that_wakes_us_late_is_to_blame(tmp_path: Path) -> None:
@@ -178,15 +178,15 @@ def test_rows_are_handed_on_while_there_is_time_to_wait(tmp_path: Path, engine: 
     took: list[int] = []
 
     def slow() -> None:
-        took.append(len(run.memory.time))
+        took.append(len(run.memory.columns()[0]))
         run.fake.time += 50 * MS
 
     run.recording = slow
     timing = run.to_the_end()
     assert timing.overruns == 0
     assert max(b - a for a, b in pairwise([*took, 1501])) <= SOME + 2
-    assert run.memory.time.tolist() == [k * 100 * MS / 1e9 for k in range(1501)]
-    assert run.memory.signals["a.y"] == pytest.approx(run.memory.time)
+    assert run.memory.columns()[0].tolist() == [k * 100 * MS / 1e9 for k in range(1501)]
+    assert run.memory.columns()[1]["a.y"] == pytest.approx(run.memory.columns()[0])
 
 
 def test_rows_wait_where_there_is_no_time_for_them(tmp_path: Path, engine: Engine) -> None:
@@ -194,7 +194,7 @@ def test_rows_wait_where_there_is_no_time_for_them(tmp_path: Path, engine: Engin
     took: list[int] = []
 
     def slow() -> None:
-        took.append(len(run.memory.time))
+        took.append(len(run.memory.columns()[0]))
         run.fake.time += 50 * MS
 
     run.recording = slow
@@ -204,7 +204,7 @@ def test_rows_wait_where_there_is_no_time_for_them(tmp_path: Path, engine: Engin
         culprits(timing)
         == [(SOME - 1, "recording"), (CHUNK - 1, "recording"), (CHUNK + 499, "a")][:2]
     )
-    assert len(run.memory.time) == CHUNK + 501
+    assert len(run.memory.columns()[0]) == CHUNK + 501
 
 
 def test_who_calls_single_steps_is_to_blame_for_a_pause(tmp_path: Path) -> None:
@@ -275,7 +275,7 @@ def test_interrupted_in_a_binary_it_keeps_what_was_handed_on(
     done = run.master.steps_done
     assert SOME <= done <= 150
     run.master.hand_on()
-    assert len(run.memory.time) == done + 1
+    assert len(run.memory.columns()[0]) == done + 1
     assert run.timing().steps <= done
 
 
@@ -290,7 +290,7 @@ def test_halted_it_stops_at_a_communication_point_and_can_go_on(
     run.halted, run.fake.on_sleep = False, lambda: None
     assert run.master.advance(100) == 7
     assert run.timing().steps == 10
-    assert run.memory.signals["a.y"].tolist() == pytest.approx([k / 10 for k in range(11)])
+    assert run.memory.columns()[1]["a.y"].tolist() == pytest.approx([k / 10 for k in range(11)])
 
 
 def test_at_a_priority_others_get_to_run_in_overload(tmp_path: Path) -> None:

@@ -14,9 +14,9 @@ from recording.rows import EXPERIMENT, SIGNALS, peak, play, rows
 def test_columns_have_the_values_and_the_types_of_their_signals(block: int) -> None:
     table, memory = rows(100), MemoryListener()
     play(memory, table, block=block)
-    assert list(memory.signals) == ["a.x[1]", "a.n", "a.on"]
+    assert list(memory.columns()[1]) == ["a.x[1]", "a.n", "a.on"]
     types = [np.float64, np.int64, np.bool_]
-    for column, expected, element in zip(memory.signals.values(), table.T, types, strict=True):
+    for column, expected, element in zip(memory.columns()[1].values(), table.T, types, strict=True):
         assert column.dtype == element
         assert column.tolist() == expected.tolist()
 
@@ -25,28 +25,21 @@ def test_time_is_that_of_the_step_numbers() -> None:
     """Decimated to every third point and the last."""
     steps, memory = np.array([0, 3, 6, 9, 10]), MemoryListener(every=3)
     play(memory, rows(5), steps)
-    assert memory.time.tolist() == [k * 100_000 / 1e9 for k in (0, 3, 6, 9, 10)]
+    assert memory.columns()[0].tolist() == [k * 100_000 / 1e9 for k in (0, 3, 6, 9, 10)]
 
 
 def test_there_are_no_rows_before_the_first() -> None:
     memory = MemoryListener()
     memory.begin(EXPERIMENT, SIGNALS)
-    assert memory.time.shape == (0,)
-    assert [column.shape for column in memory.signals.values()] == [(0,)] * 3
-
-
-def test_more_rows_than_the_run_has_steps_are_kept_as_well() -> None:
-    """Whoever looks at a decimated run on its way gets a row more each time."""
-    table, memory = rows(10_500), MemoryListener(every=1000)
-    play(memory, table)
-    assert memory.signals["a.x[1]"].tolist() == table[:, 0].tolist()
+    assert memory.columns()[0].shape == (0,)
+    assert [column.shape for column in memory.columns()[1].values()] == [(0,)] * 3
 
 
 def test_what_was_read_on_the_way_stays_as_it_was() -> None:
-    table, memory = rows(100), MemoryListener(every=1000)
+    table, memory = rows(100), MemoryListener()
     memory.begin(EXPERIMENT, SIGNALS)
     memory.block(np.arange(10), table[:10])
-    early = memory.signals
+    _, early = memory.columns()
     memory.block(np.arange(10, 100), table[10:])
     assert early["a.x[1]"].tolist() == table[:10, 0].tolist()
 

@@ -178,4 +178,4 @@ class Run:
         return self.signals()
 
     def signals(self) -> dict[str, list[float]]:
-        return {name: column.tolist() for name, column in self.memory.signals.items()}
+        return {name: column.tolist() for name, column in self.memory.columns()[1].items()}

@@ -217,6 +217,8 @@ def _notes(
             yield f"{letter} is a log from elsewhere: its settings are not known"
             if side.silent:
                 yield f"{letter} tells no units of {choices(side.silent, 6)}: taken as in the other"
+        elif side.result.every > 1:
+            yield f"{letter} recorded one row in {side.result.every}: its metrics are of these"
         if side.texts:
             yield f"{letter} has texts, which are not compared: {choices(side.texts, 6)}"
     unlike = [f"{n} ({a.units[n]}, {b.units[n]})" for n, change in changes.items() if not change]

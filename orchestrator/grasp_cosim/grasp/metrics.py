@@ -186,7 +186,8 @@ def time_to_settle(signals: Signals, finger: int) -> float | None:
     if steady is None or not len(after) or after[-1] < STEADY_WINDOW:
         return None
     error = force - steady
-    outside = np.flatnonzero(np.abs(error) > SETTLED * steady)
+    band = SETTLED * steady
+    outside = np.flatnonzero((error > band) | (error < -band))
     if not len(outside):
         return 0.0
     k = int(outside[-1])
@@ -253,8 +254,8 @@ def _force(signals: Signals, finger: int) -> Floats:
 
 def _last(signals: Signals, finger: int) -> Floats:
     """The contact force over the last STEADY_WINDOW, N."""
-    late = signals.time >= signals.time[-1] - STEADY_WINDOW
-    return np.asarray(_force(signals, finger)[late])
+    late = int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
+    return np.asarray(np.abs(signals[f"plant.contact_force[{finger}]"][late:]))
 
 
 def held_force(signals: Signals, finger: int) -> float | None:

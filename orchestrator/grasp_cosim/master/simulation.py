@@ -16,15 +16,15 @@ from ..base.numerals import counted
 from ..base.progress import Progress, phase
 from ..fmi.load import load
 from ..interface.interface import Value
-from ..metrics.metric import Function, Metric, chosen, metrics_of
+from ..metrics.metric import Function, Metric, Signals, chosen, measure, metrics_of, needed
 from ..metrics.units import in_si
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.dispatch import Dispatcher
 from ..recording.listener import Listener
-from ..recording.memory import MemoryListener
-from ..recording.proxies import proxy_lines
-from ..recording.result import Result
+from ..recording.memory import EveryRow, MemoryListener
+from ..recording.proxies import proxy_figures, proxy_lines
+from ..recording.result import Known, Result
 from ..system.checks import remarks
 from ..system.description import System
 from ..system.native import needed_twins
@@ -75,10 +75,12 @@ class Session:
         _check_count("every", every)
         recorded = {str(port) for port in system.recorded}
         self._metrics = chosen(metrics, system.metrics, recorded, system.roles)
-        all_of_them = metrics_of(system.metrics, self._metrics)
-        self._in_si = in_si(system, all_of_them)  # refuses before, not after
+        self._asked = metrics_of(system.metrics, self._metrics)
+        self._in_si = in_si(system, self._asked)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every, bool(realtime))
+        names = needed(self._asked, recorded, system.roles)
+        self._whole = EveryRow(names) if every > 1 else None
         self._wall_time = 0.0
         self._failed = False
         self._closed = False
@@ -90,8 +92,8 @@ class Session:
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
         self._stack = ExitStack()
-        self._known = (*system.notes, *system.once(remarks))
-        self._tell(self._known)
+        self._remarks = (*system.notes, *system.once(remarks))
+        self._tell(self._remarks)
         try:
             with interruptible(), _folder_kept():
                 self._begin(listeners, every, engine)
@@ -115,7 +117,7 @@ class Session:
         )
         slots, texts = self._master.slots, self._master.texts
         receivers = (self._memory, *listeners)
-        self._dispatch = Dispatcher(self.system, slots, receivers, every, texts)
+        self._dispatch = Dispatcher(self.system, slots, receivers, every, texts, self._whole)
         if self.pacer:
             self.pacer.spare = self._dispatch.spare
         self._stack.callback(self._end)
@@ -249,7 +251,8 @@ class Session:
         """
         try:
             self._master.hand_on()
-            self._dispatch.flush()
+            if self.complete or self._failed:
+                self._dispatch.flush()
         except SimulationError as error:
             self._failed = True
             error.result = self._result()
@@ -258,10 +261,11 @@ class Session:
 
     def _result(self) -> Result:
         master, signals, asked = self._master, self._dispatch.signals, self._privileges
+        time, columns = self._memory.columns(self._dispatch.pending)
         return Result(
             self._dispatch.settings,
-            self._memory.time,
-            self._memory.signals,
+            time,
+            columns,
             {s.name: s.unit for s in signals},
             self._wall_time,
             self.complete,
@@ -271,7 +275,16 @@ class Session:
             timing=self.pacer.timing(asked.granted, asked.refused) if self.pacer else None,
             more_metrics=self._metrics,
             to_si=self._in_si.conversions,
+            known=self._known(),
         )
+
+    def _known(self) -> Known | None:
+        """What is worked out of every step, where fewer rows are recorded."""
+        if self._whole is None:
+            return None
+        time, columns = self._whole.columns()
+        signals = Signals(time, columns, self.system.roles, self._in_si.conversions)
+        return Known(measure(signals, self._asked), proxy_figures(time, columns))
 
     def _tell(self, log: Sequence[str]) -> None:
         """Hand on the lines of the log that are new; `log` is all of it so far."""
@@ -283,7 +296,7 @@ class Session:
     def _early(self) -> tuple[str, ...]:
         """The lines of the log that are known before the first step."""
         return (
-            *self._known,
+            *self._remarks,
             *self._in_si.notes,
             *self._master.log,
         )
@@ -296,7 +309,7 @@ class Session:
             for name, r in master.rejections.items()
         )
         pending = master.scenario.pending() if self.complete else ()
-        memory, step = self._memory, self.system.step_ns / NANOSECONDS
+        step = self.system.step_ns / NANOSECONDS
         return (
             *self._early(),
             *self._dispatch.log,
@@ -305,7 +318,7 @@ class Session:
             *rejected,
             *master.ends,
             *pending,
-            *proxy_lines(memory.time, memory.signals, step),
+            *proxy_lines(*(self._whole or self._memory).columns(), step),
         )
 
 

@@ -361,6 +361,20 @@ def available(
     return there, [f"no {what}: {reason}" for what, reason in missing.items()]
 
 
+def needed(
+    metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
+) -> frozenset[str]:
+    """The signals of these `names` that the metrics may read, and those of proxies.
+
+    Of groups these are those they need, of a user's functions nobody knows: then all.
+    """
+    there = available(metrics, names, roles)[0]
+    if not all(m.group for m in there):
+        return frozenset(names)
+    found = {resolved(name, roles) for m in there for name in m.needs}
+    return frozenset({*found, *(name for name in names if ".proxy." in name)})
+
+
 def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> str | None:
     """Why signals of these `names` do not have all that is needed; None where they do."""
     needs = tuple(needs)

@@ -32,9 +32,13 @@ class Dispatcher:
         listeners: Sequence[Listener],
         every: int = 1,
         texts: Mapping[Port, Texts] = MappingProxyType({}),
+        whole: Listener | None = None,
     ) -> None:
-        """Slots are the columns of the rows, texts those of Strings, which are numbers there."""
-        self._listeners = tuple(listeners)
+        """Slots are the columns of the rows, texts those of Strings, which are numbers there.
+
+        whole gets every row.
+        """
+        self._listeners, self._whole = tuple(listeners), whole
         self._leisurely = [one for one in listeners if isinstance(one, Leisurely)]
         self.took = 0.0
         """s that the listeners took for their blocks."""
@@ -51,11 +55,12 @@ class Dispatcher:
         self._energy = ExchangeEnergy(system.once(bonds), slots, system.once(transforms))
         self.signals = (*outputs.values(), *self._energy.signals)
         self._block = np.empty((len(self.signals), 0))
-        self._pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
+        self.pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
+        """The last row, where decimation has left it out so far."""
         self.settings = run_settings(system)
         experiment = Experiment.of(self.settings)
         with ExitStack() as begun:
-            for listener in self._listeners:
+            for listener in (*self._listeners, *([whole] if whole else [])):
                 listener.begin(experiment, self.signals)
                 begun.callback(listener.end, False)
             begun.pop_all()  # whoever has begun is ended here only where the next one fails
@@ -73,12 +78,14 @@ class Dispatcher:
         count, wrong = self._check(steps, outputs)
         steps, columns = steps[:count], columns[:count]
         columns[:, len(self._columns) :] = self._energy(rows[:count])
-        self._pending = None
+        if self._whole:
+            self._whole.block(steps, columns)
+        self.pending = None
         wanted = slice(-int(steps[0]) % self._every, None, self._every)
         if len(steps[wanted]):
             self._hand_on(steps[wanted], columns[wanted])
         if steps[-1] % self._every:
-            self._pending = steps[-1:].copy(), columns[-1:].copy()
+            self.pending = steps[-1:].copy(), columns[-1:].copy()
         if wrong:
             raise SimulationError(wrong)
 
@@ -107,7 +114,7 @@ class Dispatcher:
 
     def flush(self) -> None:
         """Hand the last row on, where decimation has left it out."""
-        pending, self._pending = self._pending, None
+        pending, self.pending = self.pending, None
         if pending is not None:
             self._hand_on(*pending)
 

@@ -21,10 +21,10 @@ from ..base.files import check_nature
 from ..base.numerals import counted
 from ..base.plain import from_cell
 from ..interface.units import Conversion
-from ..metrics.metric import Metric, Signals, metrics_of
+from ..metrics.metric import Measured, Metric, Signals, metrics_of
 from ..realtime.timing import Timing
 from .mdf import check_mdf
-from .result import UNITS, Rejection, Result
+from .result import UNITS, Known, Rejection, Result
 
 SIGNALS, SETTINGS = "signals.csv", "run.json"
 """The files of a run's folder."""
@@ -38,7 +38,7 @@ SETTING_KEYS: Mapping[str, Any] = {
 }  # fmt: skip
 """Entries of run.json that say how the run was made, and of which types they are."""
 
-MAYBE_SETTINGS = ("roles", "input", "changed", "metrics")
+MAYBE_SETTINGS = ("diverging", "roles", "input", "changed", "metrics")
 """More of them, which may be there."""
 
 OUTCOME_KEYS: Mapping[str, Any] = {
@@ -53,7 +53,7 @@ ORIGIN_KEYS: Mapping[str, Any] = {
 
 MORE_KEYS: Mapping[str, Any] = {
     "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
-    "input": dict, "changed": dict, "metrics": list, **ORIGIN_KEYS,
+    "input": dict, "changed": dict, "metrics": list, "diverging": str, **ORIGIN_KEYS,
 }  # fmt: skip
 """Entries that may be there."""
 
@@ -81,7 +81,8 @@ def load_run(folder: str | Path) -> Result:
 
     One of its files stands for it.
 
-    Metrics are worked out anew from the signals; those of a user's file are as they were recorded.
+    Metrics are worked out anew from the signals; those of a user's file, and of a run that recorded
+    only some of its steps, are as they were recorded.
     InputError where a file is missing or damaged, or the two files are not of the same run.
     """
     folder = run_folder(Path(folder))
@@ -115,7 +116,7 @@ def _result(
     columns: Mapping[str, npt.NDArray[Any]],
 ) -> Result:
     realtime, types = written.get("realtime"), written.get("types", {})
-    return Result(
+    read = Result(
         settings={key: written[key] for key in (*SETTING_KEYS, *MAYBE_SETTINGS) if key in written},
         time=time,
         signals={
@@ -134,6 +135,19 @@ def _result(
         to_si=_to_si(f"{path}: to_si", written),
         folder=path.parent,
     )
+    return _with_known(read, written) if read.every > 1 else read
+
+
+def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
+    """A result of thinned rows with the metrics that run.json has, which are of every step."""
+    asked = metrics_of(read.groups, read.more_metrics)
+    there = tuple(m for m in asked if m.name in written)
+    if not there:  # it did not come to its end
+        line = f"one row in {read.every} was recorded: the metrics are of these"
+        return replace(read, log=(*read.log, line))
+    values = {m.name: written[m.name] for m in there}
+    measured = Measured(values, there, tuple(written.get("missing_metrics", ())))
+    return replace(read, known=Known(measured, written.get("proxies", {})))
 
 
 def _rejections(place: str, found: Mapping[str, Any]) -> dict[str, Rejection]:

@@ -2,17 +2,31 @@
 
 import mmap
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryFile, gettempdir
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import InputError, SimulationError
+from ..base.files import unwritable
 from .listener import Experiment, Signal, times
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 """The element type of a column of numbers by its signal's kind."""
+
+
+Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
+"""Steps, and their rows of values."""
+
+Columns = tuple[npt.NDArray[np.float64], Mapping[str, npt.NDArray[Any]]]
+"""Time in s, and columns by name."""
+
+FLOAT = np.dtype(np.float64).itemsize
 
 
 class MemoryListener:
@@ -29,27 +43,20 @@ class MemoryListener:
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Make room; InputError where the run does not fit into memory."""
         self._experiment, self._signals = experiment, tuple(signals)
-        self._steps = np.empty(0, np.int64)
-        self._table = np.empty((len(signals), 0))
         total = experiment.total_steps
+        rows = total // self._every + 2  # t = 0, and the last one besides every n-th
         try:
-            self._grow(total // self._every + 2)  # t = 0, and the last one besides every n-th
-        except MemoryError:
+            self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
+            self._table = _small_pages(*shape) if self._paced else np.empty(shape)
+        except (MemoryError, ValueError, OverflowError, OSError):  # more bytes than there can be
             raise InputError(
                 f"{experiment.name}: {total} steps do not fit into memory; "
                 "must have a longer step or an earlier stop, or record fewer of them"
             ) from None
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Copy the rows; SimulationError where there are more than fit into memory."""
+        """Copy the rows."""
         end = self._rows + len(steps)
-        if end > len(self._steps):
-            try:
-                self._grow(max(end, 2 * len(self._steps)))
-            except MemoryError:
-                raise SimulationError(
-                    f"{self._experiment.name}: {end} recorded rows do not fit into memory"
-                ) from None
         self._steps[self._rows : end] = steps
         self._table[:, self._rows : end] = rows.T
         self._rows = end
@@ -57,36 +64,92 @@ class MemoryListener:
     def end(self, complete: bool) -> None:
         """Nothing is left to do."""
 
-    @property
-    def time(self) -> npt.NDArray[np.float64]:
-        """The recorded communication points in s, so far."""
-        return times(self._steps[: self._rows], self._experiment.step_ns)
+    def columns(self, next_row: Rows | None = None) -> Columns:
+        """The recorded communication points in s and the columns by name, so far.
 
-    @property
-    def signals(self) -> dict[str, npt.NDArray[Any]]:
-        """The recorded columns by name, so far. Rows that come later do not change them.
-
-        Real ones are views, Strings arrays of str objects. An Integer is exact up to 2**53, as the
-        rows are float64.
+        Rows that come later do not change them. Real columns are views, Strings arrays of str
+        objects. An Integer is exact up to 2**53, as the rows are float64. With the step and values
+        of a row that is not recorded, it is their last.
         """
-        columns = self._table[:, : self._rows]
-        return {
-            s.name: s.texts.column(column)
-            if s.kind == "String"
-            else column.astype(TYPES[s.kind], copy=False)
-            for s, column in zip(self._signals, columns, strict=True)
-        }
+        steps, table = self._steps[: self._rows], self._table[:, : self._rows]
+        if next_row:
+            steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
+        found = zip(self._signals, table, strict=True)
+        return times(steps, self._experiment.step_ns), {s.name: _typed(s, c) for s, c in found}
 
-    def _grow(self, rows: int) -> None:
-        """Have room for so many rows; MemoryError where there is none."""
+
+class EveryRow:
+    """Keeps signals of these names at every step, where fewer are recorded, in a temporary file.
+
+    A metric of a thinned run would be one of other moments.
+    """
+
+    def __init__(self, names: Collection[str]) -> None:
+        self._names, self._rows = names, 0
+
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
+        """Open the file, in which a column comes after the other."""
+        self._experiment = experiment
+        self._chosen = [(i, s) for i, s in enumerate(signals) if s.name in self._names]
+        self._file = TemporaryFile(prefix="grasp_rows_", buffering=0)  # noqa: SIM115 - open as long as this
+        finalize(self, self._file.close)
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Write the columns of these rows, each to its place; SimulationError on a full disk."""
+        columns = times(steps, self._experiment.step_ns), *(rows[:, i] for i, _ in self._chosen)
         try:
-            steps, shape = np.empty(rows, np.int64), (len(self._signals), rows)
-            table = _small_pages(*shape) if self._paced else np.empty(shape)
-        except (ValueError, OverflowError, OSError) as error:  # more bytes than there can be
-            raise MemoryError from error
-        steps[: self._rows] = self._steps[: self._rows]
-        table[:, : self._rows] = self._table[:, : self._rows]
-        self._steps, self._table = steps, table
+            for place, column in enumerate(columns):
+                self._file.seek(self._place(place, int(steps[0])))
+                left = memoryview(column.tobytes())
+                while left:
+                    left = left[self._file.write(left) :]
+        except OSError as error:
+            reason = unwritable(Path(gettempdir()), error)
+            raise SimulationError(f"{reason} (every row, for the metrics)") from error
+        self._rows = int(steps[-1]) + 1
+
+    def end(self, complete: bool) -> None:
+        """The file goes with the last name of it."""
+
+    def columns(self) -> Columns:
+        """All communication points in s so far, and the columns by name.
+
+        They are in memory only from when they are asked for until they are let go.
+        """
+        return self._column(0), _Mapped(
+            {s.name: partial(self._typed, k, s) for k, (_, s) in enumerate(self._chosen, 1)}
+        )
+
+    def _typed(self, place: int, signal: Signal) -> npt.NDArray[Any]:
+        return _typed(signal, self._column(place))
+
+    def _column(self, place: int) -> npt.NDArray[np.float64]:
+        return np.memmap(self._file, np.float64, "r", self._place(place, 0), (self._rows,))
+
+    def _place(self, column: int, row: int) -> int:
+        return FLOAT * (column * (self._experiment.total_steps + 1) + row)
+
+
+class _Mapped(Mapping[str, npt.NDArray[Any]]):
+    """Columns by name, each made whenever it is asked for."""
+
+    def __init__(self, made: Mapping[str, Callable[[], npt.NDArray[Any]]]) -> None:
+        self._made = made
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        return self._made[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made)
+
+    def __len__(self) -> int:
+        return len(self._made)
+
+
+def _typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+    if signal.kind == "String":
+        return signal.texts.column(column)
+    return column.astype(TYPES[signal.kind], copy=False)
 
 
 def _small_pages(columns: int, rows: int) -> npt.NDArray[np.float64]:
@@ -96,5 +159,5 @@ def _small_pages(columns: int, rows: int) -> npt.NDArray[np.float64]:
     if sys.platform == "win32" or not columns * rows:
         return np.empty((columns, rows))
     private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
-    memory = mmap.mmap(-1, columns * rows * np.dtype(np.float64).itemsize, flags=private)
+    memory = mmap.mmap(-1, columns * rows * FLOAT, flags=private)
     return np.frombuffer(memory, np.float64).reshape(columns, rows)

@@ -63,6 +63,14 @@ class Figures(dict[str, Any]):
         raise UnknownNameError(name, tuple(self), "metric")
 
 
+@dataclass(frozen=True, slots=True)
+class Known:
+    """The metrics, and the figures of the proxies by component."""
+
+    measured: Measured
+    proxies: Mapping[str, Any]
+
+
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
@@ -93,6 +101,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """The date, versions, command and title of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
     """The conversions to SI base units of signals in others; None where the unit is in doubt."""
+    known: Known | None = None
+    """What was worked out of every step, where fewer rows were recorded."""
     folder: Path | None = None
     """Where it was read from; None of a run that was just done."""
 
@@ -145,7 +155,14 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @cached_property
     def measured(self) -> Measured:
         """The metrics, their units, and why others cannot be had."""
+        if self.known:
+            return self.known.measured
         return measure(self.by_role, metrics_of(self.groups, self.more_metrics))
+
+    @property
+    def every(self) -> int:
+        """The steps from one row to the next: more than 1 where the recording was thinned."""
+        return int(self._steps[1] - self._steps[0]) if len(self.time) > 1 else 1
 
     @property
     def numbers(self) -> dict[str, npt.NDArray[Any]]:
@@ -167,7 +184,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         """The metrics without those that fail."""
         simulated, wall_time = float(self.time[-1]), self.wall_time
         factor = simulated / wall_time if wall_time else wall_time
-        proxies = proxy_figures(self.time, self.signals)
+        known = self.known
+        proxies = known.proxies if known else proxy_figures(self.time, self.signals)
         figures = {
             **self.measured.values,
             "wall_time": wall_time,

@@ -1,0 +1,86 @@
+"""Metrics are of every step, however few rows are recorded."""
+
+from pathlib import Path
+from tempfile import gettempdir
+from typing import Any
+
+import pytest
+from grasp_cosim import Result, SimulationError, System, compare, load_run, metric, simulate
+from grasp_cosim.metrics.metric import Signals
+from grasp_cosim.recording.folder import RunFolder
+from grasp_cosim.recording.result import UNITS
+from recording.rows import full_disk
+
+
+@metric("samples", unit="1")
+def samples(run: Signals) -> int:
+    """How many there were, by one that a group would not name."""
+    return len(run["sensor_1.intensity"])
+
+
+def run(grasp: System, every: int, **more: Any) -> Result:
+    return simulate(grasp, step=1e-3, stop=2.5, every=every, metrics=[samples], **more)
+
+
+def measured(result: Result) -> dict[str, Any]:
+    return {name: m for name, m in result.metrics.items() if name not in UNITS}
+
+
+@pytest.mark.parametrize("every", [2, 100, 499, 1000, 5000])
+def test_they_do_not_depend_on_what_is_recorded(grasp: System, every: int) -> None:
+    whole, few = run(grasp, 1), run(grasp, every)
+    assert len(few.time) == 2 + 2499 // every
+    assert few.time[-1] == 2.5
+    assert measured(few) == measured(whole)
+    assert whole.metrics["samples"] == 2501
+    assert few.measured.metrics == whole.measured.metrics
+
+
+def test_on_the_way_they_are_of_the_steps_so_far(grasp: System) -> None:
+    found = []
+    for every in (1, 100):
+        with simulate.session(grasp, step=1e-3, every=every, metrics=[samples]) as session:
+            for _ in range(3):
+                session.step(150)
+                session.result()
+            found.append(session.result())
+    whole, few = found
+    assert measured(few) == measured(whole)
+    assert few.time.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4, 0.45]
+
+
+def test_they_are_read_back_as_they_were(grasp: System, tmp_path: Path) -> None:
+    few = run(grasp, 100)
+    few.to_csv(tmp_path / "signals.csv")
+    few.to_json(tmp_path / "run.json")
+    back = load_run(tmp_path)
+    assert dict(back.metrics) == dict(few.metrics)
+    assert back.measured.missing == few.measured.missing
+    assert repr(back).splitlines()[1:] == repr(few).splitlines()[1:]
+
+
+def test_of_a_run_that_did_not_end_they_are_of_its_rows_which_is_said(
+    grasp: System, tmp_path: Path
+) -> None:
+    folder = RunFolder(tmp_path, grasp, ["run"])
+    with simulate.session(grasp, step=1e-3, every=100, listeners=[folder]) as session:
+        session.step(550)
+    back = load_run(tmp_path)
+    assert back.log[-1] == "one row in 100 was recorded: the metrics are of these"
+
+
+def test_a_comparison_says_that_they_are_of_the_rows_it_has(grasp: System) -> None:
+    found = compare(run(grasp, 1), run(grasp, 100))
+    assert "B recorded one row in 100: its metrics are of these" in found.notes
+    assert not any(note.startswith("A recorded") for note in found.notes)
+
+
+def test_a_full_disk_ends_the_run_with_a_line(grasp: System) -> None:
+    session = simulate.session(grasp, step=1e-3, every=10)
+    with session, full_disk(20_000), pytest.raises(SimulationError) as caught:
+        session.step(2500)
+    assert str(caught.value) == (
+        f"{gettempdir()}: cannot be written: File too large (every row, for the metrics)"
+    )
+    assert caught.value.result is not None
+    assert len(caught.value.result.time) > 0
