@@ -139,7 +139,7 @@ def test_what_is_packed_into_fmus_imports_the_standard_library_only() -> None:
     assert not foreign
 
 
-@pytest.mark.parametrize("package", ["block_variables", "c_compilers", "si_units"])
+@pytest.mark.parametrize("package", ["block_variables", "c_compilers", "one_piece", "si_units"])
 def test_what_fmus_and_orchestrator_share_imports_the_standard_library_only(package: str) -> None:
     found = {name for _, name in imports(ROOT / "fmus" / package)}
     assert found

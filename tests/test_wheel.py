@@ -55,5 +55,5 @@ def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
         assert (empty / "c/arithmetic.h").is_file()
     assert {p.name for p in site.iterdir() if p.is_dir() and "-" not in p.name} == {
         "bin", "block_variables", "c_compilers", "grasp_cosim", "grasp_controller", "grasp_fmus",
-        "gripper_plant", "proximity_sensor", "si_units",
+        "gripper_plant", "proximity_sensor", "one_piece", "si_units",
     }  # fmt: skip

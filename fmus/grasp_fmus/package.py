@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ast
 import io
-import os
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -20,6 +19,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+from one_piece import in_one_piece
 
 from .shipped import SHIPPED
 
@@ -156,15 +157,8 @@ def write_file(target: Path, data: bytes) -> None:
     """
     if target.is_file() and target.read_bytes() == data:
         return
-    target.parent.mkdir(parents=True, exist_ok=True)
-    part = target.with_name(f"{target.name}.{os.getpid()}.part")
-    try:
+    with in_one_piece(target) as part:
         part.write_bytes(data)
-        part.replace(target)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(target)) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:

@@ -65,7 +65,7 @@ def test_the_folder_may_be_moved(fmus_here: Run, tmp_path: Path) -> None:
 WRONG = [
     (("there.toml",), "there.toml: is there already; give another name, or --force"),
     (("here.ssp",), "here.ssp: must end in .toml, a system file"),
-    (("folder.toml",), "folder.toml: is a folder; must be a file"),
+    (("folder.toml",), "folder.toml: is a folder; must be the name of a file"),
     (("a.toml", "--as", "hand=vendor.fmu"), "--as hand: no component 'hand'; valid: plant, sens"),
     (("a.toml", "--as", "plant"), "--as 'plant': must be COMPONENT=FMU"),
     (("a.toml", "--as", "plant=none.fmu"), "none.fmu: no such FMU file"),

@@ -157,8 +157,8 @@ def test_a_line_of_toml_is_named(text: str, said: str, command: Run, tmp_path: P
     [
         (("report", "run", "--out", "folder"), "folder: is a folder; must be the name of a file"),
         (("compare", "run", "run", "-o", "."), ".: is a folder; must be the name of a file"),
-        (("ssp", "-o", "."), ".: must be a file named like system.ssp"),
-        (("proxy", "plant.fmu", "-o", "."), "proxy: .: must be NAME.fmu"),
+        (("ssp", "-o", "."), ".: is a folder; must be the name of a file"),
+        (("proxy", "plant.fmu", "-o", "."), ".: is a folder; must be the name of a file"),
         (("run", "--stop", "0.01", "--out", "a.toml"), "a.toml: cannot write to "),
         (("build", "--out", "a.toml/b"), "a.toml/b: cannot write to "),
         (("report", "run", "--out", "a.toml/b"), "a.toml: cannot write to "),

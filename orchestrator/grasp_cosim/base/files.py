@@ -5,12 +5,13 @@ import json
 import os
 import tempfile
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from glob import escape
 from pathlib import Path
 from shlex import quote
 from typing import Any
+
+from one_piece import in_one_piece, is_stream
 
 from .errors import InputError, choices
 
@@ -37,6 +38,16 @@ def check_folder(folder: Path) -> None:
             pass
     except OSError as error:
         raise InputError(f"{folder}: cannot write to {nearest}: {error.strerror}") from error
+
+
+def check_file(path: Path) -> None:
+    """InputError where a file could not be written at path: see one_piece.in_one_piece()."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; must be the name of a file")
+    if not is_stream(path):
+        check_folder((Path(os.path.realpath(path)) if path.is_symlink() else path).parent)
+    elif not os.access(path, os.W_OK):
+        raise InputError(f"{path}: cannot be written to; must be a file, or a stream that can")
 
 
 WANTED = {
@@ -144,31 +155,14 @@ def write_json(path: Path, content: Any) -> None:
     write_text(path, json.dumps(content, indent=2) + "\n")
 
 
-@contextmanager
-def in_one_piece(path: Path) -> Iterator[Path]:
-    """A temporary name beside path to write to; it takes the place of path at the end."""
-    if path.is_dir():
-        raise IsADirectoryError(errno.EISDIR, "is a folder; must be the name of a file", str(path))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
-        yield part
-        part.replace(path)
-    except OSError as error:  # a write that fails does not say where, or where it is for now
-        if error.errno is None or error.filename not in (None, part, str(part)):
-            raise
-        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def remove(folder: Path, *names: str) -> None:
     """Remove files of these names, as far as there are any, and parts of them: see remove_parts().
 
     Before several files that belong together are written anew: so there are none of two works.
     """
-    for name in names:
-        (folder / name).unlink(missing_ok=True)
+    for path in (folder / name for name in names):
+        if not is_stream(path):  # nor a link, but the file that it names
+            Path(os.path.realpath(path)).unlink(missing_ok=True)
     remove_parts(folder, *names)
 
 

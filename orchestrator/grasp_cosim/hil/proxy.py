@@ -14,7 +14,7 @@ from grasp_fmus.variable import Enumeration
 from grasp_fmus.variable import Variable as ProxyVariable
 
 from ..base.errors import InputError, SimulationError
-from ..base.files import check_folder, write_text
+from ..base.files import check_file, write_text
 from ..interface.interface import Interface, Value, Variable
 from .protocol import exchanged, link_signature
 
@@ -80,7 +80,7 @@ def _check_other(fmu: Path, out: Path) -> None:
     """InputError where a file would take the place of the FMU, or cannot be in its folder."""
     if out.resolve() == fmu.resolve():
         raise InputError(f"{out}: is the original; must be another file")
-    check_folder(out.parent)
+    check_file(out)
 
 
 def _header(interface: Interface) -> str:

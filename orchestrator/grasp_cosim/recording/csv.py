@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from one_piece import in_one_piece
 
 from ..base.errors import InputError, SimulationError
-from ..base.files import in_one_piece, unwritable
+from ..base.files import unwritable
 from ..base.plain import to_cell
 from .listener import Experiment, Signal, times
 
@@ -78,14 +79,15 @@ class CsvListener:
             raise SimulationError(unwritable(self._said, error)) from error
 
     def _append(self, text: str) -> None:
-        """Write all of the text, or none of it and raise OSError."""
-        written = self._file.tell()
+        """Write all of the text, or none of it and raise OSError; a pipe may have got a part."""
+        written = self._file.tell() if self._file.seekable() else None
         data = memoryview(text.encode())
         try:
             while data:
                 data = data[self._file.write(data) :]
         except OSError:
-            self._file.truncate(written)
+            if written is not None:
+                self._file.truncate(written)
             raise
 
 

@@ -11,10 +11,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
+from one_piece import in_one_piece
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
-from ..base.files import in_one_piece, unwritable
+from ..base.files import unwritable
 from .listener import Experiment, Signal, times
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from one_piece import in_one_piece
 
 from ..base.checks import is_number
 from ..base.errors import UnknownNameError, choices
-from ..base.files import in_one_piece, write_json
+from ..base.files import write_json
 from ..base.higher import higher
 from ..base.plain import on_one_line
 from ..interface.units import Conversion

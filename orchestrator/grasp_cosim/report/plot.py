@@ -12,9 +12,11 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
+from one_piece import in_one_piece
+
 from ..base.checks import extra_module
 from ..base.errors import InputError
-from ..base.files import PICTURES, in_one_piece
+from ..base.files import PICTURES
 from ..base.numerals import in_milli
 from ..recording.result import Result
 from .caption import Caption, caption

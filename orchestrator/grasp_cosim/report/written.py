@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
+from one_piece import is_stream
+
 from ..base.errors import InputError
-from ..base.files import check_folder, of_any_format, remove_parts
+from ..base.files import check_file, of_any_format, remove_parts
 from ..recording.load import load_run, run_folder
 from .page import write_page
 from .timing import TIMING, draw_result
@@ -26,10 +28,12 @@ def write_report(run: str | Path, out: str | Path | None = None, title: str = ""
     recorded = load_run(folder).titled(title)
     if recorded.wall_time is None:
         LOGGER.warning("%s: unfinished, to t = %.6g s", folder, recorded.time[-1])
-    check_folder(page.parent)
+    check_file(page)
     remove_parts(page.parent, page.name, *of_any_format(recorded.view.stem, TIMING))
     write_page(recorded, page, scene=recorded.view.scene(recorded))
     written = [page]
+    if is_stream(page):
+        return written
     try:
         written += draw_result(recorded, page.parent)
     except InputError as error:

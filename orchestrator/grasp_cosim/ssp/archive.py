@@ -15,8 +15,9 @@ from pathlib import Path
 from threading import Lock
 from urllib.parse import unquote, urlsplit
 
+from one_piece import in_one_piece
+
 from ..base.errors import InputError, nearest
-from ..base.files import in_one_piece
 from ..base.scratch import ScratchFolder
 from ..interface.document import check_size
 from .notes import Notes

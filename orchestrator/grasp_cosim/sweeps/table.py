@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from one_piece import in_one_piece
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, nearest
-from ..base.files import in_one_piece
 from ..metrics.metric import Metric
 from .rows import Row
 from .run import Outcome

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from ...base.files import check_folder
+from ...base.files import check_file
 from ...comparison import words
 from ...comparison.bands import read_bands
 from ...comparison.compare import compare as compare_runs
@@ -43,7 +43,7 @@ def compare(
     Example: grasp-cosim compare results_a results_b -o compare.html
     """
     if out:
-        check_folder(out.parent)
+        check_file(out)
     given, metrics = read_bands(bands) if bands else None, chosen_metrics(metric_files)
     with waiting(f"comparing {a} and {b}"):
         found = compare_runs(a, b, bands=given, metrics=metrics)

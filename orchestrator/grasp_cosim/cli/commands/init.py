@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...base.errors import InputError
-from ...base.files import check_folder, write_text
+from ...base.files import check_file, write_text
 from ...base.numerals import counted
 from ...inspection.text import with_paths
 from ...interface.read import read_interface
@@ -74,7 +74,7 @@ def init(
         text, drafts = _grasp(file.parent, foreign)
     write_text(file, text)
     open_lines = to_do(text)
-    if not open_lines:
+    if not open_lines and file.is_file():
         _read_back(file)
     show(
         as_json,
@@ -121,11 +121,9 @@ def _read_back(file: Path) -> None:
 def _check_file(file: Path, force: bool) -> None:
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file}: must end in .toml, a system file")
-    if file.is_dir():
-        raise InputError(f"{file}: is a folder; must be a file")
-    if file.exists() and not force:
+    if file.is_file() and not force:
         raise InputError(f"{file}: is there already; give another name, or --force")
-    check_folder(file.parent)
+    check_file(file)
 
 
 def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ...base.files import check_folder
+from ...base.files import check_file
 from ...comparison.bands import read_bands
 from ...comparison.qualify import qualify as run_qualification
 from ...comparison.swap import component_of
@@ -83,7 +83,7 @@ def qualify(
     Example: grasp-cosim qualify vendor_plant.fmu --as plant -o qualification.html
     """
     if out:
-        check_folder(out.parent)
+        check_file(out)
     is_file = candidate.suffix.lower() in FILES
     if not is_file:
         check_runs(candidate)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from ...base.files import check_folder
+from ...base.files import check_file
 from ..frame import PATH, json_option, say, show
 from ..options import chosen_system, set_option
 
@@ -26,7 +26,7 @@ def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool
     from ...ssp.write import write_ssp  # only here: its libraries take time to load
 
     chosen = chosen_system({"system": system, "settings": settings})
-    check_folder(out.parent)
+    check_file(out)
     written = write_ssp(chosen, out)
     report = {
         "ssp": str(out),
