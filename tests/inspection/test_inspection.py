@@ -211,7 +211,7 @@ def test_the_keys_of_the_report(valve: Report) -> None:
     assert list(valve) == [
         "fmu", "model_name", "fmi_version", "kinds", "generation_tool", "guid",
         "default_experiment", "platforms", "this_machine", "sources", "python", "capabilities",
-        "variables",
+        "ambiguous", "variables",
     ]  # fmt: skip
     assert set(valve["variables"][0]) == {
         "name", "causality", "variability", "initial", "type", "dimensions", "sizes", "unit",

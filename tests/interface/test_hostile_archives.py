@@ -157,7 +157,9 @@ def described(*variables: str) -> str:
 
 def test_two_variables_of_one_name(write: Write) -> None:
     twice = [variable(f'name="a" valueReference="{i}"') for i in range(2)]
-    refused(write(described(*twice)), "two variables have the name 'a'; must be unique")
+    found = read_interface(write(described(*twice, variable('name="b" valueReference="2"'))))
+    assert found.ambiguous == ("a",)
+    assert [v.name for v in found.variables] == ["b"]
 
 
 @pytest.mark.parametrize("alias", ["x", "y"])
@@ -167,7 +169,9 @@ def test_an_alias_of_a_name_that_is_taken(write: Write, alias: str) -> None:
         '<Float64 name="y" valueReference="1"/>',
     )
     path = write(text.replace('"2.0"', '"3.0"').replace("guid", "instantiationToken"))
-    refused(path, f"two variables have the name '{alias}'")
+    found = read_interface(path)
+    assert found.ambiguous == (alias,)
+    assert alias not in found.by_name
 
 
 @pytest.mark.parametrize(
@@ -307,6 +311,14 @@ def test_a_start_value_beyond_its_type(write: Write, type_: str, start: str, wha
     path = write(text.replace('"2.0"', '"3.0"').replace("guid", "instantiationToken"))
     with pytest.raises(InputError, match=f"variable 'a': start = .*{start}.*: {what}"):
         read_interface(path)
+
+
+@pytest.mark.parametrize("name", ["../x", "binaries/../../x", "/tmp/x"])
+def test_an_entry_that_leads_out_of_the_folder_is_refused(name: str, write: Write) -> None:
+    path = write(PLAIN)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(name, "")
+    refused(path, f"{name} leads out of the archive; must be the path of a file in it")
 
 
 @pytest.mark.parametrize(

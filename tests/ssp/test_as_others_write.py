@@ -1,5 +1,6 @@
 """Forms of archives and documents in circulation, which mean the same as those by the book."""
 
+import re
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -94,6 +95,25 @@ def test_a_prefix_in_an_annotation_that_is_for_no_namespace_is_said(tmp_path: Pa
             load(tmp_path, broken)
     with pytest.raises(InputError, match=r"against the schema: .*ssx"):
         load(tmp_path, text.replace("ssd:Elements", "ssx:Elements"))
+
+
+@pytest.mark.parametrize("declared", ["", ' xmlns:ssv="http://ssp-standard.org/SSP1/Values"'])
+def test_a_parameter_set_of_a_wrong_namespace_is_said(tmp_path: Path, declared: str) -> None:
+    """As ecos' quarter truck has none."""
+    text = re.sub(r' xmlns:ss[a-z]="[^"]*"', "", parameter_set("k Real 2.5 m"))
+    text = text.replace("<ssv:ParameterSet", f"<ssv:ParameterSet{declared}")
+    bound = '<ssd:ParameterBinding source="a.ssv"/>'
+    parts = component("a", "output y Real", bound) + component("b", "input u Real")
+    loaded = load(tmp_path, structure(system("top", parts, connect("a/y", "b/u"))), {"a.ssv": text})
+    assert loaded.components[0].values["k"] == 2.5
+    assert any("a.ssv: taken, although " in note for note in loaded.notes)
+
+
+def test_a_parameter_set_that_is_none_is_refused(tmp_path: Path) -> None:
+    bound = '<ssd:ParameterBinding source="a.ssv"/>'
+    parts = component("a", "output y Real", bound) + component("b", "input u Real")
+    with pytest.raises(InputError, match=r"a\.ssv:1: Values: must be ssv:ParameterSet$"):
+        load(tmp_path, structure(system("top", parts)), {"a.ssv": "<Values/>"})
 
 
 def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> None:

@@ -36,6 +36,7 @@ from ssp.hand_made import (
     system,
 )
 from support.native_fmus import needs_gcc
+from support.state_space import state_space
 from support.stimuli import driven
 
 
@@ -165,6 +166,21 @@ def test_roles_and_presets_of_a_system_file_come_back(fmus: Path, tmp_path: Path
     assert again.roles == {"plant": "plant"}
     assert again.presets["case_0"] == original.presets["case_0"]
     assert again.with_presets("bench") == original.with_presets("bench")
+
+
+def test_a_preset_of_a_whole_array_comes_back(tmp_path: Path) -> None:
+    state_space(tmp_path, types=False)
+    (tmp_path / "s.toml").write_text(
+        "connections = []\n[experiment]\nstep = 0.1\nstop = 1.0\n"
+        '[components.ss]\nfmu = "ss.fmu"\n[presets.fast]\n"ss.u" = [1.0, 2.0, 3.0]\n'
+    )
+    original = System.load(tmp_path / "s.toml")
+    arrays = replace(original, presets={**original.presets, "own": {"ss.u": np.array([3.0, 4.0])}})
+    assert round_trip(arrays, tmp_path).presets == {
+        "fast": {"ss.u": [1.0, 2.0, 3.0]}, "own": {"ss.u": [3.0, 4.0]},
+    }  # fmt: skip
+    again = round_trip(original, tmp_path).with_presets("fast")
+    assert again.components[0].values == original.with_presets("fast").components[0].values
 
 
 def test_an_archive_of_before_roles_and_presets(grasp: System, tmp_path: Path) -> None:

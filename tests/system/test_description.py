@@ -9,6 +9,7 @@ import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.comparison.swap import prepare_swap
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.system.checks import remarks
 from grasp_cosim.system.parts import Port
 
 TEXT = SYSTEM.read_text("utf-8")
@@ -207,3 +208,26 @@ def test_a_swap_does_not_change_what_a_value_stands_for(
 def test_an_output_cannot_be_set(grasp: System) -> None:
     with pytest.raises(InputError, match=r"no input or parameter 'gap\[1\]'"):
         grasp.with_values({"plant.gap[1]": 0.1})
+
+
+def test_a_name_of_several_variables_is_left_alone_and_refused_where_it_is_wanted(
+    tmp_path: Path,
+) -> None:
+    """As DPController.fmu of ecos' demo has one."""
+    twice = "".join(
+        f'<ScalarVariable name="{name}" valueReference="{i}" causality="parameter" '
+        'variability="fixed"><Real start="1"/></ScalarVariable>'
+        for i, name in enumerate("abb")
+    )
+    with zipfile.ZipFile(tmp_path / "dp.fmu", "w") as file:
+        file.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}"><ModelVariables>'
+            f'{twice}</ModelVariables><CoSimulation modelIdentifier="m"/></fmiModelDescription>',
+        )
+    text = 'experiment = { step = 0.1, stop = 1.0 }\n[components.dp]\nfmu = "dp.fmu"\n'
+    (tmp_path / "s.toml").write_text(text)
+    system = System.load(tmp_path / "s.toml").with_values({"dp.a": 2.0})
+    assert "dp: several variables of dp.fmu are called b: they are left alone" in remarks(system)
+    with pytest.raises(InputError, match="dp.fmu, where several are called b, has no "):
+        system.with_values({"dp.b": 2.0})

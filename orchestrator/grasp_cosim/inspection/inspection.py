@@ -38,6 +38,7 @@ def inspect_fmu(path: Path) -> dict[str, Any]:
         "sources": found.sources,
         "python": found.python,
         "capabilities": dict(found.capabilities),
+        "ambiguous": list(found.ambiguous),
         "variables": [_variable(v) for v in found.variables],
     }
 
@@ -66,6 +67,7 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
         "sources": "yes, in C" if report["sources"] else "no",
         "Python": "needed, made with pythonfmu" if report["python"] else "not needed",
         "capabilities": ", ".join(able) or "none",
+        **({"of several variables": choices(several)} if (several := report["ambiguous"]) else {}),
     }
     lines = [f"{label:20s}{text}" for label, text in head.items()]
     return "\n".join([*lines, "", *_table([_row(v) for v in report["variables"]], width)])

@@ -42,6 +42,10 @@ def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
             if locked:
                 raise ValueError(f"{locked} is encrypted; ask the vendor for it without a password")
             entries = {i.filename.replace("\\", "/"): i for i in archive.infolist()}
+            if out := next((n for n in entries if n.startswith("/") or ".." in n.split("/")), None):
+                raise ValueError(
+                    f"{out} leads out of the archive; must be the path of a file in it"
+                )
             if NAME not in entries:
                 near = next((n for n in entries if n.lower().endswith(NAME.lower())), "")
                 found = near and f"; must be there, and called so: there is {near}"

@@ -231,6 +231,8 @@ class Interface:
     model_name: str | None = None
     tool: str | None = None
     flaw: str = ""
+    ambiguous: tuple[str, ...] = ()
+    """The names that several variables have, which are not among `variables`."""
     arrays: Mapping[str, Array] = field(default_factory=dict)
     exchange: Exchange | None = None
     given: Path | None = None
@@ -315,13 +317,23 @@ class Interface:
         """The command that shows all variables, for messages."""
         return f"`grasp-cosim inspect {quote(without_scratch(str(self.path)))}`"
 
+    @property
+    def short(self) -> str:
+        """The FMU in a message on a name that it does not have."""
+        several = choices(self.ambiguous)
+        return (
+            f"{self.path.name}, where several are called {several},"
+            if self.ambiguous
+            else self.path.name
+        )
+
     def _renamed(self, rename: Mapping[str, str], place: str) -> "Interface":
         whole = {own: new for new, own in rename.items() if own in self.arrays}
         rename = dict(_by_element(rename, self.arrays))
         names: dict[str, str] = {}
         for new, own in rename.items():
             entry = f"{place}: {new!r} = {own!r}"
-            known(f"{entry}: {self.path.name} has no variable", own, self.by_name, see=self.listing)
+            known(f"{entry}: {self.short} has no variable", own, self.by_name, see=self.listing)
             if own in names:
                 raise InputError(
                     f"{entry}: {own!r} is renamed to {names[own]!r} already; must have one name"
@@ -375,9 +387,7 @@ class Interface:
         }
         for name, unit in units.items():
             entry = f"{place}: {name!r} = {unit!r}"
-            known(
-                f"{entry}: {self.path.name} has no variable", name, self.by_name, see=self.listing
-            )
+            known(f"{entry}: {self.short} has no variable", name, self.by_name, see=self.listing)
             if self.by_name[name].kind != "Real":
                 raise InputError(
                     f"{entry}: is of type {self.by_name[name].nature}; must be a Real, as only "
@@ -417,7 +427,7 @@ class Interface:
             if name in self.arrays:
                 first = choices(self.arrays[name].names[:1])
                 raise InputError(f"{place}: {name} is an array; must be an element of it: {first}")
-            said = f"{place}: {self.path.name} has no input or parameter"
+            said = f"{place}: {self.short} has no input or parameter"
             known(said, name, settable, see=self.listing)
             raise AssertionError(name)  # pragma: no cover
         if not variable.supported:

@@ -6,6 +6,7 @@ read_interface() refuses the FMU, but describe() does not.
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -132,6 +133,7 @@ def describe(path: Path) -> Interface:
         model_name=root.get("modelName"),
         tool=root.get("generationTool"),
         flaw=reader.flaws[0] if reader.flaws else "",
+        ambiguous=reader.ambiguous,
         exchange=exchange,
     )
 
@@ -149,6 +151,7 @@ class _Reader:
     def __init__(self, root: Element, major: str) -> None:
         self.root, self.major = root, major
         self.flaws: list[str] = []
+        self.ambiguous: tuple[str, ...] = ()
         parent = root.find("ModelVariables")
         if parent is None:
             raise ValueError("no ModelVariables")
@@ -223,7 +226,7 @@ class _Reader:
         return found
 
     def variables(self) -> tuple[Variable, ...]:
-        """The variables, then the aliases of FMI 3.0, each with a name of its own."""
+        """The variables, then the aliases of FMI 3.0; not those of a name that several have."""
         now, initially = self.unknowns("Output"), self.unknowns("InitialUnknown")
         inputs = tuple(_name(e) for e in self.elements if e.get("causality") == "input")
         initially = {name: inputs if n is None else n for name, n in initially.items()}
@@ -242,12 +245,9 @@ class _Reader:
             for v, element in zip(found, self.elements, strict=True)
             for e in element.iterfind("Alias")
         ]
-        names = set()
-        for v in found:
-            if v.name in names:
-                raise ValueError(f"two variables have the name {v.name!r}; must be unique")
-            names.add(_printable("variable", v.name))
-        return tuple(found)
+        names = Counter(_printable("variable", v.name) for v in found)
+        self.ambiguous = tuple(name for name, count in names.items() if count > 1)
+        return tuple(v for v in found if v.name not in self.ambiguous)
 
     def unknowns(self, group: str) -> dict[str, Names]:
         """By name of an unknown what it depends on; FMI 1.0 has that at its variables."""

@@ -15,8 +15,8 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from lxml import etree  # type: ignore[import-untyped]
 
+from ..base.checks import check_values
 from ..base.errors import InputError, choices, nearest
-from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Solver
 from ..system.realtime import Realtime
@@ -51,7 +51,7 @@ class Extras:
     events: tuple[Event, ...]
     faults: tuple[Fault, ...]
     roles: Mapping[str, str] = field(default_factory=dict)
-    presets: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    presets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     diverging: Diverging = "stop"
     input: Stimuli | None = None
     realtime: Realtime = Realtime()
@@ -93,6 +93,8 @@ def read_extras(place: str, annotation: Any) -> Extras:
         extras: Extras = _typed(Extras, json.loads("" if element is None else element.text or ""))
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise InputError(f"{place}: annotation {TYPE!r}: not as it was written: {error}") from error
+    for name, values in extras.presets.items():
+        check_values(f"{place}: annotation {TYPE!r}: preset {name!r}", values)
     return extras
 
 
@@ -104,14 +106,18 @@ def _plain(value: Any) -> Any:
         return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
         return {_plain(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, tuple | list | array):
+    if isinstance(value, tuple | list):
         return [_plain(entry) for entry in value]
+    if hasattr(value, "tolist"):
+        return value.tolist()
     return value
 
 
 def _typed(kind: Any, value: Any) -> Any:
     """The reverse: a value of the given type; ValueError or TypeError where it is none."""
     origin, arguments = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return value
     if kind is Port:
         return Port(*_typed(str, value).split(".", 1))
     if is_dataclass(kind) and isinstance(kind, type):

@@ -76,7 +76,7 @@ def parse(place: str, data: bytes, form: str, notes: Notes) -> Any:
         for element in root.iter():
             prefix, colon, name = element.tag.partition(":")
             if colon and not prefix.startswith("{"):
-                element.tag = f"{{{prefix}}}{name}"
+                element.tag = f"{{{NAMESPACES.get(prefix, prefix)}}}{name}"
     if root.getroottree().docinfo.doctype:
         raise InputError(f"{place}: has a document type; SSP has none")
     return checked(place, root, form, notes)
@@ -97,7 +97,12 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
 
     What SSP 2.0 shares with 1.0 is valid as well, and what is in another order or an empty list.
     """
-    if root.tag != qualified(ROOTS[form]):
+    wanted, found = etree.QName(qualified(ROOTS[form])), etree.QName(root)
+    if found.localname == wanted.localname and found.namespace != wanted.namespace:
+        notes.add(place, f"taken, although its namespace is {found.namespace!r}")
+        for element in root.iter(f"{{{found.namespace or ''}}}*"):
+            element.tag = f"{{{wanted.namespace}}}{etree.QName(element).localname}"
+    if root.tag != wanted.text:
         raise InputError(f"{at(place, root)}: {short(root.tag)}: must be {ROOTS[form]}")
     version = root.get("version", "").strip()
     if version == "2.0":

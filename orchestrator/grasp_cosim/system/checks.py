@@ -186,6 +186,12 @@ def remarks(system: Structure) -> tuple[str, ...]:
         for component in system.components
         if (chosen := component.integrated)
     ]
+    lines += [
+        f"{component.name}: several variables of {component.fmu.name} are called {choices(names)}: "
+        "they are left alone"
+        for component in system.components
+        if (names := component.interface.ambiguous)
+    ]
     for component in system.components:
         declared = component.declared
         lines += [
