@@ -1,5 +1,6 @@
 """Who gives goes before who takes; within a loop, and else, as given."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
@@ -53,5 +54,5 @@ def test_none_waits_for_a_later_one_but_in_a_loop(names: list[str], pairs: list[
 
 def test_a_thousand_are_ordered_at_once() -> None:
     names = [chr(0x4E00 + i) for i in range(5000)]
-    chain = [f"{later}{earlier}" for earlier, later in zip(names, names[1:])]
+    chain = [f"{later}{earlier}" for earlier, later in pairwise(names)]
     assert ordered("".join(names), chain) == "".join(reversed(names))
