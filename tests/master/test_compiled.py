@@ -49,7 +49,7 @@ def counts(steps: int = 3) -> int:
 
     made = Plan(np.zeros(1), np.zeros(2), [(loop.CALL, 0, 1, 1, 0)], calls=[Call(call)])
     rows = np.zeros((steps, 1))
-    assert make_loop(made, "compiled")(rows, 0, 0, steps, 1000) == (steps, 0, 0)
+    assert make_loop(made, "compiled")(rows, 0, 0, steps, 0, 1000) == (steps, 0, 0)
     return len(seen)
 
 
@@ -159,7 +159,7 @@ def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock: bo
     try:
         begun.set()
         for _ in range(1 if keeps_lock else 10_000):  # the other's turn comes when the system likes
-            run(np.zeros((5, 1)), 0, 0, 5, 1000)
+            run(np.zeros((5, 1)), 0, 0, 5, 0, 1000)
             if seen := ran.is_set():
                 break
     finally:
@@ -173,4 +173,4 @@ def test_ctrl_c_in_the_loop_is_raised_behind_it() -> None:
     run = calling("raise", signal.SIGINT)
     rows = np.zeros((5, 1))
     with pytest.raises(KeyboardInterrupt):
-        run(rows, 0, 0, 5, 1000)
+        run(rows, 0, 0, 5, 0, 1000)

@@ -36,7 +36,7 @@ def run(made: Plan, engine: Engine, steps: int, operation: int = 0) -> tuple[Any
     """What the loop returns, and the rows."""
     call: Loop = make_loop(made, engine)
     rows = np.full((steps, len(made.values)), np.nan)
-    return call(rows, operation, 0, steps, 1_000_000), rows
+    return call(rows, operation, 0, steps, 0, 1_000_000), rows
 
 
 def test_a_copy_keeps_the_sign_of_zero_and_a_scale_computes(engine: Engine) -> None:

@@ -49,6 +49,7 @@ def followed(
         connections=(Connection(Port("a", "y0"), Port("b", "u"), factor),),
         scheme="jacobi",
         step_ns=1_000_000,
+        time_ns=lambda step: 1_000_000 * step,
     )
     outputs = {Port("a", n): Signal(f"a.{n}", unit, kind) for n in names}
     divergence, rows = Divergence(system, outputs), np.column_stack(columns)

@@ -108,10 +108,6 @@ REFUSED = [
         "'y': unit 'cm' is not defined; valid: m, mm",
     ),
     (
-        structure(TOP, '<ssd:DefaultExperiment startTime="1" stopTime="2"/>'),
-        "startTime = 1 s is not supported, as a run begins at 0 s; must be 0, with a stopTime that",
-    ),
-    (
         structure(TOP, '<ssd:DefaultExperiment stopTime="-2"/>'),
         "stopTime = -2.0 s: must be a number greater than 0",
     ),

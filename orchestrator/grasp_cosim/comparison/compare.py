@@ -145,8 +145,8 @@ def _ran(system: Result | str | Path, other: Side | None) -> Side:
     """The run of a system file, no longer than the other run."""
     loaded = System.load(str(system)).natively()
     if other:
-        steps = round(float(other.time[-1]) * NANOSECONDS) // loaded.step_ns
-        stop = min(loaded.stop_ns, max(steps, 1) * loaded.step_ns)
+        span = round(float(other.time[-1]) * NANOSECONDS) - loaded.start_ns
+        stop = min(loaded.stop_ns, loaded.time_ns(max(span // loaded.step_ns, 1)))
         loaded = loaded.with_experiment(stop=stop / NANOSECONDS)
     return side_of(simulate(loaded), str(system))
 

@@ -234,7 +234,10 @@ def _other_numerics(
 
 def _variants(system: System) -> Iterator[tuple[str, System]]:
     twice = 2 * system.step_ns
-    steps = [system.stop_ns, *(c.step_ns for c in system.components if c.step_ns is not None)]
+    steps = [
+        system.stop_ns - system.start_ns,
+        *(c.step_ns for c in system.components if c.step_ns is not None),
+    ]
     if not any(step % twice for step in steps):
         step = twice / NANOSECONDS
         yield f"step {step:g} s", system.with_experiment(step=step)
@@ -252,7 +255,9 @@ def _remarks(reference: Result, result: Result) -> tuple[str, ...]:
 
 def _shift(system: System) -> float:
     """The shift in time in s that a derived band allows."""
-    return max(SHARE * system.stop_ns, FEWEST_STEPS * system.step_ns) / NANOSECONDS
+    return (
+        max(SHARE * (system.stop_ns - system.start_ns), FEWEST_STEPS * system.step_ns) / NANOSECONDS
+    )
 
 
 def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:

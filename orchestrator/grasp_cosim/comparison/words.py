@@ -113,9 +113,10 @@ def qualification_verdict(q: Qualification) -> str:
     """The outcome in a line, and of which runs."""
     system, word = q.swap.system, "QUALIFIED" if q.qualified else "NOT QUALIFIED"
     step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
+    from_ = f"{system.start_ns / NANOSECONDS:g} to " if system.start_ns else ""
     return (
         f"{word}: {q.swap.candidate.name} as {q.swap.component} (now {q.swap.original.name}), "
-        f"{stop:g} s in steps of {1e3 * step:g} ms, {system.scheme}"
+        f"{from_}{stop:g} s in steps of {1e3 * step:g} ms, {system.scheme}"
     )
 
 

@@ -22,7 +22,7 @@ connections = [
 [experiment]
 step = {step}  # s, communication step
 stop = {stop}  # s, a whole number of steps
-scheme = "sequential"  # in the order of the components below; or "jacobi", all at once
+{start}scheme = "sequential"  # in the order of the components below; or "jacobi", all at once
 """
 MOST = 100
 """Parameters and outputs that are listed."""
@@ -34,8 +34,13 @@ STEPS = 1000
 def alone(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]]:
     """The text of a system of FMUs, by component, each with its path in the file; and notes."""
     interfaces = {name: Component(name, fmu, {}).interface for name, (fmu, _) in fmus.items()}
-    step, stop, notes = _experiment(interfaces)
-    head = HEAD.format(name=next(iter(fmus)), step=number(step), stop=number(stop))
+    step, start, stop, notes = _experiment(interfaces)
+    head = HEAD.format(
+        name=next(iter(fmus)),
+        step=number(step),
+        stop=number(stop),
+        start=f"start = {number(start)}  # s\n" if start else "",
+    )
     parts = [_component(name, i, fmus[name][1]) for name, i in interfaces.items()]
     return "\n".join([head, *parts]), notes
 
@@ -56,29 +61,36 @@ def _component(name: str, interface: Interface, path: str) -> str:
     return "".join(f"{text}\n\n" for text in tables if text)[:-1]
 
 
-def _experiment(interfaces: Mapping[str, Interface]) -> tuple[float, float, list[str]]:
-    """Step and stop time in s: the shortest and the longest that the FMUs recommend; and notes."""
+def _experiment(interfaces: Mapping[str, Interface]) -> tuple[float, float, float, list[str]]:
+    """Step, start and stop time in s: the shortest step and the longest span that the FMUs
+    recommend, from where all of them begin; and notes.
+    """
     steps, spans, notes = [], [], []
+    begins = {_finite(i.experiment.get("start_time")) for i in interfaces.values()}
+    start = begins.pop() if len(begins) == 1 else 0.0
     for name, interface in interfaces.items():
         told = interface.experiment
         begin, end, step = (_finite(told.get(k)) for k in ("start_time", "stop_time", "step_size"))
-        if begin:
-            notes.append(f"{name}: its default experiment begins at {begin:g} s, a run at 0 s")
+        if begin != start:
+            notes.append(
+                f"{name}: its default experiment begins at {begin:g} s, the run at {start:g} s"
+            )
         spans += [end - begin] if end > begin else []
         steps += [step] if step > 0.0 else []
-    stop = max(spans, default=1.0)
-    step = min(steps, default=stop / STEPS)
+    span = max(spans, default=1.0)
+    step = min(steps, default=span / STEPS)
     missing = [word for word, given in (("step", steps), ("stop time", spans)) if not given]
     if missing:
         notes.append(
             f"no FMU recommends a {' and a '.join(missing)}: chosen, step = {step:g} s, "
-            f"stop = {stop:g} s"
+            f"stop = {start + span:g} s"
         )
     step_ns = max(1, round(step * NANOSECONDS))
-    stop_ns = max(1, round(stop * NANOSECONDS / step_ns)) * step_ns
-    if abs(stop_ns / NANOSECONDS - stop) > 1e-9:
-        notes.append(f"stop = {stop:g} s: {stop_ns / NANOSECONDS:g} s is a whole number of steps")
-    return step_ns / NANOSECONDS, stop_ns / NANOSECONDS, notes
+    span_ns = max(1, round(span * NANOSECONDS / step_ns)) * step_ns
+    stop = (round(start * NANOSECONDS) + span_ns) / NANOSECONDS
+    if abs(span_ns / NANOSECONDS - span) > 1e-9:
+        notes.append(f"stop = {start + span:g} s: {stop:g} s is a whole number of steps")
+    return step_ns / NANOSECONDS, start, stop, notes
 
 
 def _finite(value: Any) -> float:

@@ -134,7 +134,14 @@ class CompiledLoop:
         self._run = library(any(call.keeps_lock for call in plan.calls)).run
 
     def __call__(
-        self, rows: Any, operation: int, start: int, stop: int, step_ns: int, row: int | None = None
+        self,
+        rows: Any,
+        operation: int,
+        start: int,
+        stop: int,
+        start_ns: int,
+        step_ns: int,
+        row: int | None = None,
     ) -> tuple[int, int, int]:
         """As loop.run(). Given the row of the first step, rows are filled round and round."""
         tables, shared = self._places
@@ -142,7 +149,9 @@ class CompiledLoop:
         if row is None:
             self.shared.taken, row = start, 0
         place, room = rows.ctypes.data, len(rows)
-        step = self._run(tables, place, room, row, operation, start, stop, step_ns, shared)
+        step = self._run(
+            tables, place, room, row, operation, start, stop, start_ns, step_ns, shared
+        )
         return step, self.shared.operation, self.shared.status
 
 
@@ -179,7 +188,7 @@ def library(locked: bool) -> ctypes.CDLL:
         raise InputError(f"{path}: the compiled loop does not load: {error}; {REMEDY}") from error
     found.run.restype = ctypes.c_int64
     whole, place = ctypes.c_int64, ctypes.c_void_p
-    found.run.argtypes = [place, place, *[whole] * 6, place]
+    found.run.argtypes = [place, place, *[whole] * 7, place]
     return found
 
 

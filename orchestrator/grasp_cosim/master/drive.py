@@ -50,12 +50,12 @@ def drives_of(system: System, slots: dict[Port, int]) -> dict[Port, Drive]:
 
 
 def at_start(system: System, drives: dict[Port, Drive], name: str) -> dict[str, Value]:
-    """The values at t = 0 of the inputs of a component that are driven."""
+    """The values at the start of the inputs of a component that are driven."""
     found: dict[str, Value] = {}
     for port, drive in drives.items():
         if port.component == name:
             kind = system.component(name, name).interface.by_name[port.variable].kind
-            value = drive.at(0)
+            value = drive.at(system.start_ns)
             found[port.variable] = (
                 value if kind == "Real" else int(value) if kind == "Integer" else value != 0.0
             )

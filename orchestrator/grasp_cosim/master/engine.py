@@ -20,8 +20,8 @@ LOGGER = logging.getLogger(__name__)
 
 ENGINES: tuple[str, ...] = get_args(Engine)
 
-Loop = Callable[[Any, int, int, int, int], tuple[int, int, int]] | compiled.CompiledLoop
-"""loop.run() over a plan: takes rows, operation, start, stop and step_ns."""
+Loop = Callable[[Any, int, int, int, int, int], tuple[int, int, int]] | compiled.CompiledLoop
+"""loop.run() over a plan: takes rows, operation, start, stop, start_ns and step_ns."""
 
 BUILDING = 0.3
 """s that compiling the loop takes, once on a machine: 0.1 to 0.3 s measured."""
@@ -85,9 +85,11 @@ def _interpreted(plan: Plan) -> Loop:
     values, clock = memoryview(plan.values), memoryview(plan.clock)  # type: ignore[arg-type]
     tables = program, connections, casts, plan.drives, calls, buffers, values, clock
 
-    def run(rows: Any, operation: int, start: int, stop: int, step_ns: int) -> tuple[int, int, int]:
+    def run(
+        rows: Any, operation: int, start: int, stop: int, start_ns: int, step_ns: int
+    ) -> tuple[int, int, int]:
         flat = memoryview(rows.reshape(-1))
-        return loop.run(*tables, flat, operation, start, stop, step_ns)
+        return loop.run(*tables, flat, operation, start, stop, start_ns, step_ns)
 
     return run
 

@@ -15,13 +15,15 @@ FaultFunction = Callable[[float, int], float]
 class Window:
     """The steps in which a fault acts. With a condition they are only known when it begins."""
 
-    def __init__(self, name: str, fault: Fault, step_ns: int) -> None:
+    def __init__(self, name: str, fault: Fault, step_ns: int, start_ns: int = 0) -> None:
         self.name = name
         self.fault = fault
         self.begun = False
         self._ended = False
-        self._earliest = first_step(fault.start_ns, step_ns)
-        self._end = math.inf if fault.end_ns is None else first_step(fault.end_ns, step_ns)
+        self._earliest = first_step(fault.start_ns - start_ns, step_ns)
+        self._end: float = math.inf
+        if fault.end_ns is not None:
+            self._end = first_step(fault.end_ns - start_ns, step_ns)
         self._first: float = self._earliest or INITIAL
         if fault.when is not None:
             self._first = math.inf

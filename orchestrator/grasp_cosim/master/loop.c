@@ -212,14 +212,14 @@ static double drive(Drive *d, int64_t time) {
 }
 
 /* Do one operation in step k; 0, or the status that ends the loop. */
-static int operate(const Plan *plan, const Operation *operation, int64_t k, int64_t step_ns,
-                   const Shared *shared) {
+static int operate(const Plan *plan, const Operation *operation, int64_t k, int64_t start_ns,
+                   int64_t step_ns, const Shared *shared) {
     double *values = plan->values;
     int64_t i, begin = operation->first, end = operation->last;
 
     switch (operation->kind) {
     case STEP:
-        plan->clock[0] = (double)((k + 1 - operation->period) * step_ns) / 1e9;
+        plan->clock[0] = (double)(start_ns + (k + 1 - operation->period) * step_ns) / 1e9;
         /* fall through */
     case CALL: {
         int status = invoke(&plan->calls[begin], plan->clock, shared);
@@ -246,7 +246,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, int6
     case DRIVE:
         for (i = begin; i < end; i++) {
             Drive *d = &plan->drives[i];
-            values[d->slot] = drive(d, (k - operation->phase) * step_ns);
+            values[d->slot] = drive(d, start_ns + (k - operation->phase) * step_ns);
         }
         return 0;
     default: /* LOAD and LOAD_LONG */
@@ -263,7 +263,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, int6
 
 /* rows has room for so many, of which the first step takes the given one; then it begins anew. */
 int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t operation,
-            int64_t start, int64_t stop, int64_t step_ns, Shared *shared) {
+            int64_t start, int64_t stop, int64_t start_ns, int64_t step_ns, Shared *shared) {
     int64_t k;
 
     shared->operation = shared->status = 0;
@@ -277,7 +277,7 @@ int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t o
         for (; operation < plan->size; operation++) {
             const Operation *o = &plan->operations[operation];
             if (o->period == 1 || k % o->period == o->phase) {
-                int status = operate(plan, o, k, step_ns, shared);
+                int status = operate(plan, o, k, start_ns, step_ns, shared);
                 if (status) {
                     shared->operation = operation;
                     shared->status = status;

@@ -74,10 +74,12 @@ def run(
     operation: int,
     start: int,
     stop: int,
+    start_ns: int,
     step_ns: int,
 ) -> tuple[int, int, int]:
     """Do the steps from start to stop, the first from the given operation on.
 
+    Step 0 begins at start_ns.
     After step k the values go into rows, one row of len(values) after the other. clock holds the
     time in s at which the component that steps now begins, and the step number. Returns the step
     reached, and where a call's status is a bad one, the operation and the status (else 0 and 0).
@@ -93,7 +95,7 @@ def run(
                 what, begin = kind[operation], first[operation]
                 if what >= CALL:
                     if what == STEP:
-                        clock[0] = (k + 1 - period[operation]) * step_ns / 1e9
+                        clock[0] = (start_ns + (k + 1 - period[operation]) * step_ns) / 1e9
                     status = invoke(calls, begin, clock)
                     if status > WORST:
                         return k, operation, status
@@ -113,7 +115,7 @@ def run(
                             return k, operation, TOO_LONG
                         values[slot[i]] = value
                 else:
-                    time = (k - phase[operation]) * step_ns
+                    time = start_ns + (k - phase[operation]) * step_ns
                     for i in range(begin, last[operation]):
                         drive(drives, i, time, values)
             operation += 1

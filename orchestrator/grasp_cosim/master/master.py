@@ -89,15 +89,16 @@ class Master:
         self._rows = np.empty((ROOM if self._alone else CHUNK, len(self.values)))
         self._rows.fill(0.0)  # its memory is there from now on
         self._cpus = os.sched_getaffinity(0) if self._alone else ()
+        self._clock = system.start_ns, system.step_ns
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
 
     def initialise(self) -> None:
-        """Start values in, then outputs at t = 0 that agree with the inputs at t = 0."""
-        stop = self.system.stop_ns / NANOSECONDS
+        """Start values in, then outputs at the start that agree with its inputs."""
+        start, stop = (t / NANOSECONDS for t in (self.system.start_ns, self.system.stop_ns))
         for component, instance in zip(self.system.components, self.instances, strict=True):
             driven = at_start(self.system, self._drives, component.name)
-            instance.enter_initialization({**component.values, **driven}, stop)
+            instance.enter_initialization({**component.values, **driven}, stop, start)
         propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
         try:
             self.log += propagation.run()
@@ -110,7 +111,7 @@ class Master:
         kept = self._kept(propagation.values)
         for port, slot in self.slots.items():
             if drive := self._drives.get(port):
-                value: Value = drive.at(0)
+                value: Value = drive.at(self.system.start_ns)
             else:
                 value = propagation.values[port] if port in propagation.values else kept[port]
             if port in self.texts:
@@ -145,7 +146,7 @@ class Master:
         """
         self.total_steps = step
         line = f"{instance.name} asked for the end of the simulation at t = {time:.9g} s"
-        row = step * self.system.step_ns
+        row = self.system.time_ns(step)
         if abs(row / NANOSECONDS - time) * NANOSECONDS > 1.0:
             line += f"; its values there are in the last row, that of t = {seconds(row)}"
         self.ends.append(line)
@@ -231,9 +232,7 @@ class Master:
         try:
             while step < (until := min(stop, self.total_steps)):
                 rows = self._rows[step - self._base :]
-                step, operation, status = self._loop(
-                    rows, operation, step, until, self.system.step_ns
-                )
+                step, operation, status = self._loop(rows, operation, step, until, *self._clock)
                 if status:
                     self.steps_done = step
                     self._resolve(step, operation, status)
@@ -264,7 +263,7 @@ class Master:
                 while step < (until := min(stop, self.total_steps)):
                     row = (step - self._base) % len(self._rows)
                     step, operation, status = compiled(
-                        self._rows, operation, step, until, self.system.step_ns, row
+                        self._rows, operation, step, until, *self._clock, row
                     )
                     if status == loop.OVERRUN:
                         raise OverrunError
@@ -290,10 +289,10 @@ class Master:
             raise self.plan.raised.pop()
         instance = self.plan.owners[call]
         assert instance is not None  # noqa: S101 - the master's own calls return no bad status
-        begin = (step + 1 - period) * self.system.step_ns / NANOSECONDS
+        begin = self.system.time_ns(step + 1 - period) / NANOSECONDS
         if kind != loop.STEP or status not in (DISCARD, EARLY):
             raise instance.failure(status, begin)
-        end = (step + 1) * self.system.step_ns / NANOSECONDS
+        end = self.system.time_ns(step + 1) / NANOSECONDS
         ended = finish_step(instance, status, begin, end)
         if ended is not None:
             self._end(instance, ended, step + 1)

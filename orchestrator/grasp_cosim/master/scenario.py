@@ -49,7 +49,7 @@ class Scenario:
             for i, event in enumerate(system.events)
         ]
         self._windows = [
-            Window(f"faults[{i}]", self._in_numbers(fault), system.step_ns)
+            Window(f"faults[{i}]", self._in_numbers(fault), system.step_ns, system.start_ns)
             for i, fault in enumerate(system.faults)
         ]
         self.fault_functions = fault_functions(self._windows, system.step_ns)
@@ -113,7 +113,7 @@ class Scenario:
         return events + faults
 
     def _note(self, step: int, lines: Sequence[str]) -> None:
-        self.log += [f"t = {seconds(step * self._system.step_ns)}: {line}" for line in lines]
+        self.log += [f"t = {seconds(self._system.time_ns(step))}: {line}" for line in lines]
 
     def _holds(self, condition: Condition | None) -> bool:
         if condition is None:
@@ -150,7 +150,9 @@ class _PendingEvent:
         self.name = name
         self.event = event
         self._period = math.lcm(*(system.period(port.component) for port in event.set))
-        self._first = first_step(event.at_ns or 0, system.step_ns)
+        self._first = (
+            0 if event.at_ns is None else first_step(event.at_ns - system.start_ns, system.step_ns)
+        )
         self._calls: dict[str, tuple[Instance, list[Variable], list[Value]]] = {}
         self._placed: dict[int, float] = {}
         self._values = values

@@ -173,7 +173,7 @@ class Session:
     @property
     def time(self) -> float:
         """The communication point reached, in s."""
-        return self._master.steps_done * self.system.step_ns / NANOSECONDS
+        return self.system.time_ns(self._master.steps_done) / NANOSECONDS
 
     @property
     def complete(self) -> bool:
@@ -407,12 +407,12 @@ def _folder_kept() -> Iterator[None]:
 
 
 def _drive(session: Session, progress: bool | str) -> None:
-    total = session.system.stop_ns / NANOSECONDS
+    begin, end = (t / NANOSECONDS for t in (session.system.start_ns, session.system.stop_ns))
     with (
         interrupts(session.halt.set),
         Progress(
             progress if isinstance(progress, str) else session.system.name,
-            total,
+            end - begin,
             unit="s",
             shown=bool(progress),
             at_once=session.pacer is not None,
@@ -423,7 +423,7 @@ def _drive(session: Session, progress: bool | str) -> None:
         def show() -> None:
             if session.pacer and not bar.disable:
                 bar.set_postfix_str(session.pacer.live(), refresh=False)
-            bar.update(session.time - bar.n)
+            bar.update(session.time - begin - bar.n)
 
         steps, start = session.shown_by(show), time.perf_counter()
         while not session.halt.is_set() and session.step(steps):

@@ -148,7 +148,7 @@ class Meter:
         )
 
     def _time(self, step: int) -> float:
-        return step * self._system.step_ns / NANOSECONDS
+        return self._system.time_ns(step) / NANOSECONDS
 
     def _real_time_factor(self) -> float:
         """Simulated by wall time, from the first deadline to the last one, or the end after it."""

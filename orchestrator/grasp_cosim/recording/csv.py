@@ -12,7 +12,7 @@ from one_piece import in_one_piece
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..base.plain import to_cell
-from .listener import Experiment, Signal, times
+from .listener import Experiment, Signal
 
 PIECE = 1024
 """Rows turned into text at once; a block may be long."""
@@ -37,7 +37,7 @@ class CsvListener:
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
-        self._step_ns = experiment.step_ns
+        self._experiment = experiment
         self._whole = [i for i, s in enumerate(signals, 1) if s.kind in ("Integer", "Boolean")]
         self._texts = {i: s.texts for i, s in enumerate(signals, 1) if s.kind == "String"}
         names = ("time", *(s.name for s in signals))
@@ -57,7 +57,7 @@ class CsvListener:
         try:
             for first in range(0, len(steps), PIECE):
                 piece = slice(first, first + PIECE)
-                time = times(steps[piece], self._step_ns)
+                time = self._experiment.times(steps[piece])
                 columns = [time.tolist(), *rows[piece].T.tolist()]
                 for i in self._whole:
                     columns[i] = [*map(int, columns[i])]

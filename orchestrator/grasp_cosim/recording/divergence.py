@@ -133,7 +133,8 @@ class Divergence:
         length = self._system.step_ns / NANOSECONDS
         decade = (reached[-1] - reached[-4]) / 3
         size = f"{value:.3g} {signal.unit or ''}".rstrip()
-        text = f"{signal.name} ran away: {size} at t = {step * length:.9g} s"
+        moment = self._system.time_ns(step) / NANOSECONDS
+        text = f"{signal.name} ran away: {size} at t = {moment:.9g} s"
         if _grows(reached):
             text += f", ten times as much every {decade * length:.2g} s"
         return f"{text}; {self._hint(decade)}"

@@ -48,7 +48,7 @@ class Signal:
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """The run that is recorded: its name, communication step and stop time in ns, its settings.
+    """The run that is recorded: its name, communication step, stop and start in ns, its settings.
 
     `settings` are those of system.settings, as in run.json.
     """
@@ -57,17 +57,25 @@ class Experiment:
     step_ns: int
     stop_ns: int
     settings: Mapping[str, Any]
+    start_ns: int = 0
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> Experiment:
         """The experiment that settings describe."""
-        step, stop = (round(settings[key] * NANOSECONDS) for key in ("step", "stop"))
-        return cls(settings["system"], step, stop, settings)
+        step, stop, start = (
+            round(settings.get(key, 0.0) * NANOSECONDS) for key in ("step", "stop", "start")
+        )
+        return cls(settings["system"], step, stop, settings, start)
 
     @property
     def total_steps(self) -> int:
-        """The number of communication steps from 0 to the stop time."""
-        return self.stop_ns // self.step_ns
+        """The number of communication steps from the start to the stop time."""
+        return (self.stop_ns - self.start_ns) // self.step_ns
+
+    def times(self, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+        """The communication points in s."""
+        found: npt.NDArray[np.float64] = (self.start_ns + steps * self.step_ns) / NANOSECONDS
+        return found
 
 
 class Listener(Protocol):
@@ -77,7 +85,7 @@ class Listener(Protocol):
         """Called before the first row."""
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Rows as (len(steps), len(signals)); step k is at t = k * experiment.step_ns.
+        """Rows as (len(steps), len(signals)); step k is at experiment.times(k).
 
         Booleans are 0.0 or 1.0, for Strings see Signal. The arrays are reused: copy what is kept.
         """
@@ -92,8 +100,3 @@ class Leisurely(Listener, Protocol):
 
     def spare(self, ns: float) -> bool:
         """Do as much as takes about so many ns; False if there was nothing, or nothing so short."""
-
-
-def times(steps: npt.NDArray[np.int64], step_ns: int) -> npt.NDArray[np.float64]:
-    """The communication points in s: k * step_ns / 1e9."""
-    return steps * step_ns / NANOSECONDS

@@ -38,7 +38,7 @@ SETTING_KEYS: Mapping[str, Any] = {
 }  # fmt: skip
 """Entries of run.json that say how the run was made, and of which types they are."""
 
-MAYBE_SETTINGS = ("diverging", "roles", "input", "changed", "metrics")
+MAYBE_SETTINGS = ("start", "diverging", "roles", "input", "changed", "metrics")
 """More of them, which may be there."""
 
 OUTCOME_KEYS: Mapping[str, Any] = {
@@ -53,7 +53,8 @@ ORIGIN_KEYS: Mapping[str, Any] = {
 
 MORE_KEYS: Mapping[str, Any] = {
     "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
-    "input": dict, "changed": dict, "metrics": list, "diverging": str, **ORIGIN_KEYS,
+    "input": dict, "changed": dict, "metrics": list, "diverging": str,
+    "start": NUMBER, **ORIGIN_KEYS,
 }  # fmt: skip
 """Entries that may be there."""
 

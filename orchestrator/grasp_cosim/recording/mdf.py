@@ -16,7 +16,7 @@ from one_piece import in_one_piece
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
-from .listener import Experiment, Signal, times
+from .listener import Experiment, Signal
 
 if TYPE_CHECKING:
     import asammdf
@@ -102,7 +102,7 @@ class MdfListener:
 
     def _flush(self) -> None:
         rows = self._rows[: self._filled].T
-        time = times(self._steps[: self._filled], self._experiment.step_ns)
+        time = self._experiment.times(self._steps[: self._filled])
         channels = [c.astype(element) for c, element in zip(rows, self._types, strict=True)]
         try:
             self._mdf.extend(0, [(samples, None) for samples in (time, *channels)])

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
-from .listener import Experiment, Signal, times
+from .listener import Experiment, Signal
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 """The element type of a column of numbers by its signal's kind."""
@@ -75,7 +75,7 @@ class MemoryListener:
         if next_row:
             steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
         found = zip(self._signals, table, strict=True)
-        return times(steps, self._experiment.step_ns), {s.name: _typed(s, c) for s, c in found}
+        return self._experiment.times(steps), {s.name: _typed(s, c) for s, c in found}
 
 
 class EveryRow:
@@ -96,7 +96,7 @@ class EveryRow:
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Write the columns of these rows, each to its place; SimulationError on a full disk."""
-        columns = times(steps, self._experiment.step_ns), *(rows[:, i] for i, _ in self._chosen)
+        columns = self._experiment.times(steps), *(rows[:, i] for i, _ in self._chosen)
         try:
             for place, column in enumerate(columns):
                 self._file.seek(self._place(place, int(steps[0])))

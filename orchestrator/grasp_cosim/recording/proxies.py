@@ -36,7 +36,7 @@ def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
     """Remarks on the proxies, a line each; step is the run's, in s."""
     lines = []
     for name, figures in proxy_figures(time, signals).items():
-        steps = round(float(time[-1]) / step)  # of which not each need be recorded
+        steps = round(float(time[-1] - time[0]) / step)  # of which not each need be recorded
         lines += [f"{name}: {line}" for line in _lines(figures, steps, step)]
     return lines
 

@@ -183,7 +183,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @cached_property
     def _figures(self) -> Mapping[str, Any]:
         """The metrics without those that fail."""
-        simulated, wall_time = float(self.time[-1]), self.wall_time
+        simulated, wall_time = float(self.time[-1]) - self._start, self.wall_time
         factor = simulated / wall_time if wall_time else wall_time
         known = self.known
         proxies = known.proxies if known else proxy_figures(self.time, self.signals)
@@ -295,11 +295,15 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         views: Iterator[View] = (higher(f"{name}.view").VIEW for name in self.groups)
         return next((view for view in views if view.fits(self)), OF_ANY)
 
+    @property
+    def _start(self) -> float:
+        return float(self.settings.get("start", 0.0))
+
     @cached_property
     def _steps(self) -> npt.NDArray[np.int64]:
         """The numbers of the recorded communication points, shape (rows,)."""
-        step_ns = round(self.settings["step"] * NANOSECONDS)
-        steps: npt.NDArray[np.int64] = np.rint(self.time * (NANOSECONDS / step_ns)).astype(np.int64)
+        step_ns, since = round(self.settings["step"] * NANOSECONDS), self.time - self._start
+        steps: npt.NDArray[np.int64] = np.rint(since * (NANOSECONDS / step_ns)).astype(np.int64)
         return steps
 
     def _play(self, listener: Listener) -> None:

@@ -19,7 +19,7 @@ from ..system.stimuli import Stimuli
 from .annotation import TYPE, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, qualified
-from .experiment import step_time, stop_time
+from .experiment import step_time, times
 from .foreign import FOREIGN, Steps, read_steps
 from .names import Called, component_names, renamed
 from .network import Carried, Network, Part
@@ -61,8 +61,9 @@ def read_ssp(
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
     if steps.base_ns:
         decided.append(f"scheme = {extras.scheme}, as meant by {steps.said}")
-    stop_ns = stop_time(file, root, parts.values(), stop, decided)
-    step_ns = step_time(file, parts.values(), stop_ns, given_ns, annotated, steps, decided)
+    start_ns, stop_ns = times(file, root, parts.values(), stop, decided)
+    span_ns = stop_ns - start_ns
+    step_ns = step_time(file, parts.values(), span_ns, given_ns, annotated, steps, decided)
     used = {TYPE, *FOREIGN} if annotated or steps.base_ns else {TYPE}
     return System(
         archive.place,
@@ -81,6 +82,7 @@ def read_ssp(
         stimuli,
         extras.realtime,
         extras.metrics,
+        start_ns,
     )
 
 

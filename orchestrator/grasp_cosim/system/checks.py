@@ -209,7 +209,7 @@ def remarks(system: Structure) -> tuple[str, ...]:
                 lines.append(f"{port} is of type {variable.nature}: {left}")
         lines += unsourced(system, component)
     lines += stimuli_remarks(system)
-    steps = system.stop_ns // system.step_ns
+    steps = system.total_steps
     if system.connections and steps < FEW:
         lines.append(
             f"{system.name}: the whole run is {counted(steps, 'step')} of "
@@ -312,15 +312,18 @@ def _declared(place: _Place, connection: Connection, target: Variable) -> tuple[
 
 def check_steps(system: Structure) -> None:
     """InputError where a step does not divide what it must."""
-    step, stop = system.step_ns, system.stop_ns
+    step, start, stop = system.step_ns, system.start_ns, system.stop_ns
+    until = f"stop = {seconds(stop)}{f' from start = {seconds(start)}' if start else ''}"
+    if stop <= start:
+        raise InputError(f"start = {seconds(start)}: must be before stop = {seconds(stop)}")
 
-    def nearest(time: int) -> str:
-        return seconds(max(1, round(time / step)) * step)
+    def nearest(time: int) -> int:
+        return max(1, round(time / step)) * step
 
-    if stop % step:
+    if (stop - start) % step:
         raise InputError(
-            f"step = {seconds(step)} does not divide stop = {seconds(stop)}; "
-            f"stop could be {nearest(stop)}"
+            f"step = {seconds(step)} does not divide {until}; "
+            f"stop could be {seconds(start + nearest(stop - start))}"
         )
     for component in system.components:
         own = step if component.step_ns is None else component.step_ns
@@ -328,12 +331,10 @@ def check_steps(system: Structure) -> None:
         if own % step:
             raise InputError(
                 f"{place} is not a whole multiple of the base step {seconds(step)}; "
-                f"could be {nearest(own)}"
+                f"could be {seconds(nearest(own))}"
             )
-        if stop % own:
-            raise InputError(
-                f"{place} does not divide stop = {seconds(stop)}; must end with a whole step"
-            )
+        if (stop - start) % own:
+            raise InputError(f"{place} does not divide {until}; must end with a whole step")
 
 
 def check_initialisation(system: Structure) -> None:

@@ -13,6 +13,7 @@ def made_of(system: Structure) -> dict[str, Any]:
         **{f"{c.name}.{name}": v for c in system.components for name, v in c.values.items()},
         "step": system.step_ns / NANOSECONDS,
         "stop": system.stop_ns / NANOSECONDS,
+        "start": system.start_ns / NANOSECONDS,
         "scheme": system.scheme,
         "diverging": system.diverging,
         **({"input": system.input.file} if system.input else {}),

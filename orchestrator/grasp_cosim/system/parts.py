@@ -32,25 +32,25 @@ def seconds(nanoseconds: int) -> str:
     return f"{nanoseconds / NANOSECONDS:.9g} s"
 
 
-def in_nanoseconds(place: str, seconds: Any, zero: bool = False) -> int:
+def in_nanoseconds(place: str, seconds: Any, zero: bool = False, low: float = 0.0) -> int:
     """A time in s as a whole number of nanoseconds; InputError where it is none.
 
-    With zero, it may be 0.
+    It is greater than low; with zero, it may be that.
     """
     if not is_number(seconds):
         raise InputError(f"{place} = {seconds!r} s: must be a number")
-    span = f"from 0 to {LONGEST:g}" if zero else f"greater than 0, at most {LONGEST:g}"
+    span = f"from {low:g} to {LONGEST:g}" if zero else f"greater than 0, at most {LONGEST:g}"
     must = f"a number {span}"
-    time = number(place, seconds, 0.0, LONGEST, above=not zero, must=must, unit="s")
+    time = number(place, seconds, low, LONGEST, above=not zero, must=must, unit="s")
     nanoseconds = round(time * NANOSECONDS)
-    if abs(nanoseconds / NANOSECONDS - time) > 1e-12 * time:
+    if abs(nanoseconds / NANOSECONDS - time) > 1e-12 * abs(time):
         raise InputError(f"{place} = {seconds!r} s: must be a whole number of nanoseconds")
     return nanoseconds
 
 
 def first_step(time_ns: int, step_ns: int) -> int:
-    """Return the number of the first communication point at or after a time."""
-    return -(-time_ns // step_ns)
+    """Return the number of the first communication point at or after a time since the start."""
+    return max(0, -(-time_ns // step_ns))
 
 
 def literal(value: Value) -> str:

@@ -21,7 +21,7 @@ SECTIONS = (
 """The entries of a system file, which are no names of components."""
 
 PLACES: Mapping[str, Sequence[str]] = {
-    "experiment": ("step", "stop", "scheme", "diverging"),
+    "experiment": ("step", "stop", "scheme", "diverging", "start"),
     "components": (),
     "initialisation": Initialisation.__slots__,
     "roles": (),

@@ -26,6 +26,7 @@ def settings(system: System) -> dict[str, Any]:
         "scheme": system.scheme,
         "step": system.step_ns / NANOSECONDS,
         "stop": system.stop_ns / NANOSECONDS,
+        **({"start": system.start_ns / NANOSECONDS} if system.start_ns else {}),
         **({"diverging": system.diverging} if system.diverging != "stop" else {}),
         "initialisation": asdict(system.initialisation),
         "components": {

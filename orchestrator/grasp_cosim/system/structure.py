@@ -8,7 +8,16 @@ from typing import Any, Literal, TypeVar, get_args
 from ..base.checks import choice
 from ..base.errors import InputError, nearest
 from ..interface.interface import Given, Variable
-from .parts import Component, Connection, Event, Fault, Initialisation, Port, in_nanoseconds
+from .parts import (
+    LONGEST,
+    Component,
+    Connection,
+    Event,
+    Fault,
+    Initialisation,
+    Port,
+    in_nanoseconds,
+)
 from .realtime import Realtime
 from .stimuli import Stimuli
 
@@ -25,10 +34,11 @@ Made = TypeVar("Made")
 class Structure:
     """Components, their connections, and the experiment.
 
-    step_ns and stop_ns are in nanoseconds; stop_ns is a whole multiple of step_ns, and so is the
-    step of each component. notes are what its reader decided or did not use, one line each. roles
-    name the component that plays a role, such as plant; where they do not, the component of that
-    name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
+    step_ns, stop_ns and start_ns are in nanoseconds; from start to stop it is a whole multiple of
+    step_ns, and of the step of each component. notes are what its reader decided or did not use, a
+    line each. roles name the component that plays a role, such as plant; where they do not, the
+    component of that name plays it. presets are values under a name, like
+    {"bench": {"sensor_1.noise.seed": 1}}.
     diverging is what a run does where a signal runs away. input drives inputs without a connection.
     realtime is how a run is paced that is to be in real time. metrics are the names of groups of
     ours, like grasp.
@@ -51,12 +61,17 @@ class Structure:
     input: Stimuli | None = None
     realtime: Realtime = Realtime()
     metrics: tuple[str, ...] = ()
+    start_ns: int = 0
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def total_steps(self) -> int:
-        """The number of communication steps from 0 to the stop time."""
-        return self.stop_ns // self.step_ns
+        """The number of communication steps from the start to the stop time."""
+        return (self.stop_ns - self.start_ns) // self.step_ns
+
+    def time_ns(self, step: int) -> int:
+        """The time of a communication point."""
+        return self.start_ns + step * self.step_ns
 
     @cached_property
     def recorded(self) -> dict[Port, Variable]:
@@ -107,7 +122,9 @@ def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[st
     """
     made: dict[str, Any] = {}
     for key, value in table.items():
-        if key in ("step", "stop"):
+        if key == "start":
+            made["start_ns"] = in_nanoseconds(place(key), value, zero=True, low=-LONGEST)
+        elif key in ("step", "stop"):
             made[f"{key}_ns"] = in_nanoseconds(place(key), value)
         else:
             made[key] = choice(place(key), value, SCHEMES if key == "scheme" else DIVERGING)
