@@ -1,13 +1,16 @@
-"""Takes the wall times of a paced run, chunk by chunk, and keeps what they come to.
+"""Keeps the wall times of a paced run, in a temporary file, and works out what they come to.
 
 A step is judged when the next one arrives: it is late where that is after its deadline. The time
 between two arrivals is divided without a gap: waiting for the start, the segments of the step, then
 recording and what else there is between two steps.
 """
 
+from array import array
 from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
+from tempfile import TemporaryFile
+from weakref import finalize
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +19,6 @@ from ..base.errors import InputError
 from ..system.description import System
 from ..system.parts import NANOSECONDS
 from ..system.realtime import Realtime
-from .histogram import Histograms
 from .timing import Histogram, Overrun, Spread, Timing
 
 HEAD = 4
@@ -31,6 +33,12 @@ LISTED = 1000
 STEP, START = "step", "start"
 EXCHANGE, RECORDING, BETWEEN, BACKLOG = "exchange", "recording", "between", "backlog"
 RESERVED = (STEP, START, EXCHANGE, RECORDING, BETWEEN, BACKLOG)
+
+PER_MILLE = (500, 990, 999)
+"""The ranks of a Spread."""
+
+FINE = 16
+"""Bars of a histogram to an octave."""
 
 Steps = npt.NDArray[np.int64]
 Table = npt.NDArray[np.float64]
@@ -64,160 +72,198 @@ class Meter:
         self.segments = segments_of(system)
         self.overruns = 0
         """The number of steps that ended late."""
-        self._system, self._realtime, self._period = system, realtime, period
-        self._names = (*names, EXCHANGE)
-        self._periods = np.array([1, 1, *map(system.period, names), 1, 1])
-        self._phase = 0 if system.scheme == "jacobi" else -1
-        owners = np.array(self.segments) % len(self._names)  # the exchange is the last one
-        self._order = owners.argsort(kind="stable")
-        self._firsts = owners[self._order].searchsorted(np.arange(len(self._names)))
-        self._inside = Histograms(len(self._names) + 3)
-        self._recording = Histograms(1)
-        self._recordings: list[tuple[int, int]] = []
-        self._culprits: Counter[str] = Counter()
-        self._listed: list[Overrun] = []
-        self._rows = np.empty((0, HEAD + len(self.segments)))
-        self._next = 0
-        self._judged = 0
-        self._first_due = self._last_end = 0.0
-        self._usual, self._usual_of = np.zeros(0), 0
+        self.system, self.realtime, self.period = system, realtime, period
+        self.names = (*names, EXCHANGE)
+        self._file = TemporaryFile(prefix="grasp_times_")  # noqa: SIM115 - open as long as this
+        finalize(self, self._file.close)
+        self.first = self._rows = self._worst = 0
+        self._first_due = self._last_end = self._before_last = 0.0
+        self.after: tuple[int, int] | None = None
+        self.recordings = array("q"), array("q")
 
     def add(self, steps: Steps, rows: Table) -> None:
         """Take the rows (HEAD, then the ends of the segments) of the steps of these numbers.
 
-        Judges the steps up to the last one, which waits for what comes after it.
+        A step counts from when it is known what comes after it.
         """
-        if not len(self._rows):
-            self._first_due = rows[0, DUE]
-        rows = np.concatenate((self._rows, rows))
-        self._rows, self._next = rows[-1:].copy(), int(steps[-1])
-        if len(rows) > 1:
-            self._judge(np.arange(self._next + 1 - len(rows), self._next), rows[:-1], rows[1:])
+        if not self._rows:
+            self.first, self._first_due = int(steps[0]), float(rows[0, DUE])
+        ends = np.maximum(rows[-2:, DUE] + float(self.period), rows[-2:, -1]).tolist()
+        self._before_last, self._last_end = [self._last_end, *ends][-2:]
+        self._file.write(rows.tobytes())
+        self._rows += len(rows)
+        self.overruns += int(np.count_nonzero(rows[:, LATE] > 0.0))
+        self._worst = max(self._worst, int((rows[:, -1] - rows[:, BEGIN]).max()))
 
     def end(self, arrived: int, late: int) -> None:
         """No step follows the last one; the next one would have begun now."""
-        row = np.zeros_like(self._rows)
-        row[0, ARRIVED], row[0, LATE] = arrived, late
-        self._judge(np.array([self._next]), self._rows, row)
-        self._rows = self._rows[:0]
+        self.after = arrived, late
+        self.overruns += late > 0
 
     def recorded(self, step: int, took: int) -> None:
-        """After that step, recording took so many ns. Comes before the next step is judged."""
-        self._recordings.append((step, took))
+        """After that step, recording took so many ns."""
+        for values, value in zip(self.recordings, (step, took), strict=True):
+            values.append(value)
 
     def verdict(self) -> str:
-        """The overrun that was listed last, in words."""
-        last = self._listed[-1]
+        """The last overrun, in words."""
+        last = _Judged(self).overruns(slice(-1, None))[0]
         return (
-            f"{self._system.name}: the step at t = {last.time:.9g} s ended {1e3 * last.late:.3g} ms"
+            f"{self.system.name}: the step at t = {last.time:.9g} s ended {1e3 * last.late:.3g} ms"
             f" late: {last.culprit} took {1e3 * last.took:.3g} ms; "
-            f"must end within {float(self._period) / 1e6:.6g} ms"
+            f"must end within {float(self.period) / 1e6:.6g} ms"
         )
 
     def live(self) -> str:
         """Return the state of the run in a few words."""
-        worst = self._inside.worst(0) / 1e6
-        factor = self._real_time_factor()
-        return f"{factor:.3g}x, worst step {worst:.3g} ms, {self.overruns} overruns"
+        factor = self.real_time_factor()
+        return f"{factor:.3g}x, worst step {self._worst / 1e6:.3g} ms, {self.overruns} overruns"
+
+    def real_time_factor(self) -> float:
+        """Simulated by wall time, from the first deadline to the last one, or the end after it."""
+        if not self.judged:
+            return 0.0
+        end = self._last_end if self.after else self._before_last
+        return self.judged * self.system.step_ns / (end - self._first_due)
+
+    @property
+    def judged(self) -> int:
+        """The number of steps of which it is known what came after them."""
+        return max(self._rows - (self.after is None), 0)
+
+    def rows(self) -> Table:
+        """All rows so far, mapped from the file."""
+        self._file.flush()
+        shape = self._rows, HEAD + len(self.segments)
+        return (
+            np.memmap(self._file, np.float64, "r", shape=shape) if self._rows else np.empty(shape)
+        )
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """Return the timing so far, with the answers of the operating system."""
-        spreads, histograms = {}, {}
-        inside = (STEP, START, *self._names, BETWEEN)
-        for name in (*inside, RECORDING):
-            recording = name == RECORDING
-            found, i = (self._recording, 0) if recording else (self._inside, inside.index(name))
-            if spread := found.spread(i):
-                times = (t / NANOSECONDS for t in spread[:4])
-                spreads[name] = Spread._make((*times, self._time(int(spread.worst_at))))
-                edges, counts = found.bars(i)
-                histograms[name] = Histogram(tuple(e / NANOSECONDS for e in edges), tuple(counts))
+        found = _Judged(self)
+        spreads, histograms = found.statistics()
+        listed = found.overruns(slice(None))
         return Timing(
-            factor=float(self._realtime.factor),
-            period=float(self._period) / NANOSECONDS,
-            overrun=self._realtime.overrun,
+            factor=float(self.realtime.factor),
+            period=float(self.period) / NANOSECONDS,
+            overrun=self.realtime.overrun,
             granted=tuple(granted),
             refused=tuple(refused),
-            steps=self._judged,
-            real_time_factor=self._real_time_factor(),
-            overruns=self.overruns,
-            listed=tuple(self._listed),
-            culprits=dict(self._culprits.most_common()),
+            steps=self.judged,
+            real_time_factor=self.real_time_factor(),
+            overruns=len(listed),
+            listed=tuple(listed[:LISTED]),
+            culprits=dict(Counter(o.culprit for o in listed).most_common()),
             parts=spreads,
             histograms=histograms,
         )
 
-    def _time(self, step: int) -> float:
-        return self._system.time_ns(step) / NANOSECONDS
 
-    def _real_time_factor(self) -> float:
-        """Simulated by wall time, from the first deadline to the last one, or the end after it."""
-        if not self._judged:
-            return 0.0
-        return self._judged * self._system.step_ns / (self._last_end - self._first_due)
+class _Judged:
+    """The times of the steps that a meter has judged, by part, in ns."""
 
-    def _judge(self, steps: Steps, rows: Table, after: Table) -> None:
-        """Take steps, given what came after each of them."""
-        recorded = self._recorded(steps)
-        segments = np.diff(rows[:, BEGIN:], axis=1)
-        parts = np.add.reduceat(segments[:, self._order], self._firsts, axis=1)
-        start, whole = rows[:, BEGIN] - rows[:, DUE], rows[:, -1] - rows[:, BEGIN]
-        between = after[:, ARRIVED] - rows[:, -1] - recorded
-        times = np.column_stack((whole, start, parts, between))
-        self._inside.add(times, steps, self._happened(steps))
-        self._judged += len(steps)
-        self._last_end = max(rows[-1, DUE] + float(self._period), rows[-1, -1])
-        late = np.flatnonzero(after[:, LATE] > 0.0)
-        if len(late):
-            ready = np.maximum(rows[:, DUE], rows[:, ARRIVED])
-            suspects = np.column_stack(
-                (rows[:, BEGIN] - ready, ready - rows[:, DUE], parts, between, recorded)
+    def __init__(self, meter: Meter) -> None:
+        self._meter, self._system = meter, meter.system
+        rows, count = meter.rows(), meter.judged
+        after = rows[1:, :DUE] if meter.after is None else np.vstack((rows[1:, :DUE], meter.after))
+        self._rows, self._arrived, self._late = rows[:count], after[:, ARRIVED], after[:, LATE]
+        self._steps = meter.first + np.arange(count)
+        at, took = (np.frombuffer(values, np.int64) for values in meter.recordings)
+        known = at < meter.first + count
+        self._recordings = at[known], took[known].astype(float)
+        self._recorded = np.bincount(at[known] - meter.first, took[known], count)
+
+    def statistics(self) -> tuple[dict[str, Spread], dict[str, Histogram]]:
+        """The spreads and the histograms of all parts that happened."""
+        names = (STEP, START, *self._meter.names, BETWEEN)
+        found = {name: (self._part(name), self._happened(name)) for name in names}
+        times = {name: (part[at], self._steps[at]) for name, (part, at) in found.items()}
+        times[RECORDING] = self._recordings[::-1]
+        times = {name: (part, steps) for name, (part, steps) in times.items() if len(part)}
+        spreads = {name: self._spread(*both) for name, both in times.items()}
+        return spreads, {name: _bars(part) for name, (part, _) in times.items()}
+
+    def overruns(self, which: slice) -> list[Overrun]:
+        """The steps that ended late, and what may have made each of them so."""
+        late = np.flatnonzero(self._late > 0.0)
+        if not len(late):
+            return []
+        usual, late = self._usual(), late[which]
+        names = (START, BACKLOG, *self._meter.names, BETWEEN, RECORDING)
+        rows = self._rows[late]
+        ready = np.maximum(rows[:, DUE], rows[:, ARRIVED])
+        own = [self._part(name)[late] for name in names[2:-1]]
+        suspects = np.column_stack(
+            (rows[:, BEGIN] - ready, ready - rows[:, DUE], *own, self._recorded[late])
+        )
+        worst = (suspects - usual).argmax(axis=1)
+        took = suspects[np.arange(len(late)), worst]
+        steps, lateness = self._steps[late].tolist(), self._late[late]
+        return [
+            Overrun(step, self._time(step), by / NANOSECONDS, names[i], spent / NANOSECONDS)
+            for step, by, i, spent in zip(
+                steps, lateness.tolist(), worst.tolist(), took.tolist(), strict=True
             )
-            self._blame(steps[late], after[late, LATE], suspects[late])
+        ]
 
-    def _recorded(self, steps: Steps) -> Table:
-        """Return the time in ns that recording took after each of these consecutive steps."""
-        spent = np.zeros(len(steps))
-        first, last = int(steps[0]), int(steps[-1])
-        taken = [entry for entry in self._recordings if entry[0] <= last]
-        if taken:
-            self._recordings = self._recordings[len(taken) :]
-            after, took = np.array([s for s, _ in taken]), np.array([float(t) for _, t in taken])
-            np.add.at(spent, after - first, took)
-            self._recording.add(took[:, np.newaxis], after)
-        return spent
-
-    def _happened(self, steps: Steps) -> npt.NDArray[np.bool_] | None:
-        """Return the parts that ran, a row per step; None if all did, as slow components do not."""
-        periods = self._periods
-        if (periods == 1).all():
-            return None
-        phase = steps[:, np.newaxis] % periods
-        happened: npt.NDArray[np.bool_] = (phase == periods - 1) | (phase == self._phase)
-        return happened
-
-    def _blame(self, steps: Steps, late: Table, suspects: Table) -> None:
-        """Take steps that ended late, and what may have made each of them late."""
-        names = (START, BACKLOG, *self._names, BETWEEN, RECORDING)
-        if 4 * self._judged > 5 * self._usual_of:  # medians are slow to change, and to find
-            self._usual, self._usual_of = self._find_usual(), self._judged
-        worst = (suspects - self._usual).argmax(axis=1)
-        self.overruns += len(steps)
-        self._culprits.update(names[i] for i in worst.tolist())
-        for i in range(min(len(steps), LISTED - len(self._listed))):
-            step, culprit = int(steps[i]), int(worst[i])
-            late_by, took = (float(t) / NANOSECONDS for t in (late[i], suspects[i, culprit]))
-            overrun = Overrun(step, self._time(step), late_by, names[culprit], took)
-            self._listed.append(overrun)
-
-    def _find_usual(self) -> Table:
+    def _usual(self) -> Table:
         """Return the usual times of the suspects in ns: the medians over all steps.
 
         Where a step takes longer than its period anyhow, nothing that it usually takes is an
-        excuse, and no backlog a reason.
+        excuse, and no backlog a reason. A slow component takes no time in most steps.
         """
-        step, start, *parts = self._inside.medians()
-        if step > self._period:
-            return np.array([0.0, np.inf, *np.zeros(len(parts) + 1)])
-        slow = self._periods[2:] > 1  # such a one takes no time in most steps
-        return np.array([start, 0.0, *np.where(slow, 0.0, parts), 0.0])
+        names = (*self._meter.names, BETWEEN)
+        if np.median(self._part(STEP)) > self._meter.period:
+            return np.array([0.0, np.inf, *np.zeros(len(names) + 1)])
+        usual = [0.0 if self._period(n) > 1 else np.median(self._part(n)) for n in names]
+        return np.array([np.median(self._part(START)), 0.0, *usual, 0.0])
+
+    def _part(self, name: str) -> Table:
+        """The time that a part took in each step."""
+        rows = self._rows
+        if name == STEP:
+            return np.asarray(rows[:, -1] - rows[:, BEGIN])
+        if name == START:
+            return np.asarray(rows[:, BEGIN] - rows[:, DUE])
+        if name == BETWEEN:
+            return np.asarray(self._arrived - rows[:, -1] - self._recorded)
+        owner, own = self._meter.names.index(name), np.zeros(len(rows))
+        for i, segment in enumerate(self._meter.segments, BEGIN):
+            if segment % len(self._meter.names) == owner:
+                own += rows[:, i + 1] - rows[:, i]
+        return own
+
+    def _happened(self, name: str) -> npt.NDArray[np.bool_]:
+        """True for the steps in which a part ran, as slow components do not in all."""
+        period, phase = self._period(name), 0 if self._system.scheme == "jacobi" else -1
+        turn = self._steps % period
+        return np.asarray((turn == period - 1) | (turn == phase))
+
+    def _period(self, name: str) -> int:
+        components = [component.name for component in self._system.components]
+        return self._system.period(name) if name in components else 1
+
+    def _spread(self, times: Table, steps: Steps) -> Spread:
+        ranks = [-(-len(times) * rank // 1000) - 1 for rank in PER_MILLE]
+        found = [*np.partition(times, ranks)[ranks].tolist(), float(times.max())]
+        at = int(steps[times.argmax()])
+        return Spread._make((*(t / NANOSECONDS for t in found), self._time(at)))
+
+    def _time(self, step: int) -> float:
+        return self._system.time_ns(step) / NANOSECONDS
+
+
+def _bars(times: Table) -> Histogram:
+    """A histogram by octaves; empty bars side by side are one, and there are none at the ends."""
+    bars, counts = np.unique(np.floor(FINE * np.log2(np.maximum(times, 1.0))), return_counts=True)
+    edges: list[float] = []
+    heights: list[int] = []
+    for bar, count in zip(bars.tolist(), counts.tolist(), strict=True):
+        if edges and edges[-1] != bar:
+            heights.append(0)
+        if not edges or edges[-1] != bar:
+            edges.append(bar)
+        edges.append(bar + 1)
+        heights.append(count)
+    return Histogram(tuple(2.0 ** (e / FINE) / NANOSECONDS for e in edges), tuple(heights))

@@ -35,9 +35,6 @@ BREATH_NS = 500_000_000
 SOME = 64
 """The rows that are handed on together while it waits, if there is time for it."""
 
-AFTER = 512
-"""Steps after which times are handed on to the meter even where there is no time for it."""
-
 NAP = 1e-4
 """s of a sleep that is there for others only."""
 
@@ -99,12 +96,11 @@ class Pacer:
         self._base = 0
         self._base_step: int | None = None
         self._end: tuple[int, int] | None = None
-        self._pending: tuple[Steps, Table] | None = None
         self._taken = 0
         self._hand_on: Callable[[int], None] = lambda _: None
         self.spare: Callable[[float], bool] | None = None
         """Does something that may wait within so many ns; False if there is nothing to do."""
-        self._measuring = self._recording = 0
+        self._recording = 0
         self._state = _State()
         self._head: Any = memoryview(bytearray(8 * HEAD)).cast("d")
 
@@ -193,8 +189,7 @@ class Pacer:
     def record(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
         """Take steps that were done: the numbers they lead to, and what was written of each.
 
-        Hands their rows on, which counts as recording. What the times come to is found out while
-        it waits for a later step, or else before it takes the next ones.
+        Hands their rows on, which counts as recording.
         """
         self._taken = int(steps[-1])
         self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
@@ -209,7 +204,7 @@ class Pacer:
         return self.meter.timing(granted, refused)
 
     def live(self, settled: bool = False) -> str:
-        """Return the state of the run in a few words, `settled` with what is not measured yet."""
+        """Return the state of the run in a few words, `settled` with the end of its last step."""
         if settled:
             self._settle()
         return self.meter.live()
@@ -220,21 +215,12 @@ class Pacer:
         return self.meter.verdict()
 
     def _take(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
-        self._measure()
         start = self._now()
-        self._pending = steps, rows.copy()
+        self.meter.add(steps, rows)
         hand_on()
         self._recording = self._now() - start
 
-    def _measure(self) -> None:
-        if self._pending is not None:
-            start = self._now()
-            self.meter.add(*self._pending)
-            self._pending = None
-            self._measuring = self._now() - start
-
     def _settle(self) -> None:
-        self._measure()
         if self._end is not None:
             self.meter.end(*self._end)
             self._end = None
@@ -245,14 +231,10 @@ class Pacer:
         It is expected to take half as long again as it did the last time.
         """
         waiting = step - self._taken
-        idle = self._pending is None and waiting < SOME
-        if self._base_step is None or (idle and self.spare is None):
+        if self._base_step is None or (waiting < SOME and self.spare is None):
             return
         spare = self._due(step) - (self._now() - self._origin)
-        if self._pending is not None:
-            if 2 * spare > 3 * self._measuring or waiting > AFTER:
-                self._timed(step - 1, self._measure)
-        elif not idle and 2 * spare > 3 * self._recording:
+        if waiting >= SOME and 2 * spare > 3 * self._recording:
             self._hand_on(step)
         elif self.spare is not None:
             start = self._now()
