@@ -1,7 +1,6 @@
 """A plant of another vendor in mm, mm/s and mN has the metrics of the one in SI."""
 
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import MadeOnce, Run
-from grasp_cosim import InputError, Result, System, load_run, simulate
+from grasp_cosim import Result, System, load_run, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.grasp.identification.identification import chosen
 from grasp_cosim.grasp.identification.log import identify_from_log
@@ -212,16 +211,11 @@ def test_parameters_are_converted_to_si_and_from_it(defined: System, grasp: Syst
     assert with_case(defined, 1).start("plant.object_width") == 70.0
 
 
-def test_a_parameter_without_a_unit_beside_others_in_mm_is_refused(defined: System) -> None:
+def test_a_parameter_without_a_unit_is_in_si(defined: System) -> None:
     plant = defined.component("plant", "")
-    assert plant.units == {}
     bare = replace(plant, fmu=plant.fmu.parents[1] / "none/MilliPlant.fmu")
     others = [c for c in defined.components if c.name != "plant"]
-    system = replace(defined, components=(replace(bare, units={"gap[1]": "mm"}), *others))
-    with pytest.raises(InputError, match=r"plant\.object_width has no unit, others mm: cannot be"):
-        start_in_si(system, "plant.object_width")
-    unitless = replace(defined, components=(bare, *others))
-    assert start_in_si(unitless, "plant.object_width") == 70.0
+    assert start_in_si(replace(defined, components=(bare, *others)), "plant.object_width") == 70.0
 
 
 @pytest.mark.slow
@@ -255,25 +249,18 @@ def test_a_sweep_has_the_metrics_in_si(
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("run", "mm.toml", "--out", "out"),
-        ("sweep", "mm.toml", "--vary", "plant.initial_object_position=0.03", "--out", "out"),
-        ("qualify", "mm.fmu", "--as", "plant", "--system", "mm.toml", "--out", "out"),
+        ("run", "--stop", "0.01"),
+        ("sweep", "--vary", "experiment.stop=0.01", "--workers", "1"),
     ],
 )
-def test_factors_without_a_unit_are_refused_before_the_run(
-    command: Run, fmus: Path, plants: Path, tmp_path: Path, arguments: tuple[str, ...]
+def test_a_plant_without_units_for_one_that_has_them_is_said(
+    command: Run, plants: Path, arguments: tuple[str, ...]
 ) -> None:
     plant = plants / "none/MilliPlant.fmu"
-    written(tmp_path / "mm.toml", fmus, plant, factors=True)
-    (tmp_path / "mm.fmu").symlink_to(plant)
-    code, out, err = command(*arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("grasp-cosim: mm.toml: plant.position[1] has no unit, and its connection")
-    entry = re.search(r"\[components\.plant\] units = \{(.*?)\}", err)
-    assert entry, err
-    pairs = {
-        f"{name}[{j}]" for name in ("position", "velocity", "gap", "contact_force") for j in (1, 2)
-    }
-    assert set(re.findall(r'"(\S+)" = "\.\.\."', entry[1])) == {"object_position", *pairs}
-    assert err.count("\n") == 1
-    assert not list((tmp_path / "out").glob("*"))
+    swap = ("--quiet", "--set", f"components.plant.fmu={plant}")
+    values = [f"plant.{name}=0.07" for name in ("object_width",)]
+    _, _, err = command(*arguments, *swap, *(x for v in values for x in ("--set", v)))
+    said = [line for line in err.splitlines() if "tells no unit of" in line]
+    assert len(said) == 1, err
+    assert "MilliPlant.fmu tells no unit of" in said[0]
+    assert said[0].endswith("as GripperPlant.fmu does: taken to be in SI; `units` names others")

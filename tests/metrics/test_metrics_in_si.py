@@ -10,8 +10,8 @@ from comparison.made import write_fmu
 from grasp_cosim import InputError, System, metric, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.interface.units import Conversion
-from grasp_cosim.metrics.metric import Metric, Signals, measure
-from grasp_cosim.metrics.units import InSi, in_si
+from grasp_cosim.metrics.in_si import InSi, in_si
+from grasp_cosim.metrics.metric import Metric, Signals
 from grasp_cosim.sweeps.sweep import sweep
 from hypothesis import given
 from hypothesis import strategies as st
@@ -97,98 +97,20 @@ def test_a_unit_that_is_not_defined_is_known_by_its_name(load: Load) -> None:
     assert found(load(room)) == InSi({"room.x": Conversion(1e-2, 0.0)}, ())
 
 
-def test_an_input_tells_the_unit_of_what_it_takes_as_it_is(load: Load) -> None:
-    assert found(load({}, {"a": MM_IN, "b": M_IN})).conversions == {"room.x": MILLI}
-    links = [*scaled(-1.0), '"room.y -> sink.b"']
-    assert found(load({}, {"a": MM_IN, "b": M_IN}, links)).conversions == {"room.x": MILLI}
-
-
 def test_without_any_unit_it_is_that_of_si_and_that_is_said(load: Load) -> None:
-    notes = tuple(f"room.{name} has no unit, taken to be in m" for name in "xy")
-    assert found(load()) == InSi({}, notes)
-    assert found(load({"x": M})) == InSi({}, notes[1:])
-
-
-def test_two_inputs_of_different_units_leave_it_in_doubt(load: Load) -> None:
-    links = ['"room.x -> sink.a"', '"room.x -> sink.b"']
-    said = refusal(load({"y": M}, {"a": MM_IN, "b": M_IN}, links))
-    assert "room.x has no unit, and goes to sink.a in mm, sink.b in m; travel must know" in said
-    system = load({"y": M}, {"a": MM_IN, "b": M_IN}, links, 'x = "mm"')
-    assert found(system).conversions == {"room.x": MILLI}
-    same = load({"y": M}, {"a": MM_IN, "b": MM_IN}, links)
-    assert found(same).conversions == {"room.x": MILLI}
-
-
-@pytest.mark.parametrize(("factor", "offset"), [(1e-3, None), (-1e-3, None), (1.0, 0.5), (2.0, 0)])
-@pytest.mark.parametrize("sink", [{}, {"a": M_IN}])
-def test_a_factor_on_what_has_no_unit_is_a_doubt(
-    load: Load, factor: float, offset: float | None, sink: Mapping[str, str]
-) -> None:
-    links = [*scaled(factor, offset), '"room.y -> sink.b"']
-    said = refusal(load({"y": M}, sink, links))
-    assert said.startswith(
-        "rooms.toml: room.x has no unit, and its connection to sink.a has factor"
-    )
-    assert said.endswith('travel must know its unit, one like m: [components.room] units = '
-                         '{ "x" = "..." }')  # fmt: skip
-    named = load({"y": M}, sink, links, 'x = "mm"')
-    assert found(named).conversions == {"room.x": MILLI}
-
-
-@pytest.mark.parametrize(
-    ("declared", "taken", "factor", "holds"),
-    [
-        (M, M_IN, 1e-3, False),
-        (MM, M_IN, 1e-3, True),
-        (MM, M_IN, -1e-3, True),
-        (MM, M_IN, 1.0, False),
-        (M, M_IN, -1.0, True),
-        (M, MM_IN, 1000.0, True),
-        (M, MM_IN, 1e-3, False),
-        (M, unit(INPUT, "N"), 98.0, True),  # a spring: no conversion of lengths
-        (M, INPUT, 1e-3, True),
-        (M, M_IN, 1.1, True),  # a gain
-        (M, M_IN, 2.0, True),
-        (M, M_IN, 39.37, False),  # inches
-    ],
-)
-def test_a_factor_that_the_units_do_not_give_is_a_doubt(
-    load: Load, declared: str, taken: str, factor: float, holds: bool
-) -> None:
-    links = [*scaled(factor), '"room.y -> sink.b"']
-    system = load({"x": declared, "y": M}, {"a": taken}, links)
-    if holds:
-        assert found(system).conversions == ({"room.x": MILLI} if declared == MM else {})
-    else:
-        assert f"but its connection to sink.a has factor = {factor:g} where" in refusal(system)
-        confirmed = load({"x": declared, "y": M}, {"a": taken}, links, 'x = "m"')
-        assert found(confirmed).conversions == {}
-
-
-def test_one_without_a_unit_beside_one_in_another_than_si_is_a_doubt(load: Load) -> None:
-    said = refusal(load({"x": MM}))
-    assert "room.y has no unit, while room.x is in mm; travel must know its unit, one " in said
-    assert found(load({"x": MM}, {"b": M_IN})).conversions == {"room.x": MILLI}  # sink.b tells it
-    assert found(load({"x": M})).conversions == {}
-
-
-@pytest.mark.parametrize(
-    ("other", "said"),
-    [
-        ({"p": unit(ROOM["p"], "mm")}, "room.p is in mm"),
-        ({"u": unit(INPUT, "mm")}, "room.u is in mm"),
-        ({"u": INPUT}, "room.u is in mm"),  # as it takes sink.y, which is in mm
-    ],
-)
-def test_one_without_a_unit_in_a_component_that_has_that_quantity_in_another(
-    load: Load, other: Mapping[str, str], said: str
-) -> None:
-    links = ['"sink.y -> room.u"'] if "u" in other else []
-    system = load(other, {"y": MM}, links)
-    assert f"room.x has no unit, while {said}; travel must know its unit" in refusal(system)
-    newtons = {n: text.replace('unit="mm"', 'unit="kN"') for n, text in other.items()}
-    forces = load(newtons, {"y": unit(OUTPUT, "kN")}, links)
-    assert "room.x" not in found(forces).conversions
+    """Whatever is beside it, takes it or scales it."""
+    said = "room.x, room.y: no unit, taken to be in SI"
+    assert found(load()) == InSi({}, (said,))
+    for system in (
+        load({"x": M}, {"b": MM_IN}),
+        load(
+            {"x": M},
+            {},
+            ['"room.x -> sink.a"', '{ from = "room.y", to = "sink.b", factor = 1000.0 }'],
+        ),
+    ):
+        assert found(system) == InSi({}, ("room.y: no unit, taken to be in SI",))
+    assert found(load({"x": MM})).conversions == {"room.x": MILLI}
 
 
 def test_a_signal_of_another_quantity_is_refused(load: Load) -> None:
@@ -204,8 +126,6 @@ def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
     silent = Metric("silent", travel.function, needs=("room.x",))
     elsewhere = Metric("elsewhere", travel.function, needs={"room.x": "m", "room.z": "m"})
     assert found(odd, silent, elsewhere).conversions == {}
-    factor = load({}, {"a": M_IN}, [*scaled(1e-3), '"room.y -> sink.b"'])
-    assert found(factor, silent).conversions == {"room.x": None}
 
 
 @pytest.mark.parametrize("name", ["mm", "cubit", ""])
@@ -237,16 +157,17 @@ def test_every_way_to_run_a_system_refuses_it_first(
 ) -> None:
     """These FMUs have no binary: loading one would be another error."""
     bring_group(monkeypatch, "travels", travel)
-    doubtful = load({}, {}, [*scaled(1e-3), '"room.y -> sink.b"'])
-    doubtful = replace(doubtful, metrics=("travels",))
+    wrong = replace(load({"x": unit(OUTPUT, "N")}), metrics=("travels",))
     ways: list[Callable[[], object]] = [
-        lambda: simulate(doubtful),
-        lambda: simulate.session(doubtful),
-        lambda: sweep(doubtful, [{"room.p": 1.0}], native=False),
-        lambda: qualify(doubtful, "room", tmp_path / "room.fmu"),
-        lambda: qualify(replace(load({"x": M, "y": M}), metrics=("travels",)), "room", other),
+        lambda: simulate(wrong),
+        lambda: simulate.session(wrong),
+        lambda: sweep(wrong, [{"room.p": 1.0}], native=False),
+        lambda: qualify(wrong, "room", tmp_path / "room.fmu"),
+        lambda: qualify(replace(load({"x": M}), metrics=("travels",)), "room", other),
     ]
-    other = write_fmu(tmp_path / "other.fmu", {**ROOM, "x": unit(OUTPUT, "mm")})
+    other = write_fmu(
+        tmp_path / "other.fmu", {**ROOM, "x": unit(OUTPUT, "mm"), "y": unit(OUTPUT, "N")}
+    )
     for way in ways:
         with pytest.raises(
             InputError, match=r"must know its unit, one like m: \[components\.room\]"
@@ -274,42 +195,6 @@ def test_signals_come_in_si(factor: float, offset: float) -> None:
     assert run.by_name["room.x"] is COLUMN
 
 
-def test_a_signal_in_doubt_fails_the_metric_that_asks_for_it() -> None:
-    run = Signals(TIME, {"room.x": COLUMN, "room.y": COLUMN}, {}, {"room.x": None})
-    other = Metric("other", lambda signals: float(signals["room.y"][0]))
-    measured = measure(run, [Metric("travel", travel.function), other])
-    assert dict(measured.values) == {"other": 1.0}
-    assert measured.failures == (
-        "metric 'travel': test_metrics_in_si.py, line 29: the unit of room.x is in doubt, as "
-        "it has none and its connections scale it; must be named in the system file, under units",
-    )
-
-
-def towards(factor: float) -> list[str]:
-    """The connections of a room and a sink, of which the first goes to the room, with a factor."""
-    return [
-        f'{{ from = "sink.z", to = "room.i", factor = {factor} }}',
-        '"room.x -> sink.a"',
-        '"room.y -> sink.b"',
-    ]
-
-
-@pytest.mark.parametrize("declared", ["m", None])
-def test_a_factor_to_an_input_leaves_the_outputs_of_its_component_in_doubt(
-    load: Load, declared: str | None
-) -> None:
-    z = OUTPUT if declared is None else unit(OUTPUT, declared)
-
-    def system(factor: float, units: str = "") -> System:
-        return load({"i": INPUT}, {"z": z}, towards(factor), units)
-
-    said = "0.001 m" if declared else "another unit, by factor = 1000"
-    assert f"room.x has no unit, while room.i is in {said}; travel" in refusal(system(1000.0))
-    assert not found(system(-1.0)).conversions
-    assert not found(system(3.0)).conversions
-    assert found(system(1000.0, 'x = "m", y = "m"')).conversions == {}
-
-
 def test_all_that_metrics_expect_of_a_signal_is_checked(load: Load) -> None:
     @metric("milli", needs={"room.x": "mm"})
     def milli(run: Signals) -> None: ...
@@ -333,6 +218,6 @@ def test_what_a_metric_may_read_without_a_unit_is_said(load: Load) -> None:
     def bound(run: Signals) -> None: ...
 
     room = load({"y": M})
-    assert found(room, free).notes == ("room.x: no unit, taken to be in SI, if free reads it",)
-    assert found(room, bound).notes == ("room.x has no unit, taken to be in m",)
+    assert found(room, free).notes == ("room.x: no unit, taken to be in SI",)
+    assert found(room, bound).notes == ("room.x: no unit, taken to be in SI",)
     assert found(load({"x": MM, "y": M}), free).notes == ()

@@ -127,9 +127,9 @@ def show(as_json: bool, report: Any, text: str) -> None:
     click.echo(json.dumps(report).replace("\x7f", "\\u007f") if as_json else text)
 
 
-def say(line: str) -> None:
-    """Print one line on standard error, whatever is in it; nothing with --quiet."""
-    if not is_quiet():
+def say(line: str, always: bool = False) -> None:
+    """Print one line on standard error, whatever is in it; with --quiet nothing, unless always."""
+    if always or not is_quiet():
         write(on_one_line(line))
 
 
@@ -159,10 +159,10 @@ def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 
 class _Said(logging.Handler):
-    """Says what is logged."""
+    """Says what is logged, with --quiet only what may make the figures wrong."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        say(record.getMessage())
+        say(record.getMessage(), always=record.levelno >= logging.ERROR)
 
 
 _SAID = _Said()

@@ -67,7 +67,7 @@ class Reference:
     shift: float
     asked: tuple[Metric, ...]
     roles: Mapping[str, str] = field(default_factory=dict)
-    to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
+    to_si: Mapping[str, Conversion] = field(default_factory=dict)
     nominals: Mapping[str, float | None] = field(default_factory=dict)
 
     def entries(

@@ -15,8 +15,8 @@ from ..base.errors import InputError, SimulationError
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..master.simulation import simulate
+from ..metrics.in_si import in_si
 from ..metrics.metric import Metric, metrics_of
-from ..metrics.units import in_si
 from ..recording.result import Result
 from ..system.description import System
 from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Isolation
@@ -172,7 +172,7 @@ def qualify(
 
 
 def _reference(
-    swap: Swap, run: Result, asked: tuple[Metric, ...], more: Mapping[str, Conversion | None]
+    swap: Swap, run: Result, asked: tuple[Metric, ...], more: Mapping[str, Conversion]
 ) -> Reference:
     """The run of the original to compare with; more are conversions of signals that it lacks."""
     to_si = {n: c for n, c in more.items() if n not in run} | dict(run.to_si)
@@ -192,8 +192,8 @@ def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
 
 def _conversions_of_candidate(
     swapped: System, metrics: Sequence[Metric]
-) -> Mapping[str, Conversion | None]:
-    """The conversions to SI of the system with the candidate; InputError where that is in doubt."""
+) -> Mapping[str, Conversion]:
+    """The conversions to SI of the system with the candidate; InputError if a unit is wrong."""
     try:
         return in_si(swapped, metrics).conversions
     except InputError as error:

@@ -36,7 +36,7 @@ class Side:
     time: Floats
     signals: Mapping[str, npt.NDArray[Any]]
     units: Mapping[str, str | None]
-    to_si: Mapping[str, Conversion | None]
+    to_si: Mapping[str, Conversion]
     texts: tuple[str, ...] = ()
     result: Result | None = None
     """The run; None of a log from elsewhere."""

@@ -14,9 +14,9 @@ from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import Conversion, conversion
 from ..system.checks import transforms
+from ..system.conversions import between, output_units
 from ..system.description import System
 from ..system.parts import Component, Isolation
-from ..system.readings import between, readings
 from ..system.swap import Replacement, converted, replaced
 from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
@@ -157,12 +157,10 @@ def _nominals(interfaces: Mapping[str, Interface]) -> dict[str, float | None]:
 
 
 def _between(source: System, target: System, name: str) -> dict[str, Conversion | None]:
-    """The conversions of the outputs of a component whose units both systems tell, even if only by
-    connections.
-    """
-    ends = readings(source), readings(target)
+    """The conversions of the outputs of a component whose units both systems tell."""
+    ends = output_units(source), output_units(target)
     return {
         str(port): conversion(start, end)
         for port in ends[0].keys() & ends[1].keys()
-        if port.component == name and (start := ends[0][port].unit) and (end := ends[1][port].unit)
+        if port.component == name and (start := ends[0][port]) and (end := ends[1][port])
     }

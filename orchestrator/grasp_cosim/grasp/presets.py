@@ -16,9 +16,9 @@ from ..base.checks import known
 from ..interface.interface import Value
 from ..interface.units import IDENTITY
 from ..metrics.metric import resolved
+from ..system.conversions import parameter_in_si
 from ..system.description import System
 from ..system.parts import Port
-from ..system.readings import parameter_in_si
 
 SYSTEM = Path(__file__).parent / "grasp.toml"
 """The built-in system: the published grasp."""
@@ -81,7 +81,7 @@ def with_si_values(system: System, values: Mapping[str, Value], place: str) -> S
     """The system with start values by role, like plant.object_width, numbers in SI units.
 
     They are converted where a component has another unit; InputError, naming the place, where that
-    is in doubt or there is no such variable.
+    is not defined or there is no such variable.
     """
     given: dict[str, Value] = {}
     for key, value in values.items():

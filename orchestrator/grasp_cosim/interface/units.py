@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from si_units import OTHER, Unit
+from si_units import Unit
 
 if TYPE_CHECKING:  # reading a description needs no numpy, which takes time to load
     import numpy as np
@@ -40,12 +40,3 @@ def conversion(source: Unit, target: Unit) -> Conversion | None:
     factor, offset = source.factor / target.factor, (source.offset - target.offset) / target.factor
     possible = factor != 0.0 and math.isfinite(factor) and math.isfinite(offset)
     return Conversion(factor, offset) if possible else None
-
-
-def between_units(ratio: float) -> bool:
-    """True if a number > 0 looks like one between two units and not like a gain: 1000, 25.4, 60."""
-    digits = math.log10(ratio)
-    if abs(digits - round(digits)) < 1e-9:
-        return round(digits) != 0
-    shifts = (sign * math.log10(factor) for factor, *_ in OTHER.values() for sign in (-1, 1))
-    return any(abs(digits - s - round(digits - s)) < 1e-4 for s in shifts if s % 1.0)

@@ -16,8 +16,8 @@ from ..base.numerals import counted
 from ..base.progress import Progress, phase
 from ..fmi.load import load
 from ..interface.interface import Value
+from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, Signals, chosen, measure, metrics_of, needed
-from ..metrics.units import in_si
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.dispatch import Dispatcher

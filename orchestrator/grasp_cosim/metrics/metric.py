@@ -63,20 +63,18 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
     `time` in s and every signal have the shape (rows,). They come in SI base units, by_name has
     them as recorded. `roles` maps a role to the component that plays it; a component of a role's
     name plays it where `roles` does not say otherwise. `to_si` are the conversions of those that
-    are not recorded in SI, None where the unit is in doubt.
+    are not recorded in SI.
     """
 
     time: npt.NDArray[np.float64]
     by_name: Mapping[str, npt.NDArray[Any]]
     roles: Mapping[str, str] = field(default_factory=dict)
-    to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
+    to_si: Mapping[str, Conversion] = field(default_factory=dict)
     worked_out: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
     """What one metric leaves for the next, by keys of their own; signals in SI units by name."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """The signal; MissingSignalError where it was not recorded, InputError where its unit is in
-        doubt.
-        """
+        """The signal; MissingSignalError where it was not recorded."""
         reason = lacking((name,), self.by_name, self.roles)
         if reason:
             raise MissingSignalError(reason)
@@ -84,13 +82,7 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
         if own not in self.to_si:
             return self.by_name[own]
         if own not in self.worked_out:
-            conversion = self.to_si[own]
-            if conversion is None:
-                raise InputError(
-                    f"the unit of {own} is in doubt, as it has none and its connections scale it; "
-                    f"must be named in the system file, under units"
-                )
-            self.worked_out[own] = conversion(self.by_name[own])
+            self.worked_out[own] = self.to_si[own](self.by_name[own])
         converted: npt.NDArray[Any] = self.worked_out[own]
         return converted
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ..base.errors import InputError
 from ..base.files import of_any_format, remove, unwritable, write_json
 from ..base.higher import groups
-from ..metrics.units import in_si
+from ..metrics.in_si import in_si
 from ..system.description import System
 from ..system.parts import Component
 from .csv import CsvListener

@@ -159,16 +159,18 @@ def _rejections(place: str, found: Mapping[str, Any]) -> dict[str, Rejection]:
         raise InputError(f"{place}: is damaged ({said}); must have count and first each") from error
 
 
-def _to_si(place: str, written: Mapping[str, Any]) -> dict[str, Conversion | None]:
+def _to_si(place: str, written: Mapping[str, Any]) -> dict[str, Conversion]:
     """The conversions to SI; of an earlier run.json by the names of its units."""
     if "to_si" not in written:
         return dict(_known(written["units"]))
-    found: dict[str, Conversion | None] = {}
+    found: dict[str, Conversion] = {}
     for name, entry in written["to_si"].items():
+        if entry is None:  # of an earlier version, which did not take it to be in SI
+            continue
         numbers = [entry.get(key) for key in Conversion._fields] if isinstance(entry, dict) else []
-        if entry is not None and not (numbers and all(map(is_number, numbers))):
-            raise InputError(f"{place}: {name} = {entry!r}; must be null, or factor and offset")
-        found[name] = Conversion(*map(float, numbers)) if numbers else None  # type: ignore[arg-type]
+        if not (numbers and all(map(is_number, numbers))):
+            raise InputError(f"{place}: {name} = {entry!r}; must be factor and offset")
+        found[name] = Conversion(*map(float, numbers))  # type: ignore[arg-type]
     return found
 
 

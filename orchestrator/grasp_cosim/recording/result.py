@@ -100,8 +100,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """Metrics that were asked for beside those of the system."""
     origin: Mapping[str, Any] = field(default_factory=dict)
     """The date, versions, command and title of a run with a folder: see recording.folder."""
-    to_si: Mapping[str, Conversion | None] = field(default_factory=dict)
-    """The conversions to SI base units of signals in others; None where the unit is in doubt."""
+    to_si: Mapping[str, Conversion] = field(default_factory=dict)
+    """The conversions to SI base units of signals in others."""
     known: Known | None = None
     """What was worked out of every step, where fewer rows were recorded."""
     folder: Path | None = None
@@ -339,6 +339,6 @@ def _in_words(metric: Metric, value: Any) -> str:
     return f"{metric.name} {', '.join(texts)} {metric.display_unit}".rstrip()
 
 
-def conversions_entry(to_si: Mapping[str, Conversion | None]) -> dict[str, Any]:
+def conversions_entry(to_si: Mapping[str, Conversion]) -> dict[str, Any]:
     """The conversions of a result to SI base units as run.json has them."""
-    return {name: c and c._asdict() for name, c in to_si.items()}
+    return {name: c._asdict() for name, c in to_si.items()}

@@ -14,10 +14,10 @@ from si_units import known_unit
 from ..base.errors import InputError, reason
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
+from ..system.conversions import parameter_in_si
 from ..system.description import System
 from ..system.parts import Port
 from ..system.places import plain
-from ..system.readings import parameter_in_si
 
 Row = Mapping[str, Value]
 
@@ -108,7 +108,7 @@ def read_rows(path: Path) -> list[dict[str, Value]]:
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
     """The rows with the values in the units that the system's FMUs have.
 
-    InputError where a unit is in doubt, or the first row does not fit the system.
+    InputError where a unit is not defined, or the first row does not fit the system.
     """
     places = dict.fromkeys(place for row in rows for place in row)
     changes = {place: _to_si(system, place) for place in places}

@@ -16,8 +16,8 @@ from ..base.errors import InputError, SimulationError
 from ..base.numerals import counted
 from ..base.parallel import Crew, Lost
 from ..base.progress import Progress, phase
+from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of
-from ..metrics.units import in_si
 from ..system.description import System
 from ..system.settings import settings
 from .cluster import said
@@ -103,7 +103,7 @@ def _beside(table: Path) -> Path:
 
 
 def _measured(system: System, own: tuple[Metric, ...], recorded: set[str]) -> list[Metric]:
-    """The metrics that the system permits; InputError where there is none, or a unit in doubt."""
+    """The metrics that the system permits; InputError if there is none, or a unit is wrong."""
     check_portable(own)
     asked = metrics_of(system.metrics, own)
     in_si(system, asked)

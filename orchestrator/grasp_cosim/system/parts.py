@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from ..base.checks import is_number, number
 from ..base.errors import InputError
 from ..interface.expansion import expanded
-from ..interface.interface import Interface, Value, Variable
+from ..interface.interface import Interface, Value
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 
@@ -149,11 +149,6 @@ class Component:
         """True if no native twin is chosen, and the FMU is in Python, without a binary for here."""
         fmu = self._read[0]
         return self.native is None and fmu.python and of_binary(fmu) is not None
-
-    def names_unit(self, variable: Variable) -> bool:
-        """True if units name the one of a variable, or of the array that it is in."""
-        array = variable.element.array if variable.element else variable.name
-        return variable.name in self.units or array in self.units
 
     def sized(self, interface: Interface) -> Interface:
         """The interface of an FMU, with its arrays taken apart, of the sizes that values give."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,16 +10,18 @@ from shlex import quote
 from typing import Any
 
 from ..base.checks import choice, text
-from ..base.errors import InputError, nearest
-from ..interface.interface import Interface, Value
+from ..base.errors import InputError, choices, nearest
+from ..interface.interface import Interface, Value, Variable
 from ..interface.read import describe
 from ..interface.units import IDENTITY
 from .checks import check_items
+from .conversions import unit_of
 from .parts import ISOLATIONS, Component, Port, Solver, in_nanoseconds, literal
 from .places import changed, plain
-from .readings import unit_of
 from .structure import Structure
 from .values import with_given
+
+LOGGER = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +100,22 @@ def with_fmu(
         for name, value in was.values.items()
         if name not in given
     ]
+    if silent := [v.name for v in after.variables if _silent(v, before)]:
+        LOGGER.error(
+            "%s: %s tells no unit of %s, as %s does: taken to be in SI; `units` names others",
+            place, new.fmu.name, choices(silent, 6), was.fmu.name,
+        )  # fmt: skip
     now = replace(now, values={**given, **converted(kept, before, after)})
     check_items(was, now, [name for name in now.values if name not in anew], place)
     return now, notes
+
+
+def _silent(variable: Variable, before: Interface) -> bool:
+    """True for a Real without a unit that had one before."""
+    was = before.by_name.get(variable.name)
+    return bool(
+        variable.kind == "Real" and not variable.unit and was and was.unit not in (None, "1")
+    )
 
 
 def _check_ends(system: Structure, was: Component, after: Interface, place: str) -> None:
