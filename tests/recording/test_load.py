@@ -117,7 +117,7 @@ def test_damaged_signals_are_refused_in_one_line(
         ({**JSON, "types": {"a.on": "x"}}, "type of a.on = 'x': must be one of float64, int32, "),
         ({**JSON, "types": {"a.on": []}}, "type of a.on = []: must be one of float64, int32, "),
         ({**JSON, "types": {"a.x": "int64"}}, "type of a.x = int64: must be a type of its values"),
-        ({**RUN, "units": {"a.x": "m"}}, "must be those of the columns of signals.csv: a.x, a.on"),
+        ({**RUN, "units": {"a.x": "m"}}, "must be those of the recorded columns: a.x, a.on"),
     ],
 )
 def test_damaged_settings_are_refused_in_one_line(

@@ -58,7 +58,7 @@ WANTED = {
 """The natures of files that a command may want, in words."""
 
 _SUFFIXES = {"fmu": (".fmu",), "system": (".toml", ".ssp")}
-_IN_A_RUN = {"run.json", "signals.csv"}
+_IN_A_RUN = {"run.json", "signals.csv", "signals.arrow"}
 _IN_AN_ARCHIVE = {"modelDescription.xml": "an FMU", "SystemStructure.ssd": "an SSP archive"}
 
 

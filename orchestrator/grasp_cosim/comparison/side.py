@@ -15,7 +15,7 @@ from ..base.errors import InputError
 from ..base.files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals
-from ..recording.load import SETTINGS, SIGNALS, load_run, read_mdf
+from ..recording.load import ARROW, SETTINGS, SIGNALS, load_run, read_mdf
 from ..recording.result import Result
 from ..system.parts import NANOSECONDS
 from ..system.stimuli import read_stimuli
@@ -108,7 +108,7 @@ def read_side(path: Path) -> Side:
 
     InputError where it is missing, damaged or none of these.
     """
-    one_of_its = path.name in (SIGNALS, SETTINGS) and path.with_name(SETTINGS).is_file()
+    one_of_its = path.name in (SIGNALS, ARROW, SETTINGS) and path.with_name(SETTINGS).is_file()
     if path.is_dir() or one_of_its:
         return _run(str(path), load_run(path))
     if not path.is_file():

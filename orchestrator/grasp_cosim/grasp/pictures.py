@@ -11,7 +11,18 @@ import numpy as np
 from ..base.numerals import fixed
 from ..recording.result import Result
 from ..report.caption import caption
-from ..report.plot import BLUE, DASHES, GREY, RED, finish, headed, kept, new_figure, one_legend
+from ..report.plot import (
+    BLUE,
+    DASHES,
+    GREY,
+    RED,
+    drawn,
+    finish,
+    headed,
+    kept,
+    new_figure,
+    one_legend,
+)
 from .metrics import CLOSING, FINGERS, first_contact
 
 if TYPE_CHECKING:
@@ -100,7 +111,7 @@ def _around(
 def _gaps(axes: Axes, run: Result, rows: slice, fingers: Sequence[int]) -> None:
     for j in fingers:
         gap = 1e3 * run.by_role[f"plant.gap[{j}]"][rows]
-        axes.plot(run.time[rows], gap, DASHES[j], color=COLOR[j], label=f"finger {j}")
+        axes.plot(*drawn(run.time[rows], gap), DASHES[j], color=COLOR[j], label=f"finger {j}")
 
 
 def draw_contact_forces(axes: Axes, run: Result) -> None:
@@ -109,7 +120,7 @@ def draw_contact_forces(axes: Axes, run: Result) -> None:
     for j in FINGERS:
         force = abs(run.by_role[f"plant.contact_force[{j}]"])
         peaks.append(float(force.max()))
-        axes.plot(run.time, force, DASHES[j], color=COLOR[j], label=f"finger {j}")
+        axes.plot(*drawn(run.time, force), DASHES[j], color=COLOR[j], label=f"finger {j}")
     highest = max(peaks)
     axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))
     if highest > FORCE_LIMIT:
@@ -123,10 +134,10 @@ def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
     for result, style, label in runs:
         target = 1e3 * result.by_role["controller.target_position"]
         name = f"target, {label}" if label else "target"
-        axes.plot(result.time, target, style, color=TARGET, label=name)
+        axes.plot(*drawn(result.time, target), style, color=TARGET, label=name)
     result = runs[0][0]
     centre = 1e3 * result.by_role["plant.object_position"]
-    axes.plot(result.time, centre, ":", color=GREY, label="centre of the object")
+    axes.plot(*drawn(result.time, centre), ":", color=GREY, label="centre of the object")
     finish(axes, "position in mm", legend=False)
 
 

@@ -1,4 +1,4 @@
-"""The folder of a run, on disk while it runs: signals.csv row by row, and run.json beside it."""
+"""The folder of a run, on disk while it runs: its rows, and run.json beside them."""
 
 import fcntl
 import os
@@ -10,7 +10,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -21,15 +21,20 @@ from ..base.higher import groups
 from ..metrics.in_si import in_si
 from ..system.description import System
 from ..system.parts import Component
+from .arrow import ArrowListener
 from .csv import CsvListener
 from .listener import Experiment, Signal
-from .load import SETTINGS, SIGNALS, TEXT
+from .load import ARROW, SETTINGS, SIGNALS, TEXT
 from .memory import TYPES
 from .result import Result, conversions_entry
 from .view import OF_ANY
 
 DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
 """The files that may be made of a run in its folder, beside its picture."""
+
+Form = Literal["csv", "arrow"]
+FORMS: tuple[str, ...] = get_args(Form)
+FILES = (SIGNALS, ARROW)
 
 FIRST_GUESS = 20e3
 """ns that it takes to write a row."""
@@ -54,15 +59,21 @@ class RunFolder:
         command: Sequence[str] = (),
         paced: bool = False,
         title: str = "",
+        form: Form = "csv",
     ) -> None:
         """`command` led to the run; if it is `paced`, rows are written in spare() time only.
 
-        `title` is what its pictures and pages are called, by default what it is.
+        `title` is what its pictures and pages are called, by default what it is. `form` is that of
+        the rows, signals.csv or signals.arrow. InputError without pyarrow, where that needs it.
         """
         self._folder, self._paced = folder, paced
         self._origin = {**origin(system, command), **({"title": title} if title else {})}
         self._to_si = in_si(system, ()).conversions
-        self._csv = CsvListener(folder / SIGNALS, in_place=True)
+        self._file: CsvListener | ArrowListener = (
+            ArrowListener(folder / ARROW)
+            if form == "arrow"
+            else CsvListener(folder / SIGNALS, in_place=True)
+        )
         self._begun, self._broken = False, False
         self._waiting: deque[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = deque()
         self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
@@ -108,14 +119,14 @@ class RunFolder:
         return True
 
     def end(self, complete: bool) -> None:
-        """Write the rows that still wait, and close signals.csv."""
+        """Write the rows that still wait, and close their file."""
         if self._begun:
             try:
                 while self._waiting and not self._broken:
                     self._write(*self._waiting.popleft())
             finally:
                 if self._signals:
-                    self._csv.end(complete)
+                    self._file.end(complete)
 
     def finish(self, result: Result) -> None:
         """Write the run.json of a result that ended, in whatever way; not if rows are missing."""
@@ -126,7 +137,7 @@ class RunFolder:
         if not self._signals:
             return
         self._broken = True
-        self._csv.block(steps, rows)
+        self._file.block(steps, rows)
         self._broken = False
 
     def _take_the_folder(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
@@ -134,15 +145,15 @@ class RunFolder:
 
         Without run.json there is no run in the folder.
         """
-        settings, signals = self._folder / SETTINGS, self._folder / SIGNALS
+        settings = self._folder / SETTINGS
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._keep_others_out()
-            if settings.is_file() and signals.is_file():
+            if settings.is_file() and any((self._folder / name).is_file() for name in FILES):
                 remove(self._folder, *DRAWN, *of_any_format(OF_ANY.stem, *groups()))
-            remove(self._folder, SETTINGS, SIGNALS)
+            remove(self._folder, SETTINGS, *FILES)
             if self._signals:
-                self._csv.begin(self._experiment, self._signals)
+                self._file.begin(self._experiment, self._signals)
             self._begun = True
             self._write(steps, rows)
             write_json(settings, self._unfinished())

@@ -5,6 +5,7 @@ import json
 import logging
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -15,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from si_units import known_unit
 
-from ..base.checks import choice, is_number, real
+from ..base.checks import choice, extra_module, is_number, real
 from ..base.errors import InputError, choices
 from ..base.files import check_nature
 from ..base.numerals import counted
@@ -23,11 +24,15 @@ from ..base.plain import from_cell
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, metrics_of
 from ..realtime.timing import Timing
+from .arrow import pyarrow, read_arrow
 from .mdf import check_mdf
 from .result import UNITS, Known, Rejection, Result
 
-SIGNALS, SETTINGS = "signals.csv", "run.json"
-"""The files of a run's folder."""
+SIGNALS, ARROW, SETTINGS = "signals.csv", "signals.arrow", "run.json"
+"""The files of a run's folder, of which it has one of the former two."""
+
+LARGE = 20_000_000
+"""Bytes of a file that is worth another reader."""
 
 NUMBER = (int, float)
 MAYBE = (int, float, type(None))
@@ -71,7 +76,7 @@ FORMS = {
 
 def run_folder(path: Path) -> Path:
     """The folder of a run, which one of its files names as well; InputError where it is none."""
-    if path.name in (SIGNALS, SETTINGS) and path.is_file():
+    if path.name in (SIGNALS, ARROW, SETTINGS) and path.is_file():
         return path.parent
     check_nature(path, "run")
     return path
@@ -90,15 +95,19 @@ def load_run(folder: str | Path) -> Result:
     path = folder / SETTINGS
     written = _settings(path)
     units, types = written["units"], written.get("types", {})
-    if not units and not (folder / SIGNALS).exists():
+    arrow = folder / ARROW
+    if not units and not (folder / SIGNALS).exists() and not arrow.exists():
         raise InputError(f"{path}: this run recorded no signal; must have recorded one")
     unfinished = not written["complete"] and written["wall_time"] is None
     texts = {n for n, kind in types.items() if kind == TEXT}
-    time, columns = _table(folder / SIGNALS, texts, unfinished)
+    if arrow.exists():
+        time, columns = read_arrow(arrow)
+    else:
+        time, columns = _table(folder / SIGNALS, texts, unfinished)
     if list(units) != list(columns):
         raise InputError(
             f"{path}: units are those of {choices(units)}; "
-            f"must be those of the columns of {SIGNALS}: {choices(columns)}"
+            f"must be those of the recorded columns: {choices(columns)}"
         )
     return _result(path, written, time, columns)
 
@@ -297,24 +306,52 @@ def _table(
         columns = _texts(path, names, texts, count) if texts else {}
         places = [0, *(i for i, name in enumerate(names, 1) if name not in columns)]
         some: dict[str, Any] = {"usecols": places, "quotechar": '"'} if columns else {}
-        table = np.loadtxt(
-            path,
-            delimiter=",",
-            skiprows=1,
-            comments=None,
-            ndmin=2,
-            encoding="utf-8",
-            max_rows=count,
-            **some,
-        )
+        table = [] if columns or torn else _fast(path, len(places))
+        if not table:
+            table = [
+                *np.loadtxt(
+                    path,
+                    delimiter=",",
+                    skiprows=1,
+                    comments=None,
+                    ndmin=2,
+                    encoding="utf-8",
+                    max_rows=count,
+                    **some,
+                ).T
+            ]
     except (ValueError, csv.Error) as error:  # also where it is no UTF-8
         raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
-    if table.shape[1] != len(places):
-        raise InputError(f"{path}: is damaged: {_uneven(table.shape[1], names)}")
-    if not (np.diff(table[:, 0], prepend=-np.inf) > 0.0).all():
+    if len(table) != len(places):
+        raise InputError(f"{path}: is damaged: {_uneven(len(table), names)}")
+    if not (np.diff(table[0], prepend=-np.inf) > 0.0).all():
         raise InputError(f"{path}: is damaged: the time must grow from row to row")
-    columns |= {names[i - 1]: table[:, k] for k, i in enumerate(places[1:], 1)}
-    return table[:, 0], {name: columns[name] for name in names}
+    columns |= {names[i - 1]: table[k] for k, i in enumerate(places[1:], 1)}
+    return table[0], {name: columns[name] for name in names}
+
+
+def _fast(path: Path, width: int) -> list[npt.NDArray[np.float64]]:
+    """The columns of a large file, if pyarrow is here, and nothing is wrong with them.
+
+    They have the same bits, in a tenth of the time.
+    """
+    if path.stat().st_size < LARGE:
+        return []
+    with suppress(InputError):
+        arrow, reader = pyarrow(), extra_module("pyarrow.csv", "it reads CSV", "arrow")
+        names = [str(i) for i in range(width)]
+        try:
+            table = reader.read_csv(
+                path,
+                reader.ReadOptions(skip_rows=1, column_names=names),
+                convert_options=reader.ConvertOptions(
+                    column_types=dict.fromkeys(names, arrow.float64()), null_values=[]
+                ),
+            )
+        except arrow.ArrowInvalid:  # which the other reader says better
+            return []
+        return [column.to_numpy() for column in table]
+    return []
 
 
 def _texts(
@@ -388,7 +425,7 @@ def _header(path: Path, torn: bool) -> list[str]:
 
 def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
     """The column with the element type of that name; InputError where its values have another."""
-    if choice(place, name, TYPES) == TEXT:
+    if choice(place, name, TYPES) == TEXT or column.dtype == name:
         return column
     with np.errstate(invalid="ignore"):
         typed = column.astype(name)

@@ -21,6 +21,7 @@ from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
 from ..realtime.timing import Timing
 from ..system.parts import NANOSECONDS
+from .arrow import ArrowListener
 from .csv import CsvListener
 from .frames import as_pandas, as_xarray
 from .listener import Experiment, Listener, Signal
@@ -209,6 +210,11 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         """Write time and signals with full precision, a line per communication point."""
         with in_one_piece(Path(path)) as part:
             self._play(CsvListener(part, path))
+
+    def to_arrow(self, path: str | Path) -> None:
+        """Write an Arrow file (Feather 2), with the units; InputError without pyarrow."""
+        with in_one_piece(Path(path)) as part:
+            self._play(ArrowListener(part, path))
 
     def to_mdf(self, path: str | Path) -> None:
         """Write an ASAM MDF 4 file with the units and the settings; InputError without asammdf."""

@@ -12,6 +12,8 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import numpy.typing as npt
 from one_piece import in_one_piece
 
 from ..base.checks import extra_module
@@ -20,11 +22,14 @@ from ..base.files import PICTURES
 from ..base.numerals import in_milli
 from ..recording.result import Result
 from .caption import Caption, caption
+from .embed import fit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
+
+Times = npt.NDArray[np.float64]
 
 BLUE, RED, GREY, MUTED = "#1f5fa8", "#c0392b", "#7f7f7f", "#5b6470"
 COLORS = (BLUE, RED, GREY)
@@ -35,6 +40,9 @@ STYLES = ("-", "--", "-.", ":")
 
 DPI = 130
 """Of the pictures."""
+
+MOST_POINTS = 200_000
+"""So many points at most has a line."""
 
 MOST_LINES = 6
 """So many lines at most are in one panel."""
@@ -71,7 +79,7 @@ def plot_signals(run: Result, path: Path | None = None, of: Sequence[str] = ()) 
         factor, shown = in_milli(unit)
         for name, style, color in zip(of_unit, cycle(STYLES), cycle(COLORS), strict=False):
             values = factor * run.signals[name]
-            axes.plot(run.time, values, style, color=color, linewidth=1.0, label=name)
+            axes.plot(*drawn(run.time, values), style, color=color, linewidth=1.0, label=name)
         finish(axes, f"in {shown}" if shown else "no unit", legend=False)
         beside(axes)
     figure.axes[-1].set_xlabel("time in s")
@@ -149,6 +157,12 @@ def check_picture(path: Path) -> str:
     if found not in PICTURES:
         raise InputError(f"{path}: must end in {', '.join(f'.{f}' for f in PICTURES)}")
     return found
+
+
+def drawn(time: Times, values: npt.NDArray[Any]) -> tuple[Times, npt.NDArray[Any]]:
+    """A line as it is drawn: of many points the lowest and the highest of those side by side."""
+    line = fit(time, {"": values}, 2 * MOST_POINTS)
+    return line.time, line.signals[""]
 
 
 def save(figure: Figure, path: Path) -> None:

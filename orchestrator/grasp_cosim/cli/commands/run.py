@@ -8,7 +8,7 @@ import click
 
 from ...base.errors import InputError, SimulationError
 from ...master.simulation import simulate
-from ...recording.folder import RunFolder
+from ...recording.folder import FORMS, Form, RunFolder
 from ...recording.mdf import check_mdf
 from ...recording.result import Result
 from ...report import terminal
@@ -50,7 +50,15 @@ from ..options import (
 @click.option(
     "--every", type=click.IntRange(1), default=1, metavar="N", help="Record each N-th step only."
 )
-@click.option("-o", "--out", type=PATH, help="Write signals.csv and run.json into a folder.")
+@click.option("-o", "--out", type=PATH, help="Write the signals and run.json into a folder.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(FORMS),
+    default="csv",
+    show_default=True,
+    help="Of the signals in --out: arrow is for long runs.",
+)
 @click.option(
     "--plot",
     is_flag=True,
@@ -64,6 +72,7 @@ def run(
     realtime: bool,
     every: int,
     out: Path | None,
+    form: Form,
     plot: bool,
     mdf: bool,
     as_json: bool,
@@ -77,6 +86,8 @@ def run(
     """
     if mdf and not out:
         raise InputError("--mdf: needs --out, the folder for signals.mf4")
+    if form != "csv" and not out:
+        raise InputError(f"--format {form}: needs --out, the folder for signals.{form}")
     for text in given["settings"]:
         if text.startswith("realtime.") and not realtime:
             raise InputError(f"--set {text}: does nothing without --realtime")
@@ -86,7 +97,7 @@ def run(
     check_outputs(out, plot)
     chosen = system if native is None and given["system"] else natively(system, native)
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
-    with RunFolder(out, chosen, command, realtime) if out else nullcontext() as folder:
+    with RunFolder(out, chosen, command, realtime, form=form) if out else nullcontext() as folder:
         try:
             result = simulate(
                 chosen,

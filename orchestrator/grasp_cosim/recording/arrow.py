@@ -1,0 +1,132 @@
+"""Apache Arrow: a listener that writes columns while the run goes on, and the reader of its files.
+
+The file is of the IPC format (Feather 2): a signal is a field with its unit and description in the
+metadata. Until its end is written it is a stream of whole batches behind eight
+bytes, which is how a file is read that a kill left behind.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.checks import extra_module
+from ..base.errors import InputError, SimulationError
+from ..base.files import unwritable
+from .listener import Experiment, Signal
+
+BATCH = 4096
+"""Rows that are written together, if they do not take longer than LONG to come."""
+
+LONG = 0.5
+"""s of wall time."""
+
+MAGIC = 8
+"""Bytes before the first batch."""
+
+
+def pyarrow() -> Any:
+    """The library; InputError where it is not installed."""
+    extra_module("pyarrow.ipc", "it writes and reads Arrow", "arrow")
+    return extra_module("pyarrow", "it writes and reads Arrow", "arrow")
+
+
+class ArrowListener:
+    """Writes time and signals; `said` is the name of the file in messages, if it is another."""
+
+    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
+        """InputError without pyarrow."""
+        self._path, self._said, self._arrow = Path(path), Path(said or path), pyarrow()
+
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
+        """Write the schema; InputError where the file cannot be written."""
+        arrow = self._arrow
+        types = {
+            "Real": arrow.float64(), "Integer": arrow.int64(), "Boolean": arrow.bool_(),
+            "String": arrow.string(),
+        }  # fmt: skip
+        self._experiment, self._signals = experiment, tuple(signals)
+        fields = [arrow.field("time", arrow.float64(), metadata={"unit": "s"})]
+        for s in signals:
+            about = {"unit": s.unit or "", "description": s.description}
+            fields.append(arrow.field(s.name, types[s.kind], metadata=about))
+        self._schema = arrow.schema(fields)
+        self._waiting: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = []
+        self._rows, self._since = 0, time.monotonic()
+        try:
+            self._file = self._path.open("wb")
+            self._writer = arrow.ipc.new_file(self._file, self._schema)
+            self._file.flush()
+        except OSError as error:
+            raise InputError(unwritable(self._said, error)) from error
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Take the rows; SimulationError where writing fails, the batches until then are whole."""
+        self._waiting.append((steps.copy(), rows.copy()))
+        self._rows += len(steps)
+        if self._rows >= BATCH or time.monotonic() - self._since > LONG:
+            self._flush()
+
+    def end(self, complete: bool) -> None:
+        """Write what is left, and the end of the file; SimulationError where that fails."""
+        try:
+            self._flush()
+            self._writer.close()
+            self._file.close()
+        except OSError as error:
+            raise SimulationError(unwritable(self._said, error)) from error
+
+    def _flush(self) -> None:
+        if not self._waiting:
+            return
+        steps, rows = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
+        self._waiting, self._rows, self._since = [], 0, time.monotonic()
+        columns = [self._column(s, rows[:, i]) for i, s in enumerate(self._signals)]
+        arrays = [self._arrow.array(self._experiment.times(steps)), *columns]
+        try:
+            self._writer.write_batch(self._arrow.record_batch(arrays, schema=self._schema))
+            self._file.flush()
+        except OSError as error:
+            raise SimulationError(unwritable(self._said, error)) from error
+
+    def _column(self, signal: Signal, values: npt.NDArray[np.float64]) -> Any:
+        if signal.kind == "String":
+            return self._arrow.array(signal.texts.column(values), self._arrow.string())
+        kind = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}[signal.kind]
+        return self._arrow.array(np.ascontiguousarray(values).astype(kind, copy=False))
+
+
+def read_arrow(path: Path) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:
+    """The time and the columns by name, of a file that was cut off those of its whole batches.
+
+    Strings are objects. InputError without pyarrow, or where the file is missing or damaged.
+    """
+    arrow = pyarrow()
+    try:
+        with path.open("rb") as file:
+            try:
+                table = arrow.ipc.open_file(file).read_all()
+            except arrow.ArrowInvalid:
+                file.seek(MAGIC)
+                table = _whole_batches(arrow, file)
+        columns = {
+            name: column.to_numpy() for name, column in zip(table.column_names, table, strict=True)
+        }
+        return columns.pop("time"), columns
+    except (OSError, arrow.ArrowInvalid, KeyError) as error:
+        said = " ".join(f"{error}".split())
+        raise InputError(f"{path}: is damaged, or no Arrow file of a run: {said}") from error
+
+
+def _whole_batches(arrow: Any, file: Any) -> Any:
+    stream, batches = arrow.ipc.open_stream(file), []
+    while True:
+        try:
+            batches.append(stream.read_next_batch())
+        except (StopIteration, OSError, arrow.ArrowInvalid):  # the last one is not whole
+            return arrow.Table.from_batches(batches, stream.schema)
