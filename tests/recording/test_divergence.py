@@ -146,30 +146,6 @@ def test_what_stops_growing_before_that_does_not() -> None:
     assert watch(np.minimum(10.0 ** (K / 300.0), 1e4)) is None
 
 
-def test_what_grows_to_the_end_but_not_yet_far_is_told() -> None:
-    rate = 1.0 / 1250.0  # 3.2 decades
-    divergence, found = followed(np.sin(K), -(10.0 ** (rate * K)), unit="N", factor=-2.0)
-    assert found is None
-    assert divergence.still(ROWS - 1) == (
-        "a.y1 still grows at the end, beyond 1e+03 N, ten times as much every 1.2 s, as if it ran "
-        "away; look at factor = -2 of a.y0 -> b.u"
-    )
-
-
-@pytest.mark.parametrize(
-    "curve",
-    [
-        np.minimum(10.0 ** (K / 500.0), 1e4),  # ended long ago
-        99.0 * 10.0 ** ((K - ROWS) / 1000.0),  # no two decades
-        1e5 * (K > 5),
-        1e4 * (K / ROWS) ** 6,
-        10.0 ** (K[K < 3600] / 500.0),  # it ran away
-    ],
-)
-def test_of_others_there_is_no_such_line(curve: Floats) -> None:
-    assert followed(curve)[0].still(len(curve) - 1) == ""
-
-
 def test_the_scale_is_the_nominal_or_the_first_value() -> None:
     curve = 10.0 ** (K / 500.0)  # up to 1e8
     assert watch(curve) is not None
@@ -210,18 +186,12 @@ def test_the_first_to_run_away_is_named() -> None:
     found = watch(late, unit="N")
     assert found is not None
     assert found.text == (
-        "a.y0 ran away: 1e+06 N at t = 3 s, ten times as much every 0.5 s; look at the signs, "
-        "factors and gains of its loop"
+        "a.y0 ran away: 1e+06 N at t = 3 s, ten times as much every 0.5 s; look at the signs and "
+        "gains, or try a shorter step"
     )
 
 
-def test_the_hint_names_a_negative_factor_or_the_step() -> None:
+def test_the_advice_names_a_negative_factor() -> None:
     found = watch(-(10.0 ** (K / 500.0)), factor=-1.0)
     assert found is not None
-    assert found.text.endswith("; look at factor = -1 of a.y0 -> b.u")
-    found = watch((-1.8) ** K[:100], factor=-1.0)
-    assert found is not None
-    assert found.text.endswith(
-        "; look at factor = -1 of a.y0 -> b.u, or try a shorter step than 0.001 s, or the scheme "
-        "sequential"
-    )
+    assert found.text.endswith("; look at factor = -1 of a.y0 -> b.u, or try a shorter step")

@@ -313,7 +313,6 @@ class Session:
         return (
             *self._early(),
             *self._dispatch.log,
-            *(self._dispatch.still_growing(master.steps_done) if self.complete else ()),
             *master.scenario.log,
             *rejected,
             *master.ends,

@@ -108,10 +108,6 @@ class Dispatcher:
         name, value = self.signals[i].name, outputs[good, i]
         return good + 1, f"{name} = {value} at step {steps[good]}: must be finite"
 
-    def still_growing(self, end: int) -> tuple[str, ...]:
-        """A line if a signal grows up to the step `end`, the last one, as if it ran away."""
-        return tuple(filter(None, [self._divergence.still(end)]))
-
     def flush(self) -> None:
         """Hand the last row on, where decimation has left it out."""
         pending, self.pending = self.pending, None

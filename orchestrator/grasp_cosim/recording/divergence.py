@@ -3,8 +3,7 @@
 Of the size |x| of a signal the moments count at which it first reaches its scale, ten times that,
 and so on. What diverges takes no longer for each decade than for the one before: it grows
 exponentially, or faster. A jump passes decades in one step; a ramp takes ten times as long for
-each, a power t^n the n-th root of ten times; a stable response ends. An oscillation counts with its
-envelope.
+each, a power t^n the n-th root of ten times; a stable response ends.
 """
 
 from __future__ import annotations
@@ -16,14 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port
+from ..system.parts import NANOSECONDS, Port, seconds
 from .listener import Signal
 
 DECADES = 6
 """A signal is looked at from so many decades above its scale on; over as many it has to grow."""
-
-FEWER = 2
-"""Decades above its scale by which a signal that still grows at the end of a run is noted."""
 
 UNEVEN = 2.5
 """Times as long as another that one of these may take: the peaks of an oscillation are apart."""
@@ -35,9 +31,6 @@ FAR = 1e15
 """Times its scale, its first value other than 0 or 1 from which a signal has run away however it
 came there: of what it should be, a float64 has no digit left.
 """
-
-FEW = 20.0
-"""Steps a decade, below which the step itself is likely to be the reason."""
 
 
 def largest(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -64,11 +57,10 @@ class Divergence:
 
     def __init__(self, system: System, outputs: Mapping[Port, Signal]) -> None:
         """Over the columns of the outputs; only those that are Real count."""
-        self._system = system
-        self._signals = tuple(outputs.values())
+        self._system, self._signals = system, tuple(outputs.values())
         self._scales = np.array([_scale(system, port) for port in outputs])
-        self._far = np.zeros(len(outputs))
         self._limits = np.array([0.0 if s.kind == "Real" else np.inf for s in self._signals])
+        self._far: dict[int, float] = {}
         self._reached: list[list[int]] = [[] for _ in outputs]
         self._begun, self._over = False, False
 
@@ -93,31 +85,21 @@ class Divergence:
             return None
         self._over = True
         row, i = min(found, key=lambda f: (f[0], -abs(rows[f]) / self._scales[f[1]]))
-        return Runaway(row, self._said(i, int(steps[row]), float(rows[row, i])))
-
-    def still(self, end: int) -> str:
-        """A line on the signal that has grown most, if it still grows exponentially at the step
-        `end`, the last one, and nothing ran away; else empty.
-        """
-        most = max(range(len(self._reached)), key=lambda i: len(self._reached[i]), default=None)
-        if self._over or most is None or not _grows(reached := self._reached[most], FEWER):
-            return ""
-        decade = reached[-1] - reached[-2]
-        if end - reached[-1] > SLOWER * decade:
-            return ""
-        signal, seconds = self._signals[most], decade * self._system.step_ns / NANOSECONDS
-        size = f"{0.1 * self._limits[most]:.3g} {signal.unit or ''}".rstrip()
-        return (
-            f"{signal.name} still grows at the end, beyond {size}, ten times as much every "
-            f"{seconds:.2g} s, as if it ran away; {self._hint(decade)}"
-        )
+        signal, time = self._signals[i], seconds(self._system.time_ns(int(steps[row])))
+        size = f"{rows[row, i]:.3g} {signal.unit or ''}".rstrip()
+        decade = (self._reached[i][-1] - self._reached[i][-4]) / 3
+        text = f"{signal.name} ran away: {size} at t = {time}"
+        if _grows(self._reached[i]):
+            length = decade * self._system.step_ns / NANOSECONDS
+            text += f", ten times as much every {length:.2g} s"
+        return Runaway(row, f"{text}; {self._advice()}")
 
     def _follow(
         self, i: int, steps: npt.NDArray[np.int64], column: npt.NDArray[np.float64]
     ) -> int | None:
         """Note the decades that a signal reaches; the row in which it has run away, if it has."""
         peaks = np.maximum.accumulate(np.abs(column))
-        if not self._far[i]:
+        if i not in self._far:
             first = float(peaks[np.flatnonzero(peaks)[0]])
             self._far[i] = FAR * max(1.0, float(self._scales[i]), first)
             self._limits[i] = self._scales[i]
@@ -128,26 +110,10 @@ class Divergence:
             self._limits[i] = 10.0 * float(self._limits[i])
         return None
 
-    def _said(self, i: int, step: int, value: float) -> str:
-        signal, reached = self._signals[i], self._reached[i]
-        length = self._system.step_ns / NANOSECONDS
-        decade = (reached[-1] - reached[-4]) / 3
-        size = f"{value:.3g} {signal.unit or ''}".rstrip()
-        moment = self._system.time_ns(step) / NANOSECONDS
-        text = f"{signal.name} ran away: {size} at t = {moment:.9g} s"
-        if _grows(reached):
-            text += f", ten times as much every {decade * length:.2g} s"
-        return f"{text}; {self._hint(decade)}"
-
-    def _hint(self, decade: float) -> str:
-        """The advice for a signal that takes so many steps for a decade."""
+    def _advice(self) -> str:
         turned = [c for c in self._system.connections if c.factor is not None and c.factor < 0.0]
-        look = f"look at factor = {turned[0].factor:g} of {turned[0]}" if turned else ""
-        if decade < FEW:
-            scheme = ", or the scheme sequential" if self._system.scheme == "jacobi" else ""
-            step = f"{self._system.step_ns / NANOSECONDS:g} s"
-            return ", or ".join(filter(None, [look, f"try a shorter step than {step}{scheme}"]))
-        return look or "look at the signs, factors and gains of its loop"
+        look = f"factor = {turned[0].factor:g} of {turned[0]}" if turned else "the signs and gains"
+        return f"look at {look}, or try a shorter step"
 
 
 def _scale(system: System, port: Port) -> float:
@@ -160,14 +126,14 @@ def _scale(system: System, port: Port) -> float:
     return max(1.0, 1.0 / abs(unit.factor))
 
 
-def _grows(reached: Sequence[int], decades: int = DECADES) -> bool:
+def _grows(reached: Sequence[int]) -> bool:
     """True if the last decades took about equally long, and the later ones no longer than before.
 
     Each took a step at least, so that a jump is no growth.
     """
-    if len(reached) <= decades:
+    if len(reached) <= DECADES:
         return False
-    spans = np.diff(reached[-decades - 1 :])
+    spans = np.diff(reached[-DECADES - 1 :])
     before, after = np.split(spans, 2)
     even = 0 < spans.max() <= UNEVEN * spans.min()
     return bool(even and after.sum() <= SLOWER * before.sum())
