@@ -16,7 +16,7 @@ from pdoc import doc, render
 MODULES = (
     "grasp_cosim",
     "grasp_cosim.metrics.metric",
-    "grasp_cosim.recording.listener",
+    "grasp_cosim.exchange.listener",
     "grasp_cosim.recording.csv",
     "grasp_cosim.recording.mdf",
     "grasp_cosim.sweeps.sweep",

@@ -152,13 +152,13 @@ FLOORS = (
     ("base",),
     ("interface",),
     ("system",),
-    ("fmi", "realtime", "metrics"),
-    ("recording",),
-    ("ssp", "inspection", "master"),
+    ("fmi", "realtime", "metrics", "exchange"),
+    ("recording", "ssp", "inspection"),
+    ("master", "report"),
     ("sweeps", "comparison", "hil"),
-    ("report",),
     ("grasp",),
-    ("cli", "__init__", "__main__"),
+    ("cli", "__init__"),
+    ("__main__",),
 )
 """From the ground up: a room imports from its own floor and from those below."""
 
@@ -188,10 +188,12 @@ def test_only_three_rooms_import_by_name(sources: dict[str, str]) -> None:
     assert {room(module) for module in calls(sources, BY_NAME)} == {"__init__", "cli", "base"}
 
 
-def test_three_rooms_take_by_name_what_is_higher(sources: dict[str, str]) -> None:
-    """A system the reader of its file, metrics their groups, a result its pictures."""
+def test_four_rooms_take_by_name_what_is_higher(sources: dict[str, str]) -> None:
+    """A system the reader of its file, metrics their groups, a result its pictures, and a run that
+    has proxies their figures.
+    """
     found = {room(module) for module in calls(sources, frozenset({"higher"}))}
-    assert found == {"system", "metrics", "recording"}
+    assert found == {"system", "metrics", "recording", "master"}
 
 
 def test_all_files_are_read(sources: dict[str, str]) -> None:

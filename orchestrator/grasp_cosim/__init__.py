@@ -9,7 +9,7 @@
 
 Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
 when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.sweeps.sweep`,
-`grasp_cosim.recording.listener`, `grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`,
+`grasp_cosim.exchange.listener`, `grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`,
 `grasp_cosim.comparison.compare`, `grasp_cosim.comparison.qualify`, `grasp_cosim.comparison.bands`.
 """
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from c_compilers import find_compiler
 from grasp_cosim import InputError, System, simulate
-from grasp_cosim.fmi.instance import STEP_2, Call, Native
+from grasp_cosim.base.calls import STEP_2, Call, Native
 from grasp_cosim.master import compiled, loop
 from grasp_cosim.master.engine import Loop, make_loop
 from grasp_cosim.master.plan import Plan
@@ -66,7 +66,7 @@ def test_it_is_built_once_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatch)
 
 def test_what_was_built_from_other_constants_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     before = compiled._job().kept_as
-    monkeypatch.setattr("grasp_cosim.fmi.instance.EARLY", 7)
+    monkeypatch.setattr(compiled, "EARLY", 7)
     assert compiled._job().kept_as != before
 
 

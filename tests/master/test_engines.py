@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import SimulationError, System, simulate
-from grasp_cosim.fmi.instance import STEP_2, Call, Native
+from grasp_cosim.base.calls import STEP_2, Call, Native
 from grasp_cosim.master import compiled, loop
 from grasp_cosim.master import engine as engines
 from grasp_cosim.master.engine import Engine

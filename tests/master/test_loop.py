@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim.fmi.instance import Call
+from grasp_cosim.base.calls import Call
 from grasp_cosim.master import loop
 from grasp_cosim.master.engine import Engine, Loop, make_loop
 from grasp_cosim.master.loop import CALL, COPY, LOAD, LOAD_LONG, SCALE, STEP, STORE

@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import Master
 from grasp_cosim.realtime.pacer import Clock, Pacer
 from grasp_cosim.realtime.timing import Timing
-from grasp_cosim.recording.dispatch import Dispatcher
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.description import System
 from grasp_cosim.system.realtime import Realtime

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
-from grasp_cosim.fmi.instance import PACE
+from grasp_cosim.base.calls import PACE
 from grasp_cosim.master import aside, master
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.recording.folder import RunFolder

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from grasp_cosim import InputError, Realtime, System, simulate
-from grasp_cosim.fmi.instance import CLOCK
+from grasp_cosim.base.calls import CLOCK
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.privileges import check_cpu

@@ -7,7 +7,7 @@ from resource import RLIMIT_FSIZE, getrlimit, setrlimit
 
 import numpy as np
 import numpy.typing as npt
-from grasp_cosim.recording.listener import Experiment, Listener, Signal
+from grasp_cosim.exchange.listener import Experiment, Listener, Signal
 
 EXPERIMENT = Experiment.of({"system": "bare", "scheme": "sequential", "step": 1e-4, "stop": 1.0})
 SIGNALS = (

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from conftest import Run
 from grasp_cosim import InputError, SimulationError, System, compare, load_run, simulate
+from grasp_cosim.exchange.listener import Signal, Texts
 from grasp_cosim.recording import arrow as module
 from grasp_cosim.recording import load
 from grasp_cosim.recording.arrow import ArrowListener, read_arrow
 from grasp_cosim.recording.folder import RunFolder
-from grasp_cosim.recording.listener import Signal, Texts
 from recording.rows import EXPERIMENT, full_disk
 
 pyarrow = pytest.importorskip("pyarrow")

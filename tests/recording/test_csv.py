@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError
+from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.recording.csv import CsvListener
-from grasp_cosim.recording.listener import Signal
 from hypothesis import given
 from hypothesis import strategies as st
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows

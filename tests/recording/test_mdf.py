@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System
-from grasp_cosim.recording.listener import Experiment, Signal
+from grasp_cosim.exchange.listener import Experiment, Signal
 from grasp_cosim.recording.mdf import PIECE, MdfListener
 from grasp_cosim.system.settings import settings
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows

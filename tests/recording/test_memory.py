@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.recording.listener import Signal
+from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.recording.memory import MemoryListener
 from recording.rows import EXPERIMENT, SIGNALS, peak, play, rows
 

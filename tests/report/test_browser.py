@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.comparison.compare import compare
-from grasp_cosim.report.comparison import comparison_html
+from grasp_cosim.comparison.page import comparison_html
 from grasp_cosim.report.page import page_html
 from report.javascript import in_browser
 from report.runs import grasp_run, ring_run

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import Comparison, compare
-from grasp_cosim.report.comparison import comparison_html
+from grasp_cosim.comparison.page import comparison_html
 from report.javascript import in_browser
 from report.runs import grasp_run, write_run
 

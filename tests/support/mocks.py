@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from grasp_cosim import SimulationError, System
-from grasp_cosim.fmi.instance import DISCARD, Call
+from grasp_cosim.base.calls import Call
+from grasp_cosim.exchange.dispatch import Dispatcher
+from grasp_cosim.fmi.instance import DISCARD
 from grasp_cosim.interface.interface import Interface, Value, Variable
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import Master
-from grasp_cosim.recording.dispatch import Dispatcher
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.parts import Component, Connection
 

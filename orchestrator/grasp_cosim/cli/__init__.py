@@ -1,7 +1,6 @@
 """The command line, grasp-cosim.
 
 group.py finds the commands, each a file in commands/; frame.py and options.py is what they share.
-Imports every room.
 """
 
 from .entry import entry, main

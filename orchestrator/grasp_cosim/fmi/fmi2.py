@@ -21,9 +21,9 @@ from fmpy.fmi2 import (
     fmi2Terminated,
 )
 
+from ..base.calls import STEP_2, TRANSFER_2, Call, Native
 from ..base.scratch import ScratchFolder
 from ..interface.interface import Value
-from .instance import STEP_2, TRANSFER_2, Call, Native
 from .loaded import KEPT, LoadedInstance, keep_message, know_signatures
 from .variadic import formatted, logger_type
 

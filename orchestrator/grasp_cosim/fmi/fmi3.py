@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi3 import _FMU3, FMU3Slave
 
+from ..base.calls import STEP_3, TRANSFER_3, Call, Native
 from ..interface.interface import Interface, Value, Variable
-from .instance import EARLY, STEP_3, TRANSFER_3, WARNING, Call, Native
+from .instance import EARLY, WARNING
 from .loaded import KEPT, LoadedInstance, keep_message, know_signatures
 
 TERMINATE, SHORT = 1, 2

@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
+from ..base.calls import TRANSFER_3, Call, Native
 from ..base.errors import InputError, SimulationError
 from ..base.files import FULL
 from ..base.scratch import ScratchFolder, without_scratch
@@ -33,7 +34,7 @@ from ..interface.arrays import Element
 from ..interface.interface import Interface, Value, Variable
 from ..interface.obstacles import of_binary, of_loading, this_machine
 from .inputs import Inputs
-from .instance import EARLY, ERROR, FATAL, OK, STATUS, TRANSFER_3, Call, Native
+from .instance import EARLY, ERROR, FATAL, OK, STATUS
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)

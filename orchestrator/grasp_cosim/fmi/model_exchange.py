@@ -20,13 +20,14 @@ import numpy.typing as npt
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 
+from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import NANOSECONDS, Solver
 from .cvode import Cvode, CvodeError
 from .fmi2 import FmuInstance
 from .fmi3 import Fmi3Instance, Lenient
-from .instance import DISCARD, EARLY, OK, WARNING, Call
+from .instance import DISCARD, EARLY, OK, WARNING
 from .loaded import LoadedInstance, know_signatures
 
 AT_POINT = 1e-10

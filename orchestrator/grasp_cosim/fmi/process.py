@@ -23,13 +23,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from ..base.scratch import ScratchFolder
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Solver
-from .exchange import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, Exchange
 from .inputs import Inputs
-from .instance import EARLY, WARNING, Call
+from .instance import EARLY, WARNING
+from .shared_memory import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, SharedMemory
 
 POSIX = os.name == "posix"
 """Elsewhere a process is not handed open files."""
@@ -72,7 +73,7 @@ class ProcessInstance:
         folder = self._stack.enter_context(ScratchFolder()).name
         memory = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
         memory.truncate(SIZE)
-        self._exchange = Exchange(memory.fileno())
+        self._exchange = SharedMemory(memory.fileno())
         ours, theirs = socket.socketpair()
         self._connection = Connection(ours.detach())
         reading, writing = os.pipe()

@@ -14,10 +14,11 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from ..base import interruption
+from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
-from .exchange import ANSWER, CALL, LOGGED, STEP, Exchange
-from .instance import EARLY, WARNING, Call, Instance
+from .instance import EARLY, WARNING, Instance
 from .load import load_here
+from .shared_memory import ANSWER, CALL, LOGGED, STEP, SharedMemory
 
 Answer = tuple[str, Any, list[str]]
 """The kind of an answer ("value" or an error's name), its value, and notes or warnings."""
@@ -26,7 +27,7 @@ Answer = tuple[str, Any, list[str]]
 class Worker:
     """Serves commands on one instance."""
 
-    def __init__(self, connection: Connection, exchange: Exchange) -> None:
+    def __init__(self, connection: Connection, exchange: SharedMemory) -> None:
         self._connection = connection
         self._exchange = exchange
         self._instance: Instance
@@ -126,7 +127,7 @@ def main(connection: int, memory: int, lifeline: int) -> None:
     logging.basicConfig(format=f"{LOGGED}%(message)s", level=logging.INFO)
     interruption.worker(lifeline)
     with suppress(EOFError):  # where the master wants no more of it
-        Worker(Connection(connection), Exchange(memory)).serve()
+        Worker(Connection(connection), SharedMemory(memory)).serve()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(0)  # without what the FMU's library might do at exit

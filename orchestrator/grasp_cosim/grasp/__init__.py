@@ -1,5 +1,4 @@
 """The grasp of the paper on top of the co-simulation core.
 
 The built-in system, its presets, metrics, pictures and scene, the studies, the paper's figures.
-Imports every room of the core; nobody but the command line and the top of the package knows it.
 """

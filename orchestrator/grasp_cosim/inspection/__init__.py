@@ -1,4 +1,1 @@
-"""What an FMU is, whether this machine loads it, and a system file to start from with it.
-
-Imports interface and the ground floor.
-"""
+"""What an FMU is, whether this machine loads it, and a system file to start from with it."""

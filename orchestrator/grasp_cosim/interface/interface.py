@@ -193,7 +193,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Exchange:
+class ModelExchange:
     """Needs of model exchange: the name of the binary, in FMI 2.0 the numbers of states and event
     indicators. Of FMI 3.0 the instance says these.
     """
@@ -234,7 +234,7 @@ class Interface:
     ambiguous: tuple[str, ...] = ()
     """The names that several variables have, which are not among `variables`."""
     arrays: Mapping[str, Array] = field(default_factory=dict)
-    exchange: Exchange | None = None
+    exchange: ModelExchange | None = None
     given: Path | None = None
     """The path by which the user knows it, where that is not `path`."""
 

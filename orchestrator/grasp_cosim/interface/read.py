@@ -26,8 +26,8 @@ from .interface import (
     TYPES,
     TYPES_3,
     Enumeration,
-    Exchange,
     Interface,
+    ModelExchange,
     Variable,
     kind_of,
     limits,
@@ -360,7 +360,7 @@ class _Reader:
         reference = dimension.get("valueReference") if dimension.get("start") is None else None
         return None if reference is None else _name(self.places[_whole("Dimension", reference)])
 
-    def exchange(self, kinds: Mapping[str, Element]) -> Exchange | None:
+    def exchange(self, kinds: Mapping[str, Element]) -> ModelExchange | None:
         """The needs of model exchange; None where the FMU is not for that."""
         if "ModelExchange" not in kinds:
             return None
@@ -370,7 +370,7 @@ class _Reader:
             key = "numberOfEventIndicators"
             indicators = _whole(key, self.root.get(key, "0"), MOST_INDICATORS)
         states = len(self.root.findall("ModelStructure/Derivatives/Unknown"))
-        return Exchange(identifier, states, indicators)
+        return ModelExchange(identifier, states, indicators)
 
     def size(self, place: str, dimension: Element) -> int:
         """The size of an array in a dimension, at the start where a variable holds it."""

@@ -14,10 +14,11 @@ from typing import Any
 
 from c_compilers import CompilerError, Job, cache, compile_all, find_compiler
 
+from ..base import calls as shapes
+from ..base.calls import PYTHON, Native
 from ..base.errors import InputError
 from ..base.scratch import ScratchFolder
-from ..fmi import instance
-from ..fmi.instance import PYTHON, Native
+from ..fmi.instance import EARLY
 from ..realtime import meter, pacer
 from ..system.parts import NANOSECONDS
 from . import loop
@@ -217,8 +218,9 @@ def _constants() -> list[str]:
         **{n: getattr(loop, n) for n in ("COPY", "SCALE", "STORE", "LOAD", "LOAD_LONG", "DRIVE")},
         **{n: getattr(loop, n) for n in ("CALL", "STEP", "TOO_LONG", "EXACT", "WORST")},
         **{n: getattr(loop, n) for n in ("FULL", "HALTED", "OVERRUN")},
-        **{n: getattr(instance, n) for n in ("TRANSFER_2", "TRANSFER_3", "STEP_2", "STEP_3")},
-        **{n: getattr(instance, n) for n in ("CLOCK", "PACE", "EARLY")},
+        **{n: getattr(shapes, n) for n in ("TRANSFER_2", "TRANSFER_3", "STEP_2", "STEP_3")},
+        **{n: getattr(shapes, n) for n in ("CLOCK", "PACE")},
+        "EARLY": EARLY,
         **{n: getattr(meter, n) for n in ("ARRIVED", "LATE", "DUE", "BEGIN")},
         "SLICE": pacer.SLICE_NS,
         "NAP": round(pacer.NAP * NANOSECONDS),

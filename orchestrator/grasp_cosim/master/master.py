@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
+from ..exchange.listener import Texts
 from ..fmi.instance import DISCARD, EARLY, Instance
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer
-from ..recording.listener import Texts
 from ..recording.result import Rejection
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port, seconds

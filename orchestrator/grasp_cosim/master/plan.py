@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..fmi.instance import Call, Instance, dtype
+from ..base.calls import Call
+from ..exchange.listener import Texts
+from ..fmi.instance import Instance, dtype
 from ..interface.interface import Interface, Variable
 from ..realtime.pacer import Pacer
-from ..recording.listener import Texts
 from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Connection, Port

@@ -11,20 +11,20 @@ from numbers import Integral
 from typing import Any
 
 from ..base.errors import InputError, SimulationError, nearest
+from ..base.higher import higher
 from ..base.interruption import interruptible, interrupts
 from ..base.numerals import counted
 from ..base.progress import Progress, phase
+from ..exchange.dispatch import Dispatcher
+from ..exchange.listener import Listener
 from ..fmi.load import load
 from ..interface.interface import Value
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, Signals, chosen, measure, metrics_of, needed
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
-from ..recording.dispatch import Dispatcher
-from ..recording.listener import Listener
 from ..recording.memory import EveryRow, MemoryListener
-from ..recording.proxies import proxy_figures, proxy_lines
-from ..recording.result import Known, Result
+from ..recording.result import Known, Result, has_proxies, proxy_figures
 from ..system.checks import remarks
 from ..system.description import System
 from ..system.native import needed_twins
@@ -278,6 +278,14 @@ class Session:
             known=self._known(),
         )
 
+    def _of_proxies(self, step: float) -> list[str]:
+        """Remarks on the proxies, a line each."""
+        if not has_proxies(self.system.recorded):
+            return []
+        time, columns = (self._whole or self._memory).columns()
+        lines: list[str] = higher("hil.figures").proxy_lines(time, columns, step)
+        return lines
+
     def _known(self) -> Known | None:
         """What is worked out of every step, where fewer rows are recorded."""
         if self._whole is None:
@@ -317,7 +325,7 @@ class Session:
             *rejected,
             *master.ends,
             *pending,
-            *proxy_lines(*(self._whole or self._memory).columns(), step),
+            *self._of_proxies(step),
         )
 
 

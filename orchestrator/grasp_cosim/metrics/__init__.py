@@ -2,5 +2,4 @@
 
 Signals by role, groups of metrics by name, metrics from a user's file. What is in a group is
 decided higher up.
-Imports base.
 """

@@ -1,5 +1,4 @@
 """Runs paced by the clock.
 
 Waiting for the next step, what the operating system grants, and the statistics of the times.
-Imports fmi, system and what is below them.
 """

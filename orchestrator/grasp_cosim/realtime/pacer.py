@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..fmi.instance import CLOCK, PACE, Call, Native
+from ..base.calls import CLOCK, PACE, Call, Native
 from ..system.description import System
 from ..system.realtime import Realtime
 from .meter import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
-from .listener import Experiment, Signal
+from ..exchange.listener import Experiment, Signal
 
 BATCH = 4096
 """Rows that are written together, if they do not take longer than LONG to come."""

@@ -12,7 +12,7 @@ from one_piece import in_one_piece
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..base.plain import to_cell
-from .listener import Experiment, Signal
+from ..exchange.listener import Experiment, Signal
 
 PIECE = 1024
 """Rows turned into text at once; a block may be long."""

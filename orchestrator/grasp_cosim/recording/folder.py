@@ -18,12 +18,12 @@ import numpy.typing as npt
 from ..base.errors import InputError
 from ..base.files import of_any_format, remove, unwritable, write_json
 from ..base.higher import groups
+from ..exchange.listener import Experiment, Signal
 from ..metrics.in_si import in_si
 from ..system.description import System
 from ..system.parts import Component
 from .arrow import ArrowListener
 from .csv import CsvListener
-from .listener import Experiment, Signal
 from .load import ARROW, SETTINGS, SIGNALS, TEXT
 from .memory import TYPES
 from .result import Result, conversions_entry

@@ -16,7 +16,7 @@ from one_piece import in_one_piece
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
-from .listener import Experiment, Signal
+from ..exchange.listener import Experiment, Signal
 
 if TYPE_CHECKING:
     import asammdf

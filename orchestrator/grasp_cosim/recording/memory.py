@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
-from .listener import Experiment, Signal
+from ..exchange.listener import Experiment, Signal
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 """The element type of a column of numbers by its signal's kind."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from ..base.errors import UnknownNameError, choices
 from ..base.files import write_json
 from ..base.higher import higher
 from ..base.plain import on_one_line
+from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
 from ..realtime.timing import Timing
@@ -24,9 +25,7 @@ from ..system.parts import NANOSECONDS
 from .arrow import ArrowListener
 from .csv import CsvListener
 from .frames import as_pandas, as_xarray
-from .listener import Experiment, Listener, Signal
 from .mdf import MdfListener
-from .proxies import proxy_figures
 from .view import OF_ANY, View
 
 if TYPE_CHECKING:
@@ -343,6 +342,19 @@ def _in_words(metric: Metric, value: Any) -> str:
         for v in values
     ]
     return f"{metric.name} {', '.join(texts)} {metric.display_unit}".rstrip()
+
+
+def has_proxies(names: Iterable[object]) -> bool:
+    """Return True where there are the diagnostics of a proxy among signals of these names."""
+    return any(str(name).endswith(".proxy.state") for name in names)
+
+
+def proxy_figures(time: npt.NDArray[np.float64], signals: Mapping[str, Any]) -> dict[str, Any]:
+    """The figures of the proxies of a run by component, if it has any."""
+    if not has_proxies(signals):
+        return {}
+    found: dict[str, Any] = higher("hil.figures").proxy_figures(time, signals)
+    return found
 
 
 def conversions_entry(to_si: Mapping[str, Conversion]) -> dict[str, Any]:

@@ -25,8 +25,8 @@ import numpy.typing as npt
 
 from ..base.files import write_text
 from ..base.numerals import grouped
+from ..exchange.listener import Texts
 from ..recording.csv import quoted
-from ..recording.listener import Texts
 from ..recording.result import Result
 from .caption import Caption, caption
 from .diagram import Link, diagram_svg

@@ -1,5 +1,4 @@
 """The description of a system, checked once.
 
 Components, connections, events, faults, roles and presets; from and to TOML.
-Imports interface and the ground floor.
 """

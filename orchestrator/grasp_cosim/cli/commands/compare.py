@@ -8,7 +8,7 @@ from ...base.files import check_file
 from ...comparison import words
 from ...comparison.bands import read_bands
 from ...comparison.compare import compare as compare_runs
-from ...report.comparison import write_comparison
+from ...comparison.page import write_comparison
 from ..frame import NEGATIVE, PATH, chosen_metrics, json_option, metrics_option, say, show, waiting
 
 

@@ -8,11 +8,11 @@ import click
 
 from ...base.files import check_file
 from ...comparison.bands import read_bands
+from ...comparison.page import write_qualification
 from ...comparison.qualify import qualify as run_qualification
 from ...comparison.swap import component_of
 from ...comparison.words import qualification_json, qualification_text
 from ...interface.read import check_runs
-from ...report.comparison import write_qualification
 from ...system.description import FILES
 from ...system.places import SECTIONS
 from ..frame import (

@@ -8,8 +8,8 @@ import click
 
 from ...base.errors import InputError
 from ...interface.interface import Value
-from ...report.sweeps import draw_sweep
 from ...sweeps.cluster import cluster
+from ...sweeps.pictures import draw_sweep
 from ...sweeps.rows import as_rows, grid, varied
 from ...sweeps.sweep import kept_runs
 from ...sweeps.sweep import sweep as run_sweep

@@ -12,9 +12,9 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.numerals import counted
 from ..metrics.metric import Metric
-from ..sweeps.table import Table
-from .caption import Caption
-from .plot import BLUE, COLORS, STYLES, finish, headed, kept, new_figure
+from ..report.caption import Caption
+from ..report.plot import BLUE, COLORS, STYLES, finish, headed, kept, new_figure
+from .table import Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

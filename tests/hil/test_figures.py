@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from grasp_cosim.recording.proxies import proxy_figures, proxy_lines
+from grasp_cosim.hil.figures import proxy_figures, proxy_lines
 
 TIME: npt.NDArray[np.float64] = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 

@@ -13,12 +13,18 @@ import numpy.typing as npt
 
 from ..base.files import write_text
 from ..base.numerals import counted, grouped
-from ..comparison.compare import Comparison
-from ..comparison.judged import Compared
-from ..comparison.qualify import Qualification
-from ..comparison.side import Side
-from ..comparison.tube import deviation, tube
-from ..comparison.words import (
+from ..metrics.metric import Metric
+from ..recording.result import Result
+from ..report.caption import Caption, about, caption, changes
+from ..report.embed import LIMIT, Shown, fit
+from ..report.page import Scene, data_html, document, looks, moments, scripts, traces_html
+from ..report.tables import bullets, number, origin_rows, scaled, summary, table
+from .compare import Comparison
+from .judged import Compared
+from .qualify import Qualification
+from .side import Side
+from .tube import deviation, tube
+from .words import (
     basis,
     difference_lines,
     notes,
@@ -27,12 +33,6 @@ from ..comparison.words import (
     reason,
     verdict,
 )
-from ..metrics.metric import Metric
-from ..recording.result import Result
-from .caption import Caption, about, caption, changes
-from .embed import LIMIT, Shown, fit
-from .page import Scene, data_html, document, looks, moments, scripts, traces_html
-from .tables import bullets, number, origin_rows, scaled, summary, table
 
 AT_FIRST = 4
 """So many of the worst signals are shown first."""

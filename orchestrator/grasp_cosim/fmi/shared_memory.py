@@ -28,7 +28,7 @@ SIZE = 1 << 26
 """Bytes of shared memory; only what is used of it takes memory."""
 
 
-class Exchange:
+class SharedMemory:
     """The shared memory, behind the file with the given descriptor."""
 
     def __init__(self, descriptor: int) -> None:
