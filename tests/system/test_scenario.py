@@ -320,7 +320,7 @@ ANY: dict[str, dict[str, float]] = {
 
 def test_the_readme_has_a_row_for_each_kind_of_fault() -> None:
     """A new kind touches faults.py and that row."""
-    text = (Path(__file__).parents[2] / "orchestrator/README.md").read_text("utf-8")
+    text = (Path(__file__).parents[2] / "docs/system_files.md").read_text("utf-8")
     table = text.split("| kind | makes of a value | parameters |\n|---|---|---|\n")[1]
     rows = [f"| {name} | {kind.makes} | {kind.takes} |" for name, kind in KINDS.items()]
     assert table.split("\n\n")[0].splitlines() == rows

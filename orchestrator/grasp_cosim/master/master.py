@@ -1,6 +1,6 @@
 """The fixed-step master: initialise, then run the loop in chunks and hand its rows on.
 
-The schemes, components with a longer step and time are in the README of the orchestrator.
+The schemes, components with a longer step and time are in docs/system_files.md.
 """
 
 import os

@@ -1,7 +1,7 @@
 """The kinds of faults of a connection: what each makes of a value, and its parameters.
 
 FAULTS is the one table of them. The checks, the system file and the run take from it what they need
-of a kind; the table in the README of the orchestrator has the same words.
+of a kind; the table in docs/system_files.md has the same words.
 
 At run time a fault gets each value that its connection passes, units converted, with the number of
 the base step in which it does so, INITIAL in initialisation mode, and whether the fault acts in it.

@@ -1,4 +1,4 @@
-"""Events and faults as entries of the system file, and back: see the README of the orchestrator."""
+"""Events and faults as entries of the system file, and back: see docs/system_files.md."""
 
 import re
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""The system file: a system in TOML. Its entries are in the README of the orchestrator."""
+"""The system file: a system in TOML. Its entries are in docs/system_files.md."""
 
 import re
 from dataclasses import replace
