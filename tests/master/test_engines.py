@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import SimulationError, System, simulate
-from grasp_cosim.base.calls import STEP_2, Call, Native
-from grasp_cosim.master import compiled, loop
+from grasp_cosim.master import compiled
 from grasp_cosim.master import engine as engines
 from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.plan import Plan
@@ -146,63 +145,15 @@ def test_a_value_that_is_not_finite_at_t_0_is_kept_too(
     assert mock.calls[-1] == "close"
 
 
-def native(count: int) -> list[Call]:
-    return [Call(lambda: 0, Native(STEP_2, 0, 0))] * count
-
-
-def plan(calls: list[Call], period: int = 1) -> Plan:
-    operations = [(loop.CALL, i, i + 1, period, 0) for i in range(len(calls))]
-    return Plan(np.zeros(1), np.zeros(2), operations, calls=calls)
-
-
-@pytest.fixture(autouse=True)
-def fresh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a process that could not have saved anything yet."""
-    monkeypatch.setattr(engines, "_forgone", 0.0)
-
-
-@pytest.fixture
-def not_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a machine on which the loop was never built."""
-    monkeypatch.setattr(compiled, "is_there", lambda: False)
-
-
-ENOUGH = round(engines.BUILDING / (10 * engines.SAVED))
-"""The steps with 10 native calls that save what building the loop costs."""
-
-
-@pytest.mark.usefixtures("not_there")
-@pytest.mark.parametrize(
-    ("made", "steps", "pays"),
-    [
-        (plan(native(10)), ENOUGH - 1, False),
-        (plan(native(10)), ENOUGH + 1, True),
-        (plan(native(20)), ENOUGH // 2 + 1, True),
-        (plan(native(10), period=4), 4 * ENOUGH - 1, False),
-        (plan(native(10), period=4), 4 * ENOUGH + 4, True),
-        (plan([Call(lambda: 0)] * 10), 100 * ENOUGH, False),
-        (plan(native(1)), None, True),
-    ],
-)
-def test_auto_builds_it_where_the_steps_save_more_than_that_takes(
-    made: Plan, steps: int | None, pays: bool
+@pytest.mark.parametrize("compiler", [True, False])
+@pytest.mark.parametrize("there", [True, False])
+@pytest.mark.parametrize("steps", [1, engines.LONG - 1, engines.LONG, None])
+def test_auto_takes_it_where_it_is_there_and_builds_it_for_long_runs(
+    monkeypatch: pytest.MonkeyPatch, there: bool, compiler: bool, steps: int | None
 ) -> None:
-    assert engines._pays(made, steps) is pays
-
-
-@pytest.mark.usefixtures("not_there")
-def test_auto_builds_it_once_many_short_runs_of_a_process_would_have_saved_as_much() -> None:
-    made = plan(native(10))
-    assert [engines._pays(made, ENOUGH // 4 + 1) for _ in range(5)] == [False] * 3 + [True] * 2
-
-
-def test_what_is_built_already_is_taken_at_once() -> None:
-    compiled.library(False)
-    assert engines._pays(plan(native(1)), 1)
-
-
-@pytest.mark.usefixtures("not_there")
-def test_without_a_compiler_auto_runs_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "has_compiler", lambda: False)
-    assert not engines._pays(plan(native(10)), 10 * ENOUGH)
-    assert not engines._pays(plan(native(10)), None)
+    monkeypatch.setattr(compiled, "is_there", lambda: there)
+    monkeypatch.setattr(compiled, "has_compiler", lambda: compiler)
+    monkeypatch.setattr(compiled, "CompiledLoop", lambda plan: "in C")
+    found = engines.make_loop(Plan(np.zeros(1), np.zeros(2)), "auto", steps)
+    long = steps in (engines.LONG, None)
+    assert (found == "in C") is (there or (long and compiler))

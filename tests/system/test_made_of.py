@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from grasp_cosim import System, grasp_system, simulate
-from grasp_cosim.system.made_of import changed
+from grasp_cosim.system.settings import changed
 
 Do = Callable[[System], System]
 

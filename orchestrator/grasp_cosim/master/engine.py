@@ -1,8 +1,7 @@
 """The two engines: the loop as plain Python, and the same loop in C.
 
 Which one "auto" takes is known before the run: that in C where it is there already, which it is
-once it was built on this machine. A process builds it as soon as what it could have saved, with the
-run to come, exceeds the time that takes.
+once it was built on this machine; a long run, or one in real time, builds it.
 """
 
 import logging
@@ -23,16 +22,10 @@ ENGINES: tuple[str, ...] = get_args(Engine)
 Loop = Callable[[Any, int, int, int, int, int], tuple[int, int, int]] | compiled.CompiledLoop
 """loop.run() over a plan: takes rows, operation, start, stop, start_ns and step_ns."""
 
-BUILDING = 0.3
-"""s that compiling the loop takes, once on a machine: 0.1 to 0.3 s measured."""
-
-SAVED = 1e-6
-"""s that a native call takes less in a compiled step, with the connections and casts around it:
-0.7 us measured over 4 native FMUs with 23 calls a step, 1.2 us over the 13 calls of the grasp.
+LONG = 20_000
+"""Steps of a run for which the loop is built in C where it is not there: that takes 0.1 to 0.3 s
+once on a machine, and saves about 20 us a step of the grasp.
 """
-
-_forgone = 0.0
-"""s that compiled code could have saved in this process until now."""
 
 
 def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
@@ -45,9 +38,9 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     if engine == "compiled":
         return _compiled(plan, why)
     if engine == "auto":
-        why = "as a loop in C would save less time than its build takes, or there is no compiler"
         there = compiled.is_there()
-        if _pays(plan, steps):
+        why = "as the run is short, or there is no compiler"
+        if there or ((steps is None or steps >= LONG) and compiled.has_compiler()):
             try:
                 return _compiled(plan, "built before" if there else "as the run is long enough")
             except InputError as error:  # of a compiler that does not work
@@ -60,20 +53,6 @@ def _compiled(plan: Plan, why: str) -> Loop:
     made = compiled.CompiledLoop(plan)
     LOGGER.info("engine: the loop in C, %s", why)
     return made
-
-
-def _pays(plan: Plan, steps: int | None) -> bool:
-    """Return True if the compiled loop is there already, or will have saved more than it costs."""
-    global _forgone
-    if compiled.is_there():
-        return True
-    rates = [
-        1.0 / period
-        for kind, call, _, period, _ in plan.operations
-        if kind >= loop.CALL and plan.calls[call].native
-    ]
-    _forgone += SAVED * sum(rates) * (steps or 0)
-    return (steps is None or _forgone > BUILDING) and compiled.has_compiler()
 
 
 def _interpreted(plan: Plan) -> Loop:

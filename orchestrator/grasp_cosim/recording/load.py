@@ -37,31 +37,21 @@ LARGE = 20_000_000
 NUMBER = (int, float)
 MAYBE = (int, float, type(None))
 
-SETTING_KEYS: Mapping[str, Any] = {
+REQUIRED: Mapping[str, Any] = {
     "system": str, "scheme": str, "step": NUMBER, "stop": NUMBER, "initialisation": dict,
     "components": dict, "connections": list, "events": list, "faults": list,
-}  # fmt: skip
-"""Entries of run.json that say how the run was made, and of which types they are."""
-
-MAYBE_SETTINGS = ("start", "diverging", "roles", "input", "changed", "metrics")
-"""More of them, which may be there."""
-
-OUTCOME_KEYS: Mapping[str, Any] = {
     "wall_time": MAYBE, "complete": bool, "log": list, "rejections": dict, "units": dict,
 }  # fmt: skip
-"""Entries that say what came of it, besides metrics."""
+"""Entries of run.json besides metrics, and of which types they are; the first nine are settings."""
 
-ORIGIN_KEYS: Mapping[str, Any] = {
-    "title": str, "date": str, "versions": dict, "fmus": dict, "command": list,
+OPTIONAL: Mapping[str, Any] = {
+    "roles": dict, "input": dict, "changed": dict, "metrics": list, "diverging": str,
+    "start": NUMBER, "title": str, "date": str, "versions": dict, "fmus": dict, "command": list,
+    "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
 }  # fmt: skip
-"""Entries that say when the run was made, and with what."""
+"""Entries that may be there: six settings, five of its origin, four by signal or metric."""
 
-MORE_KEYS: Mapping[str, Any] = {
-    "roles": dict, "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
-    "input": dict, "changed": dict, "metrics": list, "diverging": str,
-    "start": NUMBER, **ORIGIN_KEYS,
-}  # fmt: skip
-"""Entries that may be there."""
+OF_SETTINGS, OF_ORIGIN = (*[*REQUIRED][:9], *[*OPTIONAL][:6]), [*OPTIONAL][6:11]
 
 TEXT = "str"
 TYPES = ("float64", "int32", "int64", "bool", TEXT)
@@ -127,7 +117,7 @@ def _result(
 ) -> Result:
     realtime, types = written.get("realtime"), written.get("types", {})
     read = Result(
-        settings={key: written[key] for key in (*SETTING_KEYS, *MAYBE_SETTINGS) if key in written},
+        settings={key: written[key] for key in OF_SETTINGS if key in written},
         time=time,
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
@@ -141,7 +131,7 @@ def _result(
         log=tuple(written["log"]),
         timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
         more_metrics=_as_recorded(written),
-        origin={key: written[key] for key in ORIGIN_KEYS if key in written},
+        origin={key: written[key] for key in OF_ORIGIN if key in written},
         to_si=_to_si(f"{path}: to_si", written),
         folder=path.parent,
     )
@@ -272,8 +262,8 @@ def _settings(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is damaged, not JSON: {error}") from error
     if not isinstance(settings, dict):
         raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
-    for key, kind in {**SETTING_KEYS, **OUTCOME_KEYS, **MORE_KEYS}.items():
-        if key not in settings and key not in MORE_KEYS:
+    for key, kind in {**REQUIRED, **OPTIONAL}.items():
+        if key not in settings and key in REQUIRED:
             raise InputError(
                 f"{path}: no entry {key!r}; must be as `grasp-cosim run --out` writes it"
             )

@@ -42,7 +42,7 @@ def caption(result: Result, title: str = "") -> Caption:
 def about(
     changed: Mapping[str, Any] | None, date: str | None = None, own_version: str | None = None
 ) -> str:
-    """Return a line of what was changed of a system (see system.made_of; None: that is not known),
+    """Return a line of what was changed of a system (see system.settings; None: that is not known),
     the date and the version of grasp-cosim.
 
     By default those of now; an empty text is left out.
@@ -54,7 +54,7 @@ def about(
 
 
 def changes(changed: Mapping[str, Any]) -> str:
-    """Return what was changed of a system, each as name = value; see system.made_of."""
+    """Return what was changed of a system, each as name = value; see system.settings."""
     named = [f"{name} = {_text(value)}" for name, value in changed.items()]
     more = [f"{len(named) - MOST_CHANGED} more"] if len(named) > MOST_CHANGED else []
     return ", ".join([*named[:MOST_CHANGED], *more]) or DEFAULTS

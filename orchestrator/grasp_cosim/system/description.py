@@ -18,11 +18,11 @@ from .checks import (
     check_solvers,
     check_steps,
 )
-from .made_of import made_of
 from .native import natives
 from .parts import Component
 from .places import SECTIONS, as_file, changed, plain
 from .scenario_checks import check_scenario
+from .settings import made_of
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli
 from .structure import Structure, experiment

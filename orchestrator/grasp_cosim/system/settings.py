@@ -1,22 +1,23 @@
-"""The settings of a run, as plain data for run.json and for the header of an MDF file."""
+"""The settings of a run as plain data, for run.json and the header of an MDF file, and what of them
+was changed since the system was read.
+"""
 
 from dataclasses import asdict
 from typing import Any
 
-from .description import System
-from .made_of import changed
 from .parts import NANOSECONDS
 from .realtime import Realtime
 from .scenario import event_entry, fault_entry
 from .stimuli import input_entry
+from .structure import Structure
 
 
-def run_settings(system: System) -> dict[str, Any]:
+def run_settings(system: Structure) -> dict[str, Any]:
     """The settings of a run: those of its system, and what of these is not as it was read."""
     return {**settings(system), "changed": changed(system)}
 
 
-def settings(system: System) -> dict[str, Any]:
+def settings(system: Structure) -> dict[str, Any]:
     """The settings of a system, of types that JSON has. Times are in s.
 
     Events and faults are as a system file has them.
@@ -56,4 +57,35 @@ def settings(system: System) -> dict[str, Any]:
         "faults": [fault_entry(f) for f in system.faults],
         **({"realtime": asdict(system.realtime)} if system.realtime != Realtime() else {}),
         **({"input": input_entry(system.input)} if system.input else {}),
+    }
+
+
+def made_of(system: Structure) -> dict[str, Any]:
+    """Its FMUs by component, the values given by variable, and the experiment; times in s."""
+    return {
+        **{c.name: c.fmu.name for c in system.components},
+        **{f"{c.name}.{name}": v for c in system.components for name, v in c.values.items()},
+        "step": system.step_ns / NANOSECONDS,
+        "stop": system.stop_ns / NANOSECONDS,
+        "start": system.start_ns / NANOSECONDS,
+        "scheme": system.scheme,
+        "diverging": system.diverging,
+        **({"input": system.input.file} if system.input else {}),
+    }
+
+
+def changed(system: Structure) -> dict[str, Any]:
+    """Of made_of() what is not as it was read, as types that JSON has.
+
+    A value that was not given there is compared with the one that the FMU starts with.
+    """
+    starts = {
+        f"{c.name}.{name}": c.interface.by_name[name].start_value
+        for c in system.components
+        for name in c.values
+    }
+    return {
+        key: value
+        for key, value in made_of(system).items()
+        if value != system.as_read.get(key, starts.get(key))
     }

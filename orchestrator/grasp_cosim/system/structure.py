@@ -42,7 +42,7 @@ class Structure:
     diverging is what a run does where a signal runs away. input drives inputs without a connection.
     realtime is how a run is paced that is to be in real time. metrics are the names of groups of
     ours, like grasp.
-    as_read is what the system was made of when it was read, see system.settings.made_of.
+    as_read is what the system was made of when it was read, see settings.made_of.
     """
 
     name: str

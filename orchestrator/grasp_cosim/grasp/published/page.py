@@ -13,8 +13,8 @@ from ...report.page import page_style
 from ...report.plot import as_svg, new_figure, one_legend
 from ...report.tables import table
 from ...system.description import System
-from ...system.made_of import changed
 from ...system.parts import NANOSECONDS
+from ...system.settings import changed
 from ..controllers import controller_name
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES
