@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .recording.load import load_run
     from .recording.result import Result
     from .report.written import write_report
-    from .ssp.write import write_ssp
+    from .ssp.to_archive import write_ssp
     from .sweeps.sweep import sweep
     from .system.description import System
     from .system.realtime import Realtime
@@ -76,7 +76,7 @@ _HOMES = {
     "simulate": "master.simulation",
     "sweep": "sweeps.sweep",
     "write_report": "report.written",
-    "write_ssp": "ssp.write",
+    "write_ssp": "ssp.to_archive",
 }
 
 

@@ -5,7 +5,7 @@ import io
 import unicodedata
 
 import pytest
-from grasp_cosim.base.plain import from_cell, on_one_line, printable, to_cell
+from grasp_cosim.base.plain_text import from_cell, on_one_line, printable, to_cell
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -8,7 +8,7 @@ import pytest
 from conftest import Run
 from grasp_cosim import System, load_run, simulate
 from grasp_cosim.comparison.qualify import qualify
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from support.native_fmus import build, needs_gcc
 from support.stimuli import driven
 

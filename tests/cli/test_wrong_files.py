@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from conftest import Run
 from grasp_cosim import InputError, System, load_run, simulate
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 
 FMU = [
     ("inspect", "{}"),

@@ -18,7 +18,7 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from support.foreign_fmus import deviations_from_fmpy
 from support.foreign_tools import (
     COFMUPY,

@@ -13,7 +13,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.server import Server
 from grasp_cosim.master.compiled import has_compiler
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from support.slow import slow
 
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from grasp_cosim.fmi.instance import Instance, dtype
-from grasp_cosim.fmi.load import load
+from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.interface.interface import Value, Variable
 from grasp_cosim.system.parts import Component, Isolation
 from support.native_fmus import TYPES, build

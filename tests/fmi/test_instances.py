@@ -15,8 +15,8 @@ from grasp_cosim import InputError, SimulationError
 from grasp_cosim.base.calls import STEP_2, STEP_3, TRANSFER_2, TRANSFER_3
 from grasp_cosim.fmi import fmi2
 from grasp_cosim.fmi.instance import DISCARD, EARLY, OK
-from grasp_cosim.fmi.load import load
 from grasp_cosim.fmi.loaded import KEPT
+from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.system.parts import Component, Isolation
 from support.native_fmus import EARLY as MIGHT_RETURN_EARLY

@@ -245,7 +245,7 @@ def test_the_process_ends_when_the_masters_is_killed(tmp_path: Path) -> None:
     code = f"""
 import numpy as np
 from pathlib import Path
-from grasp_cosim.fmi.load import load
+from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.system.parts import Component
 part = load(Component("part", Path({str(fmu)!r}), {{}}, isolation="process"))
 part.enter_initialization({{"hang_at": 0.1}}, 1.0)

@@ -11,8 +11,8 @@ from fmi.instances import Bound, variable
 from grasp_cosim import InputError, SimulationError
 from grasp_cosim.fmi.fmi2 import SharedInstance
 from grasp_cosim.fmi.instance import ERROR, OK
-from grasp_cosim.fmi.load import load
 from grasp_cosim.fmi.loaded import LoadedInstance
+from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.system.parts import Component, Isolation
 from support.native_fmus import build, needs_gcc

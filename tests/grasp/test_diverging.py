@@ -11,7 +11,7 @@ from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.master import master
 from grasp_cosim.master.engine import Engine
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.toml import read_toml
 from support.slow import slow

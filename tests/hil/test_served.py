@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.fmi.load import load_here
+from grasp_cosim.fmi.make_instance import load_here
 from grasp_cosim.hil.driven import DrivenFmu
 from grasp_cosim.hil.protocol import exchanged, link_signature
 from grasp_cosim.hil.served import BACKLOG, ServedFmu, Service

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.interface.units import conversion
-from grasp_cosim.system.checks import connection_transform
 from grasp_cosim.system.parts import Component, Connection, Port
+from grasp_cosim.system.validity import connection_transform
 from hypothesis import given
 from hypothesis import strategies as st
 from si_units import BASE, Unit

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim.master.faults import FaultFunction, Window, fault_functions
+from grasp_cosim.master.fault_windows import FaultFunction, Window, fault_functions
 from grasp_cosim.system.faults import INITIAL
 from grasp_cosim.system.parts import Fault, Port
 from hypothesis import given

@@ -11,7 +11,7 @@ import pytest
 from conftest import Run
 from grasp_cosim import InputError, System, load_run, simulate
 from grasp_cosim.master.engine import Engine
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Connection, Event, Fault, Port
 from grasp_cosim.system.stimuli import read_stimuli
 from support.both_engines import engines

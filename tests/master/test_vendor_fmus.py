@@ -11,8 +11,8 @@ from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.interface.interface import limits
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.master.engine import Engine
-from grasp_cosim.system.checks import connection_transform, remarks
 from grasp_cosim.system.parts import Event, Port
+from grasp_cosim.system.validity import connection_transform, remarks
 from support.both_engines import engines
 from support.native_fmus import TYPES, build, needs_gcc
 

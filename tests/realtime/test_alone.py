@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
 from grasp_cosim.base.calls import PACE
-from grasp_cosim.master import aside, master
+from grasp_cosim.master import master, side_thread
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.load import load_run
@@ -92,7 +92,7 @@ def test_it_has_the_bits_of_a_free_run_and_a_timing(
 def test_rows_go_round_in_their_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     two = system(tmp_path)
     monkeypatch.setattr(master, "ROOM", 7)
-    monkeypatch.setattr(aside, "PAUSE", 0)
+    monkeypatch.setattr(side_thread, "PAUSE", 0)
     monkeypatch.setattr(master, "LONG", 0.0)
     assert same_bits(simulate(two), simulate(two, realtime=FAST))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.interface import document
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from ssp.hand_made import (
     archive,
     bind,

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.interface.interface import Value
-from grasp_cosim.system.checks import transforms
 from grasp_cosim.system.parts import Port
+from grasp_cosim.system.validity import transforms
 from ssp.hand_made import (
     archive,
     bind,

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 from grasp_cosim import InputError, System, simulate
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Connection, Port
 from hypothesis import given
 from hypothesis import strategies as st

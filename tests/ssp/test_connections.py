@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.system import checks
-from grasp_cosim.system.checks import transforms
+from grasp_cosim.system import validity
 from grasp_cosim.system.parts import Connection, Port
+from grasp_cosim.system.validity import transforms
 from ssp.hand_made import archive, component, connect, fmu, linear, structure, system
 
 GIVES = fmu("output Real y - m")
@@ -259,5 +259,5 @@ def test_the_place_of_a_connection_is_worked_out_for_errors_only(
     """It takes a look at all of them, and there may be thousands."""
     drawn = system("top", BOTH, connect("a/y", "b/u"))
     path = archive(tmp_path, structure(drawn), {"a": GIVES, "b": TAKES})
-    monkeypatch.setattr(checks, "as_written", lambda _: pytest.fail("looked for a place"))
+    monkeypatch.setattr(validity, "as_written", lambda _: pytest.fail("looked for a place"))
     assert len(System.load(path).connections) == 1

@@ -20,7 +20,7 @@ import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.served import Service
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from support.cases import CASES
 from support.proxies import build_proxy, serving
 from support.slow import interop

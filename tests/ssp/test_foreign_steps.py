@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from lxml import etree  # type: ignore[import-untyped]
 from ssp.hand_made import NAMESPACES, archive, changed, component, connect, fmu, structure, system
 

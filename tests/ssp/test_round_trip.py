@@ -11,9 +11,8 @@ from grasp_cosim import InputError, Realtime, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
-from grasp_cosim.ssp.notes import Notes
-from grasp_cosim.ssp.write import SET, write_ssp
-from grasp_cosim.system.checks import transforms
+from grasp_cosim.ssp.remarks import Notes
+from grasp_cosim.ssp.to_archive import SET, write_ssp
 from grasp_cosim.system.parts import (
     Component,
     Condition,
@@ -23,6 +22,7 @@ from grasp_cosim.system.parts import (
     Initialisation,
     Port,
 )
+from grasp_cosim.system.validity import transforms
 from lxml import etree  # type: ignore[import-untyped]
 from ssp.hand_made import (
     archive,

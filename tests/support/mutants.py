@@ -416,7 +416,7 @@ def main(kind: str, first: int, count: int, fmus: Path, folder: Path) -> None:
     """Try seeds and print what came of it."""
     from grasp_cosim import System
     from grasp_cosim.cli.commands import inspect, run, ssp  # noqa: F401
-    from grasp_cosim.ssp.write import write_ssp
+    from grasp_cosim.ssp.to_archive import write_ssp
 
     folder.mkdir(parents=True)
     (folder / "clean.toml").write_text(system_text(fmus), "utf-8")

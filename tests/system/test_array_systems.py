@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.cli import main
-from grasp_cosim.system.checks import remarks
 from grasp_cosim.system.parts import Condition, Port
 from grasp_cosim.system.scenario import event_entry, read_events
+from grasp_cosim.system.validity import remarks
 from support.state_space import state_space
 
 Load = Callable[..., System]

@@ -9,8 +9,8 @@ import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.comparison.swap import prepare_swap
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.system.checks import remarks
 from grasp_cosim.system.parts import Port
+from grasp_cosim.system.validity import remarks
 
 TEXT = SYSTEM.read_text("utf-8")
 

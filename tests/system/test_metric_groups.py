@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System, load_run, simulate
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 
 
 def without(fmus: Path, tmp_path: Path, entry: str) -> System:

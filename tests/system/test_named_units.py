@@ -7,9 +7,9 @@ import pytest
 from comparison.made import PLANT, write_fmu
 from grasp_cosim import InputError, System
 from grasp_cosim.interface.read import read_interface
-from grasp_cosim.system.checks import connection_transform, remarks
 from grasp_cosim.system.parts import Condition, Event, Port
 from grasp_cosim.system.settings import settings
+from grasp_cosim.system.validity import connection_transform, remarks
 from si_units import Unit
 
 SPRING = {

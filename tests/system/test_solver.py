@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System, simulate
-from grasp_cosim.ssp.write import write_ssp
-from grasp_cosim.system.checks import remarks
+from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Solver
+from grasp_cosim.system.validity import remarks
 from support.models import build_model
 from support.native_fmus import needs_gcc
 

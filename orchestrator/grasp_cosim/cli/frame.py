@@ -15,7 +15,7 @@ import click
 
 from ..base.errors import InputError
 from ..base.files import check_folder
-from ..base.plain import on_one_line
+from ..base.plain_text import on_one_line
 from ..base.progress import Progress, phase, write
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import Any, NoReturn
 
-from ..base.plain import printable
+from ..base.plain_text import printable
 
 OUTPUT = "standard output"
 

@@ -13,11 +13,11 @@ from ..interface.expansion import values_of
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
 from ..interface.units import Conversion, conversion
-from ..system.checks import transforms
 from ..system.conversions import between, output_units
 from ..system.description import System
 from ..system.parts import Component, Isolation
 from ..system.swap import Replacement, converted, replaced
+from ..system.validity import transforms
 from .feedthrough import feedthrough_differences
 from .interface_difference import SEVERITIES, Difference, interface_differences, use_of
 

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import SimulationError
-from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import run_settings
+from ..system.validity import transforms
 from .divergence import Divergence, largest
 from .energy import ExchangeEnergy, bonds
 from .listener import Experiment, Leisurely, Listener, Signal, Texts

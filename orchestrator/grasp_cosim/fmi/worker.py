@@ -17,7 +17,7 @@ from ..base import interruption
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from .instance import EARLY, WARNING, Instance
-from .load import load_here
+from .make_instance import load_here
 from .shared_memory import ANSWER, CALL, LOGGED, STEP, SharedMemory
 
 Answer = tuple[str, Any, list[str]]

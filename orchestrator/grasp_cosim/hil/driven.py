@@ -10,7 +10,7 @@ from grasp_fmus.link.signature import LinkVariable, Signature
 
 from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
-from ..fmi.load import load_here
+from ..fmi.make_instance import load_here
 from ..interface.interface import Interface, Value, Variable
 from ..master.rejection import finish_step
 

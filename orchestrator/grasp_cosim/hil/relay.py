@@ -13,7 +13,7 @@ from typing import Any
 from ..base.columns import columns
 from ..base.errors import InputError
 from .address import Address, connected, is_loopback, resolved, text
-from .loop import Loop, received
+from .event_loop import EventLoop, received
 from .network import Direction, Network
 from .traffic import Counters, Held, Log, Traffic
 
@@ -30,7 +30,7 @@ class _Client:
     towards_peer: socket.socket
 
 
-class Relay(Loop):
+class Relay(EventLoop):
     """Relays between its port and a peer while it runs; what is under way at the end stays so.
 
     InputError where host or peer have no IPv4 address, the port is taken, the peer is out of reach

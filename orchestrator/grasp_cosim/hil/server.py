@@ -6,14 +6,14 @@ from grasp_fmus.link.message import PORT
 
 from ..base.errors import InputError
 from .address import Address, text
-from .loop import Loop, received
+from .event_loop import EventLoop, received
 from .served import Say, ServedFmu
 
 DEFAULT_ADDRESS: Address = ("127.0.0.1", PORT)
 """The address that a proxy looks at if nobody says otherwise."""
 
 
-class Server(Loop):
+class Server(EventLoop):
     """Serves an FMU, which it closes in the end."""
 
     def __init__(

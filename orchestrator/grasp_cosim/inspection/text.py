@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from ..base.errors import choices
-from ..base.plain import on_one_line
+from ..base.plain_text import on_one_line
 from ..interface.interface import Value, Variable
 
 FEW = 6

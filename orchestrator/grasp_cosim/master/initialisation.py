@@ -16,10 +16,10 @@ from ..base.errors import InputError, choices
 from ..base.numerals import counted
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
-from ..system.checks import transforms
 from ..system.description import System
 from ..system.faults import INITIAL
 from ..system.parts import Connection, Initialisation, Port
+from ..system.validity import transforms
 
 Floats = npt.NDArray[np.float64]
 

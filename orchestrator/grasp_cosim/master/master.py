@@ -21,14 +21,14 @@ from ..recording.result import Rejection
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port, seconds
 from . import loop
-from .aside import Aside
 from .compiled import CompiledLoop
-from .drive import at_start, drives_of
+from .driven_inputs import at_start, drives_of
 from .engine import Engine, make_loop
 from .initialisation import Propagation
 from .plan import Planner, slots_of
 from .rejection import finish_step
 from .scenario import Scenario
+from .side_thread import Aside
 
 CHUNK = 4096
 """The most steps between two times that rows are handed on."""

@@ -18,11 +18,11 @@ from ..exchange.listener import Texts
 from ..fmi.instance import Instance, dtype
 from ..interface.interface import Interface, Variable
 from ..realtime.pacer import Pacer
-from ..system.checks import transforms
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Connection, Port
 from ..system.stimuli_checks import driven
-from .drive import Drive
+from ..system.validity import transforms
+from .driven_inputs import Drive
 from .loop import CALL, COPY, DRIVE, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 from .scenario import Scenario
 

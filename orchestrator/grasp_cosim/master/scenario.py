@@ -14,7 +14,7 @@ from ..interface.interface import Value, Variable
 from ..system.description import System
 from ..system.parts import Condition, Event, Fault, Port, first_step, literal, seconds
 from ..system.scenario_checks import check_setting
-from .faults import Window, fault_functions
+from .fault_windows import Window, fault_functions
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -30,7 +30,7 @@ class Scenario:
     """The events and faults of one run.
 
     log says what happened, a line each, in order. fault_functions are those of the connections that
-    have faults, by target: see faults.py.
+    have faults, by target: see fault_windows.py.
     """
 
     def __init__(

@@ -17,7 +17,7 @@ from ..base.numerals import counted
 from ..base.progress import Progress, phase
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener
-from ..fmi.load import load
+from ..fmi.make_instance import load
 from ..interface.interface import Value
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, Signals, chosen, measure, metrics_of, needed
@@ -25,11 +25,11 @@ from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.memory import EveryRow, MemoryListener
 from ..recording.result import Known, Result, has_proxies, proxy_figures
-from ..system.checks import remarks
 from ..system.description import System
 from ..system.native import needed_twins
 from ..system.parts import NANOSECONDS, Component, Port
 from ..system.realtime import Realtime
+from ..system.validity import remarks
 from .engine import Engine
 from .master import Master
 

@@ -11,7 +11,7 @@ from one_piece import in_one_piece
 
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
-from ..base.plain import to_cell
+from ..base.plain_text import to_cell
 from ..exchange.listener import Experiment, Signal
 
 PIECE = 1024

@@ -20,7 +20,7 @@ from ..base.checks import choice, extra_module, is_number, real
 from ..base.errors import InputError, choices
 from ..base.files import check_nature
 from ..base.numerals import counted
-from ..base.plain import from_cell
+from ..base.plain_text import from_cell
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, metrics_of
 from ..realtime.timing import Timing

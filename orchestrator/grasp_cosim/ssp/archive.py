@@ -20,7 +20,7 @@ from one_piece import in_one_piece
 from ..base.errors import InputError, nearest
 from ..base.scratch import ScratchFolder
 from ..interface.document import check_size
-from .notes import Notes
+from .remarks import Notes
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources/"

@@ -10,7 +10,7 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from ..base.errors import InputError
 from ..fmi import fmpy
-from .notes import Notes
+from .remarks import Notes
 from .version2 import as_version_1
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"

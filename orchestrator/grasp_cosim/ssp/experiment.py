@@ -7,9 +7,9 @@ from typing import Any
 from ..base.errors import InputError, choices
 from ..system.parts import LONGEST, NANOSECONDS, in_nanoseconds
 from .annotation import Extras
+from .connectors import Part
 from .document import at, child
 from .foreign import Steps
-from .network import Part
 
 
 def times(

@@ -10,9 +10,9 @@ from ..base.errors import InputError, choices
 from ..interface.interface import Value
 from ..system.parts import Component, Solver
 from .annotation import Beside
-from .network import Part
-from .tree import Path
-from .units import same
+from .connectors import Part
+from .elements import Path
+from .unit_tables import same
 
 
 class Called:

@@ -11,8 +11,8 @@ from ..base.checks import known
 from ..base.errors import InputError
 from .archive import STRUCTURE, Archive
 from .document import ROOTS, checked, child, parse
-from .notes import Notes
-from .units import read_units
+from .remarks import Notes
+from .unit_tables import read_units
 
 _KINDS = {
     "ssv": "parameter-set",

@@ -22,11 +22,11 @@ from si_units import Unit
 
 from ..base.errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
+from .connectors import Carried, Connectors
 from .document import at, child, children, is_true, short
-from .network import Carried, Network
+from .elements import Element, Hop, Node, Path, linear, transformation
 from .origin import Origin
-from .tree import Element, Hop, Node, Path, linear, transformation
-from .units import change, same
+from .unit_tables import change, same
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
     "Real": float,
@@ -70,7 +70,7 @@ class Given:
     transformation: Any = None
 
 
-def read_settings(network: Network) -> dict[Path, dict[str, Value]]:
+def read_settings(network: Connectors) -> dict[Path, dict[str, Value]]:
     """The value that holds for each variable that is given one.
 
     By the path of the component and the FMU's name of the variable.
@@ -86,7 +86,7 @@ def read_settings(network: Network) -> dict[Path, dict[str, Value]]:
     return values
 
 
-def read_sizes(network: Network) -> dict[Path, dict[str, Value]]:
+def read_sizes(network: Connectors) -> dict[Path, dict[str, Value]]:
     """The same of structural parameters alone, on which depends how many elements arrays have."""
     sizes: dict[Path, dict[str, Value]] = {}
     for end, parameter in _settled(network):
@@ -96,7 +96,7 @@ def read_sizes(network: Network) -> dict[Path, dict[str, Value]]:
     return sizes
 
 
-def _settled(network: Network) -> Iterator[tuple[Node, Parameter]]:
+def _settled(network: Connectors) -> Iterator[tuple[Node, Parameter]]:
     """Yield the variables that are given a value, and the one that holds."""
     given: dict[Node, Parameter] = {}
     for element, origin, binding in _bindings(network):
@@ -113,7 +113,7 @@ def _settled(network: Network) -> Iterator[tuple[Node, Parameter]]:
             yield end, _arriving(network, end, given)
 
 
-def _bindings(network: Network) -> Iterator[tuple[Element, Origin, Any]]:
+def _bindings(network: Connectors) -> Iterator[tuple[Element, Origin, Any]]:
     """All bindings with what they are at; who goes before another comes after it."""
     components = (part.element for part in network.parts.values())
     inner_first = sorted(network.systems.values(), key=lambda e: len(e.path), reverse=True)
@@ -172,7 +172,7 @@ def _parameter(place: str, origin: Origin, element: Any) -> Parameter:
     return Parameter(place, origin, kind, _READERS[kind](text), element.get("unit"))
 
 
-def _nodes(network: Network, element: Element, name: str) -> Iterator[Node]:
+def _nodes(network: Connectors, element: Element, name: str) -> Iterator[Node]:
     """Yield the variables and connectors that a name means at a system or component."""
     if element.path in network.parts:
         if name in network.parts[element.path].interface.by_name:
@@ -185,7 +185,7 @@ def _nodes(network: Network, element: Element, name: str) -> Iterator[Node]:
             yield from _nodes(network, inner, name[len(inner.name) + 1 :])
 
 
-def _ends(network: Network, node: Node) -> Iterator[Node]:
+def _ends(network: Connectors, node: Node) -> Iterator[Node]:
     """Yield the variables of components that a value at a node is for, there or passed on to."""
     if node.path in network.parts:
         yield node
@@ -194,7 +194,7 @@ def _ends(network: Network, node: Node) -> Iterator[Node]:
         yield from _ends(network, hop.target)
 
 
-def _arriving(network: Network, node: Node, given: Mapping[Node, Parameter]) -> Parameter:
+def _arriving(network: Connectors, node: Node, given: Mapping[Node, Parameter]) -> Parameter:
     """The value that holds at a node: of what it is connected to, else its own."""
     hops = network.trace(node)
     start = next((k for k, hop in enumerate(hops) if hop.source in given), None)
@@ -213,7 +213,7 @@ def _arriving(network: Network, node: Node, given: Mapping[Node, Parameter]) -> 
     return parameter
 
 
-def _passed(network: Network, hop: Hop, given: Parameter) -> Parameter:
+def _passed(network: Connectors, hop: Hop, given: Parameter) -> Parameter:
     """The parameter after one more hop."""
     if given.type in ("Real", "Integer"):
         carried = network.carry(hop, Carried(given.unit, settled=given.settled))
@@ -225,7 +225,7 @@ def _passed(network: Network, hop: Hop, given: Parameter) -> Parameter:
     return given
 
 
-def _check_type(network: Network, node: Node, given: Parameter) -> None:
+def _check_type(network: Connectors, node: Node, given: Parameter) -> None:
     """InputError where a connector of a system is of another type."""
     if node.path in network.parts:
         return
@@ -237,7 +237,7 @@ def _check_type(network: Network, node: Node, given: Parameter) -> None:
         raise InputError(f"{given.place}: {given.type}; {node} is {connector.type}")
 
 
-def _adapted(network: Network, node: Node, given: Given) -> Parameter:
+def _adapted(network: Connectors, node: Node, given: Given) -> Parameter:
     """The parameter in the unit of the node, transformed."""
     unit, parameter = network.unit(node), given.parameter
     if parameter.twice:
@@ -254,7 +254,7 @@ def _adapted(network: Network, node: Node, given: Given) -> Parameter:
     return parameter
 
 
-def _own_unit(network: Network, node: Node, parameter: Parameter) -> Unit | None:
+def _own_unit(network: Connectors, node: Node, parameter: Parameter) -> Unit | None:
     """The unit of a value for a node; None where it is that of the node, or has no meaning there.
 
     A unit of the name that the FMU gives it is the FMU's, however the set defines it.
@@ -304,7 +304,7 @@ def _linear(value: Value, factor: float, offset: float) -> Value:
     return value if (factor, offset) == (1.0, 0.0) else factor * float(value) + offset
 
 
-def _value(network: Network, node: Node, given: Parameter) -> Value:
+def _value(network: Connectors, node: Node, given: Parameter) -> Value:
     """The value for a variable of a component, checked."""
     part = network.parts[node.path]
     variable = part.interface.by_name[node.name]

@@ -10,7 +10,7 @@ from typing import Any
 from lxml import etree  # type: ignore[import-untyped]
 
 from ..base.errors import InputError
-from .notes import Notes
+from .remarks import Notes
 
 _TYPES = {
     "Float64": "Real",

@@ -11,13 +11,6 @@ from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
 from .arrays import as_written, by_element, check_arrays
-from .checks import (
-    check_components,
-    check_connections,
-    check_initialisation,
-    check_solvers,
-    check_steps,
-)
 from .native import natives
 from .parts import Component
 from .places import SECTIONS, as_file, changed, plain
@@ -27,6 +20,13 @@ from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli
 from .structure import Structure, experiment
 from .swap import with_entries
+from .validity import (
+    check_components,
+    check_connections,
+    check_initialisation,
+    check_solvers,
+    check_steps,
+)
 
 ARCHIVE = ".ssp"
 
@@ -90,7 +90,7 @@ class System(Structure):
             return system.with_experiment(step, stop)
         if fmus is not None:
             raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
-        system = higher("ssp.read").read_ssp(path, step, stop, _stimuli(input))
+        system = higher("ssp.from_archive").read_ssp(path, step, stop, _stimuli(input))
         return system
 
     def start(self, key: str) -> float:

@@ -25,7 +25,7 @@ from si_units import known_unit
 from ..base.checks import EXACT, choice, integer, real
 from ..base.errors import InputError
 from ..base.numerals import counted
-from ..base.plain import from_cell
+from ..base.plain_text import from_cell
 from ..interface.units import conversion
 from .parts import LONGEST, NANOSECONDS, Port
 

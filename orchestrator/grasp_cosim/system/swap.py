@@ -14,11 +14,11 @@ from ..base.errors import InputError, choices, nearest
 from ..interface.interface import Interface, Value, Variable
 from ..interface.read import describe
 from ..interface.units import IDENTITY
-from .checks import check_items
 from .conversions import unit_of
 from .parts import ISOLATIONS, Component, Port, Solver, in_nanoseconds, literal
 from .places import changed, plain
 from .structure import Structure
+from .validity import check_items
 from .values import with_given
 
 LOGGER = logging.getLogger(__name__)

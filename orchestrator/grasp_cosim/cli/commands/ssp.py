@@ -23,7 +23,7 @@ def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool
     \b
     Example: grasp-cosim ssp my_system.toml -o my_system.ssp
     """
-    from ...ssp.write import write_ssp  # only here: its libraries take time to load
+    from ...ssp.to_archive import write_ssp  # only here: its libraries take time to load
 
     chosen = chosen_system({"system": system, "settings": settings})
     check_file(out)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.ssp.write import write_ssp
+from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_fmus.build import build_native, planned
 from grasp_fmus.native.targets import WINDOWS
 from support.compilers import needs_zig

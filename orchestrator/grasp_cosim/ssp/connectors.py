@@ -18,8 +18,8 @@ from si_units import Unit
 
 from ..base.errors import InputError, nearest
 from ..interface.interface import Interface, Variable
-from .tree import Element, Hop, Node, Path
-from .units import change, same
+from .elements import Element, Hop, Node, Path
+from .unit_tables import change, same
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Carried:
 
 
 @dataclass(frozen=True)
-class Network:
+class Connectors:
     """All systems and components by path, and the hops between their connectors."""
 
     systems: Mapping[Path, Element]

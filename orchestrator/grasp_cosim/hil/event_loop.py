@@ -15,7 +15,7 @@ LARGEST = 65_536
 """Bytes to take of a datagram; no UDP datagram has as many."""
 
 
-class Loop:
+class EventLoop:
     """Listens at a port once it is made; `run` calls the handlers. Leaving the context closes it.
 
     `due` returns when there is something to do next, in ns of the clock, None for not by time;

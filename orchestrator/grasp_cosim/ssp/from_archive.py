@@ -18,16 +18,16 @@ from ..system.parts import Component, Connection, Port, in_nanoseconds
 from ..system.stimuli import Stimuli
 from .annotation import TYPE, Extras, no_extras, read_extras
 from .archive import STRUCTURE, Archive
+from .connectors import Carried, Connectors, Part
 from .document import at, child, children, qualified
+from .elements import Element, Hop, Path, read_system
+from .execution_order import flow_order
 from .experiment import step_time, times
 from .foreign import FOREIGN, Steps, read_steps
 from .names import Called, component_names, renamed
-from .network import Carried, Network, Part
-from .notes import Notes
-from .order import flow_order
 from .origin import Origin, open_structure
 from .parameters import read_settings, read_sizes
-from .tree import Element, Hop, Path, read_system
+from .remarks import Notes
 
 
 def read_ssp(
@@ -49,7 +49,7 @@ def read_ssp(
     extras = annotated or no_extras(names.values(), steps)
     called = _called(file, _sized(systems, parts, notes), names, extras)
     parts = {at: part.in_units() for at, part in called.items()}
-    network = Network(systems, parts)
+    network = Connectors(systems, parts)
     network.check()
     connections = tuple(_connections(network, names, called))
     stimuli = stimuli or extras.input
@@ -115,7 +115,7 @@ def _sized(
     if not any(v.shape for part in parts.values() for v in part.interface.variables):
         return dict(parts)
     with notes.off():  # of the values of elements that are not there yet
-        sizes = read_sizes(Network(systems, parts))
+        sizes = read_sizes(Connectors(systems, parts))
     return {
         at: replace(part, interface=expanded(part.interface, sizes.get(at, {})))
         for at, part in parts.items()
@@ -141,7 +141,7 @@ def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:
 
 
 def _connections(
-    network: Network, names: Mapping[Path, str], called: Mapping[Path, Called]
+    network: Connectors, names: Mapping[Path, str], called: Mapping[Path, Called]
 ) -> Iterator[Connection]:
     """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
@@ -159,7 +159,7 @@ def _connections(
             yield Connection(source, sink, carried.factor, carried.offset)
 
 
-def _carried(network: Network, hops: list[Hop]) -> Carried:
+def _carried(network: Connectors, hops: list[Hop]) -> Carried:
     """Follow a value from component to component; InputError where the way is not allowed."""
     carried = Carried(network.unit(hops[0].source))
     variable = network.variable(hops[0].source)
@@ -187,7 +187,7 @@ def _carried(network: Network, hops: list[Hop]) -> Carried:
 
 def _components(
     file: str,
-    network: Network,
+    network: Connectors,
     names: Mapping[Path, str],
     called: Mapping[Path, Called],
     sourced: Collection[Port],

@@ -22,9 +22,9 @@ from ..system.parts import NANOSECONDS, Component, Connection, Port
 from .annotation import extras_of, write_extras
 from .archive import RESOURCES, STRUCTURE, write_archive
 from .document import VERSION, add, new, to_bytes
+from .elements import FMU
 from .foreign import PREFIXES, write_hint, write_steps
-from .tree import FMU
-from .units import change, same, write_units
+from .unit_tables import change, same, write_units
 
 SET = "initialValues"
 """The name of all parameter sets: Ecos takes those of one name, EcosSimulation.init(...)."""

@@ -18,7 +18,7 @@ from ..interface.read import read_interface
 from .archive import STRUCTURE, Archive
 from .document import at, child, children, is_true, qualified, short
 from .origin import Origin, open_structure
-from .units import same
+from .unit_tables import same
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
