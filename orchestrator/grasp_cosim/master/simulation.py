@@ -282,13 +282,14 @@ class Session:
         """Remarks on the proxies, a line each."""
         if not has_proxies(self.system.recorded):
             return []
-        time, columns = (self._whole or self._memory).columns()
+        kept = self._whole if self._whole and not self._whole.lost else self._memory
+        time, columns = kept.columns()
         lines: list[str] = higher("hil.figures").proxy_lines(time, columns, step)
         return lines
 
     def _known(self) -> Known | None:
         """What is worked out of every step, where fewer rows are recorded."""
-        if self._whole is None:
+        if self._whole is None or self._whole.lost:
             return None
         time, columns = self._whole.columns()
         signals = Signals(time, columns, self.system.roles, self._in_si.conversions)
@@ -317,7 +318,7 @@ class Session:
             for name, r in master.rejections.items()
         )
         pending = master.scenario.pending() if self.complete else ()
-        step = self.system.step_ns / NANOSECONDS
+        step, lost = self.system.step_ns / NANOSECONDS, self._whole and self._whole.lost
         return (
             *self._early(),
             *self._dispatch.log,
@@ -326,6 +327,7 @@ class Session:
             *master.ends,
             *pending,
             *self._of_proxies(step),
+            *([f"{lost}: the metrics are of the rows that were recorded"] if lost else []),
         )
 
 

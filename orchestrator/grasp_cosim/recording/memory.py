@@ -12,7 +12,7 @@ from weakref import finalize
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import InputError, SimulationError
+from ..base.errors import InputError
 from ..base.files import unwritable
 from ..exchange.listener import Experiment, Signal
 
@@ -81,11 +81,12 @@ class MemoryListener:
 class EveryRow:
     """Keeps signals of these names at every step, where fewer are recorded, in a temporary file.
 
-    A metric of a thinned run would be one of other moments.
+    A metric of a thinned run would be one of other moments. `lost` says why they are not kept any
+    more, as on a full disk: the run goes on.
     """
 
     def __init__(self, names: Collection[str]) -> None:
-        self._names, self._rows = names, 0
+        self._names, self._rows, self.lost = names, 0, ""
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Open the file, in which a column comes after the other."""
@@ -95,7 +96,9 @@ class EveryRow:
         finalize(self, self._file.close)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Write the columns of these rows, each to its place; SimulationError on a full disk."""
+        """Write the columns of these rows, each to its place."""
+        if self.lost:
+            return
         columns = self._experiment.times(steps), *(rows[:, i] for i, _ in self._chosen)
         try:
             for place, column in enumerate(columns):
@@ -104,8 +107,8 @@ class EveryRow:
                 while left:
                     left = left[self._file.write(left) :]
         except OSError as error:
-            reason = unwritable(Path(gettempdir()), error)
-            raise SimulationError(f"{reason} (every row, for the metrics)") from error
+            self.lost = unwritable(Path(gettempdir()), error)
+            self._file.truncate(0)
         self._rows = int(steps[-1]) + 1
 
     def end(self, complete: bool) -> None:
