@@ -20,6 +20,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from grasp_cosim.base.system_calls import cpus
+
 from benchmarks.harness import Program, built_fmus, by_turns, head, row, spread
 
 WORKER = Path(__file__).parent / "worker.py"
@@ -87,7 +89,7 @@ def measure(
     What the masters leave behind goes to `scratch`.
     """
     environment = {**os.environ, "TMPDIR": str(scratch)}
-    core = [str(max(os.sched_getaffinity(0)))] if case.one_core else []
+    core = [str(cpus()[-1])] if case.one_core else []
     with ExitStack() as stack:
         workers = {}
         for name, python in masters.items():

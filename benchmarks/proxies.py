@@ -8,7 +8,6 @@ beside what is declared: proxy.timeout for each miss that is tolerated, and one 
 long.
 """
 
-import os
 import random
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from io import StringIO
 from pathlib import Path
 
 from grasp_cosim import System, cli, simulate
+from grasp_cosim.base.system_calls import pin, put_first
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.interface.interface import Value
@@ -100,8 +100,8 @@ def native_cost(folder: Path) -> None:
         there = there.with_values({"controller.proxy.port": port})
         compare(system, there, "controller, all native,")
         with suppress(OSError):  # both on one processor: a call to another one takes its time
-            os.sched_setaffinity(process.pid, {0})
-            os.sched_setscheduler(process.pid, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
+            pin(process.pid, 0)
+            put_first(process.pid, PRIORITY + 5)
         paced = Realtime(priority=PRIORITY, cpu=0, lock_memory=True)
         result = simulate(there, step=1e-3, stop=20.0, realtime=paced)
         process.kill()

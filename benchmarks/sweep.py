@@ -49,7 +49,7 @@ def main() -> None:
     print(f"{given.runs} grasps of 3 s, step {given.step:g} s, {os.cpu_count()} processors")
     head("round", "1 worker, s", "2 workers, s", "times as fast", "plain arithmetic", "load")
     for k in range(given.rounds):
-        load = os.getloadavg()[0]
+        load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
         found = {n: timed(rows, given.step, n) for n in ((1, 2) if k % 2 else (2, 1))}
         (one, first), (two, second) = found[1], found[2]
         if first != second or first.errors:

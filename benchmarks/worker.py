@@ -194,7 +194,7 @@ def main() -> None:
     """Answer on the standard output as it was; what a master prints goes to standard error."""
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
-    if sys.argv[3:]:
+    if sys.argv[3:] and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {int(sys.argv[3])})
     master = MASTERS[sys.argv[1]](Path(sys.argv[2]))
     for line in sys.stdin:

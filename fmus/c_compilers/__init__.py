@@ -185,5 +185,9 @@ def _made(job: Job, process: subprocess.Popen[str], folder: Path) -> Path:
 def _end(process: subprocess.Popen[str]) -> None:
     """End a compiler with what it has started."""
     with suppress(ProcessLookupError):
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()
+        if process.poll() is not None:
+            return
+        if hasattr(os, "killpg") and hasattr(signal, "SIGKILL"):
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()

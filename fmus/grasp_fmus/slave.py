@@ -421,8 +421,9 @@ def let_go() -> None:
     As the process ends they do it twice, the second time in memory that was freed.
     """
     for binary in _binaries:
-        with suppress(OSError, AttributeError):  # it was unloaded; on Windows there is no need
-            ctypes.PyDLL(binary, mode=os.RTLD_NOLOAD | os.RTLD_NOW).finalizePythonInterpreter()
+        if hasattr(os, "RTLD_NOLOAD"):  # on Windows there is no need
+            with suppress(OSError, AttributeError):  # it was unloaded
+                ctypes.PyDLL(binary, mode=os.RTLD_NOLOAD).finalizePythonInterpreter()
 
 
 def keep(used: object) -> None:

@@ -76,27 +76,6 @@ def test_what_is_not_known_to_be_left_stays(folder: Path) -> None:
     sweep(str(folder / "missing"))
 
 
-def test_one_that_is_taken_for_left_as_it_is_made_is_made_again(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Another process may look between the making and the locking of it."""
-    mkdtemp = tempfile.mkdtemp
-    taken: list[str] = []
-
-    def swept(prefix: str) -> str:
-        name = mkdtemp(prefix=prefix)
-        if not taken:
-            taken.append(name)
-            sweep.cache_clear()
-            sweep(str(folder))
-        return name
-
-    monkeypatch.setattr(tempfile, "mkdtemp", swept)
-    with ScratchFolder() as scratch:
-        assert not Path(taken[0]).exists()
-        assert Path(scratch.name).exists()
-
-
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root gives folders away")
 def test_those_of_others_stay(folder: Path) -> None:
     theirs = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))

@@ -1,6 +1,5 @@
 """Commands as processes: what SIGINT, SIGTERM and SIGKILL leave behind."""
 
-import fcntl
 import json
 import os
 import signal
@@ -15,7 +14,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.base.interruption import AT_ONCE
-from grasp_cosim.base.scratch import PREFIX
+from grasp_cosim.base.scratch import PREFIX, lock_of
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.recording.load import load_run
 from support.native_fmus import build, needs_gcc
@@ -132,8 +131,8 @@ def test_a_second_signal_ends_a_run_that_hangs(
 @needs_gcc
 def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_path: Path) -> None:
     alive = tempfile.mkdtemp(prefix=PREFIX, dir=tmp_path / "tmp")
-    lock = os.open(alive, os.O_RDONLY)
-    fcntl.flock(lock, fcntl.LOCK_EX)
+    lock = lock_of(Path(alive))
+    assert lock.taken()
     process = start("run", native_system(tmp_path), "--out", "out")
     wait_for(process, lambda: (tmp_path / "out/run.json").exists() and size(tmp_path) > 10_000)
     process.kill()
@@ -150,7 +149,7 @@ def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_pat
     assert f"out: unfinished, to t = {run.time[-1]:.6g} s" in err
     assert "unfinished: to t = " in Path(tmp_path, json.loads(out)["page"]).read_text("utf-8")
     assert left(tmp_path) == [Path(alive).name]
-    os.close(lock)
+    lock.release()
 
 
 def size(folder: Path) -> int:

@@ -92,7 +92,7 @@ def test_it_has_the_bits_of_a_free_run_and_a_timing(
 def test_rows_go_round_in_their_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     two = system(tmp_path)
     monkeypatch.setattr(master, "ROOM", 7)
-    monkeypatch.setattr(side_thread, "PAUSE", 0)
+    monkeypatch.setattr(side_thread, "PAUSE", 1e-6)
     monkeypatch.setattr(master, "LONG", 0.0)
     assert same_bits(simulate(two), simulate(two, realtime=FAST))
 

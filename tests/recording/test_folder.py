@@ -99,7 +99,7 @@ def test_no_picture_of_another_run_stays(run: RunFolder, tmp_path: Path) -> None
     run.block(np.arange(1), rows(1))
     run.end(complete=False)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
-        ["run.json", "signals.csv", *theirs]
+        [".lock", "run.json", "signals.csv", *theirs]
     )
 
 

@@ -3,16 +3,17 @@
 SIGTERM, with which systemd and Docker stop a command, does there what Ctrl-C does.
 """
 
-import fcntl
 import os
-import select
 import signal
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
+
+from .system_calls import end_when_closed
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -31,9 +32,9 @@ def command() -> None:
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as after `&`
             signal.signal(number, _raise)
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    signal.set_wakeup_fd(writer)
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    signal.set_wakeup_fd(writer.detach())
     threading.Thread(target=_end_at_second, args=(reader,), daemon=True).start()
 
 
@@ -51,18 +52,19 @@ def came() -> bool:
 def worker(lifeline: int) -> None:
     """Leave signals to the process that started this one, and end with it, whatever an FMU does.
 
-    `lifeline` is the end to read from of a pipe that it keeps open, through which nothing comes.
+    `lifeline` is the end to read from of a pipe that it keeps open, through which nothing comes, or
+    what multiprocessing has for that.
     """
+    from multiprocessing.connection import wait
 
-    def wait() -> None:
-        os.read(lifeline, 1)
+    def end() -> None:
+        wait([lifeline])
         os._exit(1)
 
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
-    fcntl.fcntl(lifeline, fcntl.F_SETFL, os.O_ASYNC)  # SIGIO ends it while an FMU keeps the GIL
-    threading.Thread(target=wait, daemon=True).start()
+    end_when_closed(lifeline)
+    threading.Thread(target=end, daemon=True).start()
 
 
 @contextmanager
@@ -119,9 +121,9 @@ def _is_first(number: int) -> bool:
     return len(_came) == 1  # after that _end_at_second() ends the process
 
 
-def _end_at_second(reader: int) -> None:
+def _end_at_second(reader: socket.socket) -> None:
     """End the process by a signal that does not come at once with the first."""
-    select.select([reader], [], [])
+    reader.recv(1, socket.MSG_PEEK)
     time.sleep(AT_ONCE)
-    os.read(reader, 64)
-    os._exit(128 + os.read(reader, 1)[0])
+    reader.recv(64)
+    os._exit(128 + reader.recv(1)[0])

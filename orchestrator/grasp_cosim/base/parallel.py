@@ -22,6 +22,7 @@ from . import interruption
 from .errors import SimulationError
 from .progress import Progress, phase
 from .scratch import sweep
+from .system_calls import held_back
 
 Job = TypeVar("Job")
 Run = TypeVar("Run")
@@ -151,17 +152,12 @@ class _Worker:
         self.pipe, theirs = context.Pipe()
         self._started = False
         self._process: BaseProcess = context.Process(target=_work, args=(theirs,))
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, interruption.SIGNALS)  # are for us
         try:
-            with _safe_path():
+            with closing(theirs), held_back(interruption.SIGNALS), _safe_path():  # they are for us
                 self._process.start()
-        finally:
-            theirs.close()
-            try:
-                signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-            except BaseException:  # of a signal that came meanwhile
-                _end([self])
-                raise
+        except BaseException:  # of a signal that came meanwhile
+            _end([self])
+            raise
 
     def give(self, run: Callable[[Job], Any], job: Job) -> None:
         """Have it do a job; where it has died meanwhile, received() says so."""
@@ -193,8 +189,9 @@ class _Worker:
 
     def join(self) -> None:
         """Wait for the end of a stopped process."""
-        self._process.join()
-        self._process.close()
+        if self._process.pid:
+            self._process.join()
+            self._process.close()
 
     def _end(self) -> str:
         """Return how the process, whose pipe has ended, came to its end."""

@@ -1,10 +1,9 @@
 """Temporary folders that do not outlive their process, however it ends.
 
-Its process has locked each. A lock goes with its process: a folder that is not locked has been left
-behind by a kill, and the next process that needs one removes it.
+Its process has locked each, before it made it. A lock goes with its process: a folder that is not
+locked has been left behind by a kill, and the next process that needs one removes it.
 """
 
-import fcntl
 import os
 import re
 import shutil
@@ -13,18 +12,21 @@ import weakref
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from secrets import token_hex
 from typing import Self
+
+from .locks import SUFFIX, Lock
+from .system_calls import is_mine
 
 PREFIX = "grasp_scratch_"
 """So the names of our folders begin."""
 
-_OPEN = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-
 
 def without_scratch(text: str) -> str:
     """The text without the paths of our temporary folders: files are named as in their archive."""
-    folder = re.escape(tempfile.gettempdir())
-    return re.sub(rf"(file://)?{folder}/({PREFIX}[^/\s]+/)+([0-9a-f]{{64}}/)?", "", text)
+    folder = r"[\\/]".join(map(re.escape, re.split(r"[\\/]", tempfile.gettempdir())))
+    ours = rf"{folder}[\\/]({PREFIX}[^\\/\s]+[\\/])+([0-9a-f]{{64}}[\\/])?"
+    return re.sub(rf"(file:///?)?{ours}", "", text)
 
 
 class ScratchFolder:
@@ -52,34 +54,32 @@ def sweep(folder: str) -> None:
         for entry in entries:
             if entry.name.startswith(PREFIX):
                 with suppress(OSError):
-                    _remove_if_left(entry.path)
+                    _remove_if_left(Path(entry.path))
 
 
-def _made() -> tuple[str, int]:
-    """A new folder, and the descriptor by which it is locked."""
-    while True:
-        name = tempfile.mkdtemp(prefix=PREFIX)
-        with suppress(FileNotFoundError):
-            lock = os.open(name, _OPEN)
-            with suppress(OSError):  # a file system without locks: there nothing is swept
-                fcntl.flock(lock, fcntl.LOCK_EX)
-            if Path(name).exists():
-                return name, lock
-            os.close(lock)  # another process took it for one that was left
+def lock_of(folder: Path) -> Lock:
+    """The lock of a folder, which is there before it and after it."""
+    return Lock(folder.with_name(f".{folder.name}{SUFFIX}"))
 
 
-def _remove_if_left(name: str) -> None:
-    lock = os.open(name, _OPEN)
-    try:
-        if os.fstat(lock).st_uid == os.getuid():
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            shutil.rmtree(name, ignore_errors=True)
-    finally:
-        os.close(lock)
+def _made() -> tuple[str, Lock]:
+    """A new folder, and the lock that we have of it."""
+    folder = Path(tempfile.gettempdir(), PREFIX + token_hex(8))
+    lock = lock_of(folder)
+    lock.taken()
+    folder.mkdir(0o700)
+    return str(folder), lock
 
 
-def _end(name: str, lock: int, owner: int) -> None:
+def _remove_if_left(folder: Path) -> None:
+    if folder.is_dir() and not folder.is_symlink() and is_mine(folder):
+        lock = lock_of(folder)
+        if lock.taken() and lock.sure:
+            _end(str(folder), lock, os.getpid())
+
+
+def _end(name: str, lock: Lock, owner: int) -> None:
     """Remove the folder, unless this process is a fork of its owner."""
     if os.getpid() == owner:
         shutil.rmtree(name, ignore_errors=True)
-    os.close(lock)
+        lock.release()

@@ -12,6 +12,7 @@ import click
 from ..base import interruption
 from ..base.errors import InputError, SimulationError
 from ..base.files import FULL
+from ..base.system_calls import when_c_exits
 from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
 from .streams import OutputError, harmless_streams, keep_output_for_us, leave
@@ -28,7 +29,7 @@ def entry() -> NoReturn:
     keep_output_for_us()
     interruption.command()
     try:
-        ctypes.CDLL(None).__cxa_atexit(_EXITED, None, None)
+        when_c_exits(_EXITED)
         if "--debug" in sys.argv:
             faulthandler.enable()
         code = main(sys.argv[1:])

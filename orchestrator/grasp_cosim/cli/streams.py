@@ -1,7 +1,6 @@
 """What is printed: harmless to a terminal, and an output that fails is an error of one line."""
 
 import atexit
-import ctypes
 import os
 import sys
 from codecs import lookup
@@ -10,6 +9,7 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppres
 from typing import Any, NoReturn
 
 from ..base.plain_text import printable
+from ..base.system_calls import flush_c
 
 OUTPUT = "standard output"
 
@@ -90,7 +90,7 @@ def leave(code: int) -> NoReturn:
     atexit._run_exitfuncs()
     with suppress(OSError):
         sys.stderr.flush()
-    ctypes.CDLL(None).fflush(None)
+    flush_c()
     os._exit(code)
 
 

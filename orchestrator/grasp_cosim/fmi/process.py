@@ -6,7 +6,6 @@ process is lost.
 
 import os
 import pickle
-import select
 import signal
 import socket
 import subprocess
@@ -16,7 +15,7 @@ import threading
 import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -26,6 +25,7 @@ import numpy.typing as npt
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from ..base.scratch import ScratchFolder
+from ..base.system_calls import end_group, listener
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Solver
 from .inputs import Inputs
@@ -93,8 +93,7 @@ class ProcessInstance:
         )
         theirs.close()
         os.close(reading)
-        self._poll = select.poll()
-        self._poll.register(self._connection.fileno(), select.POLLIN)
+        self._answers = listener(self._connection)
         self._reader = threading.Thread(target=self._read_output, daemon=True)
         self._reader.start()
         try:
@@ -229,7 +228,7 @@ class ProcessInstance:
                 # not send(), whose buffer would be in the traceback of an error, and be complained
                 # of when that is cleared away
                 self._connection.send_bytes(pickle.dumps(call))
-            if not self._poll.poll(1000.0 * timeout):
+            if not self._answers(timeout):
                 self._process.kill()
                 raise self._lose(f"did not answer within {timeout:g} s and was ended")
             status = self._connection.recv_bytes()[0]
@@ -266,8 +265,7 @@ class ProcessInstance:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        with suppress(OSError):  # there are none, as a rule
-            os.killpg(self._process.pid, signal.SIGKILL)  # forks of it
+        end_group(self._process.pid)  # forks of it
         self._reader.join(OUTPUT_TIMEOUT)
 
     def _value(self, kind: str, value: Any, notes: list[str]) -> Any:

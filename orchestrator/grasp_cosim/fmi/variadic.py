@@ -13,7 +13,10 @@ import struct
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
+from functools import cache
 from typing import Any, NamedTuple
+
+from ..base.system_calls import c_library
 
 _NAMED = c_void_p, c_char_p, c_int, c_char_p, c_char_p
 """Environment, instance, status, category and the format."""
@@ -72,7 +75,7 @@ def formatted(
 
     def printed(text: Any, size: int) -> int:
         read = convention.va_list(words, words + 8 * convention.words + 128)
-        return int(_vsnprintf(text, size, form, ctypes.create_string_buffer(read)))
+        return int(_vsnprintf()(text, size, form, ctypes.create_string_buffer(read)))
 
     size = printed(None, 0)
     if size < 0:
@@ -82,5 +85,8 @@ def formatted(
     return text.value
 
 
-_vsnprintf = ctypes.CDLL(None).vsnprintf
-_vsnprintf.argtypes = c_void_p, c_size_t, c_char_p, c_void_p
+@cache
+def _vsnprintf() -> Any:
+    found = c_library().vsnprintf
+    found.argtypes = c_void_p, c_size_t, c_char_p, c_void_p
+    return found

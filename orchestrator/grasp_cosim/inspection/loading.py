@@ -22,6 +22,7 @@ from xml.etree import ElementTree
 from ..base.checks import install_command
 from ..base.errors import choices
 from ..base.scratch import ScratchFolder
+from ..base.system_calls import forbids_programs
 from ..fmi import fmpy
 from ..interface.document import unreadable
 from ..interface.interface import Interface
@@ -120,7 +121,7 @@ def _machine(python: bool) -> Iterator[Finding]:
     """The checks without an FMU; python: also those that matter to Python FMUs only."""
     yield Finding("python", *interpreter(sys.version_info[:3], sys.maxsize))
     folder = Path(tempfile.gettempdir())
-    noexec = LINUX and bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
+    noexec = forbids_programs(folder)
     yield Finding("temp folder", *temporary_folder(folder, noexec, python))
     if python and LINUX:
         yield Finding("libpython", *libpython(find_libpython()))

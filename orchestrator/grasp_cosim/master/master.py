@@ -3,7 +3,6 @@
 The schemes, components with a longer step and time are in docs/system_files.md.
 """
 
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
+from ..base.system_calls import cpus
 from ..exchange.listener import Texts
 from ..fmi.instance import DISCARD, EARLY, Instance
 from ..interface.interface import Value
@@ -88,7 +88,7 @@ class Master:
         self._alone = made if pacer and isinstance(made, CompiledLoop) and made.alone else None
         self._rows = np.empty((ROOM if self._alone else CHUNK, len(self.values)))
         self._rows.fill(0.0)  # its memory is there from now on
-        self._cpus = os.sched_getaffinity(0) if self._alone else ()
+        self._cpus = cpus() if self._alone else []
         self._clock = system.start_ns, system.step_ns
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()

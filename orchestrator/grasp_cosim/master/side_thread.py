@@ -1,18 +1,19 @@
 """What goes on beside the loop while that runs without Python's lock: handing rows on."""
 
-import os
-import select
 import signal
+import socket
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from threading import Thread
 from typing import Self
 
-PAUSE = 20
-"""ms between two times that rows are handed on."""
+from ..base.system_calls import be_ordinary
+
+PAUSE = 0.02
+"""s between two times that rows are handed on."""
 
 _OVER = 0
-"""Through the pipe comes the number of a signal, or this."""
+"""Through the sockets comes the number of a signal, or this."""
 
 
 class Aside:
@@ -36,11 +37,12 @@ class Aside:
         return self._error is not None
 
     def __enter__(self) -> Self:
-        self._reader, self._writer = os.pipe()
-        os.set_blocking(self._writer, False)
+        self._reader, self._writer = socket.socketpair()
+        self._writer.setblocking(False)
+        self._reader.settimeout(PAUSE)
         self._before: int | None = None
         with suppress(ValueError):  # in another thread than the main one there are no signals
-            self._before = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+            self._before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
         self._thread.start()
         return self
 
@@ -48,21 +50,19 @@ class Aside:
         """Have it end; raises the error of `act`."""
         if self._before is not None:
             signal.set_wakeup_fd(self._before)
-        os.write(self._writer, bytes([_OVER]))
+        self._writer.send(bytes([_OVER]))
         self._thread.join()
-        os.close(self._writer)
-        os.close(self._reader)
+        self._writer.close()
+        self._reader.close()
         if self._error is not None:
             raise self._error
 
     def _run(self) -> None:
-        with suppress(OSError):  # the loop's own would be inherited
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-            os.sched_setaffinity(0, self._cpus)
-        said = select.poll()
-        said.register(self._reader, select.POLLIN)
+        be_ordinary(self._cpus)  # the loop's own would be inherited
         while True:
-            came = os.read(self._reader, 64) if said.poll(PAUSE) else b""
+            came = b""
+            with suppress(TimeoutError):
+                came = self._reader.recv(64)
             if _OVER in came:
                 return
             if came:

@@ -1,9 +1,6 @@
 """Requests of a paced run to the operating system. It does without what is not permitted."""
 
-import ctypes
 import gc
-import os
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -12,10 +9,8 @@ from functools import partial
 from pathlib import Path
 
 from ..base.errors import InputError, choices
+from ..base.system_calls import NotPossible, cpus, lock_memory, pin, put_first
 from ..system.realtime import Realtime
-
-CURRENT, FUTURE, ON_FAULT = 1, 2, 4
-"""Flags of mlockall on Linux: pages that are there, that will be, each from its first use on."""
 
 ONLINE = Path("/sys/devices/system/cpu/online")
 """The file in which Linux lists its CPUs, as in 0-3,6."""
@@ -58,16 +53,18 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
         thread = threading.get_native_id()
         wanted: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
         if realtime.cpu is not None:
-            wanted.append((f"CPU {realtime.cpu}", partial(_pin, thread, realtime.cpu), _cpus()))
+            there = cpus()
+            remedy = f"must be one of {choices(there)}" if there else ""
+            wanted.append((f"CPU {realtime.cpu}", partial(pin, thread, realtime.cpu), remedy))
         if realtime.lock_memory:
-            wanted.append(("memory locked", _lock, LOCKING))
+            wanted.append(("memory locked", lock_memory, LOCKING))
         if realtime.priority is not None:
             name = f"SCHED_FIFO, priority {realtime.priority}"
-            wanted.append((name, partial(_schedule, thread, realtime.priority), SCHEDULING))
+            wanted.append((name, partial(put_first, thread, realtime.priority), SCHEDULING))
         for name, ask, remedy in wanted:
             try:
                 stack.callback(ask())
-            except AttributeError:  # Python offers what the system has
+            except NotPossible:
                 found.refused.append(f"{name}: not possible on this operating system")
             except OSError as error:
                 found.refused.append(f"{name}: {error.strerror}; {remedy}")
@@ -107,33 +104,6 @@ def _throttled() -> list[str]:
         f"such a thread for {(period - allowed) / 1e3:g} ms in every {period / 1e3:g} ms; "
         "sysctl kernel.sched_rt_runtime_us=-1 lifts that, or run without a priority"
     ]
-
-
-def _cpus() -> str:
-    affinity = getattr(os, "sched_getaffinity", None)
-    return f"must be one of {choices(sorted(affinity(0)))}" if affinity else ""
-
-
-def _schedule(thread: int, priority: int) -> Callable[[], object]:
-    policy, parameter = os.sched_getscheduler(thread), os.sched_getparam(thread)
-    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
-    return lambda: os.sched_setscheduler(thread, policy, parameter)
-
-
-def _pin(thread: int, cpu: int) -> Callable[[], object]:
-    before = os.sched_getaffinity(thread)
-    os.sched_setaffinity(thread, {cpu})
-    return lambda: os.sched_setaffinity(thread, before)
-
-
-def _lock() -> Callable[[], object]:
-    if sys.platform != "linux":  # whose flags these are
-        raise AttributeError("mlockall")
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.mlockall(CURRENT | FUTURE | ON_FAULT):
-        code = ctypes.get_errno()
-        raise OSError(code, os.strerror(code))
-    return libc.munlockall
 
 
 @contextmanager

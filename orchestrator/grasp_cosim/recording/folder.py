@@ -1,6 +1,5 @@
 """The folder of a run, on disk while it runs: its rows, and run.json beside them."""
 
-import fcntl
 import os
 import platform
 import time
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from ..base.errors import InputError
 from ..base.files import of_any_format, remove, unwritable, write_json
 from ..base.higher import groups
+from ..base.locks import SUFFIX, Lock
 from ..exchange.listener import Experiment, Signal
 from ..metrics.in_si import in_si
 from ..system.description import System
@@ -77,16 +77,14 @@ class RunFolder:
         self._begun, self._broken = False, False
         self._waiting: deque[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = deque()
         self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
-        self._lock: int | None = None
+        self._lock = Lock(folder / SUFFIX)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         """Let others into the folder."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._lock.release()
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Nothing is written yet."""
@@ -162,16 +160,11 @@ class RunFolder:
 
     def _keep_others_out(self) -> None:
         """Lock the folder, for as long as this process lives; InputError where another one has."""
-        self._lock = os.open(self._folder, os.O_RDONLY | os.O_CLOEXEC)
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+        if not self._lock.taken():
             raise InputError(
                 f"{self._folder}: another process records a run in it; must end first, or --out be "
                 "another folder"
-            ) from error
-        except OSError:  # a file system without locks
-            pass
+            )
 
     def _unfinished(self) -> dict[str, Any]:
         """The run.json of a run that goes on: see Result.to_json()."""

@@ -1,7 +1,5 @@
 """Keeps a run in memory, as NumPy columns."""
 
-import mmap
-import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -14,6 +12,7 @@ import numpy.typing as npt
 
 from ..base.errors import InputError
 from ..base.files import unwritable
+from ..base.system_calls import memory
 from ..exchange.listener import Experiment, Signal
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
@@ -47,7 +46,7 @@ class MemoryListener:
         rows = total // self._every + 2  # t = 0, and the last one besides every n-th
         try:
             self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
-            self._table = _small_pages(*shape) if self._paced else np.empty(shape)
+            self._table = _table(*shape) if self._paced else np.empty(shape)
         except (MemoryError, ValueError, OverflowError, OSError):  # more bytes than there can be
             raise InputError(
                 f"{experiment.name}: {total} steps do not fit into memory; "
@@ -155,12 +154,7 @@ def _typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
     return column.astype(TYPES[signal.kind], copy=False)
 
 
-def _small_pages(columns: int, rows: int) -> npt.NDArray[np.float64]:
-    """Return a table without a huge page, of which each column would make the system clear one,
-    every now and then, in the middle of a run.
-    """
-    if sys.platform == "win32" or not columns * rows:
+def _table(columns: int, rows: int) -> npt.NDArray[np.float64]:
+    if not columns * rows:
         return np.empty((columns, rows))
-    private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
-    memory = mmap.mmap(-1, columns * rows * FLOAT, flags=private)
-    return np.frombuffer(memory, np.float64).reshape(columns, rows)
+    return np.frombuffer(memory(columns * rows * FLOAT), np.float64).reshape(columns, rows)

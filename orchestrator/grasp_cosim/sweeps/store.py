@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
+from io import FileIO
 from pathlib import Path
 
 from ..base.errors import InputError, SimulationError
+from ..base.locks import SUFFIX, Lock
 from ..base.numerals import counted
 from .run import Outcome
 
@@ -20,20 +20,25 @@ class Store:
     """The file of the runs that are done, open and locked; `done` are their outcomes by index."""
 
     path: Path
-    descriptor: int
+    file: FileIO
     done: dict[int, Outcome]
 
     def keep(self, outcome: Outcome) -> None:
         """Keep the outcome of a run from now on; SimulationError where that fails."""
         line = json.dumps(asdict(outcome)).encode() + b"\n"
         try:
-            os.write(self.descriptor, line)
+            self.file.write(line)
         except OSError as error:
             kept = counted(len(self.done), "run")
             raise SimulationError(
                 f"{self.path}: {error.strerror}; {kept} kept, the same command goes on"
             ) from error
         self.done[outcome.index] = outcome
+
+    def remove(self) -> None:
+        """Remove the file, as all runs are done."""
+        self.file.close()  # as Windows wants it
+        self.path.unlink()
 
 
 @contextmanager
@@ -44,25 +49,24 @@ def opened(path: Path, identity: str) -> Iterator[Store]:
     process, however that ends. InputError where another process has it, or it is of other runs.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+    lock = Lock(path.with_name(path.name + SUFFIX))
+    if not lock.taken():
+        said = f"{path}: another process does runs of it"
+        raise InputError(f"{said}; wait for its end, or name another --out")
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            said = f"{path}: another process does runs of it"
-            raise InputError(f"{said}; wait for its end, or name another --out") from error
-        yield Store(path, descriptor, _read(path, descriptor, identity))
+        with closing(FileIO(path, "a")) as file:
+            yield Store(path, file, _read(path, file, identity))
     finally:
-        os.close(descriptor)
+        lock.release()
 
 
-def _read(path: Path, descriptor: int, identity: str) -> dict[int, Outcome]:
+def _read(path: Path, file: FileIO, identity: str) -> dict[int, Outcome]:
     """The outcomes in the file, whose last line may be torn by a kill; that is cut off."""
     whole, newline, _ = path.read_bytes().rpartition(b"\n")
-    os.truncate(descriptor, len(whole) + len(newline))
+    file.truncate(len(whole) + len(newline))
     head = json.dumps({"runs of": identity}).encode()
     if not whole:
-        os.write(descriptor, head + b"\n")
+        file.write(head + b"\n")
         return {}
     first, *lines = whole.split(b"\n")
     if first != head:

@@ -88,7 +88,7 @@ def sweep(
         table = made(found, [done[i] for i in range(len(found))], units, asked)
         if file and store:
             table.write(file)
-            store.path.unlink()
+            store.remove()
     return table
 
 
