@@ -143,12 +143,16 @@ def _here(task: Task, jobs: Sequence[tuple[int, Row]], workers: int | None) -> O
                 yield from found
 
 
+def _same(shared: Any) -> Any:
+    return shared
+
+
 def _elsewhere(executor: Executor, task: Task, jobs: Sequence[tuple[int, Row]]) -> Outcomes:
     """The outcomes of an executor, in the order in which they end; closing it cancels the rest."""
     left = iter(jobs)
     shared: Any = packed(task, with_fmus=True)
-    if client := getattr(executor, "_client", None):  # Dask: it goes to each worker once
-        shared = client.scatter(shared, broadcast=True, hash=False)
+    if client := getattr(executor, "_client", None):  # Dask: it goes to each worker once,
+        shared = client.submit(_same, shared, pure=False)  # and again if the one that has it dies
     pending: dict[Future[list[Outcome]], int] = {}
 
     def submit(count: int) -> None:
