@@ -1,6 +1,5 @@
 """What several tests share: the FMUs, built once, and the built-in system."""
 
-import fcntl
 import gc
 import importlib
 import os
@@ -18,6 +17,7 @@ from typing import Any
 import c_compilers
 import fmpy
 import pytest
+from filelock import FileLock
 from grasp_cosim import System, cli
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.build import build, build_native, shipped_twins
@@ -184,8 +184,7 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
     base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
     def folder(name: str, fill: Callable[[Path], object]) -> Path:
-        with (base / f"{name}.lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with FileLock(base / f"{name}.lock"):
             if not (base / name).exists():
                 part = tmp_path_factory.mktemp(name)
                 fill(part)
@@ -208,8 +207,7 @@ def folder_of() -> Folder:
             at = _FMUS.with_name(_FMUS.name.replace("python", kind.replace(" ", "_")))
             plan = None if kind == "python" else kinds.plan(kind)
             at.mkdir(exist_ok=True)
-            with (at.parent / f"{at.name}.lock").open("w") as lock:
-                fcntl.flock(lock, fcntl.LOCK_EX)
+            with FileLock(at.parent / f"{at.name}.lock"):
                 if plan is None:
                     build(at)
                 else:

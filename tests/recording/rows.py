@@ -3,10 +3,10 @@
 import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from resource import RLIMIT_FSIZE, getrlimit, setrlimit
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 from grasp_cosim.exchange.listener import Experiment, Listener, Signal
 
 EXPERIMENT = Experiment.of({"system": "bare", "scheme": "sequential", "step": 1e-4, "stop": 1.0})
@@ -61,9 +61,10 @@ def peak(work: Callable[[], None]) -> int:
 @contextmanager
 def full_disk(size: int) -> Iterator[None]:
     """No file can grow beyond size bytes."""
-    before = getrlimit(RLIMIT_FSIZE)
-    setrlimit(RLIMIT_FSIZE, (size, before[1]))
+    resource = pytest.importorskip("resource", reason="NO limits of processes on this system")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
         yield
     finally:
-        setrlimit(RLIMIT_FSIZE, before)
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

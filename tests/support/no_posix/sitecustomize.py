@@ -1,8 +1,8 @@
 """A Python as on Windows, as far as Linux can be that: on PYTHONPATH, its processes have it, too.
 
 Modules and functions that Windows lacks are not there, but for those that the standard library of
-Linux and filelock ask for, SIGKILL and geteuid: mypy for win32 finds these. An open file can be
-neither removed nor replaced.
+Linux, filelock and pytest ask for, SIGKILL and the numbers of users: mypy for win32 finds these. An
+open file can be neither removed nor replaced.
 """
 
 import ctypes
@@ -34,7 +34,7 @@ MODULES = {"fcntl", "resource", "termios", "tty", "pty", "pwd", "grp", "syslog",
 FUNCTIONS: dict[Any, tuple[str, ...]] = {
     os: (
         "fork", "forkpty", "killpg", "setsid", "getsid", "setpgid", "getpgid",
-        "getuid", "getegid", "getgid", "getgroups", "chown", "mkfifo", "mknod",
+        "getegid", "getgid", "getgroups", "chown", "mkfifo", "mknod",
         "register_at_fork", "wait", "wait3", "wait4", "waitid", "statvfs", "getloadavg", "nice",
         "sched_getaffinity", "sched_setaffinity", "sched_getscheduler", "sched_setscheduler",
         "sched_getparam", "sched_param", "SCHED_FIFO", "SCHED_OTHER", "SCHED_RR", "sched_yield",
