@@ -142,6 +142,8 @@ def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
     """A result of thinned rows with the metrics that run.json has, which are of every step."""
     asked = metrics_of(read.groups, read.more_metrics)
     there = tuple(m for m in asked if m.name in written)
+    if not asked:
+        return read
     if not there:  # it did not come to its end
         line = f"one row in {read.every} was recorded: the metrics are of these"
         return replace(read, log=(*read.log, line))
