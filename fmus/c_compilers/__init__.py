@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import mkdtemp
+from threading import Event, Lock
 from typing import NamedTuple
 
 from . import cache
@@ -140,12 +141,16 @@ def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
 
     most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     started: list[subprocess.Popen[str]] = []
+    starting, over = Lock(), Event()
 
     def run(job: Job) -> Path:
         if library := cache.kept(job.kept_as):
             return library
         folder = Path(mkdtemp(dir=scratch))
-        started.append(process := _started(job, folder))
+        with starting:  # or it would be started behind the back of who ends them all
+            if over.is_set():
+                raise CompilerError(f"{job.name}.c: was not compiled any more")
+            started.append(process := _started(job, folder))
         return cache.keep(_made(job, process, folder), job.kept_as)
 
     with ThreadPoolExecutor(most) as pool:
@@ -153,6 +158,8 @@ def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
             return [*pool.map(run, jobs)]
         finally:  # on Ctrl-C, too, which comes to the main thread alone
             pool.shutdown(wait=False, cancel_futures=True)
+            with starting:
+                over.set()
             for process in started:
                 _end(process)
 
