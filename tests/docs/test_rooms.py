@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.base.higher import groups
+from support.imports import graph, read_imports, read_modules
 
 ORCHESTRATOR = Path(__file__).parents[2] / "orchestrator"
 ROOMS = sorted(p.parent for p in (ORCHESTRATOR / "grasp_cosim").glob("*/__init__.py"))
@@ -24,6 +25,9 @@ def test_the_map_has_all_rooms_on_a_page() -> None:
     assert len(text.splitlines()) <= 60
     rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
     assert sorted(rows) == [room.name for room in ROOMS]
+    imports = graph(read_imports(read_modules(ORCHESTRATOR / "grasp_cosim")), of_rooms=True)
+    for i, row in enumerate(rows):
+        assert {*imports.get(row, ())} <= {*rows[:i]}, row
 
 
 def test_a_group_of_metrics_is_a_room_with_metrics_and_a_view() -> None:
