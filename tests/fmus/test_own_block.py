@@ -185,5 +185,5 @@ def test_a_folder_in_the_place_of_the_fmu(command: Run, tmp_path: Path) -> None:
     (tmp_path / "out/FirstOrderLag.fmu").mkdir(parents=True)
     code, out, err = command("build", write(tmp_path, LAG), "--out", "out")
     assert (code, out) == (2, "")
-    assert err == "grasp-cosim: out/FirstOrderLag.fmu: Is a directory\n"
+    assert err == "grasp-cosim: out/FirstOrderLag.fmu: is a folder; must be the name of a file\n"
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["FirstOrderLag.fmu"]
