@@ -6,11 +6,15 @@ nothing else to compare. Where the folder cannot be written to, what is made sta
 
 import os
 import shutil
+import sys
 from collections.abc import Iterable
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from threading import get_ident
+
+CACHES = {"win32": "AppData/Local", "darwin": "Library/Caches"}
+"""Where a user's caches are below the home folder, on other systems than Linux."""
 
 
 def folder() -> Path | None:
@@ -20,7 +24,7 @@ def folder() -> Path | None:
     """
     with suppress(RuntimeError):  # nobody's home
         base = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        base = base if base.is_absolute() else Path.home() / ".cache"
+        base = base if base.is_absolute() else Path.home() / CACHES.get(sys.platform, ".cache")
         return base / "grasp-cosim" if base.is_absolute() else None
     return None
 

@@ -197,3 +197,18 @@ def test_zig_compiles_for_others(target: Target, tmp_path: Path) -> None:
     magic = b"\x7fELF" if target.suffix == ".so" else struct.pack("<I", 0xFEEDFACF)
     task = job("Sum", SOURCES, target, compiler_for(target, asked=True))
     assert compile_all([task], tmp_path)[0].read_bytes()[:4] == magic
+
+
+@pytest.mark.parametrize(
+    ("system", "place"),
+    [("linux", ".cache"), ("win32", "AppData/Local"), ("darwin", "Library/Caches")],
+)
+def test_what_is_kept_is_where_the_system_has_caches(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, system: str, place: str
+) -> None:
+    monkeypatch.setattr("sys.platform", system)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    assert cache.folder() == tmp_path / place / "grasp-cosim"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "own"))
+    assert cache.folder() == tmp_path / "own" / "grasp-cosim"
