@@ -121,6 +121,13 @@ def test_a_signal_of_another_quantity_is_refused(load: Load) -> None:
     assert "room.x is in 'cubit', which its FMU does not define in SI units" in refusal(unknown)
 
 
+def test_of_several_that_are_refused_the_first_that_is_expected_is_named(load: Load) -> None:
+    wrong = load({name: unit(OUTPUT, "N") for name in "xy"})
+    needs = {"room.y": "m", "room.x": "m"}
+    assert "room.y is in N" in refusal(wrong, Metric("back", travel.function, needs=needs))
+    assert "room.x is in N" in refusal(wrong)
+
+
 def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
     odd = load({"x": unit(OUTPUT, "N"), "y": unit(OUTPUT, "cubit")})
     silent = Metric("silent", travel.function, needs=("room.x",))

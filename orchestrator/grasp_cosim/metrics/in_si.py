@@ -42,8 +42,9 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     asked, recorded = tuple(metrics), {str(port): v for port, v in system.recorded.items()}
     units = {str(port): unit for port, unit in system.once(output_units).items()}
     expected = _expected(system, asked)
-    for name in expected.keys() & units.keys():
-        _check(system, name, recorded[name].unit, units[name], expected[name])
+    for name, expects in expected.items():
+        if name in units:
+            _check(system, name, recorded[name].unit, units[name], expects)
     free = any(not m.expects for m in asked)
     silent = [n for n, v in recorded.items() if v.kind == "Real" and v.unit is None]
     read = [name for name in silent if free or name in expected]
