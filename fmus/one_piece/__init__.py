@@ -5,10 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 NO_FILES = ("dev", "proc")
 """The folders at the top of a system in which nothing is a file that may be replaced."""
@@ -16,8 +16,9 @@ NO_FILES = ("dev", "proc")
 
 def is_stream(path: Path) -> bool:
     """Return True for a device, a pipe or the like, also behind a link: it is written into."""
-    special = path.absolute().parts[1:2] and path.absolute().parts[1] in NO_FILES
-    return path.exists() and not path.is_dir() and bool(special or not path.is_file())
+    if path.is_dir() or not path.exists():
+        return False
+    return not path.is_file() or bool({*path.absolute().parts[1:2]} & {*NO_FILES})
 
 
 @contextmanager
@@ -29,18 +30,27 @@ def in_one_piece(path: Path) -> Iterator[Path]:
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder; must be the name of a file", str(path))
-    stream, target = is_stream(path), Path(os.path.realpath(path))
-    if not stream:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.gettempdir()) if stream else target.parent
-    part = folder / f"{path.name if stream else target.name}.{os.getpid()}.part"
-    try:
-        yield part
-        if stream:
+    if is_stream(path):
+        with (
+            TemporaryDirectory(prefix="one_piece_") as folder,
+            _named(path, Path(folder, "part")) as part,
+        ):
+            yield part
             with part.open("rb") as made, path.open("ab") as into:
                 shutil.copyfileobj(made, into)
-        else:
-            part.replace(target)
+        return
+    target = Path(os.path.realpath(path))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with _named(path, target.with_name(f"{target.name}.{os.getpid()}.part")) as part:
+        yield part
+        part.replace(target)
+
+
+@contextmanager
+def _named(path: Path, part: Path) -> Iterator[Path]:
+    """A temporary name that is not there at the end; what fails on it names path."""
+    try:
+        yield part
     except OSError as error:  # a write that fails does not say where, or where it is for now
         if error.errno is None or error.filename not in (None, part, str(part)):
             raise
