@@ -20,10 +20,10 @@ class Window:
         self.fault = fault
         self.begun = False
         self._ended = False
-        self._earliest = first_step(fault.start_ns - start_ns, step_ns)
+        self._earliest = first_step(fault.start_ns, step_ns, start_ns)
         self._end: float = math.inf
         if fault.end_ns is not None:
-            self._end = first_step(fault.end_ns - start_ns, step_ns)
+            self._end = first_step(fault.end_ns, step_ns, start_ns)
         self._first: float = self._earliest or INITIAL
         if fault.when is not None:
             self._first = math.inf

@@ -150,9 +150,8 @@ class _PendingEvent:
         self.name = name
         self.event = event
         self._period = math.lcm(*(system.period(port.component) for port in event.set))
-        self._first = (
-            0 if event.at_ns is None else first_step(event.at_ns - system.start_ns, system.step_ns)
-        )
+        at_ns = system.start_ns if event.at_ns is None else event.at_ns
+        self._first = first_step(at_ns, system.step_ns, system.start_ns)
         self._calls: dict[str, tuple[Instance, list[Variable], list[Value]]] = {}
         self._placed: dict[int, float] = {}
         self._values = values

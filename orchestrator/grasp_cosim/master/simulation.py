@@ -24,7 +24,7 @@ from ..metrics.metric import Function, Metric, Signals, chosen, measure, metrics
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.memory import EveryRow, MemoryListener
-from ..recording.result import Known, Result, has_proxies, proxy_figures
+from ..recording.result import Known, Result, of_proxies, proxy_figures
 from ..system.description import System
 from ..system.native import needed_twins
 from ..system.parts import NANOSECONDS, Component, Port
@@ -79,8 +79,10 @@ class Session:
         self._in_si = in_si(system, self._asked)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every, bool(realtime))
-        names = needed(self._asked, recorded, system.roles)
-        self._whole = EveryRow(names) if every > 1 else None
+        self._whole: EveryRow | None = None
+        if every > 1:
+            names = needed(self._asked, recorded, system.roles)
+            self._whole = EveryRow(names | of_proxies(recorded))
         self._wall_time = 0.0
         self._failed = False
         self._closed = False
@@ -280,7 +282,7 @@ class Session:
 
     def _of_proxies(self, step: float) -> list[str]:
         """Remarks on the proxies, a line each."""
-        if not has_proxies(self.system.recorded):
+        if not of_proxies(self.system.recorded):
             return []
         kept = self._whole if self._whole and not self._whole.lost else self._memory
         time, columns = kept.columns()

@@ -356,15 +356,14 @@ def available(
 def needed(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> frozenset[str]:
-    """The signals of these `names` that the metrics may read, and those of proxies.
+    """The signals of these `names` that the metrics may read.
 
     Of groups these are those they need, of a user's functions nobody knows: then all.
     """
     there = available(metrics, names, roles)[0]
     if not all(m.group for m in there):
         return frozenset(names)
-    found = {resolved(name, roles) for m in there for name in m.needs}
-    return frozenset({*found, *(name for name in names if ".proxy." in name)})
+    return frozenset(resolved(name, roles) for m in there for name in m.needs)
 
 
 def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> str | None:

@@ -1,8 +1,8 @@
 """Apache Arrow: a listener that writes columns while the run goes on, and the reader of its files.
 
 The file is of the IPC format (Feather 2): a signal is a field with its unit and description in the
-metadata. Until its end is written it is a stream of whole batches behind eight
-bytes, which is how a file is read that a kill left behind.
+metadata. Until its end is written it is a stream of whole batches behind eight bytes; so a file is
+read that a kill left behind.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..exchange.listener import Experiment, Signal
+from .memory import TYPES, typed
 
 BATCH = 4096
 """Rows that are written together, if they do not take longer than LONG to come."""
@@ -46,10 +47,8 @@ class ArrowListener:
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the schema; InputError where the file cannot be written."""
         arrow = self._arrow
-        types = {
-            "Real": arrow.float64(), "Integer": arrow.int64(), "Boolean": arrow.bool_(),
-            "String": arrow.string(),
-        }  # fmt: skip
+        types = {kind: arrow.from_numpy_dtype(own) for kind, own in TYPES.items()}
+        types["String"] = arrow.string()
         self._experiment, self._signals = experiment, tuple(signals)
         fields = [arrow.field("time", arrow.float64(), metadata={"unit": "s"})]
         for s in signals:
@@ -86,19 +85,13 @@ class ArrowListener:
             return
         steps, rows = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
         self._waiting, self._rows, self._since = [], 0, time.monotonic()
-        columns = [self._column(s, rows[:, i]) for i, s in enumerate(self._signals)]
-        arrays = [self._arrow.array(self._experiment.times(steps)), *columns]
+        own = (np.ascontiguousarray(typed(s, rows[:, i])) for i, s in enumerate(self._signals))
+        columns = [self._experiment.times(steps), *own]
         try:
-            self._writer.write_batch(self._arrow.record_batch(arrays, schema=self._schema))
+            self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
             self._file.flush()
         except OSError as error:
             raise SimulationError(unwritable(self._said, error)) from error
-
-    def _column(self, signal: Signal, values: npt.NDArray[np.float64]) -> Any:
-        if signal.kind == "String":
-            return self._arrow.array(signal.texts.column(values), self._arrow.string())
-        kind = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}[signal.kind]
-        return self._arrow.array(np.ascontiguousarray(values).astype(kind, copy=False))
 
 
 def read_arrow(path: Path) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:

@@ -37,21 +37,30 @@ LARGE = 20_000_000
 NUMBER = (int, float)
 MAYBE = (int, float, type(None))
 
-REQUIRED: Mapping[str, Any] = {
+SETTINGS_THERE: Mapping[str, Any] = {
     "system": str, "scheme": str, "step": NUMBER, "stop": NUMBER, "initialisation": dict,
     "components": dict, "connections": list, "events": list, "faults": list,
-    "wall_time": MAYBE, "complete": bool, "log": list, "rejections": dict, "units": dict,
 }  # fmt: skip
-"""Entries of run.json besides metrics, and of which types they are; the first nine are settings."""
-
-OPTIONAL: Mapping[str, Any] = {
+SETTINGS_MAYBE: Mapping[str, Any] = {
     "roles": dict, "input": dict, "changed": dict, "metrics": list, "diverging": str,
-    "start": NUMBER, "title": str, "date": str, "versions": dict, "fmus": dict, "command": list,
-    "types": dict, "descriptions": dict, "metric_units": dict, "to_si": dict,
+    "start": NUMBER,
 }  # fmt: skip
-"""Entries that may be there: six settings, five of its origin, four by signal or metric."""
+"""Entries of run.json that say how the run was made, and of which types they are."""
 
-OF_SETTINGS, OF_ORIGIN = (*[*REQUIRED][:9], *[*OPTIONAL][:6]), [*OPTIONAL][6:11]
+ORIGIN: Mapping[str, Any] = {
+    "title": str, "date": str, "versions": dict, "fmus": dict, "command": list,
+}  # fmt: skip
+"""Entries that say when it was made, and with what; they may be there."""
+
+REQUIRED: Mapping[str, Any] = {
+    **SETTINGS_THERE, "wall_time": MAYBE, "complete": bool, "log": list, "rejections": dict,
+    "units": dict,
+}  # fmt: skip
+OPTIONAL: Mapping[str, Any] = {
+    **SETTINGS_MAYBE, **ORIGIN, "types": dict, "descriptions": dict, "metric_units": dict,
+    "to_si": dict,
+}  # fmt: skip
+"""All entries besides metrics."""
 
 TEXT = "str"
 TYPES = ("float64", "int32", "int64", "bool", TEXT)
@@ -117,7 +126,7 @@ def _result(
 ) -> Result:
     realtime, types = written.get("realtime"), written.get("types", {})
     read = Result(
-        settings={key: written[key] for key in OF_SETTINGS if key in written},
+        settings={k: written[k] for k in (*SETTINGS_THERE, *SETTINGS_MAYBE) if k in written},
         time=time,
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
@@ -131,7 +140,7 @@ def _result(
         log=tuple(written["log"]),
         timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
         more_metrics=_as_recorded(written),
-        origin={key: written[key] for key in OF_ORIGIN if key in written},
+        origin={key: written[key] for key in ORIGIN if key in written},
         to_si=_to_si(f"{path}: to_si", written),
         folder=path.parent,
     )

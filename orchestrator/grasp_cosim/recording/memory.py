@@ -74,7 +74,7 @@ class MemoryListener:
         if next_row:
             steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
         found = zip(self._signals, table, strict=True)
-        return self._experiment.times(steps), {s.name: _typed(s, c) for s, c in found}
+        return self._experiment.times(steps), {s.name: typed(s, c) for s, c in found}
 
 
 class EveryRow:
@@ -123,7 +123,7 @@ class EveryRow:
         )
 
     def _typed(self, place: int, signal: Signal) -> npt.NDArray[Any]:
-        return _typed(signal, self._column(place))
+        return typed(signal, self._column(place))
 
     def _column(self, place: int) -> npt.NDArray[np.float64]:
         return np.memmap(self._file, np.float64, "r", self._place(place, 0), (self._rows,))
@@ -148,7 +148,8 @@ class _Mapped(Mapping[str, npt.NDArray[Any]]):
         return len(self._made)
 
 
-def _typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+def typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+    """The values of a signal in rows in its own type, Strings as str objects."""
     if signal.kind == "String":
         return signal.texts.column(column)
     return column.astype(TYPES[signal.kind], copy=False)

@@ -344,14 +344,14 @@ def _in_words(metric: Metric, value: Any) -> str:
     return f"{metric.name} {', '.join(texts)} {metric.display_unit}".rstrip()
 
 
-def has_proxies(names: Iterable[object]) -> bool:
-    """Return True where there are the diagnostics of a proxy among signals of these names."""
-    return any(str(name).endswith(".proxy.state") for name in names)
+def of_proxies(names: Iterable[object]) -> frozenset[str]:
+    """Those of the names of signals that are diagnostics of a proxy."""
+    return frozenset(str(name) for name in names if ".proxy." in str(name))
 
 
 def proxy_figures(time: npt.NDArray[np.float64], signals: Mapping[str, Any]) -> dict[str, Any]:
     """The figures of the proxies of a run by component, if it has any."""
-    if not has_proxies(signals):
+    if not of_proxies(signals):
         return {}
     found: dict[str, Any] = higher("hil.figures").proxy_figures(time, signals)
     return found

@@ -22,12 +22,12 @@ def times(
     experiment = child(root, "ssd:DefaultExperiment")
     attributes = {} if experiment is None else experiment.attrib
     start = float(attributes.get("startTime", "0"))
-    start_ns = in_nanoseconds(f"{file}: startTime", start, zero=True, low=-LONGEST)
+    place = file if experiment is None else at(file, experiment)
+    start_ns = in_nanoseconds(f"{place}: startTime", start, zero=True, low=-LONGEST)
     if given is not None:
         return start_ns, in_nanoseconds("stop", given)
     if "stopTime" in attributes:
-        place = f"{at(file, experiment)}: stopTime"
-        return start_ns, in_nanoseconds(place, float(attributes["stopTime"]))
+        return start_ns, in_nanoseconds(f"{place}: stopTime", float(attributes["stopTime"]))
     declared = [part.interface.experiment.get("stop_time") for part in parts]
     stop = max((float(time) for time in declared if time is not None), default=0.0)
     if not 0.0 < stop < math.inf:

@@ -48,9 +48,9 @@ def in_nanoseconds(place: str, seconds: Any, zero: bool = False, low: float = 0.
     return nanoseconds
 
 
-def first_step(time_ns: int, step_ns: int) -> int:
-    """Return the number of the first communication point at or after a time since the start."""
-    return max(0, -(-time_ns // step_ns))
+def first_step(time_ns: int, step_ns: int, start_ns: int = 0) -> int:
+    """Return the number of the first communication point at or after a time."""
+    return max(0, -((start_ns - time_ns) // step_ns))
 
 
 def literal(value: Value) -> str:

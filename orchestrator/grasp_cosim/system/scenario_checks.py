@@ -115,7 +115,7 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
     _check_parameters(fault, interface, place)
     step, start, end = system.step_ns, fault.start_ns, fault.end_ns
     since = system.start_ns
-    if end is not None and first_step(start - since, step) >= first_step(end - since, step):
+    if end is not None and first_step(start, step, since) >= first_step(end, step, since):
         raise InputError(
             f"{place}: from {seconds(start)} until {seconds(end)}: must hold a communication "
             f"point, a multiple of {seconds(step)}"
