@@ -57,7 +57,7 @@ def test_what_is_built_is_said_before_the_compiler_runs(
 
     monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
     monkeypatch.setattr("grasp_fmus.build.build_native", ended)
-    line = f"building for {here().tuple}, 0 s\ngrasp-cosim: out of patience\n"
+    line = f"building for {here().tuple}, 00:00\ngrasp-cosim: out of patience\n"
     assert command("build", "--native") == (3, "", line)
 
 

@@ -21,7 +21,7 @@ from support.slow import slow
 
 pytestmark = needs_compiler
 
-ANNOUNCED = "compiling the native FMUs, once for these sources, 0 s\n"
+ANNOUNCED = "compiling the native FMUs, once for these sources, 00:00\n"
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
 HERE = ("--set", "components.plant.isolation=none")

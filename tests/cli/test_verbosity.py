@@ -40,7 +40,7 @@ def test_what_is_said_is_what_was_asked_for(command: Run, monkeypatch: pytest.Mo
     usual, quiet, verbose = (command(*RUN, *more) for more in ((), ("-q",), ("--verbose",)))
     assert {usual[0], quiet[0], verbose[0]} == {0}
     assert shown(usual[1]) == shown(quiet[1]) == shown(verbose[1])
-    assert "oscillator.toml: 0.50 of 0.50 s, 0 s\n" in usual[2]
+    assert "oscillator.toml: 0.50 of 0.50 s, 00:00" in usual[2]
     assert quiet[2] == ""
     said = verbose[2]
     assert re.search(r"^a: \S+\.fmu, FMI 2\.0, a binary$", said, re.MULTILINE)

@@ -1,15 +1,15 @@
-"""How far something is, on standard error: on a terminal a bar, else a line every 10 s.
+"""How far something is, on standard error: tqdm's bar; a line every 10 s where is no terminal.
 
 What is over sooner than can be read shows nothing.
 """
 
+import io
 import logging
 import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from tqdm import tqdm
 
@@ -21,16 +21,22 @@ DELAY = 0.5
 EVERY = 10.0
 """s between two lines where there is no terminal."""
 
-SOBER = 1.0
-"""s between the first sample and the last from which on they tell how long the rest takes."""
+
+class _Lines(io.StringIO):
+    """Standard error for a bar that is drawn again and again: each time is a line."""
+
+    def write(self, text: str) -> int:
+        if line := text.strip():
+            sys.stderr.write(f"{line}\n")
+            sys.stderr.flush()
+        return len(text)
 
 
 class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
     """A context manager; update() says how much more is done, of `total` or of nobody knows what.
 
-    Named `what`: "candidate: 1.25 of 3.00 s" for the unit "s", else "map: run 12 of 36", the run
-    that is at work; without a unit nothing is counted. Two samples are needed to tell how long the
-    rest takes: the first says how long it took to begin, too.
+    Named `what`: "candidate: 1.25 of 3.00 s" for the unit "s", else "map: 11 of 36 runs"; without a
+    unit nothing is counted.
     """
 
     def __init__(
@@ -41,95 +47,51 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         shown: bool = True,
         unit: str = "run",
         initial: float = 0,
-        at_once: bool = False,
+        delay: float = DELAY,
         ticking: bool = True,
     ) -> None:
-        """Begin; with `initial` of `total` done before, `at_once` without a delay on a terminal.
+        """Begin, with `initial` of `total` done before; on a terminal it shows after `delay` s.
 
         `ticking` shows that time goes by, from a thread, also where update() is not called.
         """
-        self._lines = not sys.stderr.isatty()
-        self._first = self._last = (0.0, -1.0)  # time in s and n of two samples
-        self._delay = EVERY if self._lines else 0.0 if at_once else DELAY
+        lines = not sys.stderr.isatty()
+        every, delay = (EVERY, EVERY) if lines else (0.1, delay)
+        form = "{n:.2f} of {total:.2f} s" if unit == "s" else "{n} of {total} {unit}s"
+        counted = f": {form if total else '{n} {unit}s'}" if unit else ""
+        left = ", about {remaining} left" if total else ""
+        bar = " {bar:24}" if total and not lines else ","
         self._over = threading.Event()
-        self._ticker: threading.Thread | None = None
         super().__init__(
             desc=what,
             total=total,
             unit=unit,
             initial=initial,
+            file=_Lines() if lines else sys.stderr,
             disable=not shown,
-            leave=bool(unit) and not self._lines,
-            delay=self._delay,
-            mininterval=EVERY if self._lines else 0.1,
+            leave=bool(unit) and not lines,
+            delay=delay,
+            mininterval=every,
             miniters=0,
-            bar_format="{what} {bar:24} {took}" if total else "{what}, {took}",
+            bar_format=f"{{desc}}{counted}{bar} {{elapsed}}{left}{{postfix}}",
+        )
+        often = max(every, 1.0)
+        self._ticker = threading.Thread(
+            target=self._tick, args=(delay or often, often), daemon=True
         )
         if ticking and shown:
-            self._ticker = threading.Thread(target=self._tick, daemon=True)
             self._ticker.start()
 
-    def update(self, n: float | None = 1) -> bool | None:
-        """Say that so many more are done."""
-        self._last = time.monotonic(), self.n + (n or 0)
-        if self._first[1] < 0:
-            self._first = self._last
-        return super().update(n)
-
-    @property
-    def left(self) -> float | None:
-        """How long the rest takes, in s; None where that cannot be told yet."""
-        took, done = (b - a for a, b in zip(self._first, self._last, strict=True))
-        if not self.total or took < SOBER or done <= 0 or self.n >= self.total:
-            return None
-        since = time.monotonic() - self._last[0]
-        return max(float((self.total - self.n) * took / done) - since, 0.0)
-
-    @property
-    def format_dict(self) -> Any:
-        """What the format of a bar may have."""
-        found = super().format_dict
-        took = [span(found["elapsed"])]
-        if (left := self.left) is not None:
-            took.append(f"about {span(max(left, 1.0))} left")
-        if self.postfix:
-            took.append(str(self.postfix))
-        count = self._count()
-        what = f"{self.desc}: {count}" if count else self.desc
-        return {**found, "what": what, "took": ", ".join(took)}
-
-    def display(self, msg: str | None = None, pos: int | None = None) -> bool:  # type: ignore[override]
-        """Draw the bar, or write a line, once the delay is over."""
-        if hasattr(self, "start_t") and time.time() - self.start_t < self._delay:
-            return False
-        if not self._lines:
-            return bool(super().display(msg, pos))
-        if msg is None:
-            self.fp.write("{what}, {took}\n".format(**self.format_dict))
-            self.fp.flush()
-        return False
+    def _tick(self, wait: float, every: float) -> None:
+        while not self._over.wait(wait):
+            self.refresh()
+            wait = every
 
     def close(self) -> None:
         """End it; a bar that counts something stays."""
         self._over.set()
-        if self._ticker:
+        if self._ticker.ident:
             self._ticker.join()
         super().close()
-
-    def _count(self) -> str:
-        if self.unit == "s":
-            return f"{self.n:.2f} of {self.total:.2f} s"
-        if self.total is None:
-            return self.unit and f"{self.n} {self.unit}s"
-        return f"{self.unit} {min(self.n + 1, self.total)} of {self.total}"
-
-    def _tick(self) -> None:
-        while not self._over.wait(1.0):
-            now = time.time()  # tqdm's clock
-            wait = EVERY if self._lines else 1.0
-            if now - self.start_t >= self._delay and now - self.last_print_t >= wait:
-                self.last_print_t = now
-                self.refresh()
 
 
 Progress.set_lock(threading.RLock())  # tqdm's own is of multiprocessing, which may start a process
@@ -150,10 +112,3 @@ def phase(what: str) -> Iterator[None]:
     began = time.perf_counter()
     yield
     LOGGER.info("%s: %.2f s", what, time.perf_counter() - began)
-
-
-def span(seconds: float) -> str:
-    """A time as one says it: 8 s, 45 s, 3 min, 1.5 h."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -14,7 +14,7 @@ from ..base.errors import InputError, SimulationError, nearest
 from ..base.higher import higher
 from ..base.interruption import interruptible, interrupts
 from ..base.numerals import counted
-from ..base.progress import Progress, phase
+from ..base.progress import DELAY, Progress, phase
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener
 from ..fmi.make_instance import load
@@ -426,7 +426,7 @@ def _drive(session: Session, progress: bool | str) -> None:
             end - begin,
             unit="s",
             shown=bool(progress),
-            at_once=session.pacer is not None,
+            delay=0.0 if session.pacer else DELAY,
             ticking=False,  # a thread more would be felt in real time
         ) as bar,
     ):
@@ -443,4 +443,4 @@ def _drive(session: Session, progress: bool | str) -> None:
             steps = max(1, min(GROWTH * steps, int(steps * LOOK / (now - start))))
             start = now
         if session.pacer:
-            bar.set_postfix_str(session.pacer.live(settled=True))
+            bar.set_postfix_str(session.pacer.live(settled=True), refresh=False)
