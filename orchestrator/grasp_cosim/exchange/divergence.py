@@ -28,8 +28,8 @@ SLOWER = 1.25
 """Times as long as for the first half of these that the second half may take."""
 
 FAR = 1e15
-"""Times its scale, its first value other than 0 or 1 from which a signal has run away however it
-came there: of what it should be, a float64 has no digit left.
+"""Times its scale, or 1, from which a signal has run away however it came there: of what it should
+be, a float64 has no digit left.
 """
 
 
@@ -51,8 +51,8 @@ class Runaway(NamedTuple):
 class Divergence:
     """Looks at every row of a run until the first signal has run away.
 
-    The scale of a signal is its nominal value, or its first value if that is greater. Without a
-    nominal value it is 1, in the signal's unit or in the SI unit, whichever is greater.
+    The scale of a signal is its nominal value, or its first value other than 0 if that is greater.
+    Without a nominal value it is 1, in the signal's unit or in the SI unit, whichever is greater.
     """
 
     def __init__(self, system: System, outputs: Mapping[Port, Signal]) -> None:
@@ -60,9 +60,8 @@ class Divergence:
         self._system, self._signals = system, tuple(outputs.values())
         self._scales = np.array([_scale(system, port) for port in outputs])
         self._limits = np.array([0.0 if s.kind == "Real" else np.inf for s in self._signals])
-        self._far: dict[int, float] = {}
         self._reached: list[list[int]] = [[] for _ in outputs]
-        self._begun, self._over = False, False
+        self._over = False
 
     def __call__(
         self,
@@ -77,8 +76,6 @@ class Divergence:
         """
         if self._over or not rows.size:
             return None
-        if not self._begun:
-            self._begun, self._scales = True, np.maximum(self._scales, np.abs(rows[0]))
         grown = np.flatnonzero((sizes >= self._limits) & (sizes > 0.0)).tolist()
         found = [(row, i) for i in grown if (row := self._follow(i, steps, rows[:, i])) is not None]
         if not found:
@@ -99,15 +96,14 @@ class Divergence:
     ) -> int | None:
         """Note the decades that a signal reaches; the row in which it has run away, if it has."""
         peaks = np.maximum.accumulate(np.abs(column))
-        if i not in self._far:
-            first = float(peaks[np.flatnonzero(peaks)[0]])
-            self._far[i] = FAR * max(1.0, float(self._scales[i]), first)
-            self._limits[i] = self._scales[i]
+        if not self._limits[i]:
+            first = peaks[np.flatnonzero(peaks)[0]]
+            self._limits[i] = self._scales[i] = max(self._scales[i], first)
         while (row := int(np.searchsorted(peaks, self._limits[i]))) < len(peaks):
             self._reached[i].append(int(steps[row]))
-            if self._limits[i] >= self._far[i] or _grows(self._reached[i]):
+            if self._limits[i] >= FAR * max(1.0, self._scales[i]) or _grows(self._reached[i]):
                 return row
-            self._limits[i] = 10.0 * float(self._limits[i])
+            self._limits[i] *= 10.0
         return None
 
     def _advice(self) -> str:
