@@ -83,7 +83,6 @@ class FmuInstance(LoadedInstance):
         self._slave.enterInitializationMode()
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0]."""
         bound, address = self._stepping(clock, step, ctypes.c_int(1))
         native = Native(STEP_2, address, self._slave.component, step=step)
         return Call(bound, native, self._python)

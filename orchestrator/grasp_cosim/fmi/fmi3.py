@@ -96,7 +96,6 @@ class Fmi3Instance(LoadedInstance):
         self._slave.enterInitializationMode(self.tolerance, startTime=start, stopTime=stop)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
         flags, last = self._flags.ctypes.data, self._last.ctypes.data
         places = (ctypes.c_void_p(place) for place in (flags, flags + 1, flags + 2, last))
         bound, address = self._stepping(clock, step, ctypes.c_bool(True), *places)

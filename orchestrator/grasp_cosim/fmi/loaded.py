@@ -201,18 +201,15 @@ class LoadedInstance(ABC):
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
     ) -> None:
-        """Set start values, set up the experiment (times in s) and enter initialisation mode."""
         with self._refusals():
             self._start(values, stop, start)
 
     def exit_initialization(self) -> None:
-        """Leave initialisation mode."""
         with self._refusals():
             self._slave.exitInitializationMode()
         self._running = self._inputs.running = True
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
-        """The values of the variables now, one by one. For use outside the loop."""
         whole: dict[int, list[Any]] = {}
         with self._failures():
             for v in variables:
@@ -224,16 +221,10 @@ class LoadedInstance(ABC):
             ]
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        """Set inputs or tunable parameters. For use outside the loop."""
         with self._failures():
             self._assign(zip(variables, values, strict=True))
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
-
-        The variables are all of one FMI type; data is contiguous, in their order and of dtype(). Of
-        an array they are all elements.
-        """
         listed = [v.reference for v in variables if not (v.element and v.element.place)]
         count, size, place = len(listed), len(variables), data.ctypes.data
         references = (ctypes.c_uint * count)(*listed)
@@ -302,14 +293,9 @@ class LoadedInstance(ABC):
         return list(getter([variable.reference], size))
 
     def last_successful_time(self) -> float | None:
-        """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
         return self._reached()
 
     def the_end(self) -> float | None:
-        """Return the time in s at which the FMU asked for the end of the simulation.
-
-        In a step that it rejected, or in its initialisation; None if it did not.
-        """
         self._said_before = len(self._unread)
         if not self._wants_the_end():
             return None

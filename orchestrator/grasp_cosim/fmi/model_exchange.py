@@ -111,7 +111,6 @@ class ModelInstance(LoadedInstance):
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
     ) -> None:
-        """Set start values, set up the experiment (times in s) and enter initialisation mode."""
         self._now = start
         super().enter_initialization(values, stop, start)
 
@@ -135,10 +134,7 @@ class ModelInstance(LoadedInstance):
             self._given |= given
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
-
-        Inputs arrive as the next step begins.
-        """
+        """As Instance.transfer: inputs arrive as the next step begins."""
         call = super().transfer(action, variables, data)
         if action == "get":
             return call
@@ -146,10 +142,7 @@ class ModelInstance(LoadedInstance):
         return Call(lambda: OK)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0].
-
-        EARLY where the FMU asks for the end of the simulation.
-        """
+        """As Instance.stepper: EARLY where the FMU asks for the end of the simulation."""
         time: Any = memoryview(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
         def advance() -> int:

@@ -120,33 +120,26 @@ class ProcessInstance:
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
     ) -> None:
-        """Set start values and enter initialisation mode; the times are in s."""
         for name, value in values.items():
             self._inputs.set(self.interface.by_name[name], value)
         self._prepare("enter_initialization", dict(values), stop, start)
 
     def exit_initialization(self) -> None:
-        """Leave initialisation mode."""
         self._prepare("exit_initialization")
         self._inputs.running = True
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
-        """The values of the variables now, one by one. For use outside the loop."""
         values: list[Value] = self._ask("get", list(variables))
         return values
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        """Set inputs or tunable parameters. For use outside the loop."""
         self._fresh = False
         for variable, value in zip(variables, values, strict=True):
             self._inputs.set(variable, value)
         self._ask("set", list(variables), list(values))
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        """The call that passes data to inputs ("set") or fetches outputs into it ("get").
-
-        Inputs arrive with the next step, and outputs come with it.
-        """
+        """As Instance.transfer: inputs arrive with the next step, and outputs come with it."""
         pending, shared = self._exchange.add(self.interface, variables)
         self._ask("transfer", action, list(variables))
         if action == "set":
@@ -167,7 +160,6 @@ class ProcessInstance:
         return Call(put if action == "set" else fetch)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
         exchange = self._exchange
 
         def advance() -> int:
@@ -178,17 +170,14 @@ class ProcessInstance:
         return Call(advance)
 
     def last_successful_time(self) -> float | None:
-        """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
         time: float | None = self._ask("last_successful_time")
         return time
 
     def the_end(self) -> float | None:
-        """Return the time in s at which the FMU asked for the end; None if it did not."""
         time: float | None = self._ask("the_end")
         return time
 
     def failure(self, status: int, time: float) -> SimulationError:
-        """The error for a call that returned a bad status at time in s."""
         try:
             return self._ask("failure", status, time)  # type: ignore[no-any-return]
         except SimulationError as error:
