@@ -46,7 +46,7 @@ def _end(job: int) -> int:
 
 
 def test_a_process_that_dies_is_an_error() -> None:
-    with pytest.raises(SimulationError, match="a process for the runs ended by signal 9, Killed"):
+    with pytest.raises(SimulationError, match="a process for the runs ended with signal SIGKILL"):
         run_all(_end, range(3), 1, progress=False, what="runs")
 
 

@@ -68,7 +68,7 @@ def test_a_crash_takes_its_own_run_only(system: System, mine) -> None:
     for workers in (1, 2):
         table = sweep(system, rows, metrics=mine, workers=workers)
         assert set(table.errors) == {1, 3}
-        assert "the process of the run ended by signal" in table.errors[1]
+        assert "the process of the run ended with signal" in table.errors[1]
 
 
 def test_what_is_refused_before_any_run(system: System, mine, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The two ways a simulation is refused or broken off."""
 
+import signal
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -27,6 +28,12 @@ class UnknownNameError(KeyError):
 def reason(error: Exception) -> str:
     """The text of an error, without the number and the file that an OSError puts around it."""
     return getattr(error, "strerror", None) or str(error)
+
+
+def ended(code: int) -> str:
+    """How a process came to its end: "ended with exit code 1", "ended with signal SIGSEGV"."""
+    how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+    return f"ended with {how}"
 
 
 def nearest(name: object, names: Iterable[object], see: str = "") -> str:

@@ -7,7 +7,6 @@ from.
 """
 
 import os
-import signal
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
@@ -19,7 +18,7 @@ from tempfile import gettempdir
 from typing import Any, NamedTuple, Self, TypeVar
 
 from . import interruption
-from .errors import SimulationError
+from .errors import SimulationError, ended
 from .progress import Progress, phase
 from .scratch import sweep
 from .system_calls import held_back
@@ -197,11 +196,7 @@ class _Worker:
         """Return how the process, whose pipe has ended, came to its end."""
         self._process.join(PATIENCE)
         code = self._process.exitcode
-        if code is None:
-            return "closed its pipe"
-        if code < 0:
-            return f"ended by signal {-code}, {signal.strsignal(-code)}"
-        return f"ended with exit code {code}"
+        return "closed its pipe" if code is None else ended(code)
 
 
 @contextmanager

@@ -6,7 +6,6 @@ process is lost.
 
 import os
 import pickle
-import signal
 import socket
 import subprocess
 import sys
@@ -23,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.calls import Call
-from ..base.errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError, ended
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import end_group, listener
 from ..interface.interface import Interface, Value, Variable
@@ -235,14 +234,12 @@ class ProcessInstance:
     def _lose(self, what: str = "") -> SimulationError:
         """The error for a process that has ended, or is about to."""
         self._wait_for_the_end()
-        code = self._process.returncode
-        ended = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         logged = [line.removeprefix(LOGGED) for line in self._printed if line.startswith(LOGGED)]
         said = f": {' '.join(logged[-1].split())}" if logged else ""
         self._lost = SimulationError(
             f"{self.name}: the process of {self.interface.path.name} "
-            f"{what or f'ended with {ended}'} at t = {self._exchange.clock[0]:.9g} s{said}"
-            f"{self._inputs}"
+            f"{what or ended(self._process.returncode)} "
+            f"at t = {self._exchange.clock[0]:.9g} s{said}{self._inputs}"
         )
         for line in self._printed:
             self._lost.add_note(line.rstrip())
