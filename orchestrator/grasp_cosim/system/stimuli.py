@@ -22,7 +22,7 @@ from typing import Literal, get_args
 
 from si_units import known_unit
 
-from ..base.checks import EXACT, choice, integer, real
+from ..base.checks import choice, real
 from ..base.errors import InputError
 from ..base.numerals import counted
 from ..base.plain_text import from_cell
@@ -45,20 +45,17 @@ class Column:
     """The samples of one input, in its unit or in the one named.
 
     With texts, such as the names of an enumeration, they are their places among these. Sequences
-    are arrays, which take 8 bytes a number. rounded are the whole numbers, by row, that float64
-    does not have, as they are written.
+    are arrays, which take 8 bytes a number.
     """
 
     samples: Sequence[float]
     unit: str | None = None
     texts: tuple[str, ...] = ()
-    rounded: Mapping[int, str] = field(default_factory=dict, compare=False)
 
     def text(self, row: int) -> str:
         """The sample of a row as a text."""
-        if self.texts:
-            return self.texts[int(self.samples[row])]
-        return self.rounded.get(row) or _text(self.samples[row])
+        sample = self.samples[row]
+        return self.texts[int(sample)] if self.texts else _text(sample)
 
     @cached_property
     def extremes(self) -> tuple[int, ...]:
@@ -154,7 +151,7 @@ def _read(path: Path, reader: _Reader, interpolation: Interpolation) -> Stimuli:
         file,
         _times(columns[0], factor, lines),
         {
-            port: Column(column.samples, unit, tuple(column.texts), column.rounded)
+            port: Column(column.samples, unit, tuple(column.texts))
             for port, unit, column in zip(ports, units, columns[1:], strict=True)
         },
         interpolation,
@@ -252,7 +249,6 @@ class _Cells:
         self.file, self.number, self.name = file, number, name
         self.samples: array[float] = array("d")
         self.texts: dict[str, int] = {}
-        self.rounded: dict[int, str] = {}
 
     def extend(self, lines: Sequence[int], cells: Sequence[str]) -> None:
         """Take more cells, of these lines; InputError at one without a value."""
@@ -262,15 +258,11 @@ class _Cells:
                 self.samples.extend(map(real, cells))
             except ValueError:
                 del self.samples[before:]
-                numbers = [self.rounded.get(i) or _text(x) for i, x in enumerate(self.samples)]
-                self.samples = array("d", map(self._text, numbers))
+                self.samples = array("d", map(self._text, map(_text, self.samples)))
             else:
                 new = self.samples[before:]
                 if not math.isfinite(sum(new)):
                     self._check(lines, map(math.isfinite, new), cells)
-                if max(new) >= EXACT or min(new) <= -EXACT:
-                    written = enumerate(map(str.strip, cells), before)
-                    self.rounded |= {row: cell for row, cell in written if _is_rounded(cell)}
                 return
         self._check(lines, map(str.strip, cells), cells)
         self.samples.extend(self._text(cell.strip()) for cell in cells)
@@ -292,14 +284,6 @@ class _Cells:
 def _text(sample: float) -> str:
     """A number as it may have been written."""
     return repr(sample).removesuffix(".0")
-
-
-def _is_rounded(cell: str) -> bool:
-    """True for a whole number, written as one, that float64 does not have."""
-    try:
-        return integer(cell) != float(cell)
-    except ValueError:
-        return False
 
 
 def _place(file: str, line: int, column: int, name: str = "") -> str:
