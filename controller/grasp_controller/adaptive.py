@@ -101,7 +101,8 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     (x_1, x_2), (v_1, v_2) = u.position, u.velocity
     xi_1, xi_2 = u.intensity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
-    held = holding.hold(p.hold, series.outputs(p, x.layers, u).force, closing)
+    u_1, u_2 = series.outputs(p, x.layers, u).force
+    held = holding.hold(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
     floor = p.impact_reduction.intensity_floor
     free, low_pass = 1.0 - held, reflectance_ratio.low_pass(p.reflectance, h)
     line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, free, low_pass)

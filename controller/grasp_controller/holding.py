@@ -1,6 +1,6 @@
 """Tells a grasp from an approach: the fingers press, and no longer move towards each other.
 
-P = max(0, (u_2 - u_1)/2)         h = P^2/(P^2 + P_0^2) · w_0^2/(w_0^2 + w^2)
+P: mean force with which they press         h = P^2/(P^2 + P_0^2) · w_0^2/(w_0^2 + w^2)
 """
 
 from dataclasses import dataclass
@@ -40,10 +40,12 @@ def filtered(p: Params, before: float, closing: float, h: float) -> float:
     return before + h / (p.time_constant + h) * (closing - before)
 
 
-def hold(p: Params, u: tuple[float, float], closing: float) -> float:
-    """Return h from the forces u in N and the low-passed speed of closing in m/s: 1 is a grasp."""
-    u_1, u_2 = u
-    squeeze = max(0.0, 0.5 * u_2 - 0.5 * u_1)
+def hold(p: Params, squeeze: float, closing: float) -> float:
+    """Return h from the mean closing force in N and the low-passed speed of closing in m/s.
+
+    1 is a grasp; fingers that pull apart have none.
+    """
+    squeeze = max(0.0, squeeze)
     pressed, slow = squeeze * squeeze, p.speed * p.speed
     of = (pressed + p.squeeze * p.squeeze) * (slow + closing * closing)
     return pressed * slow / of

@@ -42,10 +42,21 @@ class Params(Group, name="simultaneous_contact"):
 def virtual_force(p: Params, xi: tuple[float, float]) -> float:
     """f_s in N, Eq. (2), from the intensities in V; zero where neither sensor sees anything."""
     xi_1, xi_2 = xi
-    xi_1 = 0.0 if xi_1 < 0.0 else xi_1
-    xi_2 = 0.0 if xi_2 < 0.0 else xi_2
-    total = xi_1 + xi_2
-    return 0.0 if total == 0.0 else p.gain * tanh((xi_1 - xi_2) / total)
+    return p.gain * contrast(lit(xi_1), lit(xi_2))
+
+
+def lit(xi: float) -> float:
+    """An intensity in V; what is below zero counts as none."""
+    return 0.0 if xi < 0.0 else xi
+
+
+def contrast(xi: float, other: float) -> float:
+    """How much brighter than the other an intensity is, both from 0 V on: from -tanh(1) to tanh(1).
+
+    Zero where both are zero.
+    """
+    total = xi + other
+    return 0.0 if total == 0.0 else tanh((xi - other) / total)
 
 
 def desired_position(x: tuple[float, float]) -> float:
@@ -56,7 +67,12 @@ def desired_position(x: tuple[float, float]) -> float:
 
 def advance(p: Params, x_v2: Motion, x_d: float, f_s: float, h: float) -> Motion:
     """The target h seconds later, Eq. (3), x_d in m and f_s in N held."""
-    position, velocity = x_v2
     a = impedance.transition(p.mass, p.damping, p.stiffness, h)
+    return follow(p, a, x_v2, x_d, f_s)
+
+
+def follow(p: Params, a: impedance.Matrix, x_v2: Motion, x_d: float, f_s: float) -> Motion:
+    """The target after the transition a of the layer, x_d in m and f_s in N held."""
+    position, velocity = x_v2
     e, e_dot = impedance.advance(a, position - x_d, velocity, f_s / p.stiffness)
     return x_d + e, e_dot
