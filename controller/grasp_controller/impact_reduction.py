@@ -82,9 +82,7 @@ def virtual_force(viscosity: float, floor: float, xi: float, was: float, h: floa
     return 0.0 if xi < floor or was < floor else viscosity * log(xi / was) / h
 
 
-def advance(
-    p: Gains, x_v1: Motions, before: Motion, after: Motion, f_p: Pair, h: float
-) -> Motions:
+def advance(p: Gains, x_v1: Motions, before: Motion, after: Motion, f_p: Pair, h: float) -> Motions:
     """The virtual objects of both fingers h seconds later, Eq. (6), the forces f_p in N held.
 
     before and after are the target's motion x_v2 at the two ends of the step.

@@ -210,10 +210,10 @@ def white(p: Params) -> float:
 
 def gaps(p: Params, white: float, line_1: Line, line_2: Line) -> tuple[float, float]:
     """The gaps in m that light and slopes tell; without a slope, that to a white face."""
-    return _gap(p, line_1, white), _gap(p, line_2, white)
+    return gap(p, line_1, white), gap(p, line_2, white)
 
 
-def _gap(p: Params, line: Line, white: float) -> float:
+def gap(p: Params, line: Line, white: float) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     gain = prior / (prior + line.variance) if prior > 0.0 else 0.0

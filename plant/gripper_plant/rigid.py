@@ -17,6 +17,28 @@ from .fingers import Pair as Pair
 LONGEST_STEP = own.LONGEST_STEP
 
 
+Alpha = Annotated[
+    float,
+    Parameter(
+        "alpha, damping rate of the contact stabilisation",
+        unit="1/s",
+        low=1.0,
+        high=1e5,
+        tunable=True,
+    ),
+]
+Beta = Annotated[
+    float,
+    Parameter(
+        "beta, natural rate of the contact stabilisation",
+        unit="1/s",
+        low=1.0,
+        high=1e5,
+        tunable=True,
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Params(fingers.Params):
     """Critical damping, alpha = beta: the paper names Baumgarte's method but no rates.
@@ -24,26 +46,8 @@ class Params(fingers.Params):
     At 200 1/s a finger that arrives with 6 mm/s sinks in by 11 um and is back within some 20 ms.
     """
 
-    baumgarte_alpha: Annotated[
-        float,
-        Parameter(
-            "alpha, damping rate of the contact stabilisation",
-            unit="1/s",
-            low=1.0,
-            high=1e5,
-            tunable=True,
-        ),
-    ] = 200.0
-    baumgarte_beta: Annotated[
-        float,
-        Parameter(
-            "beta, natural rate of the contact stabilisation",
-            unit="1/s",
-            low=1.0,
-            high=1e5,
-            tunable=True,
-        ),
-    ] = 200.0
+    baumgarte_alpha: Alpha = 200.0
+    baumgarte_beta: Beta = 200.0
 
     @cached_property
     def rates(self) -> contact.Rates:

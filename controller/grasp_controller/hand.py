@@ -1,0 +1,205 @@
+"""Multiple impedance control of a hand of N fingers that close along rays from its wrist.
+
+Each finger has a target of its own, and balance weights n_k with sum n_k·e_k = 0 tie them together;
+the layers are those of series.py, s_k >= 0 being the way from the wrist along the ray:
+
+    (2N) f_sk = K_s·(phi_k - <phi>),    phi_k = tanh((xi_k - m_k)/(xi_k + m_k))
+    (4N) z_dk = s_k - <s>               <q> = 1/N·sum n_k·q_k, m_k: mean of the others' intensities
+    (7N) u_k = n_k·[-D_i·(s_k' - s_vk') - K_i·(s_k - s_vk)]
+
+Eq. (3), (5), (6) hold for each finger. With N = 2 it is the published law, x_1 = s_1, x_2 = -s_2.
+Card: controller/README.md
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from block_variables import Input, Output, Parameter, check
+
+from . import contact_force as layer_1
+from . import hand_impact_reduction as layer_2
+from . import impedance
+from . import simultaneous_contact as layer_3
+from .impedance import Motion
+
+FINGERS = 3
+"""N; a build for another number of fingers changes this line alone."""
+
+if TYPE_CHECKING:
+    Each = tuple[float, ...]
+    Motions = tuple[Motion, ...]
+else:
+    Each = tuple[(float,) * FINGERS]
+    Motions = tuple[(Motion,) * FINGERS]
+
+ZEROS: Each = (0.0,) * FINGERS
+
+
+@dataclass(frozen=True)
+class Params:
+    """The weights of the fingers, and the parameters of the three layers."""
+
+    weight: Annotated[
+        Each,
+        Parameter(
+            "n_k, balance weight of the finger; with its direction e_k the sum of n_k·e_k is 0",
+            unit="1",
+            low=1e-3,
+            high=1e3,
+        ),
+    ] = (1.0,) * FINGERS
+    simultaneous_contact: layer_3.Params = layer_3.Params()
+    impact_reduction: layer_2.Params = layer_2.Params()
+    contact_force: layer_1.Params = layer_1.Params()
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Inputs(NamedTuple):
+    """Samples of the hand and of its sensors."""
+
+    position: Annotated[
+        Each, Input("s_k, way of the fingertip from the wrist", unit="m", nominal=0.1)
+    ] = (0.11,) * FINGERS
+    velocity: Annotated[
+        Each, Input("s_k', velocity of the fingertip, opening", unit="m/s", nominal=0.1)
+    ] = ZEROS
+    intensity: Annotated[
+        Each,
+        Input("xi_k, offset-compensated output of the proximity sensor", unit="V", nominal=0.1),
+    ] = (0.03,) * FINGERS
+
+
+class State(NamedTuple):
+    """The targets z_k and virtual objects s_vk, and what the last sample left behind."""
+
+    target: Motions
+    virtual: Motions
+    intensity: Each
+    simultaneous_contact_force: Each
+    impact_reduction_force: Each
+
+
+Force = Annotated[
+    Each,
+    Output(
+        "u_k, actuator force on the finger, opening",
+        unit="N",
+        nominal=1.0,
+        depends_on={"position", "velocity[j]"},
+    ),
+]
+TargetPosition = Annotated[
+    Each, Output("z_k, target of the finger", unit="m", nominal=0.1, depends_on={"position"})
+]
+VirtualPosition = Annotated[
+    Each,
+    Output("s_vk, virtual object of the finger", unit="m", nominal=0.1, depends_on={"position"}),
+]
+SimultaneousContactForce = Annotated[
+    Each,
+    Output(
+        "f_sk, virtual force of layer 3",
+        unit="N",
+        nominal=1.0,
+        depends_on=set(),
+        depends_initially_on={"intensity"},
+    ),
+]
+ImpactReductionForce = Annotated[
+    Each, Output("f_pk, virtual force of layer 2", unit="N", nominal=1.0, depends_on=set())
+]
+
+
+class Outputs(NamedTuple):
+    """The command to the fingers, and the inner signals of the layers.
+
+    With layers 3 and 2 off, the mean of the fingers goes straight through to the forces.
+    """
+
+    force: Force
+    target_position: TargetPosition
+    virtual_position: VirtualPosition
+    simultaneous_contact_force: SimultaneousContactForce
+    impact_reduction_force: ImpactReductionForce
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """Virtual objects at the measured fingers and at rest, so that nothing jumps at the start."""
+    at_rest = tuple((s, 0.0) for s in u.position)
+    return State(_desired(p, u), at_rest, u.intensity, virtual_forces(p, u.intensity), ZEROS)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance the virtual objects by h seconds (h > 0), the samples u held."""
+    return advance(p, x, u, virtual_forces(p, u.intensity), h)
+
+
+def advance(p: Params, x: State, u: Inputs, f_s: Each, h: float) -> State:
+    """The virtual objects h seconds later, the samples u and the virtual forces f_s in N held."""
+    third, second = p.simultaneous_contact, p.impact_reduction
+    before = after = _desired(p, u)
+    if third.enabled:
+        before = x.target
+        a = impedance.transition(third.mass, third.damping, third.stiffness, h)
+        after = tuple(
+            layer_3.follow(third, a, z, z_d, f)
+            for z, (z_d, _), f in zip(before, after, f_s, strict=True)
+        )
+    viscosity, floor = second.viscosity, second.intensity_floor
+    f_p = tuple(
+        layer_2.virtual_force(viscosity, floor, xi, was, h)
+        for xi, was in zip(u.intensity, x.intensity, strict=True)
+    )
+    virtual = after
+    if second.enabled:
+        a = impedance.transition(second.mass, second.damping, second.stiffness, h)
+        virtual = tuple(
+            layer_2.follow(second, a, s_v, z, z_after, f)
+            for s_v, z, z_after, f in zip(x.virtual, before, after, f_p, strict=True)
+        )
+    return State(after, virtual, u.intensity, f_s, f_p)
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The forces for the samples u; a layer that is off passes on the layer above."""
+    target = x.target if p.simultaneous_contact.enabled else _desired(p, u)
+    virtual = x.virtual if p.impact_reduction.enabled else target
+    forces = tuple(
+        n * layer_1.force(p.contact_force, s, s_dot, s_v)
+        for n, s, s_dot, s_v in zip(p.weight, u.position, u.velocity, virtual, strict=True)
+    )
+    return Outputs(
+        forces,
+        tuple(z for z, _ in target),
+        tuple(s_v for s_v, _ in virtual),
+        x.simultaneous_contact_force,
+        x.impact_reduction_force,
+    )
+
+
+def virtual_forces(p: Params, intensity: Each) -> Each:
+    """f_sk in N, Eq. (2N), from the intensities in V; zero where no sensor sees anything."""
+    lit = tuple(layer_3.lit(xi) for xi in intensity)
+    total = 0.0
+    for xi in lit:
+        total = total + xi
+    others = float(FINGERS - 1)
+    contrasts = tuple(layer_3.contrast(xi, (total - xi) / others) for xi in lit)
+    mean = weighted_mean(p.weight, contrasts)
+    return tuple(p.simultaneous_contact.gain * (phi - mean) for phi in contrasts)
+
+
+def weighted_mean(weight: Each, values: Each) -> float:
+    """<q> of a value per finger."""
+    total = 0.0
+    for n, value in zip(weight, values, strict=True):
+        total = total + n * value
+    return total / float(FINGERS)
+
+
+def _desired(p: Params, u: Inputs) -> Motions:
+    """z_dk of Eq. (4N): no velocity and no acceleration, by definition."""
+    mean = weighted_mean(p.weight, u.position)
+    return tuple((s - mean, 0.0) for s in u.position)

@@ -1,0 +1,146 @@
+"""Multiple impedance control of a hand whose faces may differ in colour.
+
+Layers 1 and 2 and the targets are those of hand.py; layer 3 compares the intensities as faces of
+one colour would give them, and fades as the fingers hold:
+
+    f_sk = (1 - h)·K_s·(phi_k - <phi>),   phi of  exp(min b - b_k)·xi_k       Eq. (2N')
+
+Card: controller/README.md
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import exp
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from block_variables import Output
+
+from . import hand, hand_reflectances, holding, reflectance_ratio
+from .hand import FINGERS, Each
+from .hand import Inputs as Inputs
+from .reflectance_ratio import Line
+
+if TYPE_CHECKING:
+    Lines = tuple[Line, ...]
+else:
+    Lines = tuple[(Line,) * FINGERS]
+
+
+@dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
+class Params(hand.Params):
+    """The weights and the three layers' parameters, and those of what is learnt."""
+
+    reflectance: reflectance_ratio.Params = reflectance_ratio.Params()
+    hold: holding.Params = holding.Params()
+
+    @cached_property
+    def white(self) -> float:
+        """1/kappa of a white face, m.V^(1/n)."""
+        return reflectance_ratio.white(self.reflectance)
+
+
+class State(NamedTuple):
+    """The virtual objects, the fingers' lines, and what they told at the last sample."""
+
+    layers: hand.State
+    lines: Lines
+    brightness: Each
+    closing: float
+    hold: float
+
+
+class Outputs(NamedTuple):
+    """Those of the published law, and what has been learnt."""
+
+    force: hand.Force
+    target_position: hand.TargetPosition
+    virtual_position: hand.VirtualPosition
+    simultaneous_contact_force: hand.SimultaneousContactForce
+    impact_reduction_force: hand.ImpactReductionForce
+    reflectance_ratio: Annotated[
+        Each,
+        Output(
+            "alpha_k to the mean of all faces, reflectance as learnt",
+            unit="1",
+            nominal=1.0,
+            depends_on=set(),
+        ),
+    ]
+    reflectance_ratio_standard_deviation: Annotated[
+        Each,
+        Output(
+            "standard deviation of that ratio, by noise alone",
+            unit="1",
+            nominal=1.0,
+            depends_on=set(),
+        ),
+    ]
+    estimated_gap: Annotated[
+        Each,
+        Output(
+            "l_k, gap as learnt",
+            unit="m",
+            nominal=0.1,
+            depends_on=set(),
+            depends_initially_on={"intensity[j]"},
+        ),
+    ]
+    hold: Annotated[
+        float,
+        Output(
+            "h, from 0 while approaching to 1 in a grasp", unit="1", nominal=1.0, depends_on=set()
+        ),
+    ]
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """As the published law starts, with nothing learnt."""
+    floor = p.impact_reduction.intensity_floor
+    lines = tuple(
+        reflectance_ratio.first_point(p.reflectance, floor, s, xi)
+        for s, xi in zip(u.position, u.intensity, strict=True)
+    )
+    return State(hand.initial_state(p, u), lines, hand.ZEROS, 0.0, 0.0)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance the virtual objects by h seconds (h > 0), the samples u held, and learn from them."""
+    rate, pressed = 0.0, 0.0
+    y = hand.outputs(p, x.layers, u)
+    for s_dot, force in zip(u.velocity, y.force, strict=True):
+        rate = rate + s_dot
+        pressed = pressed - force
+    fingers = float(FINGERS)
+    closing = holding.filtered(p.hold, x.closing, 2.0 * rate / fingers, h)
+    held = holding.hold(p.hold, pressed / fingers, closing)
+    floor = p.impact_reduction.intensity_floor
+    free, low_pass = 1.0 - held, reflectance_ratio.low_pass(p.reflectance, h)
+    lines = tuple(
+        reflectance_ratio.moved(p.reflectance, line, floor, s, xi, free, low_pass)
+        for line, s, xi in zip(x.lines, u.position, u.intensity, strict=True)
+    )
+    b = hand_reflectances.brightnesses(p.reflectance, lines)
+    f_s = hand.virtual_forces(p, hand_reflectances.alike(b, u.intensity))
+    layers = hand.advance(p, x.layers, u, tuple(free * f for f in f_s), h)
+    return State(layers, lines, b, closing, held)
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The forces for the samples u, and what has been learnt."""
+    y = hand.outputs(p, x.layers, u)
+    ratios = tuple(exp(b) for b in x.brightness)
+    deviations = tuple(
+        ratio * hand_reflectances.deviation(p.reflectance, line)
+        for ratio, line in zip(ratios, x.lines, strict=True)
+    )
+    return Outputs(
+        y.force,
+        y.target_position,
+        y.virtual_position,
+        y.simultaneous_contact_force,
+        y.impact_reduction_force,
+        ratios,
+        deviations,
+        tuple(reflectance_ratio.gap(p.reflectance, line, p.white) for line in x.lines),
+        x.hold,
+    )

@@ -1,0 +1,82 @@
+"""A hand of N fingers on rays from the wrist and a rigid, fixed object: a prism or a disc.
+
+Each finger is that of rigid.py, with a surface of its own. Card: plant/README.md
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+from . import contact, hand_fingers, rigid
+from . import substeps as own
+from .fingers import Side
+from .friction import NONE
+from .hand_fingers import FINGERS, Each
+from .hand_fingers import Inputs as Inputs
+from .hand_fingers import Outputs as Outputs
+
+LONGEST_STEP = own.LONGEST_STEP
+
+if TYPE_CHECKING:
+    Sides = tuple[Side, ...]
+else:
+    Sides = tuple[(Side,) * FINGERS]
+
+
+@dataclass(frozen=True)
+class Params(hand_fingers.Params):
+    """The contact is that of rigid.py."""
+
+    baumgarte_alpha: rigid.Alpha = 200.0
+    baumgarte_beta: rigid.Beta = 200.0
+
+    @cached_property
+    def rates(self) -> contact.Rates:
+        """Those of the contact."""
+        return contact.Rates(self.baumgarte_alpha, self.baumgarte_beta)
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Each finger and its face of the object."""
+        return tuple(
+            Side(begins, mass, NONE)
+            for begins, mass in zip(self.surfaces, self.finger_mass, strict=True)
+        )
+
+
+class State(NamedTuple):
+    """Fingertip positions in m, velocities in m/s and contact forces in N."""
+
+    position: Each
+    velocity: Each
+    contact_force: Each
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """All fingers at rest at their initial positions, free of the object."""
+    return State(p.initial_position, hand_fingers.ZEROS, hand_fingers.ZEROS)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance all fingers by h seconds (h > 0), the forces held."""
+    moved = tuple(
+        contact.advance(side, p.rates, s, v, f, h)
+        for side, s, v, f in zip(p.sides, x.position, x.velocity, u.force, strict=True)
+    )
+    return State(
+        tuple(s for s, _, _ in moved), tuple(v for _, v, _ in moved), tuple(f for _, _, f in moved)
+    )
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The outputs, as the sensors see them; no input reaches an output without a step."""
+    gaps = tuple(s - begins for s, begins in zip(x.position, p.surfaces, strict=True))
+    return Outputs(
+        x.position,
+        x.velocity,
+        gaps,
+        x.contact_force,
+        tuple(gap <= 0.0 for gap in gaps),
+        p.initial_object_position,
+        p.initial_object_angle,
+    )

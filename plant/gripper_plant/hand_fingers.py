@@ -1,0 +1,200 @@
+"""The fingers of a hand, m_k·s_k'' = u_k + f_k, and what every plant with a hand declares.
+
+A finger moves along its ray from the wrist; s_k >= 0 is its way there, in the direction e_k of
+`angle[k]`, and everything of it counts as it opens. Card: plant/README.md
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, fmod, inf, pi, sin
+from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeAlias
+
+from block_variables import Input, Output, Parameter, check
+
+from .hand_object import Pose, Ray, Shape, surface
+
+FINGERS = 3
+"""N; a build for another number of fingers changes this line alone."""
+
+if TYPE_CHECKING:
+    Each = tuple[float, ...]
+    Touches = tuple[bool, ...]
+    Rays = tuple[Ray, ...]
+else:
+    Each = tuple[(float,) * FINGERS]
+    Touches = tuple[(bool,) * FINGERS]
+    Rays = tuple[(Ray,) * FINGERS]
+
+Plane = tuple[float, float]
+"""x and y in the plane of the rays, the wrist at the origin."""
+
+ZEROS: Each = (0.0,) * FINGERS
+
+OPPOSITE = 1e-6
+"""rad by which two directions may be off and yet be opposite."""
+
+
+@dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
+class Params:
+    """Parameters of every plant with a hand; a value outside its range raises ValueError.
+
+    Fingers at equal angles and 110 mm out, as the paper has two; an object of 70 mm in the middle.
+    """
+
+    angle: Annotated[
+        Each,
+        Parameter(
+            "direction of the finger, from the x axis", unit="rad", low=-2.0 * pi, high=2.0 * pi
+        ),
+    ] = tuple(2.0 * pi * k / FINGERS for k in range(FINGERS))
+    finger_mass: Annotated[
+        Each, Parameter("m_k, mass of the finger", unit="kg", low=1e-3, high=1e3, tunable=True)
+    ] = (0.5,) * FINGERS
+    initial_position: Annotated[
+        Each,
+        Parameter(
+            "s_init,k, way of the fingertip from the wrist at the start",
+            unit="m",
+            low=-10.0,
+            high=10.0,
+        ),
+    ] = (0.11,) * FINGERS
+    shape: Annotated[Shape, Parameter("of the object, seen from above")] = Shape.PRISM
+    object_radius: Annotated[
+        float, Parameter("R, radius of a disc", unit="m", low=1e-4, high=10.0)
+    ] = 0.035
+    half_width: Annotated[
+        Each,
+        Parameter(
+            "h_k, from the middle of a prism to its face under the finger",
+            unit="m",
+            low=1e-4,
+            high=10.0,
+        ),
+    ] = (0.035,) * FINGERS
+    initial_object_position: Annotated[
+        Plane,
+        Parameter("c, centre of the object at the start, x and y", unit="m", low=-10.0, high=10.0),
+    ] = (0.0, 0.0)
+    initial_object_angle: Annotated[
+        float,
+        Parameter(
+            "theta, turn of a prism at the start, counter-clockwise; its faces are square to the "
+            "rays at 0",
+            unit="rad",
+            low=-1.0,
+            high=1.0,
+        ),
+    ] = 0.0
+
+    def __post_init__(self) -> None:
+        check(self)
+        widest, second = gaps_between(self.angle)
+        if widest > pi + OPPOSITE or (widest > pi - OPPOSITE and second < pi - OPPOSITE):
+            raise ValueError(
+                f"angle: there is no finger within {widest:.6g} rad of another; fingers can hold "
+                f"where that is less than {pi:.6g}, or where all are on one line, at both ends"
+            )
+        for s, begins in zip(self.initial_position, self.surfaces, strict=True):
+            if begins == -inf:
+                raise ValueError(
+                    f"object_radius = {self.object_radius!r} m: the disc is beside the ray of a "
+                    "finger, must be under all of them"
+                )
+            if s < begins:
+                raise ValueError(
+                    f"initial_position = {s!r} m: must be at least {begins:g} m, where the object "
+                    "begins on the ray of that finger"
+                )
+
+    @cached_property
+    def rays(self) -> Rays:
+        """The directions of the fingers, and the object's faces under them."""
+        return tuple(
+            Ray(cos(a), sin(a), a, half)
+            for a, half in zip(self.angle, self.half_width, strict=True)
+        )
+
+    @cached_property
+    def first_pose(self) -> Pose:
+        """Where the object is at the start."""
+        x, y = self.initial_object_position
+        return Pose(x, y, self.initial_object_angle)
+
+    @cached_property
+    def surfaces(self) -> Each:
+        """Where the object begins on each ray at the start, m; -inf where it is beside."""
+        shape, radius, pose = self.shape, self.object_radius, self.first_pose
+        return tuple(surface(shape, radius, ray, pose) for ray in self.rays)
+
+
+def gaps_between(angle: Each) -> tuple[float, float]:
+    """The widest and the second widest angle in rad between neighbouring directions."""
+    widest, second = 0.0, 0.0
+    for a in angle:
+        following = 2.0 * pi
+        for b in angle:
+            way = fmod(b - a, 2.0 * pi)
+            way = way + 2.0 * pi if way <= 0.0 else way
+            following = min(following, way)
+        second = max(second, min(widest, following))
+        widest = max(widest, following)
+    return widest, second
+
+
+class Inputs(NamedTuple):
+    """Held over the step."""
+
+    force: Annotated[
+        Each, Input("u_k, actuator force on the finger, opening", unit="N", nominal=1.0)
+    ] = ZEROS
+
+
+Position: TypeAlias = Annotated[
+    Each,
+    Output("s_k, way of the fingertip from the wrist", unit="m", nominal=0.1, depends_on=set()),
+]
+Velocity: TypeAlias = Annotated[
+    Each,
+    Output("s_k', velocity of the fingertip, opening", unit="m/s", nominal=0.1, depends_on=set()),
+]
+Gap: TypeAlias = Annotated[
+    Each,
+    Output(
+        "l_k, distance from the sensor face to the object surface along the ray",
+        unit="m",
+        nominal=0.1,
+        depends_on=set(),
+    ),
+]
+ContactForce: TypeAlias = Annotated[
+    Each,
+    Output(
+        "f_ck, force of the object on the finger along the ray",
+        unit="N",
+        nominal=1.0,
+        depends_on=set(),
+    ),
+]
+Contact: TypeAlias = Annotated[Touches, Output("the finger touches the object", depends_on=set())]
+ObjectPosition: TypeAlias = Annotated[
+    Plane, Output("c, centre of the object, x and y", unit="m", nominal=0.1, depends_on=set())
+]
+ObjectAngle: TypeAlias = Annotated[
+    float,
+    Output(
+        "theta, turn of the object, counter-clockwise", unit="rad", nominal=0.1, depends_on=set()
+    ),
+]
+
+
+class Outputs(NamedTuple):
+    """Measured at the fingers and at the object."""
+
+    position: Position
+    velocity: Velocity
+    gap: Gap
+    contact_force: ContactForce
+    contact: Contact
+    object_position: ObjectPosition
+    object_angle: ObjectAngle

@@ -1,0 +1,228 @@
+"""A hand of N fingers and an object on a floor that slides and turns: a prism or a disc.
+
+    m_k·s_k'' = u_k + f_k·(nu_k·e_k)
+    m·c'' = -sum f_k·nu_k + floor,    m·r^2·theta'' = -sum (p_k - c) x f_k·nu_k + floor
+
+The fingertips are points without friction on stiff rails. Card: plant/README.md
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, sqrt
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from block_variables import Parameter
+
+from . import contact_laws, hand_fingers, hand_object
+from . import substeps as own
+from .box import GRAVITY
+from .contact_laws import HuntCrossley, KelvinVoigt
+from .friction import NONE, move
+from .hand_fingers import FINGERS, Each, Rays
+from .hand_fingers import Inputs as Inputs
+from .hand_fingers import Outputs as Outputs
+from .hand_object import Normal, Pose
+from .movable import ITERATIONS
+
+LONGEST_STEP = own.LONGEST_STEP
+
+FAR = 10.0
+"""m; the gap of a finger whose ray passes beside the object."""
+
+if TYPE_CHECKING:
+    Normals = tuple[Normal, ...]
+else:
+    Normals = tuple[(Normal,) * FINGERS]
+
+
+@dataclass(frozen=True)
+class Params(hand_fingers.Params):
+    """A light object, which 0.15 N shift and 3 mN.m turn, with the walls of movable.py."""
+
+    object_mass: Annotated[
+        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3, tunable=True)
+    ] = 0.05
+    radius_of_gyration: Annotated[
+        float,
+        Parameter(
+            "r, radius of gyration about the vertical axis",
+            unit="m",
+            low=1e-4,
+            high=10.0,
+            tunable=True,
+        ),
+    ] = 0.025
+    floor_friction: Annotated[
+        float,
+        Parameter(
+            "mu, friction of the object on the floor", unit="1", low=0.0, high=1.0, tunable=True
+        ),
+    ] = 0.3
+    floor_contact_radius: Annotated[
+        float,
+        Parameter(
+            "r_t, radius at which the floor's friction holds a turn",
+            unit="m",
+            low=0.0,
+            high=10.0,
+            tunable=True,
+        ),
+    ] = 0.02
+    kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
+    hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
+
+    @cached_property
+    def law(self) -> contact_laws.Law:
+        """The contact law that is chosen."""
+        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
+
+    @cached_property
+    def drag(self) -> float:
+        """The floor's friction on an object that slides, N."""
+        return self.floor_friction * self.object_mass * GRAVITY
+
+
+class Body(NamedTuple):
+    """Where the object is, and its rates in m/s and rad/s."""
+
+    pose: Pose
+    x_dot: float
+    y_dot: float
+    turning: float
+
+
+class State(NamedTuple):
+    """Fingertip positions in m, velocities in m/s, normal forces in N; the object."""
+
+    position: Each
+    velocity: Each
+    normal_force: Each
+    body: Body
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """All at rest, the fingers free of the object."""
+    body = Body(p.first_pose, 0.0, 0.0, 0.0)
+    return State(p.initial_position, hand_fingers.ZEROS, hand_fingers.ZEROS, body)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance fingers and object by h seconds (h > 0), the forces held."""
+    rays = p.rays
+    n = own.count(_rate(p, rays, x, u, h), h)
+    if n > own.MOST:
+        return x._replace(position=tuple(s + inf - inf for s in x.position))
+    for _ in range(n):
+        x = _substep(p, rays, x, u.force, h / n)
+    return x
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The outputs, as the sensors see them; no input reaches an output without a step.
+
+    The gap of a finger that touches is zero.
+    """
+    pose, rays = x.body.pose, p.rays
+    normals = _normals(p, rays, x, pose)
+    begins = tuple(hand_object.surface(p.shape, p.object_radius, ray, pose) for ray in rays)
+    gaps = tuple(
+        0.0 if at.depth >= 0.0 else min(FAR, max(0.0, s - begin))
+        for at, s, begin in zip(normals, x.position, begins, strict=True)
+    )
+    forces = tuple(
+        f * (at.x * ray.x + at.y * ray.y)
+        for f, at, ray in zip(x.normal_force, normals, rays, strict=True)
+    )
+    return Outputs(
+        x.position,
+        x.velocity,
+        gaps,
+        forces,
+        tuple(at.depth >= 0.0 for at in normals),
+        (pose.x, pose.y),
+        pose.angle,
+    )
+
+
+def _normals(p: Params, rays: Rays, x: State, pose: Pose) -> Normals:
+    return tuple(
+        hand_object.normal(p.shape, p.object_radius, ray, pose, s)
+        for ray, s in zip(rays, x.position, strict=True)
+    )
+
+
+def _substep(p: Params, rays: Rays, x: State, u: Each, d: float) -> State:
+    """D seconds with the normal forces held along today's normals, found by iteration."""
+    normals = _normals(p, rays, x, x.body.pose)
+    along = tuple(at.x * ray.x + at.y * ray.y for at, ray in zip(normals, rays, strict=True))
+    forces, body, moved = x.normal_force, x.body, x
+    for _ in range(ITERATIONS):
+        body = _pushed(p, rays, x, normals, forces, d)
+        fingers = tuple(
+            move(s, v, m, f + share * push, NONE, d)
+            for s, v, m, f, share, push in zip(
+                x.position, x.velocity, p.finger_mass, u, along, forces, strict=True
+            )
+        )
+        moved = State(tuple(s for s, _ in fingers), tuple(v for _, v in fingers), forces, body)
+        after = _normals(p, rays, moved, body.pose)
+        found = tuple(
+            contact_laws.mean_force(p.law, at.depth, then.depth, d)
+            for at, then in zip(normals, after, strict=True)
+        )
+        if all(contact_laws.settled(new, old) for new, old in zip(found, forces, strict=True)):
+            break
+        forces = found
+    return moved
+
+
+def _pushed(p: Params, rays: Rays, x: State, normals: Normals, forces: Each, d: float) -> Body:
+    """The object d seconds later under normal forces in N, with the friction of the floor.
+
+    The floor takes what it can of the speeds that the object would have without it: it comes to
+    rest, and stays so, wherever that is within what friction can do.
+    """
+    pose, m = x.body.pose, p.object_mass
+    push_x, push_y, moment = 0.0, 0.0, 0.0
+    for ray, s, at, f in zip(rays, x.position, normals, forces, strict=True):
+        push_x = push_x - f * at.x
+        push_y = push_y - f * at.y
+        arm_x, arm_y = s * ray.x - pose.x, s * ray.y - pose.y
+        moment = moment - f * (arm_x * at.y - arm_y * at.x)
+    x_dot, y_dot = x.body.x_dot + d * push_x / m, x.body.y_dot + d * push_y / m
+    inertia = m * p.radius_of_gyration * p.radius_of_gyration
+    turning = x.body.turning + d * moment / inertia
+    kept = _kept(sqrt(x_dot * x_dot + y_dot * y_dot), d * p.drag / m)
+    turned = _kept(abs(turning), d * p.drag * p.floor_contact_radius / inertia)
+    x_dot, y_dot, turning = kept * x_dot, kept * y_dot, turned * turning
+    after = Pose(
+        pose.x + 0.5 * d * (x.body.x_dot + x_dot),
+        pose.y + 0.5 * d * (x.body.y_dot + y_dot),
+        pose.angle + 0.5 * d * (x.body.turning + turning),
+    )
+    return Body(after, x_dot, y_dot, turning)
+
+
+def _kept(speed: float, taken: float) -> float:
+    """The share of a speed that is left after friction has taken so much of it."""
+    return 0.0 if speed <= taken else (speed - taken) / speed
+
+
+def _rate(p: Params, rays: Rays, x: State, u: Inputs, h: float) -> float:
+    """The fastest that a finger and the object can do within h seconds, 1/s.
+
+    The object gives way to a push by what it weighs, and turns by its lever about the centre.
+    """
+    body, pose = x.body, x.body.pose
+    speed = sqrt(body.x_dot * body.x_dot + body.y_dot * body.y_dot)
+    deepest, gives = -inf, 1.0 / min(p.finger_mass)
+    normals = _normals(p, rays, x, pose)
+    for ray, at, s, v, m, f in zip(
+        rays, normals, x.position, x.velocity, p.finger_mass, u.force, strict=True
+    ):
+        lever = (s * ray.x - pose.x) * at.y - (s * ray.y - pose.y) * at.x
+        ratio = lever / p.radius_of_gyration
+        gives = gives + (1.0 + ratio * ratio) / p.object_mass
+        reach = speed + abs(body.turning * lever) + abs(v) + 0.5 * h * abs(f) / m
+        deepest = max(deepest, at.depth + h * reach)
+    return contact_laws.rate(p.law, deepest, 1.0 / gives)
