@@ -25,7 +25,7 @@ from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_c
 
 from .native.targets import Target, Version, folders, here, universal
 from .package import Built, card_file, package_folder, write_built
-from .shipped import PACKAGES, SHIPPED
+from .shipped import FEWEST, MOST, PACKAGES, SHIPPED, of_fingers, together
 
 if TYPE_CHECKING:
     import zipfile
@@ -126,13 +126,19 @@ def build_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
         return build_model(model, out, plan)
 
 
-def build_chosen(block: Path | None, out: Path, plan: Plan | None = None) -> list[Built]:
+def build_chosen(
+    block: Path | None, out: Path, plan: Plan | None = None, fingers: int | None = None
+) -> list[Built]:
     """Build the FMUs of all blocks that come with the package, or of one, into the folder `out`.
 
-    block is a Python file; with a plan, which makes them native, also the name of one of ours.
+    block is a Python file; with a plan, which makes them native, also the name of one of ours. With
+    `fingers` the FMUs are those of a hand that has so many.
     ValueError, one line, where there is no such block, or a compiler is missing; CompilerError
     where one fails.
     """
+    if fingers is not None:
+        names = of_fingers(fingers)
+        return build_native(out, plan, names) if plan else _brought(out, shipped_fmus(fingers))
     if block is None:
         return build_native(out, plan) if plan else build(out)
     if plan and names_ours(block):
@@ -183,8 +189,11 @@ def chosen_names(names: Sequence[str] = ()) -> list[str]:
     ValueError, one line, for one that is none.
     """
     for name in names:
-        if name not in SHIPPED:
-            valid = f"must be of {', '.join(SHIPPED)}, or a file NAME.py"
+        if together(name) is None:
+            valid = (
+                f"must be of {', '.join(SHIPPED)}, one of a hand with a number of fingers from "
+                f"{FEWEST} to {MOST} behind it, or a file NAME.py"
+            )
             raise ValueError(f"{name}: no such block; {valid}")
     return [*names] or [*SHIPPED]
 
@@ -297,10 +306,10 @@ def _brought(out: Path, made: Path) -> list[Built]:
     return built
 
 
-def _build_python(folder: Path) -> None:
+def _build_python(names: Sequence[str], folder: Path) -> None:
     from .package import shipped_model, write_python
 
-    for name in SHIPPED:
+    for name in names:
         model = shipped_model(name)
         write_python(folder / f"{name}.fmu", model)
         _write_checks(folder, name, model.block)
@@ -334,22 +343,24 @@ def _write_checks(folder: Path, name: str, block: Any) -> None:
 # ------------------------------------------------------------------ twins
 
 
-def shipped_fmus() -> Path:
+def shipped_fmus(fingers: int | None = None) -> Path:
     """The folder of the FMUs of the blocks that come with the package, built if need be.
 
-    Threads and processes may ask at the same time.
+    With `fingers` these are the FMUs of a hand that has so many. Threads and processes may ask at
+    the same time. ValueError for a number of fingers that there is not.
     """
-    return _kept(_build_python, "python")
+    names = of_fingers(fingers) if fingers is not None else [*SHIPPED]
+    return _kept(partial(_build_python, names), "python", *names)
 
 
 @functools.cache
-def shipped_twins() -> Path:
-    """The folder of the native FMUs of the blocks that come with the package, built if need be.
+def shipped_twins(names: tuple[str, ...]) -> Path:
+    """The folder of the native FMUs of blocks that come with the package, built if need be.
 
     NoTwinsError where they cannot be built.
     """
     try:
-        return _kept_native(planned(), chosen_names())
+        return _kept_native(planned(), names)
     except (ValueError, CompilerError) as error:
         raise NoTwinsError(str(error)) from error
     except OSError as error:

@@ -29,18 +29,27 @@ def updated(card: str, blocks: Mapping[str, Block]) -> str:
 def variable_tables(blocks: Mapping[str, Block]) -> str:
     """The variables of a block as a Markdown table; of several, what all have, then what each adds.
 
-    The blocks are given by name.
+    The blocks are given by name. Those of a hand follow by themselves.
     """
     rows = {name: [_row(f) for f in declared(block)] for name, block in blocks.items()}
+    if len(rows) == 1:
+        return _table(*rows.values())
+    hands = {name: own for name, own in rows.items() if name.startswith("hand")}
+    others = {name: own for name, own in rows.items() if name not in hands}
+    tables = _tables("What all have", others)
+    if hands:
+        tables += _tables("What all of a hand of three fingers have", hands)
+    return "\n".join(tables)
+
+
+def _tables(title: str, rows: Mapping[str, list[str]]) -> list[str]:
     first, *others = rows.values()
-    if not others:
-        return _table(first)
     common = [row for row in first if all(row in other for other in others)]
-    tables = [f"What all have:\n\n{_table(common)}"]
+    tables = [f"{title}:\n\n{_table(common)}"]
     for name, own in rows.items():
         if added := [row for row in own if row not in common]:
             tables.append(f"What `{name}` adds:\n\n{_table(added)}")
-    return "\n".join(tables)
+    return tables
 
 
 def _table(rows: list[str]) -> str:

@@ -22,7 +22,7 @@ from .contract import declared, longest_step, unpacker, variables
 from .description import Description
 from .package import HASH, IMPORT, Model, script
 from .page import BEGIN
-from .shipped import PACKAGES, SHIPPED
+from .shipped import FEWEST, MOST, PACKAGES, SHIPPED, of_fingers
 from .variable import Variable
 
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
@@ -41,7 +41,7 @@ def own_model(file: Path) -> Iterator[Model]:
     if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
         raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
-    for ours in SHIPPED:
+    for ours in (*SHIPPED, *(hand for n in range(FEWEST, MOST + 1) for hand in of_fingers(n))):
         if ours.lower() == name.lower():  # the same file on Windows
             raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
     text, tree = _parsed(file)

@@ -15,14 +15,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from one_piece import in_one_piece
 
-from .shipped import SHIPPED
+from .shipped import block_of, found, sized_source
 
 if TYPE_CHECKING:
     from .description import Description
@@ -64,18 +63,20 @@ class Model:
 
 
 def shipped_model(name: str) -> Model:
-    """Return the model of an FMU that comes with this package."""
+    """Return the model of an FMU that comes with this package, or of a hand of another size."""
     from .contract import declared, variables
     from .description import Description
     from .page import icon
 
-    shipped = SHIPPED[name]
-    block = import_module(shipped.module)
+    shipped, fingers = found(name)
+    block = block_of(name)
     package, _, module = shipped.module.rpartition(".")
+    summary = f"{shipped.summary}: {fingers} fingers" if fingers else shipped.summary
+    imports = script(f"from {package} import {module} as block")
     return Model(
-        Description(name, shipped.summary, variables(declared(block))),
+        Description(name, summary, variables(declared(block))),
         card_file(package).read_text("utf-8"),
-        {f"{name}.py": script(f"from {package} import {module} as block")},
+        {f"{name}.py": imports, **sized_source(name)},
         block,
         picture=icon(name),
     )

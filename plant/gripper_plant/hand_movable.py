@@ -21,13 +21,10 @@ from .friction import NONE, move
 from .hand_fingers import FINGERS, Each, Rays
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
-from .hand_object import Normal, Pose
+from .hand_object import FAR, Normal, Pose
 from .movable import ITERATIONS
 
 LONGEST_STEP = own.LONGEST_STEP
-
-FAR = 10.0
-"""m; the gap of a finger whose ray passes beside the object."""
 
 if TYPE_CHECKING:
     Normals = tuple[Normal, ...]
@@ -39,6 +36,10 @@ else:
 class Params(hand_fingers.Params):
     """A light object, which 0.15 N shift and 3 mN.m turn, with the walls of movable.py."""
 
+    face_length: Annotated[
+        float,
+        Parameter("of the faces of a prism, from end to end", unit="m", low=1e-3, high=10.0),
+    ] = 0.2
     object_mass: Annotated[
         float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = 0.05
@@ -126,7 +127,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     normals = _normals(p, rays, x, pose)
     begins = tuple(hand_object.surface(p.shape, p.object_radius, ray, pose) for ray in rays)
     gaps = tuple(
-        0.0 if at.depth >= 0.0 else min(FAR, max(0.0, s - begin))
+        0.0 if at.depth >= 0.0 else FAR if at.depth <= -FAR else min(FAR, max(0.0, s - begin))
         for at, s, begin in zip(normals, x.position, begins, strict=True)
     )
     forces = tuple(
@@ -146,7 +147,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 
 def _normals(p: Params, rays: Rays, x: State, pose: Pose) -> Normals:
     return tuple(
-        hand_object.normal(p.shape, p.object_radius, ray, pose, s)
+        hand_object.normal(p.shape, p.object_radius, p.face_length, ray, pose, s)
         for ray, s in zip(rays, x.position, strict=True)
     )
 
@@ -215,14 +216,17 @@ def _rate(p: Params, rays: Rays, x: State, u: Inputs, h: float) -> float:
     """
     body, pose = x.body, x.body.pose
     speed = sqrt(body.x_dot * body.x_dot + body.y_dot * body.y_dot)
-    deepest, gives = -inf, 1.0 / min(p.finger_mass)
     normals = _normals(p, rays, x, pose)
+    deepest, even, odd, turned = -inf, 0.0, 0.0, 0.0
     for ray, at, s, v, m, f in zip(
         rays, normals, x.position, x.velocity, p.finger_mass, u.force, strict=True
     ):
         lever = (s * ray.x - pose.x) * at.y - (s * ray.y - pose.y) * at.x
-        ratio = lever / p.radius_of_gyration
-        gives = gives + (1.0 + ratio * ratio) / p.object_mass
+        ratio = lever / p.radius_of_gyration if at.depth > -FAR else 0.0
+        even, odd = even + at.x * at.x - at.y * at.y, odd + 2.0 * at.x * at.y
+        turned = turned + ratio * ratio
         reach = speed + abs(body.turning * lever) + abs(v) + 0.5 * h * abs(f) / m
         deepest = max(deepest, at.depth + h * reach)
+    pushed = 0.5 * (float(FINGERS) + sqrt(even * even + odd * odd))  # the most, in any direction
+    gives = 1.0 / min(p.finger_mass) + (pushed + turned) / p.object_mass
     return contact_laws.rate(p.law, deepest, 1.0 / gives)

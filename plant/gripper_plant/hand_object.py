@@ -10,6 +10,12 @@ from enum import IntEnum
 from math import cos, inf, sin, sqrt
 from typing import NamedTuple
 
+FACING = 0.1
+"""Cosine of a prism's turn below which its faces do not look to the rays any more."""
+
+FAR = 10.0
+"""m; as far is what is beside a finger."""
+
 
 class Shape(IntEnum):
     """Of the object, seen from above."""
@@ -46,20 +52,30 @@ class Normal(NamedTuple):
 def surface(shape: Shape, radius: float, ray: Ray, pose: Pose) -> float:
     """Where the object begins on a ray, m from the wrist; -inf where it is beside the ray."""
     if shape == Shape.PRISM:
+        facing = cos(pose.angle)
+        if facing < FACING:
+            return -inf
         x, y = cos(ray.angle + pose.angle), sin(ray.angle + pose.angle)
-        return (ray.half_width + x * pose.x + y * pose.y) / cos(pose.angle)
+        return (ray.half_width + x * pose.x + y * pose.y) / facing
     along = ray.x * pose.x + ray.y * pose.y
     beside = ray.x * pose.y - ray.y * pose.x
     left = radius * radius - beside * beside
     return along + sqrt(left) if left >= 0.0 else -inf
 
 
-def normal(shape: Shape, radius: float, ray: Ray, pose: Pose, s: float) -> Normal:
-    """The normal where the fingertip is, s m out on the ray, and its depth."""
+def normal(shape: Shape, radius: float, face: float, ray: Ray, pose: Pose, s: float) -> Normal:
+    """The normal where the fingertip is, s m out on the ray, and its depth.
+
+    A face of a prism ends half of its length `face` in m away from its middle.
+    """
+    arm_x, arm_y = s * ray.x - pose.x, s * ray.y - pose.y
     if shape == Shape.PRISM:
+        facing = cos(pose.angle)
         x, y = cos(ray.angle + pose.angle), sin(ray.angle + pose.angle)
-        return Normal(x, y, ray.half_width + x * pose.x + y * pose.y - s * cos(pose.angle))
-    x, y = s * ray.x - pose.x, s * ray.y - pose.y
+        if facing < FACING or abs(arm_x * y - arm_y * x) > 0.5 * face:
+            return Normal(x, y, -FAR)
+        return Normal(x, y, ray.half_width + x * pose.x + y * pose.y - s * facing)
+    x, y = arm_x, arm_y
     distance = sqrt(x * x + y * y)
     if distance <= 0.0:
         return Normal(ray.x, ray.y, radius)

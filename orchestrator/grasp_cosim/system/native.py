@@ -71,19 +71,19 @@ def _twins(components: list[Component]) -> tuple[dict[str, Path], str]:
     if not ours:
         return {}, ""
     from grasp_fmus.build import NoTwinsError, shipped_twins
-    from grasp_fmus.shipped import SHIPPED
+    from grasp_fmus.shipped import together
 
-    folder, failure = None, ""
-    shipped = [c for c in ours if c.interface.identifier in SHIPPED]
-    if shipped:
+    folders, failure = {}, ""
+    shipped = {c.name: names for c in ours if (names := together(c.interface.identifier))}
+    for names in dict.fromkeys(shipped.values()):
         try:
-            folder = shipped_twins()
+            folders[names] = shipped_twins(names)
+            LOGGER.info("native FMUs: %s", folders[names])
         except NoTwinsError as error:
             failure = str(error)
-    if folder:
-        LOGGER.info("native FMUs: %s", folder)
-    found = {c.name: twin for c in ours if (twin := _twin(c, folder))}
-    missing = [c for c in shipped if c.name not in found]
+    built = {name: folders.get(names) for name, names in shipped.items()}
+    found = {c.name: twin for c in ours if (twin := _twin(c, built.get(c.name)))}
+    missing = [c for c in ours if c.name in shipped and c.name not in found]
     for component in missing:
         if failure and _needs_twin(component):
             raise InputError(f"{component.name}: {_lacking(component)}; {failure}")
