@@ -95,7 +95,9 @@ def compare(
     changes = _changes(ours, theirs)
     asked, other = (_asked(side, part, metrics) for side, part in ((first, ours), (second, theirs)))
     shift = max(SHARE * (end - begin), FEWEST_STEPS * max(ours.interval, theirs.interval))
-    reference = Reference(ours.curves(), ours.units, shift, asked, ours.roles, ours.to_si)
+    reference = Reference(
+        ours.curves(), ours.units, shift, asked, ours.roles, ours.to_si, given=ours.values
+    )
     entries, singles = reference.entries(bands, _lacking(theirs.signals, ours.signals))
     curves = _converted(theirs, changes, reference.curves)
     values, again = single_values(theirs.by_role(), other), every_second(reference.curves)

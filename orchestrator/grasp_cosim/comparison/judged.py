@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -67,6 +68,8 @@ class Reference:
     shift: float
     asked: tuple[Metric, ...]
     roles: Mapping[str, str] = field(default_factory=dict)
+    given: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+    """The start values that the system sets."""
     to_si: Mapping[str, Conversion] = field(default_factory=dict)
     nominals: Mapping[str, float | None] = field(default_factory=dict)
 
@@ -140,7 +143,8 @@ class Reference:
             return {}
         time = next(iter(curves.values())).time
         columns = {n: c.values for n, c in curves.items()}
-        return single_values(Signals(time, columns, self.roles, self.to_si), self.asked)
+        signals = Signals(time, columns, self.roles, self.to_si, self.given)
+        return single_values(signals, self.asked)
 
 
 def single_values(signals: Signals, asked: Iterable[Metric]) -> dict[str, float | None]:

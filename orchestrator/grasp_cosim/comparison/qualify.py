@@ -177,7 +177,9 @@ def _reference(
     """The run of the original to compare with; more are conversions of signals that it lacks."""
     to_si = {n: c for n, c in more.items() if n not in run} | dict(run.to_si)
     shift, roles = _shift(swap.system), swap.system.roles
-    return Reference(curves_of(run), run.units, shift, asked, roles, to_si, swap.nominals)
+    return Reference(
+        curves_of(run), run.units, shift, asked, roles, to_si, swap.nominals, given=run.given
+    )
 
 
 def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:

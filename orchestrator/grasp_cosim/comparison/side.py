@@ -41,6 +41,8 @@ class Side:
     result: Result | None = None
     """The run; None of a log from elsewhere."""
     roles: Mapping[str, str] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+    """The start values that the system of the run sets."""
     groups: Sequence[str] = ()
     """The groups of metrics that the system of the run names."""
     silent: tuple[str, ...] = ()
@@ -64,7 +66,7 @@ class Side:
 
     def by_role(self) -> Signals:
         """The signals as metrics take them."""
-        return Signals(self.time, self.signals, self.roles, self.to_si)
+        return Signals(self.time, self.signals, self.roles, self.to_si, self.values)
 
     def like(self, other: Side) -> Side:
         """A log from elsewhere as one of the other's system: with its roles, its types where they
@@ -80,6 +82,7 @@ class Side:
             units={**self.units, **{name: other.units[name] for name in silent}},
             to_si={**self.to_si, **{n: c for n, c in other.to_si.items() if n in same}},
             roles=other.roles,
+            values=other.values,
             groups=other.groups,
             silent=tuple(n for n in self.signals if n in silent),
         )
@@ -130,7 +133,7 @@ def _run(name: str, result: Result) -> Side:
     texts = tuple(name for name in result if name not in result.numbers)
     return Side(
         name, result.time, result.numbers, result.units, result.to_si, texts, result,
-        result.roles, result.groups,
+        result.roles, result.given, result.groups,
     )  # fmt: skip
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import wraps
-from math import copysign
+from itertools import count, takewhile
+from math import copysign, hypot
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,18 +27,14 @@ ENTRIES = ("finger 1", "finger 2")
 CLOSING = {1: -1.0, 2: 1.0}
 """Direction in which a finger closes."""
 
+QUANTITIES: Mapping[str, str | None] = {
+    "position": "m", "velocity": "m/s", "gap": "m", "contact_force": "N", "contact": None,
+}  # fmt: skip
+"""The outputs of every plant on each of its fingers, and their units."""
+
 PLANT_OUTPUTS: Mapping[str, str | None] = {
-    f"plant.{name}[{j}]": unit
-    for name, unit in {
-        "position": "m",
-        "velocity": "m/s",
-        "gap": "m",
-        "contact_force": "N",
-        "contact": None,
-    }.items()
-    for j in FINGERS
+    f"plant.{name}[{j}]": unit for name, unit in QUANTITIES.items() for j in FINGERS
 }
-"""The outputs of every gripper plant on its fingers, and their units."""
 
 NEEDS: Mapping[str, str | None] = {"controller.target_position": "m", **PLANT_OUTPUTS}
 """The signals of a grasp, and their units."""
@@ -79,7 +76,7 @@ def of_fingers(
         @of_grasp(name, unit, entries=ENTRIES, **more)
         @wraps(function)
         def per_finger(signals: Signals) -> list[Value]:
-            return [function(signals, j) for j in FINGERS]
+            return [function(signals, j) for j in fingers_of(signals)]
 
         return function
 
@@ -105,9 +102,10 @@ def time_to_contact(signals: Signals, finger: int) -> float | None:
 
 @of_grasp("time_difference", "s")
 def time_difference(signals: Signals) -> float | None:
-    """Time between the first contacts of the two fingers; None where one never touches."""
-    first, second = (time_to_contact(signals, j) for j in FINGERS)
-    return None if first is None or second is None else abs(second - first)
+    """Time from the first finger's contact to the last one's; None where one never touches."""
+    contacts = [first_contact(signals, j) for j in fingers_of(signals)]
+    times = [contact.time for contact in contacts if contact]
+    return max(times) - min(times) if len(times) == len(contacts) else None
 
 
 def _of_free_fingers(name: str, label: str, words: str, pick: Callable[[Floats], Any]) -> None:
@@ -160,9 +158,12 @@ def steady_contact_force(signals: Signals, finger: int) -> float:
 
 @of_grasp("force_difference", "N")
 def force_difference(signals: Signals) -> float:
-    """Difference between the steady contact forces of the two fingers."""
-    first, second = (float(_last(signals, j).mean()) for j in FINGERS)
-    return abs(second - first)
+    """Largest difference between steady contact forces, of a hand each by the finger's weight."""
+    forces = [
+        float(_last(signals, j).mean()) / signals.given(f"controller.weight[{j}]", 1.0)
+        for j in fingers_of(signals)
+    ]
+    return max(forces) - min(forces)
 
 
 @of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%")
@@ -207,18 +208,18 @@ def target_position(signals: Signals) -> float:
 @of_grasp("object_shift", "m", needs=OBJECT_NEEDS)
 def object_shift(signals: Signals) -> float:
     """Largest displacement of the object, either way."""
-    position = signals["plant.object_position"]
-    return float(np.abs(position - position[0]).max())
+    return float(_displacement(signals).max())
 
 
 @of_grasp("object_drift", "m/s", needs=OBJECT_NEEDS)
 def object_drift(signals: Signals) -> float | None:
     """Mean speed of the object over the last STEADY_WINDOW, either way; None in a shorter run."""
-    time, position = signals.time, signals["plant.object_position"]
+    time = signals.time
     if time[-1] - time[0] < STEADY_WINDOW:
         return None
-    before = float(np.interp(time[-1] - STEADY_WINDOW, time, position))
-    return abs(float(position[-1]) - before) / STEADY_WINDOW
+    moment = time[-1] - STEADY_WINDOW
+    way = [float(x[-1]) - float(np.interp(moment, time, x)) for x in _centre(signals)]
+    return hypot(*way) / STEADY_WINDOW
 
 
 def _of_object(name: str, unit: str | None, output: str, label: str, description: str) -> None:
@@ -244,6 +245,30 @@ METRICS = tuple(_found)
 def is_grasp(signals: Signals) -> bool:
     """True if there are the signals of a gripper plant, its object and its controller."""
     return all(name in signals for name in OBJECT_NEEDS)
+
+
+def fingers_of(signals: Signals) -> tuple[int, ...]:
+    """The numbers of the plant's fingers, from 1 on."""
+    name = "plant.gap[{}]".format
+    return tuple(takewhile(lambda j: name(j) in signals, count(1)))
+
+
+def _closing(signals: Signals, finger: int) -> float:
+    """The sign of a velocity that closes: of a hand, whose fingers count as they open, negative."""
+    return -1.0 if "plant.object_position[1]" in signals else CLOSING[finger]
+
+
+def _centre(signals: Signals) -> list[Floats]:
+    """The coordinates of the object's centre: one, or of a hand two."""
+    if "plant.object_position" in signals:
+        return [signals["plant.object_position"]]
+    return [signals[f"plant.object_position[{i}]"] for i in (1, 2)]
+
+
+def _displacement(signals: Signals) -> Floats:
+    """How far the object is from where it was at the start, m."""
+    ways = [np.abs(x - x[0]) for x in _centre(signals)]
+    return ways[0] if len(ways) == 1 else np.asarray(np.hypot(*ways))
 
 
 def _force(signals: Signals, finger: int) -> Floats:
@@ -294,7 +319,7 @@ def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
         return None
     row = int(touching[0])
     k = max(row - 1, 0)
-    own = float(CLOSING[finger] * signals[f"plant.velocity[{finger}]"][k])
+    own = float(_closing(signals, finger) * signals[f"plant.velocity[{finger}]"][k])
     speed = own - _surface_speed(signals, finger, k)
     gap = max(float(signals[f"plant.gap[{finger}]"][k]), 0.0)
     span = float(time[row] - time[k])
@@ -310,7 +335,7 @@ def _surface_speed(signals: Signals, finger: int, k: int) -> float:
     """
     changed = np.zeros(k + 1, bool)  # the rows with other outputs of the plant than before
     changed[0] = True
-    for name in PLANT_OUTPUTS:
+    for name in (f"plant.{q}[{j}]" for q in QUANTITIES for j in fingers_of(signals)):
         changed[1:] |= np.diff(signals[name][: k + 1]) != 0
     given = np.flatnonzero(changed)
     if len(given) < 2:
@@ -319,7 +344,7 @@ def _surface_speed(signals: Signals, finger: int, k: int) -> float:
     last = k - (k - int(given[-1])) % own  # it may have stepped since, and nothing moved
     rows = [last - own, last]
     gap = signals[f"plant.gap[{finger}]"][rows]
-    surface = CLOSING[finger] * signals[f"plant.position[{finger}]"][rows] + gap
+    surface = _closing(signals, finger) * signals[f"plant.position[{finger}]"][rows] + gap
     return float((surface[1] - surface[0]) / (signals.time[last] - signals.time[last - own]))
 
 

@@ -294,7 +294,10 @@ class Session:
         if self._whole is None or self._whole.lost:
             return None
         time, columns = self._whole.columns()
-        signals = Signals(time, columns, self.system.roles, self._in_si.conversions)
+        components = self.system.components
+        values = {f"{c.name}.{name}": value for c in components for name, value in c.values.items()}
+        to_si = self._in_si.conversions
+        signals = Signals(time, columns, self.system.roles, to_si, values)
         return Known(measure(signals, self._asked), proxy_figures(time, columns))
 
     def _tell(self, log: Sequence[str]) -> None:

@@ -49,6 +49,13 @@ RESERVED = frozenset((
 """Names beside metrics in run.json and in the table of a sweep."""
 
 
+ALL = "[*]"
+"""Ends the name of an array of which a metric takes all elements."""
+
+MANY = 1000
+"""More elements than a metric takes."""
+
+
 class MissingSignalError(KeyError):
     """A signal that a metric needs was not recorded; its text says which and why."""
 
@@ -63,13 +70,15 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
     `time` in s and every signal have the shape (rows,). They come in SI base units, by_name has
     them as recorded. `roles` maps a role to the component that plays it; a component of a role's
     name plays it where `roles` does not say otherwise. `to_si` are the conversions of those that
-    are not recorded in SI.
+    are not recorded in SI. `start_values` are those that the system sets, by names like
+    plant.angle[1], in the units of their components.
     """
 
     time: npt.NDArray[np.float64]
     by_name: Mapping[str, npt.NDArray[Any]]
     roles: Mapping[str, str] = field(default_factory=dict)
     to_si: Mapping[str, Conversion] = field(default_factory=dict)
+    start_values: Mapping[str, Any] = field(default_factory=dict)
     worked_out: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
     """What one metric leaves for the next, by keys of their own; signals in SI units by name."""
 
@@ -85,6 +94,10 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
             self.worked_out[own] = self.to_si[own](self.by_name[own])
         converted: npt.NDArray[Any] = self.worked_out[own]
         return converted
+
+    def given(self, name: str, otherwise: float) -> float:
+        """The number that a parameter was set to by the system, else the one given."""
+        return float(self.start_values.get(resolved(name, self.roles), otherwise))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.by_name)
@@ -103,6 +116,8 @@ class Metric:
     `unit` is that of the value ("1" for a share, None for true or false); in tables the value is
     shown times `factor` in `shown_unit`. `entries` name its values where it has several, like
     ("finger 1", "finger 2").
+    A name with [*] stands for all elements that there are of an array, like plant.gap[*], of which
+    there must be one; an entry with * is then one for each, like "finger *".
     `needs` are the signals without which there is no value; a mapping gives the SI unit in which
     each is expected as well, or None, so that a signal of another quantity, or in a unit that is in
     doubt, is refused before a run. Metrics of one `group` are there
@@ -156,6 +171,27 @@ class Metric:
         place = self.columns.index(column)
         return f"{self.title}, {self.entries[place]}" if self.entries else self.title
 
+    def of(self, names: Collection[str], roles: Mapping[str, str]) -> Metric:
+        """The metric of so many elements as there are of its arrays in signals of these `names`."""
+        arrays = [need for need in self.needs if need.endswith(ALL)]
+        if not arrays:
+            return self
+        count = next(j for j in range(1, MANY) if _element(arrays[0], j, roles) not in names) - 1
+        return self.with_elements(max(1, count))
+
+    def with_elements(self, count: int) -> Metric:
+        """The metric of arrays of so many elements."""
+
+        def each(text: str) -> list[str]:
+            there = range(1, count + 1) if "*" in text else (1,)
+            return [text.replace("*", str(j)) for j in there]
+
+        needs: Collection[str] = [name for need in self.needs for name in each(need)]
+        if self.expects:
+            needs = {name: unit for need, unit in self.expects.items() for name in each(need)}
+        entries = tuple(entry for several in self.entries for entry in each(several))
+        return replace(self, needs=needs, entries=entries)
+
     def __call__(self, signals: Signals) -> Value | Sequence[Value]:
         """Return what its function does, so that other functions can call it."""
         return self.function(signals)
@@ -164,17 +200,19 @@ class Metric:
         """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
             return _from_text, (*self.origin, self.name)
-        if self.group in groups() and any(self is m for m in metrics_of([self.group])):
-            return _of_group, (self.group, self.name)
+        of_group = metrics_of([self.group]) if self.group in groups() else ()
+        if any(self.function is m.function for m in of_group):
+            return _of_group, (self.group, self.name, len(self.entries))
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
             return resolve_name, (f"{module}:{name}",)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-def _of_group(group: str, name: str) -> Metric:
-    """The metric of that name of a group of ours, in another process."""
-    return next(m for m in metrics_of([group]) if m.name == name)
+def _of_group(group: str, name: str, count: int) -> Metric:
+    """The metric of that name of a group of ours, with so many entries, in another process."""
+    found = next(m for m in metrics_of([group]) if m.name == name)
+    return found if len(found.entries) == count else found.with_elements(count)
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
@@ -339,7 +377,7 @@ def available(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> tuple[list[Metric], list[str]]:
     """The metrics that signals of these `names` permit, and a line for each reason against one."""
-    metrics = tuple(metrics)
+    metrics = _sized(metrics, names, roles)
     distinct = {id(m.needs): m.needs for m in metrics}  # those of a group share theirs
     lacks = {key: lacking(needs, names, roles) for key, needs in distinct.items()}
     reasons = [(m, lacks[id(m.needs)]) for m in metrics]
@@ -351,6 +389,18 @@ def available(
             whole = m.group and m.group not in in_part
             missing.setdefault(f"metrics of the {m.group}" if whole else m.name, reason)
     return there, [f"no {what}: {reason}" for what, reason in missing.items()]
+
+
+def _sized(
+    metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
+) -> tuple[Metric, ...]:
+    """The metrics with so many elements as there are; those that share their needs still do."""
+    shared: dict[int, Collection[str]] = {}
+    sized = [(m, m.of(names, roles)) for m in metrics]
+    return tuple(
+        m if m is was else replace(m, needs=shared.setdefault(id(was.needs), m.needs))
+        for was, m in sized
+    )
 
 
 def needed(
@@ -368,7 +418,7 @@ def needed(
 
 def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> str | None:
     """Why signals of these `names` do not have all that is needed; None where they do."""
-    needs = tuple(needs)
+    needs = tuple(need.replace(ALL, "[1]") for need in needs)
     for need in needs:
         if resolved(need, roles) in names:
             continue
@@ -385,6 +435,10 @@ def resolved(name: str, roles: Mapping[str, str]) -> str:
     """The name of a signal whose first part may be a role."""
     role, dot, variable = name.partition(".")
     return f"{roles.get(role, role)}{dot}{variable}"
+
+
+def _element(array: str, j: int, roles: Mapping[str, str]) -> str:
+    return resolved(array.replace("*", str(j)), roles)
 
 
 def _plays(component: str, names: Iterable[str]) -> bool:

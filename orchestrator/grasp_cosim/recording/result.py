@@ -148,10 +148,19 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         groups: Sequence[str] = self.settings.get("metrics", ())
         return groups
 
+    @property
+    def given(self) -> dict[str, Any]:
+        """The start values that the system sets, by names like plant.object_width."""
+        return {
+            f"{name}.{variable}": value
+            for name, component in self.settings["components"].items()
+            for variable, value in component["values"].items()
+        }
+
     @cached_property
     def by_role(self) -> Signals:
         """The signals as metrics take them: names may begin with a role, values are in SI units."""
-        return Signals(self.time, self.signals, self.roles, self.to_si)
+        return Signals(self.time, self.signals, self.roles, self.to_si, self.given)
 
     @cached_property
     def measured(self) -> Measured:
