@@ -101,7 +101,7 @@ class Expressions:
     def simple(self, value: Value, name: str = "value") -> Value:
         """The value where it may stand several times: what is more than a name gets a variable."""
         if value.items is not None and isinstance(value.type, Tuple):
-            return value._replace(items=tuple(self.simple(i, name) for i in value.items))
+            return self.display([self.simple(item, name) for item in value.items], value.type)
         if isinstance(value.type, Group) or _PATH.fullmatch(value.text):
             return value
         return self.copied(value, name)
