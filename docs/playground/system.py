@@ -16,7 +16,7 @@ PLANTS = {
 }
 """The plants to choose from, by what the object does."""
 
-LAWS = {name: fmu.removesuffix(".fmu") for name, fmu in CONTROLLERS.items()}
+LAWS = {name: f"GraspController{law}" for name, law in CONTROLLERS.items()}
 
 MODELS = (*PLANTS.values(), "ProximitySensor", *LAWS.values())
 """The FMUs that are in play.wasm, in the order of its kinds."""

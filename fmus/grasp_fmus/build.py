@@ -11,6 +11,7 @@ import atexit
 import functools
 import logging
 import os
+import re
 import shutil
 import sys
 import threading
@@ -138,7 +139,9 @@ def build_chosen(
     """
     if fingers is not None:
         names = of_fingers(fingers)
-        return build_native(out, plan, names) if plan else _brought(out, shipped_fmus(fingers))
+        return (
+            build_native(out, plan, names) if plan else _brought(out, shipped_fmus(fingers), names)
+        )
     if block is None:
         return build_native(out, plan) if plan else build(out)
     if plan and names_ours(block):
@@ -297,10 +300,15 @@ def _forget_old(folder: Path) -> None:
             shutil.rmtree(old)
 
 
-def _brought(out: Path, made: Path) -> list[Built]:
-    """Bring the folder `out` up to date with one that was made; return its FMUs."""
+def _brought(out: Path, made: Path, names: Sequence[str] = ()) -> list[Built]:
+    """Bring the folder `out` up to date with one that was made; return its FMUs.
+
+    With `names` those of these names alone.
+    """
     built = []
     for file in sorted(made.iterdir()):
+        if names and not re.fullmatch(rf"({'|'.join(names)})[._].*", file.name):
+            continue
         brought = write_built(out / file.name, file.read_bytes())
         built += [brought] if file.suffix == ".fmu" else []
     return built
@@ -346,10 +354,10 @@ def _write_checks(folder: Path, name: str, block: Any) -> None:
 def shipped_fmus(fingers: int | None = None) -> Path:
     """The folder of the FMUs of the blocks that come with the package, built if need be.
 
-    With `fingers` these are the FMUs of a hand that has so many. Threads and processes may ask at
-    the same time. ValueError for a number of fingers that there is not.
+    With `fingers` those of a hand that has so many are beside them. Threads and processes may ask
+    at the same time. ValueError for a number of fingers that there is not.
     """
-    names = of_fingers(fingers) if fingers is not None else [*SHIPPED]
+    names = [*SHIPPED, *(of_fingers(fingers) if fingers is not None else ())]
     return _kept(partial(_build_python, names), "python", *names)
 
 

@@ -79,8 +79,7 @@ class Params:
     initial_object_angle: Annotated[
         float,
         Parameter(
-            "theta, turn of a prism at the start, counter-clockwise; its faces are square to the "
-            "rays at 0",
+            "theta, turn of a prism at the start; at 0 its faces are square to the rays",
             unit="rad",
             low=-1.0,
             high=1.0,

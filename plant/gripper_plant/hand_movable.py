@@ -26,6 +26,9 @@ from .movable import ITERATIONS
 
 LONGEST_STEP = own.LONGEST_STEP
 
+SHALLOW = 1e-3
+"""m; a finger that comes through a face is not deeper when it is first seen below it."""
+
 if TYPE_CHECKING:
     Normals = tuple[Normal, ...]
 else:
@@ -124,14 +127,14 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     The gap of a finger that touches is zero.
     """
     pose, rays = x.body.pose, p.rays
-    normals = _normals(p, rays, x, pose)
+    normals = _normals(p, rays, x)
     begins = tuple(hand_object.surface(p.shape, p.object_radius, ray, pose) for ray in rays)
     gaps = tuple(
         0.0 if at.depth >= 0.0 else FAR if at.depth <= -FAR else min(FAR, max(0.0, s - begin))
         for at, s, begin in zip(normals, x.position, begins, strict=True)
     )
     forces = tuple(
-        f * (at.x * ray.x + at.y * ray.y)
+        0.0 + f * (at.x * ray.x + at.y * ray.y)
         for f, at, ray in zip(x.normal_force, normals, rays, strict=True)
     )
     return Outputs(
@@ -145,16 +148,27 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     )
 
 
-def _normals(p: Params, rays: Rays, x: State, pose: Pose) -> Normals:
+def _normals(p: Params, rays: Rays, x: State) -> Normals:
+    """The normals at the fingertips; a finger that is inside without having come through a face,
+    around an edge, touches nothing.
+    """
+    raw = _raw_normals(p, rays, x)
     return tuple(
-        hand_object.normal(p.shape, p.object_radius, p.face_length, ray, pose, s)
+        Normal(at.x, at.y, -FAR) if at.depth > SHALLOW and f <= 0.0 else at
+        for at, f in zip(raw, x.normal_force, strict=True)
+    )
+
+
+def _raw_normals(p: Params, rays: Rays, x: State) -> Normals:
+    return tuple(
+        hand_object.normal(p.shape, p.object_radius, p.face_length, ray, x.body.pose, s)
         for ray, s in zip(rays, x.position, strict=True)
     )
 
 
 def _substep(p: Params, rays: Rays, x: State, u: Each, d: float) -> State:
     """D seconds with the normal forces held along today's normals, found by iteration."""
-    normals = _normals(p, rays, x, x.body.pose)
+    normals = _normals(p, rays, x)
     along = tuple(at.x * ray.x + at.y * ray.y for at, ray in zip(normals, rays, strict=True))
     forces, body, moved = x.normal_force, x.body, x
     for _ in range(ITERATIONS):
@@ -166,9 +180,9 @@ def _substep(p: Params, rays: Rays, x: State, u: Each, d: float) -> State:
             )
         )
         moved = State(tuple(s for s, _ in fingers), tuple(v for _, v in fingers), forces, body)
-        after = _normals(p, rays, moved, body.pose)
+        after = _raw_normals(p, rays, moved)
         found = tuple(
-            contact_laws.mean_force(p.law, at.depth, then.depth, d)
+            0.0 if at.depth <= -FAR else contact_laws.mean_force(p.law, at.depth, then.depth, d)
             for at, then in zip(normals, after, strict=True)
         )
         if all(contact_laws.settled(new, old) for new, old in zip(found, forces, strict=True)):
@@ -216,7 +230,7 @@ def _rate(p: Params, rays: Rays, x: State, u: Inputs, h: float) -> float:
     """
     body, pose = x.body, x.body.pose
     speed = sqrt(body.x_dot * body.x_dot + body.y_dot * body.y_dot)
-    normals = _normals(p, rays, x, pose)
+    normals = _normals(p, rays, x)
     deepest, even, odd, turned = -inf, 0.0, 0.0, 0.0
     for ray, at, s, v, m, f in zip(
         rays, normals, x.position, x.velocity, p.finger_mass, u.force, strict=True
