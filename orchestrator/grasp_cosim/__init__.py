@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .grasp.identification.identification import identify
     from .grasp.published.evaluation import evaluate
     from .grasp.system import grasp_system
+    from .hand.system import hand_system
     from .inspection.inspection import inspect_fmu
     from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
@@ -48,6 +49,7 @@ __all__ = [
     "compare",
     "evaluate",
     "grasp_system",
+    "hand_system",
     "identify",
     "inspect_fmu",
     "load_run",
@@ -68,6 +70,7 @@ _HOMES = {
     "compare": "comparison.compare",
     "evaluate": "grasp.published.evaluation",
     "grasp_system": "grasp.system",
+    "hand_system": "hand.system",
     "identify": "grasp.identification.identification",
     "inspect_fmu": "inspection.inspection",
     "load_run": "recording.load",

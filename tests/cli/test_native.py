@@ -16,6 +16,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus import build as builds
 from grasp_fmus.build import Plan, build_block, planned, shipped_twins
 from grasp_fmus.native.targets import here
+from grasp_fmus.shipped import together
 from support.both_engines import needs_compiler
 from support.slow import slow
 
@@ -222,7 +223,7 @@ def test_a_full_disk_is_one_line_that_names_the_file(
 def test_what_is_kept_runs_where_nothing_can_be_written(
     command: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shipped_twins()
+    shipped_twins(together("GripperPlant"))
     shipped_twins.cache_clear()
     monkeypatch.setattr(cache, "writable", lambda _: None)
     assert command("run", *SHORT, "--native")[::2] == (0, "")
@@ -285,7 +286,7 @@ def test_one_that_is_native_already_is_no_exception(command: Run, tmp_path: Path
     twin = build_block(SPRING, tmp_path, planned()).path
     assert command("run", "--swap", f"plant={twin}", *SHORT, "--native")[::2] == (0, "")
     system = tmp_path / "native.toml"
-    text, kept = SYSTEM.read_text("utf-8"), shipped_twins()
+    text, kept = SYSTEM.read_text("utf-8"), shipped_twins(together("GripperPlant"))
     system.write_text(text.replace('fmu = "', f'fmu = "{kept}/'), "utf-8")
     for option in ("--native", "--python"):
         assert command("run", system, *SHORT, option)[::2] == (0, "")

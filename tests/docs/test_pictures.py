@@ -43,7 +43,7 @@ def test_each_picture_is_shown_somewhere() -> None:
 
 
 def test_a_name_that_is_none(pictures: Any) -> None:
-    with pytest.raises(SystemExit, match=r"^hnad: must be of hand, loop, evaluation, "):
+    with pytest.raises(SystemExit, match=r"^hnad: must be of hand, three, loop, evaluation, "):
         pictures.main("hand", "hnad")
 
 

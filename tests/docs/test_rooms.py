@@ -31,4 +31,4 @@ def test_the_map_has_all_rooms_on_a_page() -> None:
 
 
 def test_a_group_of_metrics_is_a_room_with_metrics_and_a_view() -> None:
-    assert groups() == ("grasp",)
+    assert groups() == ("grasp", "hand")

@@ -67,6 +67,12 @@ def found(root: Element) -> dict[str, dict[str, str]]:
 SHOWN = {"m": "mm", "m/s": "mm/s", "V": "mV"}
 TYPES: dict[type[Any], str] = {float: "Real", bool: "Boolean", int: "Integer"}
 PLACE = ["initial_position[1]", "initial_position[2]", "object_width", "initial_object_position"]
+WEIGHTS = [f"weight[{k}]" for k in (1, 2, 3)]
+AROUND = [
+    *(f"{name}[{k}]" for name in ("angle", "initial_position", "half_width") for k in (1, 2, 3)),
+    *("shape", "object_radius", "initial_object_position[1]", "initial_object_position[2]"),
+    "initial_object_angle",
+]
 FIXED = {
     "GripperPlant": PLACE,
     "GripperPlantCompliant": PLACE,
@@ -78,6 +84,10 @@ FIXED = {
     ],
     "GraspController": [],
     "GraspControllerAdaptive": ["reflectance.diffusion_exponent"],
+    "HandController": WEIGHTS,
+    "HandControllerAdaptive": [*WEIGHTS, "reflectance.diffusion_exponent"],
+    "HandPlant": AROUND,
+    "HandPlantMovable": [*AROUND, "face_length"],
 }
 """Start values, geometry, and what the state was made with; the cards say why of each."""
 
@@ -332,6 +342,10 @@ SWITCHES: dict[str, list[dict[str, bool]]] = {
     "GripperPlant": [{}],
     "GripperPlantCompliant": [{"hunt_crossley.enabled": on} for on in (False, True)],
     "GripperPlantMovable": [{"hunt_crossley.enabled": on} for on in (False, True)],
+    "HandController": LAYERS,
+    "HandControllerAdaptive": LAYERS,
+    "HandPlant": [{}],
+    "HandPlantMovable": [{"hunt_crossley.enabled": on} for on in (False, True)],
     "ProximitySensor": [
         {"pattern.enabled": a, "median.enabled": c, **dict.fromkeys(ELECTRONICS, b)}
         for a, b, c in ((False, False, False), (True, False, False), (True, True, False))

@@ -23,6 +23,10 @@ CLOSED = {
     "force[1]": -1.0,
     "force[2]": 1.2,
 }
+HELD = {
+    **{f"initial_position[{k}]": 0.0355 for k in (1, 2, 3)},
+    **{f"force[{k}]": -1.0 - 0.1 * k for k in (1, 2, 3)},
+}
 NEAR = {"position[1]": 0.09, "velocity[1]": -0.1, "intensity[1]": 0.1}
 STARTS: dict[str, dict[str, float]] = {
     "GripperPlant": CLOSED,
@@ -31,6 +35,10 @@ STARTS: dict[str, dict[str, float]] = {
     "ProximitySensor": {
         f"{stage}.enabled": True for stage in ("ambient", "noise", "adc", "filter", "median")
     },
+    "HandPlant": HELD,
+    "HandPlantMovable": HELD,
+    "HandController": NEAR,
+    "HandControllerAdaptive": NEAR,
     "GraspController": NEAR,
     "GraspControllerAdaptive": NEAR,
 }

@@ -21,7 +21,7 @@ def without(fmus: Path, tmp_path: Path, entry: str) -> System:
     ("entry", "said"),
     [
         ('metrics = ["grasps"]', "system.toml: metrics: no group 'grasps'; did you mean grasp?"),
-        ('metrics = ["hand"]', "system.toml: metrics: no group 'hand'; valid: grasp"),
+        ('metrics = ["foot"]', "system.toml: metrics: no group 'foot'; valid: grasp, hand"),
         ('metrics = "grasp"', "system.toml: metrics = 'grasp': must be a list of groups, like [\""),
         ("metrics = [1]", "system.toml: metrics = 1: must be the name of a group of metrics"),
     ],

@@ -1,5 +1,6 @@
 """The controllers that come with the package, by the names of their laws."""
 
+import re
 from collections.abc import Collection
 
 from grasp_fmus.build import shipped_fmus
@@ -9,11 +10,12 @@ from ..base.errors import InputError
 from ..metrics.metric import resolved
 from ..system.description import System
 
-CONTROLLERS = {
-    "published": "GraspController.fmu",
-    "adaptive": "GraspControllerAdaptive.fmu",
-}
-"""The published law, and the one that learns how the reflectances of the two faces differ."""
+CONTROLLERS = {"published": "", "adaptive": "Adaptive"}
+"""The published law, and the one that learns how the reflectances of the faces differ; what the
+names of their FMUs have behind GraspController, or HandController.
+"""
+
+_FMU = re.compile(r"(Grasp|Hand)Controller(?:Adaptive)?(\d?)")
 
 
 def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> System:
@@ -32,8 +34,12 @@ def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> 
         )
     if name in swapped:
         raise InputError(f"{place}: cannot be used with another FMU for {name}")
-    beside = system.component(name, place).fmu.with_name(CONTROLLERS[law])
-    fmu = beside if beside.is_file() else shipped_fmus() / CONTROLLERS[law]
+    now = system.component(name, place)
+    ours = _FMU.fullmatch(now.interface.identifier)
+    of, fingers = ours.groups() if ours else ("Grasp", "")
+    file = f"{of}Controller{CONTROLLERS[law]}{fingers}.fmu"
+    beside = now.fmu.with_name(file)
+    fmu = beside if beside.is_file() else shipped_fmus(int(fingers) if fingers else None) / file
     return system.with_settings({f"components.{name}.fmu": fmu}, lambda _: place)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from si_units import known_unit
@@ -15,7 +16,7 @@ from si_units import known_unit
 from ..metrics.metric import resolved
 from ..recording.result import Result
 from ..report.page import Scene, Zoom
-from .metrics import FINGERS, first_contact, is_grasp
+from .metrics import FINGERS, fingers_of, first_contact, is_grasp
 
 BEFORE, AFTER = 0.005, 0.03
 """s around a contact that a button zooms to."""
@@ -36,29 +37,36 @@ def grasp_scene(result: Result) -> Scene | None:
     """Return the scene of a result; None where it is no grasp."""
     if not is_grasp(result.by_role):
         return None
-    named = _signals(result)
-    contacts = _contacts(result)
     target = resolved("controller.target_position", result.roles)
-    used = [name for by_finger in named.values() for name in by_finger.values()]
+    made = scene_of_fingers(result, "Grasp", [target], {"target": target})
+    return replace(made, negated=[made.state["contact_force"][2]])
+
+
+def scene_of_fingers(
+    result: Result, title: str, more: Sequence[str], state: Mapping[str, Any]
+) -> Scene:
+    """Return the scene of fingers around an object, with `more` signals and `state` of its own."""
+    named, fingers = _signals(result), fingers_of(result.by_role)
+    contacts = _contacts(result)
+    used = [*(name for by_finger in named.values() for name in by_finger.values()), *more]
     shown = [
-        named[quantity][j] for quantity in ("gap", "contact_force", "velocity") for j in FINGERS
+        named[quantity][j] for quantity in ("gap", "contact_force", "velocity") for j in fingers
     ]
     return Scene(
-        title="Grasp",
+        title=title,
         html=_html(named, contacts),
         style=scene_style(),
         scripts=scene_script(),
         state={
             **named,
-            "target": target,
-            "signals": [*used, target],
-            "toSi": {n: c._asdict() for n in (*used, target) if (c := result.to_si.get(n))},
+            **state,
+            "signals": used,
+            "toSi": {n: c._asdict() for n in used if (c := result.to_si.get(n))},
             "contacts": contacts,
         },
-        shown=[*shown, target],
-        colors=_of_fingers(result, {"1": "--finger1", "2": "--finger2"}),
-        dashes=_of_fingers(result, {"1": 0, "2": 1}),
-        negated=[named["contact_force"][2]],
+        shown=[*shown, *more],
+        colors=_of_fingers(result, {str(j): f"--finger{j}" for j in fingers}),
+        dashes=_of_fingers(result, {str(j): j - 1 for j in fingers}),
         marks=[(c["t"], f"--finger{c['finger']}") for c in contacts],
         zooms=_zooms(contacts),
     )
@@ -81,8 +89,9 @@ def _text(name: str) -> str:
 def _signals(result: Result) -> dict[str, dict[int, str]]:
     """The signals that the animation is drawn from, by quantity and finger."""
     quantities = ("position", "gap", "velocity", "contact_force", "contact")
+    fingers = fingers_of(result.by_role)
     return {
-        **{q: {j: resolved(f"plant.{q}[{j}]", result.roles) for j in FINGERS} for q in quantities},
+        **{q: {j: resolved(f"plant.{q}[{j}]", result.roles) for j in fingers} for q in quantities},
         "actuator": _actuators(result),
     }
 
@@ -90,7 +99,8 @@ def _signals(result: Result) -> dict[str, dict[int, str]]:
 def _actuators(result: Result) -> dict[int, str]:
     """The recorded signal that is the force on each finger as it is, where there is one."""
     newton = known_unit("N")
-    forces = {resolved(f"plant.force[{j}]", result.roles): j for j in FINGERS}
+    fingers = fingers_of(result.by_role)
+    forces = {resolved(f"plant.force[{j}]", result.roles): j for j in fingers}
     return {
         forces[c["to"]]: c["from"]
         for c in result.settings["connections"]
@@ -110,7 +120,7 @@ def _contacts(result: Result) -> list[Contact]:
     The first one of each finger is that of the metrics, later ones are the samples themselves.
     """
     found = []
-    for j in FINGERS:
+    for j in fingers_of(result.by_role):
         touching = np.asarray(result.by_role[f"plant.contact[{j}]"]).astype(bool)
         begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
         first = first_contact(result.by_role, j)
@@ -121,20 +131,22 @@ def _contacts(result: Result) -> list[Contact]:
 
 
 def _firsts(contacts: Sequence[Contact]) -> dict[int, float]:
-    return {j: c["t"] for j in FINGERS for c in contacts[::-1] if c["finger"] == j}
+    fingers = sorted({int(c["finger"]) for c in contacts})
+    return {j: c["t"] for j in fingers for c in contacts[::-1] if c["finger"] == j}
 
 
 def _of_fingers(result: Result, each: Mapping[str, Look]) -> dict[str, Look]:
     """What there is for each finger, for signals of it: those of an element [1], of a sensor_1."""
-    found = {name: re.search(r"(?:\[([12])\]|_([12])\..*)$", name) for name in result.signals}
-    return {name: each[m[1] or m[2]] for name, m in found.items() if m}
+    found = {name: re.search(r"(?:\[(\d)\]|_(\d)\..*)$", name) for name in result.signals}
+    return {name: each[j] for name, m in found.items() if m and (j := m[1] or m[2]) in each}
 
 
 def _zooms(contacts: Sequence[Contact]) -> list[Zoom]:
     firsts = _firsts(contacts)
     spans = [(f"Contact of finger {j}", t, t, f"f{j}") for j, t in firsts.items()]
     if len(firsts) > 1:
-        spans.append(("Both contacts", min(firsts.values()), max(firsts.values()), ""))
+        both = "Both" if len(firsts) == len(FINGERS) else "All"
+        spans.append((f"{both} contacts", min(firsts.values()), max(firsts.values()), ""))
     return [Zoom(text, a - BEFORE, b + AFTER, kind) for text, a, b, kind in spans]
 
 
@@ -150,7 +162,7 @@ def _html(named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -
         f'<tr><td><span class="key{j}">finger {j}</span></td>'
         + "".join(_cell(head, named[quantity].get(j)) for quantity, head in shown.items())
         + "</tr>"
-        for j in FINGERS
+        for j in named["gap"]
     ]
     heads = "".join(f'<th class="n">{head}</th>' for head in shown.values())
     rows_html = "\n".join(rows)

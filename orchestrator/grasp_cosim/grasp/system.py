@@ -27,12 +27,17 @@ def as_named() -> System:
     return System.load(SYSTEM, shipped_fmus())
 
 
-def built(folder: Path) -> Path:
-    """Where the FMUs are below a folder, built first where they are missing or out of date."""
-    from grasp_fmus.build import build
+def built(folder: Path, fingers: int | None = None) -> Path:
+    """Where the FMUs are below a folder, built first where they are missing or out of date.
+
+    With `fingers` those of a hand that has so many are among them.
+    """
+    from grasp_fmus.build import build, build_chosen
 
     try:
         build(folder / FMU_FOLDER)
+        if fingers is not None:
+            build_chosen(None, folder / FMU_FOLDER, fingers=fingers)
     except OSError as error:
         where = f"below {folder}" if folder != Path() else "below the current folder"
         raise InputError(

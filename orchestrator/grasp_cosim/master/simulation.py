@@ -20,7 +20,16 @@ from ..exchange.listener import Listener
 from ..fmi.make_instance import load
 from ..interface.interface import Value
 from ..metrics.in_si import in_si
-from ..metrics.metric import Function, Metric, Signals, chosen, measure, metrics_of, needed
+from ..metrics.metric import (
+    Function,
+    Metric,
+    Signals,
+    check_groups,
+    chosen,
+    measure,
+    metrics_of,
+    needed,
+)
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.memory import EveryRow, MemoryListener
@@ -76,6 +85,7 @@ class Session:
         recorded = {str(port) for port in system.recorded}
         self._metrics = chosen(metrics, system.metrics, recorded, system.roles)
         self._asked = metrics_of(system.metrics, self._metrics)
+        check_groups(system)
         self._in_si = in_si(system, self._asked)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every, bool(realtime))

@@ -289,6 +289,15 @@ def metrics_of(names: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metri
     return tuple(found.values())
 
 
+def check_groups(system: Any) -> None:
+    """InputError where a group of ours has something against the values of a System that names it.
+
+    It says so in a function check() of its metrics.py, if it has one.
+    """
+    for group in system.metrics:
+        getattr(higher(f"{group}.metrics"), "check", lambda _: None)(system)
+
+
 def chosen(
     wanted: Iterable[Metric | Function | str],
     of_groups: Iterable[str],

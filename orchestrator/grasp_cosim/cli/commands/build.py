@@ -29,6 +29,9 @@ FIRST = "; zig makes its libraries first, once, which takes a minute or two"
 )
 @click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of native FMUs. Default: 2")
 @click.option(
+    "--fingers", type=int, help="Build those of a hand with so many fingers alone, from 2 to 8."
+)
+@click.option(
     "--c-only",
     type=PATH,
     metavar="DIR",
@@ -41,15 +44,17 @@ def build(
     native: bool,
     target: str | None,
     fmi: str | None,
+    fingers: int | None,
     c_only: Path | None,
     as_json: bool,
 ) -> int:
     """Build the FMUs, in Python or as C.
 
-    These are the plants, GripperPlant*, ProximitySensor, and the GraspController*. With BLOCK, a
-    Python file, the FMU of that block alone is built: spring_plant.py becomes SpringPlant.fmu
-    (docs/your_plant.md). With --native, which translates the blocks to C and compiles them, BLOCK
-    may also be the name of one of ours.
+    These are the plants, GripperPlant* and HandPlant*, ProximitySensor, GraspController* and
+    HandController*; the hand has three fingers, with --fingers as many as that, and the FMUs have
+    the number in their names. With BLOCK, a Python file, the FMU of that block alone is built:
+    spring_plant.py becomes SpringPlant.fmu (docs/your_plant.md). With --native, which translates
+    the blocks to C and compiles them, BLOCK may also be the name of one of ours.
 
     It prints whether each file is new, changed or unchanged. Where pythonfmu has no binary for this
     machine, native FMUs are built beside them, too.
@@ -72,11 +77,13 @@ def build(
     notes: list[str] = []
     try:
         if c_only:
-            if target or fmi or out:
-                raise ValueError("--c-only cannot be used with --target, --fmi or --out")
+            if target or fmi or out or fingers:
+                raise ValueError("--c-only cannot be used with --target, --fmi, --fingers or --out")
             files = [str(path) for path in write_c_only(block, c_only)]
             show(as_json, {"files": files}, "\n".join(f"{file}: written" for file in files))
             return 0
+        if fingers is not None and block:
+            raise ValueError(f"--fingers {fingers} cannot be used with {block}")
         plan, what = None, str(block or "the FMUs")
         if native:
             named = targets(target.split(",")) if target is not None else ()
@@ -84,9 +91,9 @@ def build(
             notes += [plan.note] if plan.note else []
             what = f"for {', '.join(t.tuple for t in plan.places)}"
         with waiting(f"building {what}{FIRST if target else ''}"):
-            built = build_chosen(block, folder, plan)
+            built = build_chosen(block, folder, plan, fingers)
             if not native and (obstacle := of_binary(describe(built[0].path))):
-                built += build_chosen(block, folder.parent / NATIVE_FOLDER.name, planned())
+                built += build_chosen(block, folder.parent / NATIVE_FOLDER.name, planned(), fingers)
                 notes.append(f"built native FMUs, too: {built[0].path} {obstacle.what}")
     except ValueError as error:
         raise InputError(f"build: {error}") from error

@@ -41,12 +41,18 @@ MOST = 24
 @click.option(
     "--fmu", "fmus", multiple=True, metavar="NAME=FMU", help="Make a system of these FMUs alone."
 )
+@click.option(
+    "--fingers", type=int, help="Make a system of a hand with so many fingers, from 2 to 8."
+)
+@click.option("--angles", metavar="A,B,...", help="The directions of a hand's fingers in degrees.")
 @click.option("--force", is_flag=True, help="Replace a file that is there already.")
 @json_option
 def init(
     file: Path,
     candidates: tuple[str, ...],
     fmus: tuple[str, ...],
+    fingers: int | None,
+    angles: str | None,
     force: bool,
     as_json: bool,
 ) -> int:
@@ -58,18 +64,24 @@ def init(
     \b
     Example: grasp-cosim init my_system.toml --as plant=vendor.fmu
     An FMU alone: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
+    A hand: grasp-cosim init hand.toml --fingers 3 --angles 0,90,225
     """
     _check_file(file, force)
     foreign = _paired("--as", candidates)
     own = _paired("--fmu", fmus)
     if own and foreign:
         raise InputError("--fmu cannot be used with --as")
+    hand = fingers is not None or angles is not None
+    if hand and (own or foreign):
+        raise InputError("--fingers and --angles cannot be used with --fmu or --as")
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
         from ...inspection.alone import alone
 
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
+    elif hand:
+        text, notes = _hand(file.parent, fingers, angles)
     else:
         text, drafts = _grasp(file.parent, foreign)
     write_text(file, text)
@@ -136,6 +148,25 @@ def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
         fmus[name] = Path(path)
         read_interface(fmus[name])  # before any of ours is built
     return fmus
+
+
+def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, list[str]]:
+    """The text of a hand, and what is to be said of it."""
+    from ...base.checks import real
+    from ...grasp.system import built
+    from ...hand.system import SHIPPED, directions_of, faint, hand_text
+
+    try:
+        given = None if angles is None else [real(angle) for angle in angles.split(",")]
+    except ValueError:
+        raise InputError(f"--angles {angles!r}: must be numbers in degrees, as 0,90,225") from None
+    directions = directions_of(fingers, given)
+    text = hand_text(directions)
+    count = len(directions)
+    fmus = built(folder, None if count == SHIPPED else count).relative_to(folder)
+    names = set(re.findall(r'^fmu = "(.+)"', text, re.MULTILINE))
+    note = faint(directions)
+    return with_paths(text, {n: (fmus / n).as_posix() for n in names}), [note] if note else []
 
 
 def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Draft]]:

@@ -199,6 +199,8 @@ class Grasp {
   }
 }
 
+let Picture = Grasp; // what is drawn; a hand is drawn otherwise
+
 // Playing it ---------------------------------------------------------------------------------
 let playing = false, before = 0;
 const chosenSpeed = () => Number(find("speed").value); // 0: slow around contacts
@@ -245,7 +247,7 @@ function connectScene() {
 
 // What draws a grasp at the time of the cursor, and plays it.
 function sceneOf(plan, series) {
-  const grasp = new Grasp(recording, plan, new Map(series.map((one) => [one.name, one])));
+  const grasp = new Picture(recording, plan, new Map(series.map((one) => [one.name, one])));
   find("scrub").min = recording.first;
   find("scrub").max = recording.last;
   const draw = () => {

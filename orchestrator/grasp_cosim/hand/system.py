@@ -1,0 +1,119 @@
+"""A hand as a system: the text of its file, and the system that it is."""
+
+import warnings
+from collections.abc import Sequence
+from math import radians
+from pathlib import Path
+from string import Template
+from tempfile import TemporaryDirectory
+
+from grasp_fmus.build import shipped_fmus
+from grasp_fmus.shipped import FEWEST, MOST
+
+from ..base.errors import InputError
+from ..grasp.controllers import with_controller
+from ..system.description import System
+from .weights import LEAST, balance_weights
+
+TEMPLATE = Path(__file__).parent / "hand.toml.in"
+FILE = "hand.toml"
+
+SHIPPED = 3
+"""Fingers of the FMUs that come with the package, which have no number in their names."""
+
+ELECTRONICS = ("ambient", "noise", "adc", "filter", "median")
+"""What a sensor has besides its optics."""
+
+
+def hand_system(
+    fingers: int | None = None,
+    angles: Sequence[float] | None = None,
+    controller: str = "published",
+    native: bool | None = None,
+) -> System:
+    """A hand of 2 to 8 fingers in directions `angles` in degrees; its FMUs are built if need be.
+
+    By default it has three, or as many as there are angles, and they are evenly around.
+    `controller` and `native` are as of grasp_system(). InputError where the fingers cannot hold; a
+    warning where one of them hardly takes part.
+    """
+    directions = directions_of(fingers, angles)
+    if note := faint(directions):
+        warnings.warn(note, stacklevel=2)
+    with TemporaryDirectory() as folder:
+        file = Path(folder, FILE)
+        file.write_text(hand_text(directions), "utf-8")
+        system = System.load(file, fmus_of(len(directions)))
+    chosen = system if controller == "published" else with_controller(system, controller)
+    return chosen.natively(native)
+
+
+def directions_of(fingers: int | None, angles: Sequence[float] | None) -> tuple[float, ...]:
+    """The directions in degrees of a hand; InputError where they do not go together, or hold."""
+    count = fingers if fingers is not None else SHIPPED if angles is None else len(angles)
+    if isinstance(count, bool) or not isinstance(count, int) or not FEWEST <= count <= MOST:
+        raise InputError(f"fingers = {count!r}: must be a whole number from {FEWEST} to {MOST}")
+    if angles is not None and len(angles) != count:
+        raise InputError(f"angles: there are {len(angles)}; must be {count}, one for each finger")
+    found = tuple(
+        map(float, (360.0 * k / count for k in range(count)) if angles is None else angles)
+    )
+    for angle in found:
+        if not -360.0 <= angle <= 360.0:
+            raise InputError(f"angles: {angle:g} degrees: must be from -360 to 360")
+    balance_weights(found)
+    return found
+
+
+def faint(directions: Sequence[float]) -> str:
+    """What is to be said of a finger that hardly takes part, or ""."""
+    weights = balance_weights(directions)
+    least = min(weights)
+    if least >= LEAST:
+        return ""
+    k = weights.index(least)
+    return (
+        f"finger {k + 1} at {directions[k]:g} degrees has a weight of {least:.3g}: it is soft, and "
+        f"touches late; with directions that are more even no weight is below {LEAST:g}"
+    )
+
+
+def fmus_of(fingers: int) -> Path:
+    """The folder of the FMUs of a hand that Python runs, built if need be."""
+    return shipped_fmus(None if fingers == SHIPPED else fingers)
+
+
+def hand_text(directions: Sequence[float]) -> str:
+    """The text of the system file of a hand, whose FMUs are beside it."""
+    each = range(1, len(directions) + 1)
+    links = [
+        *((f"plant.gap[{k}]", f"sensor_{k}.gap") for k in each),
+        *((f"plant.position[{k}]", f"controller.position[{k}]") for k in each),
+        *((f"plant.velocity[{k}]", f"controller.velocity[{k}]") for k in each),
+        *((f"sensor_{k}.intensity", f"controller.intensity[{k}]") for k in each),
+        *((f"controller.force[{k}]", f"plant.force[{k}]") for k in each),
+    ]
+    weights = balance_weights(directions)
+    return Template(TEMPLATE.read_text("utf-8")).substitute(
+        fingers=len(directions),
+        suffix="" if len(directions) == SHIPPED else str(len(directions)),
+        connections="\n".join(f'  "{source} -> {target}",' for source, target in links),
+        degrees=", ".join(f"{angle:g}" for angle in directions),
+        angles=_lines("angle", map(radians, directions)),
+        weights=_lines("weight", weights),
+        sensors="\n".join(_sensor(k) for k in each),
+        bench="\n".join(_electronics(k) for k in each),
+    )
+
+
+def _lines(name: str, values: "Sequence[float] | map[float]") -> str:
+    return "\n".join(f'"{name}[{k}]" = {value!r}' for k, value in enumerate(values, start=1))
+
+
+def _sensor(k: int) -> str:
+    return f'[components.sensor_{k}]\nfmu = "ProximitySensor.fmu"\n'
+
+
+def _electronics(k: int) -> str:
+    lines = [f'"sensor_{k}.{part}.enabled" = true' for part in ELECTRONICS]
+    return "\n".join([*lines, f'"sensor_{k}.noise.seed" = {k}'])

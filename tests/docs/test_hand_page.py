@@ -1,0 +1,17 @@
+"""The examples of docs/hand.md run, and what they assert holds."""
+
+import re
+from pathlib import Path
+
+from support.both_engines import needs_compiler
+
+PAGE = (Path(__file__).parents[2] / "docs/hand.md").read_text("utf-8")
+
+
+@needs_compiler
+def test_the_examples_hold() -> None:
+    names: dict[str, object] = {}
+    found = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert len(found) == 2
+    for example in found:
+        exec(example, names)
