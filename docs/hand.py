@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from grasp_cosim.grasp.metrics import FINGERS
+from grasp_cosim.hand.metrics import directions
 from grasp_cosim.recording.result import Result
 
 Part = tuple[str, str]
@@ -56,6 +57,61 @@ def hand_svg(rows: Sequence[tuple[str, Result]]) -> str:
         f'<rect width="{WIDTH}" height="{height}" rx="8" fill="var(--paper)"/>\n'
         f"{drawn}\n</svg>\n"
     )
+
+
+PLANE, AROUND = 340, 1000.0
+"""px: the height of a hand seen from above, and of a m there."""
+
+
+def three_svg(hands: Sequence[tuple[str, Result]]) -> str:
+    """The animation of hands seen from above, beside each other, as SVG; runs of one length.
+
+    The object is a disc of 35 mm.
+    """
+    height = PLANE + 34
+    parts = [part for k, (title, run) in enumerate(hands) for part in _plane(k, title, run)]
+    parts += _clock(hands[0][1].time, height)
+    drawn = "\n".join(svg for svg, _ in parts)
+    colours = "svg { --finger3: #2e8b57; }"
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height}" '
+        f'viewBox="0 0 {WIDTH} {height}" role="img" aria-label="Two hands of three fingers '
+        f'close">\n<style>{STYLE}{colours}@media (prefers-reduced-motion: no-preference) {{\n'
+        f"{''.join(css for _, css in parts)}}}\n</style>\n"
+        f'<rect width="{WIDTH}" height="{height}" rx="8" fill="var(--paper)"/>\n'
+        f"{drawn}\n</svg>\n"
+    )
+
+
+def _plane(k: int, title: str, run: Result) -> Iterator[Part]:
+    """A hand with its title, the times of its contacts and its forces as bars."""
+    middle, wrist = WIDTH * (0.25 + 0.5 * k), PLANE / 2 + 14
+    signals, time = run.by_role, run.time
+    x, y = (float(signals[f"plant.object_position[{i}]"][0]) for i in (1, 2))
+    yield (
+        f'<text class="name middle" x="{middle:g}" y="22">{title}</text>\n'
+        f'<circle cx="{middle + AROUND * x:.1f}" cy="{wrist - AROUND * y:.1f}" '
+        f'r="{AROUND * 0.035:.1f}" fill="var(--object)"/>',
+        "",
+    )
+    for j, angle in enumerate(directions(signals), start=1):
+        c, s = np.cos(angle), -np.sin(angle)
+        turn = f"rotate({np.degrees(np.arctan2(s, c)):.2f})"
+        way = AROUND * _face(run, j)
+        touch = run.metrics["time_to_contact"][j - 1]
+        finger = (
+            f'<g transform="{turn}"><rect x="0" y="-10" width="40" height="20" rx="4" '
+            f'fill="var(--finger{j})"/></g><text class="on middle" x="{20 * c:.1f}" '
+            f'y="{20 * s + 5:.1f}">{j}</text>'
+        )
+        yield _moved(f"p{k}{j}", finger, time, middle + c * way, y=wrist + s * way)
+        out = way[-1] + 62.0
+        when = "never touches" if touch is None else f"{touch:.2f} s"
+        text = (
+            f'<text class="middle" x="{middle + c * out:.1f}" y="{wrist + s * out + 5:.1f}">'
+            f"{when}</text>"
+        )
+        yield _shown(f"w{k}{j}", text, time, float(time[-1]) - 1e-2 if touch is None else touch)
 
 
 def _row(k: int, title: str, run: Result) -> Iterator[Part]:
@@ -119,10 +175,17 @@ def _moved(
     time: npt.NDArray[np.float64],
     x: npt.NDArray[np.float64],
     stretch: npt.NDArray[Any] | None = None,
+    y: npt.NDArray[np.float64] | None = None,
 ) -> Part:
-    """What is at x px over time in s, and is so many times as long; it stands still at the end."""
+    """What is at x px over time in s, and is so many times as long; it stands still at the end.
+
+    With y it is at x, y.
+    """
     frames = np.arange(round(float(time[-1]) * RATE) + 1) / RATE
     places = [f"translateX({_number(at)}px)" for at in np.interp(frames, time, x)]
+    if y is not None:
+        along = zip(np.interp(frames, time, x), np.interp(frames, time, y), strict=True)
+        places = [f"translate({_number(a)}px,{_number(b)}px)" for a, b in along]
     if stretch is not None:
         long = np.interp(frames, time, stretch)
         places = [f"{a} scaleX({_number(b)})" for a, b in zip(places, long, strict=True)]

@@ -21,22 +21,26 @@ from tempfile import TemporaryDirectory
 
 import colour_studies
 import tutorials
-from grasp_cosim import cli
+from grasp_cosim import cli, hand_system, simulate
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.published.compared import compared
 from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
+from grasp_cosim.hand.pictures import draw_hand as draw_three_fingers
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Result
 from grasp_cosim.report.caption import Caption, about
 from grasp_cosim.report.diagram import Link, diagram_svg
 from grasp_cosim.report.plot import headed, save
-from hand import hand_svg
+from hand import hand_svg, three_svg
 
 HERE = Path(__file__).parent
 
 GRASP = ("run", "--every", "10")
 """The grasp of hand.svg and loop.svg."""
+
+THREE = {"plant.shape": "disc", "sensor_1.reflectance": 0.3, "sensor_2.reflectance": 1.2}
+"""The hand of three_fingers.svg and .png: black, white, and a little brighter."""
 
 ENDS = ("from", "to")
 """Of a connection, in run.json."""
@@ -64,6 +68,16 @@ def draw_hand(folder: Path) -> None:
             for case, title in (("1", "without layer 3"), ("2", "with layer 3"))
         ]
         write_text(folder / "hand.svg", hand_svg(rows))
+
+
+def draw_three(folder: Path) -> None:
+    """three_fingers.svg and .png: a hand closes on a disc with three colours, by both laws."""
+    rows = []
+    for title, law in (("published law", "published"), ("any colours", "adaptive")):
+        system = hand_system(controller=law).with_values(THREE)
+        rows.append((title, simulate(system, stop=3.0)))
+    write_text(folder / "three_fingers.svg", three_svg(rows))
+    draw_three_fingers(rows[1][1], folder / "three_fingers.png")
 
 
 def draw_loop(folder: Path) -> None:
@@ -146,6 +160,7 @@ def draw_page(folder: Path, name: str) -> None:
 
 PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "hand": (draw_hand, ["hand.svg"]),
+    "three": (draw_three, ["three_fingers.svg", "three_fingers.png"]),
     "loop": (draw_loop, ["loop.svg"]),
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
