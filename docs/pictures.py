@@ -39,7 +39,11 @@ HERE = Path(__file__).parent
 GRASP = ("run", "--every", "10")
 """The grasp of hand.svg and loop.svg."""
 
-THREE = {"plant.shape": "disc", "sensor_1.reflectance": 0.3, "sensor_2.reflectance": 1.2}
+THREE: dict[str, str | float] = {
+    "plant.shape": "disc",
+    "sensor_1.reflectance": 0.3,
+    "sensor_2.reflectance": 1.2,
+}
 """The hand of three_fingers.svg and .png: black, white, and a little brighter."""
 
 ENDS = ("from", "to")
