@@ -12,6 +12,6 @@ PAGE = (Path(__file__).parents[2] / "docs/hand.md").read_text("utf-8")
 def test_the_examples_hold() -> None:
     names: dict[str, object] = {}
     found = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert len(found) == 2
+    assert len(found) == 3
     for example in found:
         exec(example, names)

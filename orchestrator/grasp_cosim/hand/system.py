@@ -1,7 +1,7 @@
 """A hand as a system: the text of its file, and the system that it is."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import radians
 from pathlib import Path
 from string import Template
@@ -78,6 +78,19 @@ def faint(directions: Sequence[float]) -> str:
     )
 
 
+def hand_values(directions: Sequence[float]) -> dict[str, float]:
+    """The directions in rad and the weights that balance them, by their places in the system.
+
+    So they change together: `system.with_values(hand_values((0, 90, 225)))`, or a row of a sweep.
+    The directions are in degrees; InputError where they cannot hold.
+    """
+    weights = enumerate(balance_weights(directions), start=1)
+    return {
+        **{f"plant.angle[{k}]": radians(a) for k, a in enumerate(directions, start=1)},
+        **{f"controller.weight[{k}]": n for k, n in weights},
+    }
+
+
 def fmus_of(fingers: int) -> Path:
     """The folder of the FMUs of a hand that Python runs, built if need be."""
     return shipped_fmus(None if fingers == SHIPPED else fingers)
@@ -93,21 +106,22 @@ def hand_text(directions: Sequence[float]) -> str:
         *((f"sensor_{k}.intensity", f"controller.intensity[{k}]") for k in each),
         *((f"controller.force[{k}]", f"plant.force[{k}]") for k in each),
     ]
-    weights = balance_weights(directions)
+    values = hand_values(directions)
     return Template(TEMPLATE.read_text("utf-8")).substitute(
         fingers=len(directions),
         suffix="" if len(directions) == SHIPPED else str(len(directions)),
         connections="\n".join(f'  "{source} -> {target}",' for source, target in links),
         degrees=", ".join(f"{angle:g}" for angle in directions),
-        angles=_lines("angle", map(radians, directions)),
-        weights=_lines("weight", weights),
+        angles=_lines("plant", values),
+        weights=_lines("controller", values),
         sensors="\n".join(_sensor(k) for k in each),
         bench="\n".join(_electronics(k) for k in each),
     )
 
 
-def _lines(name: str, values: "Sequence[float] | map[float]") -> str:
-    return "\n".join(f'"{name}[{k}]" = {value!r}' for k, value in enumerate(values, start=1))
+def _lines(component: str, values: Mapping[str, float]) -> str:
+    own = ((key.partition(".")[2], value) for key, value in values.items() if component in key)
+    return "\n".join(f'"{name}" = {value!r}' for name, value in own)
 
 
 def _sensor(k: int) -> str:
