@@ -52,7 +52,7 @@ def test_a_name_that_is_none(pictures: Any) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("hand", "loop", "evaluation", "report"),
+        *("hand", "three", "loop", "evaluation", "report"),
         pytest.param("maps", marks=only_whole("takes more than a minute")),
     ],
 )
