@@ -231,16 +231,20 @@ def _rate(p: Params, rays: Rays, x: State, u: Inputs, h: float) -> float:
     body, pose = x.body, x.body.pose
     speed = sqrt(body.x_dot * body.x_dot + body.y_dot * body.y_dot)
     normals = _normals(p, rays, x)
-    deepest, even, odd, turned = -inf, 0.0, 0.0, 0.0
+    deepest, near, even, odd, turned = -inf, 0.0, 0.0, 0.0, 0.0
     for ray, at, s, v, m, f in zip(
         rays, normals, x.position, x.velocity, p.finger_mass, u.force, strict=True
     ):
         lever = (s * ray.x - pose.x) * at.y - (s * ray.y - pose.y) * at.x
-        ratio = lever / p.radius_of_gyration if at.depth > -FAR else 0.0
-        even, odd = even + at.x * at.x - at.y * at.y, odd + 2.0 * at.x * at.y
-        turned = turned + ratio * ratio
+        ratio = lever / p.radius_of_gyration
         reach = speed + abs(body.turning * lever) + abs(v) + 0.5 * h * abs(f) / m
-        deepest = max(deepest, at.depth + h * reach)
-    pushed = 0.5 * (float(FINGERS) + sqrt(even * even + odd * odd))  # the most, in any direction
+        depth = at.depth + h * reach
+        touches = 1.0 if depth > 0.0 else 0.0
+        near = near + touches
+        even = even + touches * (at.x * at.x - at.y * at.y)
+        odd = odd + touches * 2.0 * at.x * at.y
+        turned = turned + touches * ratio * ratio
+        deepest = max(deepest, depth)
+    pushed = 0.5 * (near + sqrt(even * even + odd * odd))  # the most, in any direction
     gives = 1.0 / min(p.finger_mass) + (pushed + turned) / p.object_mass
     return contact_laws.rate(p.law, deepest, 1.0 / gives)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from support.examples import examples
 from support.fmi2 import OK, Fmu, Instance
 from support.kinds import all_kinds
+from support.slow import slow
 
 pytestmark = all_kinds
 
@@ -154,7 +155,7 @@ def agree(instance: Instance, twin: Twin, status: int, call: Callable[[], object
 
 
 @pytest.mark.hypothesis
-@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize("name", [slow(n) if n == "HandPlantMovable" else n for n in BLOCKS])
 def test_a_change_is_that_of_the_block(load: Load, name: str) -> None:
     """Whatever changes, between whichever steps."""
     fmu, block, start = load(name), BLOCKS[name], STARTS[name]
