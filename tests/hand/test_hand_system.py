@@ -10,6 +10,7 @@ from conftest import Run
 from grasp_cosim import InputError, System, grasp_system, hand_system, load_run, simulate
 from grasp_cosim.hand.system import directions_of, fmus_of
 from support.both_engines import needs_compiler
+from support.slow import slow
 
 COLOURS = {"sensor_1.reflectance": 0.3, "sensor_2.reflectance": 1.2, "sensor_3.reflectance": 0.6}
 
@@ -20,7 +21,7 @@ def placed(system: System, x: float, y: float, **more: float) -> System:
 
 
 @pytest.mark.parametrize("law", ["published", "adaptive"])
-@pytest.mark.parametrize(("right", "x"), [(1.0, 0.03), (0.57, 0.0)])
+@pytest.mark.parametrize(("right", "x"), [slow(1.0, 0.03), (0.57, 0.0)])
 def test_two_fingers_do_what_the_grasp_does(law: str, right: float, x: float) -> None:
     both = [
         grasp_system(law, native=False).with_values({"plant.initial_object_position": x}),
@@ -53,6 +54,7 @@ def test_the_published_law_tells_no_colour_from_a_gap() -> None:
     assert metrics["net_force"] > 1.0
 
 
+@pytest.mark.slow
 def test_a_free_prism_turns_back_to_what_the_floor_holds() -> None:
     """mu·m·g·r_t/(sum of f_k·h_k), within a tenth."""
     system = hand_system(controller="adaptive", native=False)
