@@ -29,6 +29,7 @@ Plane = tuple[float, float]
 """x and y in the plane of the rays, the wrist at the origin."""
 
 ZEROS: Each = (0.0,) * FINGERS
+OUTSIDE: Touches = (False,) * FINGERS
 
 OPPOSITE = 1e-6
 """rad by which two directions may be off and yet be opposite."""

@@ -18,7 +18,7 @@ from . import substeps as own
 from .box import GRAVITY
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .friction import NONE, move
-from .hand_fingers import FINGERS, Each, Rays
+from .hand_fingers import FINGERS, Each, Rays, Touches
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
 from .hand_object import FAR, Normal, Pose
@@ -96,18 +96,24 @@ class Body(NamedTuple):
 
 
 class State(NamedTuple):
-    """Fingertip positions in m, velocities in m/s, normal forces in N; the object."""
+    """Fingertip positions in m, velocities in m/s, normal forces in N; the object.
+
+    A finger that is below a face and not `inside` has come there around an edge, and touches
+    nothing.
+    """
 
     position: Each
     velocity: Each
     normal_force: Each
+    inside: Touches
     body: Body
 
 
 def initial_state(p: Params, u: Inputs) -> State:
     """All at rest, the fingers free of the object."""
     body = Body(p.first_pose, 0.0, 0.0, 0.0)
-    return State(p.initial_position, hand_fingers.ZEROS, hand_fingers.ZEROS, body)
+    zeros, outside = hand_fingers.ZEROS, hand_fingers.OUTSIDE
+    return State(p.initial_position, zeros, zeros, outside, body)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
@@ -149,13 +155,11 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 
 
 def _normals(p: Params, rays: Rays, x: State) -> Normals:
-    """The normals at the fingertips; a finger that is inside without having come through a face,
-    around an edge, touches nothing.
-    """
+    """The normals at the fingertips; what a finger does not touch is far away."""
     raw = _raw_normals(p, rays, x)
     return tuple(
-        Normal(at.x, at.y, -FAR) if at.depth > SHALLOW and f <= 0.0 else at
-        for at, f in zip(raw, x.normal_force, strict=True)
+        at if inside or at.depth <= SHALLOW else Normal(at.x, at.y, -FAR)
+        for at, inside in zip(raw, x.inside, strict=True)
     )
 
 
@@ -179,7 +183,8 @@ def _substep(p: Params, rays: Rays, x: State, u: Each, d: float) -> State:
                 x.position, x.velocity, p.finger_mass, u, along, forces, strict=True
             )
         )
-        moved = State(tuple(s for s, _ in fingers), tuple(v for _, v in fingers), forces, body)
+        tips, rates = tuple(s for s, _ in fingers), tuple(v for _, v in fingers)
+        moved = State(tips, rates, forces, x.inside, body)
         after = _raw_normals(p, rays, moved)
         found = tuple(
             0.0 if at.depth <= -FAR else contact_laws.mean_force(p.law, at.depth, then.depth, d)
@@ -188,7 +193,11 @@ def _substep(p: Params, rays: Rays, x: State, u: Each, d: float) -> State:
         if all(contact_laws.settled(new, old) for new, old in zip(found, forces, strict=True)):
             break
         forces = found
-    return moved
+    inside = tuple(
+        at.depth >= 0.0 and (was or at.depth <= SHALLOW)
+        for at, was in zip(_raw_normals(p, rays, moved), x.inside, strict=True)
+    )
+    return moved._replace(inside=inside)
 
 
 def _pushed(p: Params, rays: Rays, x: State, normals: Normals, forces: Each, d: float) -> Body:
