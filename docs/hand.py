@@ -105,7 +105,7 @@ def _plane(k: int, title: str, run: Result) -> Iterator[Part]:
             f'y="{20 * s + 5:.1f}">{j}</text>'
         )
         yield _moved(f"p{k}{j}", finger, time, middle + c * way, y=wrist + s * way)
-        out = way[-1] + 62.0
+        out = way[-1] + 68.0
         when = "never touches" if touch is None else f"{touch:.2f} s"
         text = (
             f'<text class="middle" x="{middle + c * out:.1f}" y="{wrist + s * out + 5:.1f}">'
