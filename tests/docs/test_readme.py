@@ -61,7 +61,7 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
 
 
 def test_there_is_something_to_try() -> None:
-    assert len(COMMANDS) == 27
+    assert len(COMMANDS) == 26
     assert len(EXAMPLES) == 1
 
 
