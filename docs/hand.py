@@ -1,4 +1,5 @@
-"""Draws docs/hand.svg: the hand closes in Case 1 and in Case 2, moved by two recorded runs.
+"""Draws docs/hand.svg: the hand closes in Case 1 and in Case 2, moved by two recorded runs; and
+docs/three_fingers.svg, two hands of three fingers seen from above.
 
 CSS moves each part from keyframe to keyframe along what was recorded. So the picture is sharp at
 any size, moves where a page shows it as an image, and stands still, at the end of the grasp, for
@@ -44,16 +45,22 @@ def hand_svg(rows: Sequence[tuple[str, Result]]) -> str:
 
     A run needs the signals of a grasp, RATE rows a second or more, and both contacts.
     """
-    height = TOP + ROW * len(rows) + 34
     parts = [part for k, (title, run) in enumerate(rows) for part in _row(k, title, run)]
-    parts += _clock(rows[0][1].time, height)
-    drawn = "\n".join(svg for svg, _ in parts)
     told = "; ".join(f"{title}: {_outcome(run)}" for title, run in rows)
+    return _animation(parts, rows[0][1].time, TOP + ROW * len(rows) + 34, told)
+
+
+def _animation(
+    parts: Sequence[Part], time: npt.NDArray[np.float64], height: int, told: str, more: str = ""
+) -> str:
+    """Parts above the line of time as SVG, with what it tells in words and `more` style."""
+    every = [*parts, *_clock(time, height)]
+    drawn = "\n".join(svg for svg, _ in every)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height}" '
-        f'viewBox="0 0 {WIDTH} {height}" role="img" '
-        f'aria-label="{told}">\n<style>{STYLE}@media (prefers-reduced-motion: no-preference) {{\n'
-        f"{''.join(css for _, css in parts)}}}\n</style>\n"
+        f'viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{told}">\n'
+        f"<style>{STYLE}{more}@media (prefers-reduced-motion: no-preference) {{\n"
+        f"{''.join(css for _, css in every)}}}\n</style>\n"
         f'<rect width="{WIDTH}" height="{height}" rx="8" fill="var(--paper)"/>\n'
         f"{drawn}\n</svg>\n"
     )
@@ -68,19 +75,9 @@ def three_svg(hands: Sequence[tuple[str, Result]]) -> str:
 
     The object is a disc of 35 mm.
     """
-    height = PLANE + 34
     parts = [part for k, (title, run) in enumerate(hands) for part in _plane(k, title, run)]
-    parts += _clock(hands[0][1].time, height)
-    drawn = "\n".join(svg for svg, _ in parts)
-    colours = "svg { --finger3: #2e8b57; }"
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height}" '
-        f'viewBox="0 0 {WIDTH} {height}" role="img" aria-label="Two hands of three fingers '
-        f'close">\n<style>{STYLE}{colours}@media (prefers-reduced-motion: no-preference) {{\n'
-        f"{''.join(css for _, css in parts)}}}\n</style>\n"
-        f'<rect width="{WIDTH}" height="{height}" rx="8" fill="var(--paper)"/>\n'
-        f"{drawn}\n</svg>\n"
-    )
+    told, green = "Two hands of three fingers close", "svg { --finger3: #2e8b57; }"
+    return _animation(parts, hands[0][1].time, PLANE + 34, told, green)
 
 
 def _plane(k: int, title: str, run: Result) -> Iterator[Part]:

@@ -153,14 +153,14 @@ def peak_contact_force(signals: Signals, finger: int) -> float:
 @of_fingers("steady_contact_force", "N")
 def steady_contact_force(signals: Signals, finger: int) -> float:
     """Mean contact force over the last STEADY_WINDOW."""
-    return float(_last(signals, finger).mean())
+    return steady_force(signals, finger)
 
 
 @of_grasp("force_difference", "N")
 def force_difference(signals: Signals) -> float:
     """Largest difference between steady contact forces, of a hand each by the finger's weight."""
     forces = [
-        float(_last(signals, j).mean()) / signals.given(f"controller.weight[{j}]", 1.0)
+        steady_force(signals, j) / signals.given(f"controller.weight[{j}]", 1.0)
         for j in fingers_of(signals)
     ]
     return max(forces) - min(forces)
@@ -281,6 +281,11 @@ def _last(signals: Signals, finger: int) -> Floats:
     """The contact force over the last STEADY_WINDOW, N."""
     late = int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
     return np.asarray(np.abs(signals[f"plant.contact_force[{finger}]"][late:]))
+
+
+def steady_force(signals: Signals, finger: int) -> float:
+    """The mean contact force over the last STEADY_WINDOW, N."""
+    return float(_last(signals, finger).mean())
 
 
 def held_force(signals: Signals, finger: int) -> float | None:

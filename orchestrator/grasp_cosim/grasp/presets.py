@@ -19,6 +19,7 @@ from ..metrics.metric import resolved
 from ..system.conversions import parameter_in_si
 from ..system.description import System
 from ..system.parts import Port
+from ..system.settings import given_values
 
 SYSTEM = Path(__file__).parent / "grasp.toml"
 """The built-in system: the published grasp."""
@@ -68,12 +69,7 @@ def words_of(settings: Mapping[str, Any]) -> list[str]:
 
 def _given(settings: Mapping[str, Any]) -> Callable[..., Any]:
     """What a run sets a variable by role to, or otherwise: (key, otherwise=None)."""
-    roles = settings.get("roles", {})
-    given = {
-        f"{name}.{variable}": value
-        for name, component in settings["components"].items()
-        for variable, value in component["values"].items()
-    }
+    roles, given = settings.get("roles", {}), given_values(settings)
     return lambda key, otherwise=None: given.get(resolved(key, roles), otherwise)
 
 

@@ -27,6 +27,9 @@ QUANTITIES = {
 }  # fmt: skip
 """Heads of the table below the animation, by quantity of a finger."""
 
+VIEW = "The object is drawn from face to face, where the gaps say it is"
+"""What is to be known of the animation."""
+
 Look = TypeVar("Look", str, int)
 
 Contact = Mapping[str, float]
@@ -38,14 +41,17 @@ def grasp_scene(result: Result) -> Scene | None:
     if not is_grasp(result.by_role):
         return None
     target = resolved("controller.target_position", result.roles)
-    made = scene_of_fingers(result, "Grasp", [target], {"target": target})
+    made = scene_of_fingers(result, "Grasp", VIEW, [target], {"target": target})
     return replace(made, negated=[made.state["contact_force"][2]])
 
 
 def scene_of_fingers(
-    result: Result, title: str, more: Sequence[str], state: Mapping[str, Any]
+    result: Result, title: str, view: str, more: Sequence[str], state: Mapping[str, Any]
 ) -> Scene:
-    """Return the scene of fingers around an object, with `more` signals and `state` of its own."""
+    """Return the scene of fingers around an object, with `more` signals and `state` of its own.
+
+    `view` says what is seen in it.
+    """
     named, fingers = _signals(result), fingers_of(result.by_role)
     contacts = _contacts(result)
     used = [*(name for by_finger in named.values() for name in by_finger.values()), *more]
@@ -54,7 +60,7 @@ def scene_of_fingers(
     ]
     return Scene(
         title=title,
-        html=_html(named, contacts),
+        html=_html(view, named, contacts),
         style=scene_style(),
         scripts=scene_script(),
         state={
@@ -150,7 +156,7 @@ def _zooms(contacts: Sequence[Contact]) -> list[Zoom]:
     return [Zoom(text, a - BEFORE, b + AFTER, kind) for text, a, b, kind in spans]
 
 
-def _html(named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -> str:
+def _html(view: str, named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -> str:
     """The canvas of the animation, its buttons, and the values at its time."""
     jumps = "\n".join(
         f'<button type="button" class="f{j}" data-at="{max(t - BEFORE, 0.0)!r}">'
@@ -166,7 +172,8 @@ def _html(named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -
     ]
     heads = "".join(f'<th class="n">{head}</th>' for head in shown.values())
     rows_html = "\n".join(rows)
-    return Template(_text("grasp.html")).substitute(jumps=jumps, heads=heads, rows=rows_html)
+    texts = {"jumps": jumps, "heads": heads, "rows": rows_html, "view": view}
+    return Template(_text("grasp.html")).substitute(texts)
 
 
 def _cell(head: str, signal: str | None) -> str:

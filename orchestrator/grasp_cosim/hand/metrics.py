@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..grasp.metrics import METRICS as OF_GRASP
-from ..grasp.metrics import QUANTITIES, STEADY_WINDOW, fingers_of
+from ..grasp.metrics import QUANTITIES, fingers_of, steady_force
 from ..grasp.presets import start_in_si
 from ..metrics.metric import Metric, Signals, metric, resolved
 from .weights import balance_weights, imbalance
@@ -51,8 +51,7 @@ def directions(signals: Signals) -> list[float]:
 @metric("net_force", unit="N", label="net force", **OF_HAND)
 def net_force(signals: Signals) -> float:
     """Magnitude of the sum of the steady contact forces, each in its finger's direction."""
-    late = int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
-    forces = [signals[f"plant.contact_force[{k}]"][late:].mean() for k in fingers_of(signals)]
+    forces = [steady_force(signals, k) for k in fingers_of(signals)]
     return float(abs(np.dot(forces, np.exp(1j * np.asarray(directions(signals))))))
 
 

@@ -11,6 +11,10 @@ from ..recording.result import Result
 from ..report.page import Scene
 from .metrics import directions, is_disc, is_hand
 
+VIEW = (
+    "The hand is seen from above; the object is drawn from face to face, where the gaps say it is"
+)
+
 
 def hand_scene(result: Result) -> Scene | None:
     """Return the scene of a result; None where it is no hand."""
@@ -20,20 +24,13 @@ def hand_scene(result: Result) -> Scene | None:
     names = ("object_position[1]", "object_position[2]", "object_angle")
     where = [resolved(f"plant.{name}", result.roles) for name in names]
     state = {"where": where, "angles": directions(signals), "disc": is_disc(signals)}
-    made = scene_of_fingers(result, "Hand", where, state)
+    made = scene_of_fingers(result, "Hand", VIEW, where, state)
     return replace(
         made,
-        html=made.html.replace(HINT_OF_GRASP, HINT),
         style=made.style + _text("hand.css"),
         scripts=f"{made.scripts}\n{_text('hand.js')}",
         shown=[name for name in made.shown if name not in where],
     )
-
-
-HINT_OF_GRASP = "The object is drawn from face to face, where the gaps say it is."
-HINT = (
-    "The hand is seen from above; the object is drawn from face to face, where the gaps say it is."
-)
 
 
 def _text(name: str) -> str:

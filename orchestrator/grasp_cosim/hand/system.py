@@ -91,9 +91,14 @@ def hand_values(directions: Sequence[float]) -> dict[str, float]:
     }
 
 
+def sized(fingers: int) -> int | None:
+    """The number in the names of the FMUs of a hand; None where they have none."""
+    return None if fingers == SHIPPED else fingers
+
+
 def fmus_of(fingers: int) -> Path:
     """The folder of the FMUs of a hand that Python runs, built if need be."""
-    return shipped_fmus(None if fingers == SHIPPED else fingers)
+    return shipped_fmus(sized(fingers))
 
 
 def hand_text(directions: Sequence[float]) -> str:
@@ -109,7 +114,7 @@ def hand_text(directions: Sequence[float]) -> str:
     values = hand_values(directions)
     return Template(TEMPLATE.read_text("utf-8")).substitute(
         fingers=len(directions),
-        suffix="" if len(directions) == SHIPPED else str(len(directions)),
+        suffix=sized(len(directions)) or "",
         connections="\n".join(f'  "{source} -> {target}",' for source, target in links),
         degrees=", ".join(f"{angle:g}" for angle in directions),
         angles=_lines("plant", values),
@@ -120,8 +125,8 @@ def hand_text(directions: Sequence[float]) -> str:
 
 
 def _lines(component: str, values: Mapping[str, float]) -> str:
-    own = ((key.partition(".")[2], value) for key, value in values.items() if component in key)
-    return "\n".join(f'"{name}" = {value!r}' for name, value in own)
+    parts = ((*key.split(".", 1), value) for key, value in values.items())
+    return "\n".join(f'"{name}" = {value!r}' for of, name, value in parts if of == component)
 
 
 def _sensor(k: int) -> str:

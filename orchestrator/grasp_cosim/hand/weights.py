@@ -7,6 +7,7 @@ than 180 degrees apart, or all are on one line, at both ends. Derivation: contro
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -31,13 +32,16 @@ def balance_weights(angles: Sequence[float]) -> tuple[float, ...]:
 
     InputError where the fingers cannot hold, with the reason.
     """
+    return _balanced(tuple(angles))
+
+
+@lru_cache(maxsize=64)
+def _balanced(angles: tuple[float, ...]) -> tuple[float, ...]:
+    """balance_weights(), which several ask for on the way to one system."""
     radians = np.radians(angles)
     conditions = np.vstack([np.cos(radians), np.sin(radians), np.ones(len(angles))])
     found = _nearest(conditions, LEAST)
-    if found is None:
-        least = _highest_floor(conditions)
-        if least < NOTHING:
-            raise InputError(_why_not(angles))
+    if found is None and (least := _highest_floor(conditions)) >= NOTHING:
         found = _nearest(conditions, least * (1.0 - 1e-9))
     if found is None:
         raise InputError(_why_not(angles))

@@ -38,6 +38,7 @@ from ..system.description import System
 from ..system.native import needed_twins
 from ..system.parts import NANOSECONDS, Component, Port
 from ..system.realtime import Realtime
+from ..system.settings import start_values
 from ..system.validity import remarks
 from .engine import Engine
 from .master import Master
@@ -304,10 +305,8 @@ class Session:
         if self._whole is None or self._whole.lost:
             return None
         time, columns = self._whole.columns()
-        components = self.system.components
-        values = {f"{c.name}.{name}": value for c in components for name, value in c.values.items()}
-        to_si = self._in_si.conversions
-        signals = Signals(time, columns, self.system.roles, to_si, values)
+        system, to_si = self.system, self._in_si.conversions
+        signals = Signals(time, columns, system.roles, to_si, start_values(system))
         return Known(measure(signals, self._asked), proxy_figures(time, columns))
 
     def _tell(self, log: Sequence[str]) -> None:

@@ -22,6 +22,7 @@ import sys
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from math import isfinite
 from pathlib import Path
 from pkgutil import resolve_name
@@ -51,9 +52,6 @@ RESERVED = frozenset((
 
 ALL = "[*]"
 """Ends the name of an array of which a metric takes all elements."""
-
-MANY = 1000
-"""More elements than a metric takes."""
 
 
 class MissingSignalError(KeyError):
@@ -176,14 +174,15 @@ class Metric:
         arrays = [need for need in self.needs if need.endswith(ALL)]
         if not arrays:
             return self
-        count = next(j for j in range(1, MANY) if _element(arrays[0], j, roles) not in names) - 1
-        return self.with_elements(max(1, count))
+        element = arrays[0].replace("*", "{}").format
+        missing = next(j for j in count(1) if resolved(element(j), roles) not in names)
+        return self.with_elements(max(1, missing - 1))
 
-    def with_elements(self, count: int) -> Metric:
+    def with_elements(self, many: int) -> Metric:
         """The metric of arrays of so many elements."""
 
         def each(text: str) -> list[str]:
-            there = range(1, count + 1) if "*" in text else (1,)
+            there = range(1, many + 1) if "*" in text else (1,)
             return [text.replace("*", str(j)) for j in there]
 
         needs: Collection[str] = [name for need in self.needs for name in each(need)]
@@ -209,10 +208,10 @@ class Metric:
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-def _of_group(group: str, name: str, count: int) -> Metric:
+def _of_group(group: str, name: str, many: int) -> Metric:
     """The metric of that name of a group of ours, with so many entries, in another process."""
     found = next(m for m in metrics_of([group]) if m.name == name)
-    return found if len(found.entries) == count else found.with_elements(count)
+    return found if len(found.entries) == many else found.with_elements(many)
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
@@ -444,10 +443,6 @@ def resolved(name: str, roles: Mapping[str, str]) -> str:
     """The name of a signal whose first part may be a role."""
     role, dot, variable = name.partition(".")
     return f"{roles.get(role, role)}{dot}{variable}"
-
-
-def _element(array: str, j: int, roles: Mapping[str, str]) -> str:
-    return resolved(array.replace("*", str(j)), roles)
 
 
 def _plays(component: str, names: Iterable[str]) -> bool:

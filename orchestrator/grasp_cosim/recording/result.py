@@ -22,6 +22,7 @@ from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
 from ..realtime.timing import Timing
 from ..system.parts import NANOSECONDS
+from ..system.settings import given_values
 from .arrow import ArrowListener
 from .csv import CsvListener
 from .frames import as_pandas, as_xarray
@@ -151,11 +152,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @property
     def given(self) -> dict[str, Any]:
         """The start values that the system sets, by names like plant.object_width."""
-        return {
-            f"{name}.{variable}": value
-            for name, component in self.settings["components"].items()
-            for variable, value in component["values"].items()
-        }
+        return given_values(self.settings)
 
     @cached_property
     def by_role(self) -> Signals:

@@ -69,7 +69,7 @@ class Scene:
     colors: Mapping[str, str] = field(default_factory=dict)
     """The colours of signals, by name; others get one in turn."""
     dashes: Mapping[str, int] = field(default_factory=dict)
-    """Their dashes, 0 or 1: 0 where nothing is said."""
+    """Their dashes, from 0 on: 0 where nothing is said."""
     negated: Sequence[str] = ()
     """Signals that are shown with the other sign."""
     marks: Sequence[tuple[float, str]] = ()

@@ -2,6 +2,7 @@
 was changed since the system was read.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -60,11 +61,25 @@ def settings(system: Structure) -> dict[str, Any]:
     }
 
 
+def given_values(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The start values in settings(), by names like plant.object_width."""
+    return {
+        f"{name}.{variable}": value
+        for name, component in settings["components"].items()
+        for variable, value in component["values"].items()
+    }
+
+
+def start_values(system: Structure) -> dict[str, Any]:
+    """The start values that it sets, by names like plant.object_width."""
+    return {f"{c.name}.{name}": v for c in system.components for name, v in c.values.items()}
+
+
 def made_of(system: Structure) -> dict[str, Any]:
     """Its FMUs by component, the values given by variable, and the experiment; times in s."""
     return {
         **{c.name: c.fmu.name for c in system.components},
-        **{f"{c.name}.{name}": v for c in system.components for name, v in c.values.items()},
+        **start_values(system),
         "step": system.step_ns / NANOSECONDS,
         "stop": system.stop_ns / NANOSECONDS,
         "start": system.start_ns / NANOSECONDS,

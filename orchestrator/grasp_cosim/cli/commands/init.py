@@ -154,7 +154,7 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
     """The text of a hand, and what is to be said of it."""
     from ...base.checks import real
     from ...grasp.system import built
-    from ...hand.system import SHIPPED, directions_of, faint, hand_text
+    from ...hand.system import directions_of, faint, hand_text, sized
 
     try:
         given = None if angles is None else [real(angle) for angle in angles.split(",")]
@@ -162,8 +162,7 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
         raise InputError(f"--angles {angles!r}: must be numbers in degrees, as 0,90,225") from None
     directions = directions_of(fingers, given)
     text = hand_text(directions)
-    count = len(directions)
-    fmus = built(folder, None if count == SHIPPED else count).relative_to(folder)
+    fmus = built(folder, sized(len(directions))).relative_to(folder)
     names = set(re.findall(r'^fmu = "(.+)"', text, re.MULTILINE))
     note = faint(directions)
     return with_paths(text, {n: (fmus / n).as_posix() for n in names}), [note] if note else []

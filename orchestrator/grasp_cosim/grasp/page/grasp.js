@@ -14,14 +14,15 @@ class Grasp {
     this.plan = plan; // names of signals, contacts: [{t, finger}], toSi
     this.series = series; // by name
     this.canvas = document.getElementById("fingers");
-    const reach = (name) => {
-      const top = series.get(name).levels.at(-1);
-      return [Math.min(...top.low), Math.max(...top.high)].map((value) => this.inSi(name, value));
-    };
-    const ends = [...reach(plan.position[1]), ...reach(plan.position[2])];
+    const ends = Object.values(plan.position).flatMap((name) => this.span(name));
     [this.low, this.high] = [Math.min(...ends), Math.max(...ends)];
     this.strongest = Math.max(1e-9, ...[...Object.values(plan.actuator),
-      ...Object.values(plan.contact_force)].flatMap((name) => reach(name).map(Math.abs)));
+      ...Object.values(plan.contact_force)].flatMap((name) => this.span(name).map(Math.abs)));
+  }
+
+  span(name) { // from its lowest to its highest value
+    const top = this.series.get(name).levels.at(-1);
+    return [Math.min(...top.low), Math.max(...top.high)].map((value) => this.inSi(name, value));
   }
 
   inSi(name, value) { // it may be recorded in another unit
@@ -123,13 +124,9 @@ class Grasp {
   }
 
   flash(pen, at, glow) {
-    const light = pen.createRadialGradient(at, MIDDLE, 0, at, MIDDLE, 60);
-    light.addColorStop(0, color("--flash"));
-    light.addColorStop(1, `${color("--flash")}00`);
+    shine(pen, at, MIDDLE, 60, glow);
     pen.save();
     pen.globalAlpha = glow;
-    pen.fillStyle = light;
-    pen.fillRect(at - 60, MIDDLE - 60, 120, 120);
     pen.fillStyle = color("--flash");
     pen.fillRect(at - 2, MIDDLE - TALL / 2, 4, TALL);
     pen.restore();
@@ -140,19 +137,9 @@ class Grasp {
     const length = this.reach * Math.sqrt(Math.abs(force) / this.strongest) * Math.sign(force);
     if (Math.abs(length) < 2) return;
     const pushes = where === "outer" && Math.sign(force) === -SIDE[j];
-    const from = pushes ? at - length : at, to = from + length, tip = Math.sign(force);
-    pen.strokeStyle = pen.fillStyle = color(where === "outer" ? `--finger${j}` : "--ink");
-    pen.lineWidth = 2.5;
-    pen.beginPath();
-    pen.moveTo(from, y);
-    pen.lineTo(to - 4 * tip, y);
-    pen.stroke();
-    pen.beginPath();
-    pen.moveTo(to, y);
-    pen.lineTo(to - 8 * tip, y - 4.5);
-    pen.lineTo(to - 8 * tip, y + 4.5);
-    pen.fill();
-    pen.lineWidth = 1;
+    const from = pushes ? at - length : at;
+    const name = where === "outer" ? `--finger${j}` : "--ink";
+    pointed(pen, [from, y], [Math.sign(force), 0], Math.abs(length), name);
   }
 
   lens(pen, width, height, j, apart, glow) {
@@ -197,6 +184,35 @@ class Grasp {
       cell.textContent = series.steps ? (value ? "yes" : "no") : `${text(sign * value * factor || 0)} ${unit}`;
     }
   }
+}
+
+// An arrow from a place, so many px long; way is its direction, of length 1.
+function pointed(pen, from, way, length, name) {
+  const along = (px, beside = 0) =>
+    [from[0] + px * way[0] + beside * way[1], from[1] + px * way[1] - beside * way[0]];
+  pen.strokeStyle = pen.fillStyle = color(name);
+  pen.lineWidth = 2.5;
+  pen.beginPath();
+  pen.moveTo(...from);
+  pen.lineTo(...along(length - 4));
+  pen.stroke();
+  pen.beginPath();
+  pen.moveTo(...along(length));
+  pen.lineTo(...along(length - 8, 4.5));
+  pen.lineTo(...along(length - 8, -4.5));
+  pen.fill();
+  pen.lineWidth = 1;
+}
+
+function shine(pen, x, y, radius, glow) { // the light of a new contact
+  const light = pen.createRadialGradient(x, y, 0, x, y, radius);
+  light.addColorStop(0, color("--flash"));
+  light.addColorStop(1, `${color("--flash")}00`);
+  pen.save();
+  pen.globalAlpha = glow;
+  pen.fillStyle = light;
+  pen.fillRect(x - radius, y - radius, 2 * radius, 2 * radius);
+  pen.restore();
 }
 
 let Picture = Grasp; // what is drawn; a hand is drawn otherwise

@@ -6,15 +6,7 @@ class Hand extends Grasp {
   constructor(recording, plan, series) {
     super(recording, plan, series);
     this.fingers = Object.keys(plan.position).map(Number);
-    const reach = (name) => {
-      const top = series.get(name).levels.at(-1);
-      return Math.max(...top.high.map(Math.abs), ...top.low.map(Math.abs));
-    };
-    this.far = Math.max(1e-6, ...this.fingers.map((j) => this.scaled(plan.position[j], reach)));
-  }
-
-  scaled(name, reach) {
-    return Math.abs((this.plan.toSi[name]?.factor ?? 1) * reach(name));
+    this.far = Math.max(1e-6, Math.abs(this.low), Math.abs(this.high));
   }
 
   draw(t, speed) {
@@ -34,7 +26,7 @@ class Hand extends Grasp {
     for (const face of faces) {
       const { j, e, s, gap } = face;
       const glow = this.glow(j, t, speed);
-      if (glow > 0) this.flashAt(pen, at([(s - gap) * e[0], (s - gap) * e[1]]), glow);
+      if (glow > 0) shine(pen, ...at([(s - gap) * e[0], (s - gap) * e[1]]), 50, glow);
       this.fingerOn(pen, at([s * e[0], s * e[1]]), face);
     }
     for (const { j, e, s } of faces) {
@@ -118,17 +110,6 @@ class Hand extends Grasp {
     pen.fillText(`${j}`, tip[0] + LONG / 2 * e[0], tip[1] - LONG / 2 * e[1]);
   }
 
-  flashAt(pen, [x, y], glow) {
-    const light = pen.createRadialGradient(x, y, 0, x, y, 50);
-    light.addColorStop(0, color("--flash"));
-    light.addColorStop(1, `${color("--flash")}00`);
-    pen.save();
-    pen.globalAlpha = glow;
-    pen.fillStyle = light;
-    pen.fillRect(x - 50, y - 50, 100, 100);
-    pen.restore();
-  }
-
   // Along a ray, from a place; one that pushes ends there, where it is to.
   force(pen, place, e, newton, name, toIt = false) {
     const length = this.reach * Math.sqrt(Math.abs(newton) / this.strongest) * Math.sign(newton);
@@ -136,20 +117,7 @@ class Hand extends Grasp {
     const way = [e[0] * Math.sign(length), -e[1] * Math.sign(length)], long = Math.abs(length);
     const back = toIt && newton < 0 ? long : 0;
     const from = [place[0] - way[0] * back, place[1] - way[1] * back];
-    const to = [from[0] + way[0] * long, from[1] + way[1] * long];
-    const beside = [way[1], -way[0]];
-    pen.strokeStyle = pen.fillStyle = color(name);
-    pen.lineWidth = 2.5;
-    pen.beginPath();
-    pen.moveTo(...from);
-    pen.lineTo(to[0] - 4 * way[0], to[1] - 4 * way[1]);
-    pen.stroke();
-    pen.beginPath();
-    pen.moveTo(...to);
-    pen.lineTo(to[0] - 8 * way[0] + 4.5 * beside[0], to[1] - 8 * way[1] + 4.5 * beside[1]);
-    pen.lineTo(to[0] - 8 * way[0] - 4.5 * beside[0], to[1] - 8 * way[1] - 4.5 * beside[1]);
-    pen.fill();
-    pen.lineWidth = 1;
+    pointed(pen, from, way, long, name);
   }
 }
 
