@@ -8,11 +8,9 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import c_compilers
 import fmpy
@@ -58,19 +56,19 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
+def pytest_addoption(parser):
     """What CI gives a new seed: a test must not need another one before it."""
     order = "run the files, and the tests of each, in an order drawn by this seed"
     parser.addoption("--shuffle", type=int, metavar="SEED", help=order)
 
 
-def pytest_report_header(config: pytest.Config) -> str | None:
+def pytest_report_header(config):
     """The seed that draws the same order again."""
     seed = config.getoption("shuffle")
     return None if seed is None else f"order: --shuffle {seed}"
 
 
-def pytest_configure(config: pytest.Config) -> None:
+def pytest_configure(config):
     """Campaigns draw from the seed that hypothesis is given.
 
     Many tests read sources: each time after 700 nodes those that there are would be gone over.
@@ -80,14 +78,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(tryfirst=True)  # before those that are slow are chosen, or left out
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config, items):
     """The slow ones first: in the end no process waits for another for long."""
     if (seed := config.getoption("shuffle")) is not None:
         drawn_by = random.Random(seed)
         files = {item.path: drawn_by.random() for item in items}
         items.sort(key=lambda item: (files[item.path], drawn_by.random()))
     for item in items:
-        drawn: dict[str, Any] = getattr(getattr(item, "callspec", None), "params", {})
+        drawn = getattr(getattr(item, "callspec", None), "params", {})
         kind, name = drawn.get("kind", "python"), str(drawn.get("name"))
         tier = kinds.tier(name, kind, "altered" in getattr(item, "fixturenames", ()))
         if tier != "quick" and not item.get_closest_marker("interop"):
@@ -95,7 +93,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+def pytest_generate_tests(metafunc):
     """A test that loads FMUs runs on each kind that it, or its module, is marked with."""
     marker = metafunc.definition.get_closest_marker("kinds")
     if marker and "kind" in metafunc.fixturenames:
@@ -103,21 +101,21 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 @pytest.fixture(scope="module")
-def kind(request: pytest.FixtureRequest, folder_of: Folder) -> Kind:
+def kind(request, folder_of):
     """The kind of FMUs that load and altered give, built; by default those that Python runs."""
-    chosen: Kind = getattr(request, "param", "python")
+    chosen = getattr(request, "param", "python")
     folder_of(chosen)
     return chosen
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _used_hypothesis() -> None:
+def _used_hypothesis():
     """It makes its generator at its first use, and complains if what holds that is frozen."""
     find(st.booleans(), bool)
 
 
 @pytest.fixture(autouse=True)
-def _no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_lines_of_progress(monkeypatch):
     """On a loaded machine what is short may take 10 s, after which a line says that it goes on."""
     monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 3600.0)
 
@@ -127,7 +125,7 @@ _collections = -1
 
 
 @pytest.fixture(autouse=True)
-def _frozen() -> None:
+def _frozen():
     """All that thousands of tests are made of is no garbage, nor to be looked at for some: a paced
     run, which collects it before it begins, would take half a second, and thaws it at its end.
     """
@@ -140,19 +138,19 @@ def _frozen() -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _unpacked_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def _unpacked_once(tmp_path_factory):
     """Of the FMUs that Python runs, one and the same file is unpacked once per test process; what
     unpacks it again is given links: to make 20 files takes longer than most runs.
 
     The binary is copied, as the system loads a file once, whatever its paths.
     """
-    kept: dict[Path, Path] = {}
+    kept = {}
     unpack = fmpy.extract
 
-    def place(source: str, target: str) -> None:
+    def place(source, target):
         (shutil.copyfile if source.endswith((".so", ".dylib")) else os.link)(source, target)
 
-    def extract(path: Path, folder: Path, *include: Callable[[str], bool]) -> None:
+    def extract(path, folder, *include):
         if path.parent != _FMUS or not include:
             unpack(path, folder, *include)
             return
@@ -167,7 +165,7 @@ def _unpacked_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture
-def ctrl_c() -> Iterator[None]:
+def ctrl_c():
     """SIGINT raises KeyboardInterrupt, here and in processes started here, even if it was ignored.
 
     A shell has background jobs ignore it, as in `make test &`, and processes inherit that.
@@ -178,12 +176,12 @@ def ctrl_c() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+def made_once(tmp_path_factory):
     """A folder that is filled once for all test processes: by its name, and what fills it."""
     base = tmp_path_factory.getbasetemp()
     base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
-    def folder(name: str, fill: Callable[[Path], object]) -> Path:
+    def folder(name, fill):
         with FileLock(base / f"{name}.lock"):
             if not (base / name).exists():
                 part = tmp_path_factory.mktemp(name)
@@ -195,14 +193,14 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
 
 
 @pytest.fixture(scope="session")
-def folder_of() -> Folder:
+def folder_of():
     """The folder with the FMUs of these sources, by kind: built once for all test processes.
 
     What is not of these sources, or was altered, is made anew.
     """
-    done: dict[Kind, Path] = {}
+    done = {}
 
-    def folder(kind: Kind) -> Path:
+    def folder(kind):
         if kind not in done:
             at = _FMUS.with_name(_FMUS.name.replace("python", kind.replace(" ", "_")))
             plan = None if kind == "python" else kinds.plan(kind)
@@ -222,23 +220,23 @@ def folder_of() -> Folder:
 
 
 @pytest.fixture(scope="session")
-def fmus(folder_of: Folder) -> Path:
+def fmus(folder_of):
     """The folder with the FMUs that Python runs."""
     return folder_of("python")
 
 
 @pytest.fixture(scope="session")
-def natives(folder_of: Folder) -> Path:
+def natives(folder_of):
     """The folder with the native FMUs, for FMI 2.0."""
     return folder_of("native")
 
 
 @pytest.fixture(scope="session")
-def load_as(folder_of: Folder, tmp_path_factory: pytest.TempPathFactory) -> LoadAs:
+def load_as(folder_of, tmp_path_factory):
     """An FMU by its name and kind, as an FMI host loads it, once per test process."""
-    loaded: dict[tuple[str, Kind], Fmu] = {}
+    loaded = {}
 
-    def fmu(name: str, kind: Kind) -> Fmu:
+    def fmu(name, kind):
         if kind == "python":
             skip_without_pythonfmu()
         if (name, kind) not in loaded:
@@ -252,34 +250,29 @@ def load_as(folder_of: Folder, tmp_path_factory: pytest.TempPathFactory) -> Load
 
 
 @pytest.fixture(scope="module")
-def load(load_as: LoadAs, kind: Kind) -> Load:
+def load(load_as, kind):
     """An FMU by its name, of the kind that the test is run on."""
     return lambda name: load_as(name, kind)
 
 
 @pytest.fixture(scope="session")
-def grasp(fmus: Path) -> System:
+def grasp(fmus):
     """The built-in grasp."""
     return System.load(SYSTEM, fmus)
 
 
 @pytest.fixture
-def built_in(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+def built_in(grasp, monkeypatch):
     """Commands take the FMUs of the tests instead of building them into their folder."""
     monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: grasp)
 
 
 @pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    built_in: None,
-    tmp_path: Path,
-) -> Run:
+def command(monkeypatch, capsys, built_in, tmp_path):
     """Runs a command line in an empty folder; exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: str | Path) -> tuple[int, str, str]:
+    def run(*arguments: str | Path):
         code = cli.main([*map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err
@@ -288,7 +281,7 @@ def command(
 
 
 @pytest.fixture
-def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[None]:
+def no_compiler(monkeypatch, tmp_path):
     """A machine without a compiler, on which nothing was built yet."""
     monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
     monkeypatch.delenv("CC", raising=False)
@@ -300,10 +293,10 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Non
 
 
 @pytest.fixture
-def unpack_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> UnpackIn:
+def unpack_in(tmp_path, monkeypatch):
     """Has FMUs unpacked in a new folder of the given name; returns it."""
 
-    def choose(name: str) -> Path:
+    def choose(name):
         folder = tmp_path / name
         folder.mkdir()
         monkeypatch.setattr(tempfile, "tempdir", str(folder))
@@ -313,12 +306,12 @@ def unpack_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> UnpackIn:
 
 
 @pytest.fixture
-def altered(tmp_path: Path, kind: Kind) -> Altered:
+def altered(tmp_path, kind):
     """Builds the FMU of a script with one place in one source file changed."""
     return lambda *change: alter(tmp_path, kind, *change)
 
 
-def alter(folder: Path, kind: Kind, script: str, source: str, before: str, after: str) -> Path:
+def alter(folder, kind, script, source, before, after):
     """Build in the folder the FMU of a script with one place in one source file changed."""
     if kind == "python":
         skip_without_pythonfmu()
@@ -336,10 +329,10 @@ def alter(folder: Path, kind: Kind, script: str, source: str, before: str, after
 
 
 @contextmanager
-def _imported_from(folder: Path, package: str) -> Iterator[None]:
+def _imported_from(folder, package):
     """The package is the one in the folder."""
 
-    def taken_out() -> dict[str, ModuleType]:
+    def taken_out():
         names = [n for n in sys.modules if n.partition(".")[0] == package]
         return {n: sys.modules.pop(n) for n in names}
 
@@ -355,7 +348,7 @@ def _imported_from(folder: Path, package: str) -> Iterator[None]:
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, fmus: Path, built_in: None, monkeypatch: pytest.MonkeyPatch) -> Path:
+def checkout(tmp_path, fmus, built_in, monkeypatch):
     """A folder like the repository, as far as its pages need it, and the current one."""
     for name in ("orchestrator", "docs"):
         (tmp_path / name).symlink_to(Path(__file__).parents[1] / name)

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import textwrap
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from support.native_fmus import needs_gcc
@@ -52,7 +51,7 @@ Command = Callable[..., str]
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """The oscillator with roles and a preset, and a file of metrics."""
     write_oscillator(tmp_path, ROLES)
     (tmp_path / "mine.py").write_text(METRICS)
@@ -60,7 +59,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def python(folder: Path) -> Python:
+def python(folder):
     """Runs a program in the folder, in a process without a grasp; what it prints.
 
     Its own processes have no grasp either: they are started by the same file.
@@ -70,13 +69,13 @@ def python(folder: Path) -> Python:
 
 
 @pytest.fixture
-def command(folder: Path) -> Command:
+def command(folder):
     """Runs a command line in the folder, in a process without a grasp; what it prints."""
     program = "from grasp_cosim.cli import entry\n\nentry()"
     return lambda *arguments: _output(folder, program, *arguments)
 
 
-def _output(folder: Path, program: str, *arguments: str) -> str:
+def _output(folder, program, *arguments):
     path = folder / "program.py"
     body = textwrap.indent(textwrap.dedent(program), "    ")
     path.write_text(f"{WITHOUT}\nif __name__ == '__main__':\n{body}\n")
@@ -86,7 +85,7 @@ def _output(folder: Path, program: str, *arguments: str) -> str:
     return done.stdout
 
 
-def test_there_is_no_grasp_in_these_processes(python: Python) -> None:
+def test_there_is_no_grasp_in_these_processes(python):
     """Or the others would show nothing."""
     python(
         """
@@ -108,7 +107,7 @@ def test_there_is_no_grasp_in_these_processes(python: Python) -> None:
 
 
 @pytest.mark.slow
-def test_every_other_module_can_be_imported(python: Python) -> None:
+def test_every_other_module_can_be_imported(python):
     """Those of the commands of a grasp cannot: its figures, its friction."""
     printed = python(
         """
@@ -133,7 +132,7 @@ def test_every_other_module_can_be_imported(python: Python) -> None:
     assert printed.split() == [f"grasp_cosim.cli.commands.{n}" for n in ("evaluate", "identify")]
 
 
-def test_the_help_has_the_commands_of_any_system(command: Command) -> None:
+def test_the_help_has_the_commands_of_any_system(command):
     listed = command("--help").partition("Simulate:\n")[2].splitlines()
     assert sorted(line.split()[0] for line in listed if line.startswith("  ")) == [
         "build", "compare", "init", "inspect", "proxy", "qualify", "relay", "report",
@@ -143,7 +142,7 @@ def test_the_help_has_the_commands_of_any_system(command: Command) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: Path) -> None:
+def test_a_run_is_written_read_back_drawn_and_reported(python, folder):
     python(
         """
         from math import hypot
@@ -177,7 +176,7 @@ def test_a_run_is_written_read_back_drawn_and_reported(python: Python, folder: P
 
 
 @pytest.mark.slow
-def test_a_system_is_swept(python: Python) -> None:
+def test_a_system_is_swept(python):
     python(
         """
         from pathlib import Path
@@ -196,7 +195,7 @@ def test_a_system_is_swept(python: Python) -> None:
 
 
 @pytest.mark.slow
-def test_a_swap_is_qualified(python: Python) -> None:
+def test_a_swap_is_qualified(python):
     python(
         """
         from pathlib import Path
@@ -217,7 +216,7 @@ def test_a_swap_is_qualified(python: Python) -> None:
 
 
 @pytest.mark.slow
-def test_the_commands_of_any_system_do_without(command: Command, folder: Path) -> None:
+def test_the_commands_of_any_system_do_without(command, folder):
     options = ("--metrics", "mine.py", "--json")
     ran = json.loads(
         command("run", "oscillator.toml", "--preset", "twice", "--out", "out", "--plot", *options)

@@ -9,14 +9,14 @@ from support.examples import examples
 TESTS = Path(__file__).parent
 
 
-def test_only_exploring_draws_other_examples_and_more() -> None:
+def test_only_exploring_draws_other_examples_and_more():
     usual, explore = (settings.get_profile(name) for name in ("usual", "explore"))
     assert (usual.derandomize, explore.derandomize) == (True, False)
     assert explore.max_examples == 40 * usual.max_examples
     assert explore.print_blob
 
 
-def test_a_count_of_examples_is_that_of_the_usual_profile() -> None:
+def test_a_count_of_examples_is_that_of_the_usual_profile():
     current = settings.get_current_profile_name()
     try:
         for name, count in (("usual", 15), ("explore", 600)):
@@ -27,7 +27,7 @@ def test_a_count_of_examples_is_that_of_the_usual_profile() -> None:
         settings.load_profile(current)
 
 
-def test_no_test_sets_its_own_randomness() -> None:
+def test_no_test_sets_its_own_randomness():
     found = [
         f"{file.relative_to(TESTS)}:{node.lineno}"
         for file in sorted(TESTS.rglob("test_*.py"))

@@ -32,26 +32,26 @@ PORTS = [f"plant.{name}" for name in PLANT] + ["sensor_1.reflectance", "sensor_2
         ("sensor_2.reflektance", PORTS, "sensor_2.reflectance"),
     ],
 )
-def test_the_nearest_names_are_asked_about(name: str, names: list[str], found: str) -> None:
+def test_the_nearest_names_are_asked_about(name, names, found):
     assert nearest(name, names, "`inspect`") == f"did you mean {found}?"
 
 
 @pytest.mark.parametrize("name", ["zzz", "plant.zzz", "1"])
-def test_where_none_is_near_a_few_are_named_and_where_all_are(name: str) -> None:
+def test_where_none_is_near_a_few_are_named_and_where_all_are(name):
     said = nearest(name, PORTS, "`inspect`")
     few = ", ".join(PORTS[:FEW])
     assert said == f"valid: {few}, ... ({len(PORTS) - FEW} more); `inspect` shows all"
 
 
 @pytest.mark.parametrize("see", ["", "`inspect`"])
-def test_a_short_list_is_named_whole(see: str) -> None:
+def test_a_short_list_is_named_whole(see):
     names = [f"component_{letter}" for letter in "abcdefgh"]
     assert len(names) == MANY
     assert nearest("zzz", names, see) == f"valid: {', '.join(names)}"
     assert nearest("zzz", [], see) == "valid: none"
 
 
-def test_every_extra_is_named_by_its_packages() -> None:
+def test_every_extra_is_named_by_its_packages():
     extras = metadata("grasp-cosim").get_all("Provides-Extra") or []
     named = {extra: packages(extra) for extra in extras}
     assert {"plot", "parquet", "native"} <= named.keys()
@@ -62,7 +62,7 @@ def test_every_extra_is_named_by_its_packages() -> None:
     assert packages("no such extra") == []
 
 
-def test_the_command_is_for_the_python_that_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_is_for_the_python_that_runs(monkeypatch):
     monkeypatch.setattr(sys, "executable", "/my folder/python")
     command = install_command("scipy>=1.15", "pandas")
     assert command == "'/my folder/python' -m pip install 'scipy>=1.15' pandas"

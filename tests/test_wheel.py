@@ -14,7 +14,7 @@ ROOT = Path(__file__).parent.parent
 pytestmark = pytest.mark.slow
 
 
-def python(*arguments: str, cwd: Path, path: Path | None = None) -> str:
+def python(*arguments, cwd, path=None):
     environment = {**os.environ, "PYTHONPATH": str(path)} if path else dict(os.environ)
     done = subprocess.run(
         [sys.executable, *arguments], cwd=cwd, env=environment, capture_output=True, text=True
@@ -23,7 +23,7 @@ def python(*arguments: str, cwd: Path, path: Path | None = None) -> str:
     return done.stdout
 
 
-def test_wheel_runs_in_an_empty_folder(tmp_path: Path) -> None:
+def test_wheel_runs_in_an_empty_folder(tmp_path):
     dist, site, empty = tmp_path / "dist", tmp_path / "site", tmp_path / "empty"
     empty.mkdir()
     build = f"import hatchling.build; hatchling.build.build_wheel({str(dist)!r})"

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 HIDDEN = Path(__file__).parents[1] / "support" / "no_posix"
 
 
-def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+def run(*arguments, cwd):
     path = os.pathsep.join([str(HIDDEN), *filter(None, [os.environ.get("PYTHONPATH")])])
     return subprocess.run(
         [sys.executable, *arguments], cwd=cwd, env={**os.environ, "PYTHONPATH": path},
@@ -21,14 +21,14 @@ def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def test_there_is_nothing_of_it_in_these_processes(tmp_path: Path) -> None:
+def test_there_is_nothing_of_it_in_these_processes(tmp_path):
     """Or the others would show nothing."""
     program = "import os, signal; assert not hasattr(os, 'killpg'); import fcntl"
     done = run("-c", program, cwd=tmp_path)
     assert "ModuleNotFoundError: No module named 'fcntl'" in done.stderr
 
 
-def test_every_module_can_be_imported(tmp_path: Path) -> None:
+def test_every_module_can_be_imported(tmp_path):
     program = (
         "import pkgutil, grasp_cosim\n"
         "for m in pkgutil.walk_packages(grasp_cosim.__path__, 'grasp_cosim.'):\n"
@@ -49,7 +49,7 @@ def test_every_module_can_be_imported(tmp_path: Path) -> None:
     ],
     ids=" ".join,
 )
-def test_the_command_works(arguments: tuple[str, ...], tmp_path: Path) -> None:
+def test_the_command_works(arguments, tmp_path):
     write_integrator(tmp_path)
     done = run("-m", "grasp_cosim", *arguments, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -57,7 +57,7 @@ def test_the_command_works(arguments: tuple[str, ...], tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_quick_tests_of_the_core_pass(tmp_path: Path) -> None:
+def test_the_quick_tests_of_the_core_pass(tmp_path):
     rooms = ("interface", "system", "metrics", "exchange", "recording", "sweeps")
     only = (
         "-q",

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from multiprocessing.context import SpawnProcess
-from pathlib import Path
 
 import pytest
 from grasp_cosim.base.errors import InputError, SimulationError
@@ -16,50 +15,50 @@ from grasp_cosim.base.progress import Progress
 from support.processes import ends
 
 
-def _process(job: int) -> tuple[int, int]:
+def _process(job):
     return job, os.getpid()
 
 
-def _refuse(job: Path) -> None:
+def _refuse(job):
     if job.name == "wrong":
         raise InputError(f"{job}: must be something else")
     job.touch()
 
 
-def test_results_come_in_the_order_of_the_jobs_from_other_processes() -> None:
+def test_results_come_in_the_order_of_the_jobs_from_other_processes():
     results = run_all(_process, range(6), 2, progress=False, what="runs")
     assert [job for job, _ in results] == list(range(6))
     assert os.getpid() not in {process for _, process in results}
 
 
-def test_the_error_of_a_job_is_that_of_all(tmp_path: Path) -> None:
+def test_the_error_of_a_job_is_that_of_all(tmp_path):
     jobs = [tmp_path / "right", tmp_path / "wrong"]
     with pytest.raises(InputError, match="wrong: must be something else"):
         run_all(_refuse, jobs, 1, progress=False, what="runs")
     assert (tmp_path / "right").exists()
 
 
-def _end(job: int) -> int:
+def _end(job):
     if job == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return job
 
 
-def test_a_process_that_dies_is_an_error() -> None:
+def test_a_process_that_dies_is_an_error():
     with pytest.raises(SimulationError, match="a process for the runs ended with signal SIGKILL"):
         run_all(_end, range(3), 1, progress=False, what="runs")
 
 
-def test_batches_share_their_processes() -> None:
+def test_batches_share_their_processes():
     with Crew(1) as crew, Progress("runs", shown=False) as bar:
         first, second = (crew.map(_process, range(2), bar) for _ in range(2))
     assert first == second
 
 
-def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch):
     start = SpawnProcess.start
 
-    def interrupted(self: SpawnProcess) -> None:
+    def interrupted(self):
         start(self)
         signal.raise_signal(signal.SIGINT)
 
@@ -69,13 +68,13 @@ def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch: pytest.MonkeyPat
     assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()
 
 
-def _endless(folder: Path) -> None:
+def _endless(folder):
     """As an FMU that hangs in C code, and keeps the lock of the interpreter."""
     (folder / "pid").write_text(str(os.getpid()))
     ctypes.PyDLL(None).sleep(1000)
 
 
-def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path: Path) -> None:
+def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path):
     code = (
         "from pathlib import Path; from grasp_cosim.base.parallel import run_all; "
         "from test_parallel import _endless; "

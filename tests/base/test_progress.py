@@ -10,19 +10,18 @@ from grasp_cosim.base.progress import Progress, write
 
 
 class Terminal(io.StringIO):
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 
 @pytest.fixture(params=[io.StringIO, Terminal])
-def stream(request: pytest.FixtureRequest) -> io.StringIO:
+def stream(request):
     """What a test puts in the place of standard error; before it, pytest puts its own there."""
-    made: io.StringIO = request.param()
-    return made
+    return request.param()
 
 
 @pytest.fixture
-def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def at_once(monkeypatch):
     """It shows from the beginning, and each time."""
     monkeypatch.setattr(progress, "EVERY", 0.0)
 
@@ -37,18 +36,14 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"what": "compiling", "unit": ""}, "compiling, 00:00"),
     ],
 )
-def test_it_says_what_is_at_work(
-    named: dict[str, object], said: str, stream: io.StringIO, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_says_what_is_at_work(named, said, stream, monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream)
     with Progress(**named, delay=0.0, ticking=False) as bar:
         bar.refresh()
     assert said in stream.getvalue()
 
 
-def test_what_is_over_at_once_shows_nothing(
-    stream: io.StringIO, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_over_at_once_shows_nothing(stream, monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "EVERY", 3600.0)  # where the machine does not stand still
     with Progress("map", 3, delay=3600.0) as bar:
@@ -57,9 +52,7 @@ def test_what_is_over_at_once_shows_nothing(
 
 
 @pytest.mark.usefixtures("at_once")
-def test_what_is_not_to_be_shown_is_not(
-    stream: io.StringIO, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_not_to_be_shown_is_not(stream, monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream)
     with Progress("map", 3, shown=False, delay=0.0) as bar:
         bar.update(3)
@@ -68,7 +61,7 @@ def test_what_is_not_to_be_shown_is_not(
 
 
 @pytest.mark.usefixtures("at_once")
-def test_without_a_terminal_there_are_whole_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_terminal_there_are_whole_lines(monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream := io.StringIO())
     with Progress("map", 3, ticking=False) as bar:
         bar.update()
@@ -77,7 +70,7 @@ def test_without_a_terminal_there_are_whole_lines(monkeypatch: pytest.MonkeyPatc
     assert {"map: 1 of 3 runs", "map: 2 of 3 runs"} <= set(heads)
 
 
-def test_what_is_said_meanwhile_stands_above_the_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_said_meanwhile_stands_above_the_bar(monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream := Terminal())
     with Progress("map", 3, delay=0.0, ticking=False) as bar:
         bar.update()
@@ -89,14 +82,12 @@ def test_what_is_said_meanwhile_stands_above_the_bar(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.usefixtures("at_once")
-def test_time_is_seen_to_go_by_while_one_run_goes_on(
-    stream: io.StringIO, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_time_is_seen_to_go_by_while_one_run_goes_on(stream, monkeypatch):
     """By another thread, which looks at the clock once in a second."""
     seen = threading.Event()
 
     class Watched(type(stream)):
-        def write(self, text: str) -> int:
+        def write(self, text):
             if "map: 0 of 3 runs" in text and "00:01" in text:
                 seen.set()
             return super().write(text)

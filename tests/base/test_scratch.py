@@ -7,7 +7,6 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from conftest import UnpackIn
 from grasp_cosim.base.scratch import PREFIX, ScratchFolder, sweep
 
 KEEPS = "import sys; from grasp_cosim.base.scratch import ScratchFolder; a = ScratchFolder(); "
@@ -15,12 +14,12 @@ FILL = "open(a.name + '/library.so', 'w').close(); print(a.name, flush=True); "
 
 
 @pytest.fixture
-def folder(unpack_in: UnpackIn) -> Path:
+def folder(unpack_in):
     """The folder for temporary ones."""
     return unpack_in("tmp")
 
 
-def ended(folder: Path, how: str) -> Path:
+def ended(folder, how):
     """The folder of a process that ended in some way."""
     done = subprocess.run(
         [sys.executable, "-c", KEEPS + FILL + how],
@@ -32,7 +31,7 @@ def ended(folder: Path, how: str) -> Path:
     return Path(done.stdout.strip())
 
 
-def test_it_is_there_until_its_end(folder: Path) -> None:
+def test_it_is_there_until_its_end(folder):
     with ScratchFolder() as scratch:
         (Path(scratch.name) / "sub").mkdir()
         sweep.cache_clear()
@@ -43,24 +42,24 @@ def test_it_is_there_until_its_end(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("how", ["", "sys.exit(3)", "raise ValueError('on purpose')"])
-def test_a_process_takes_it_with_it(folder: Path, how: str) -> None:
+def test_a_process_takes_it_with_it(folder, how):
     assert not ended(folder, how).exists()
 
 
-def test_after_a_kill_the_next_process_removes_it(folder: Path) -> None:
+def test_after_a_kill_the_next_process_removes_it(folder):
     left = ended(folder, "import os; os.kill(os.getpid(), 9)")
     assert (left / "library.so").exists()
     ended(folder, "")
     assert not left.exists()
 
 
-def test_a_fork_leaves_that_of_its_parent(folder: Path) -> None:
+def test_a_fork_leaves_that_of_its_parent(folder):
     how = "import os, pathlib; child = os.fork(); child or sys.exit(); os.wait(); "
     left = ended(folder, how + "print(pathlib.Path(a.name, 'library.so').exists())")
     assert str(left).endswith("True")
 
 
-def test_what_is_not_known_to_be_left_stays(folder: Path) -> None:
+def test_what_is_not_known_to_be_left_stays(folder):
     theirs = folder / "other"
     theirs.mkdir()
     link = folder / f"{PREFIX}link"
@@ -77,7 +76,7 @@ def test_what_is_not_known_to_be_left_stays(folder: Path) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root gives folders away")
-def test_those_of_others_stay(folder: Path) -> None:
+def test_those_of_others_stay(folder):
     theirs = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))
     os.chown(theirs, 12345, 12345)
     sweep.cache_clear()

@@ -7,7 +7,6 @@ from pathlib import Path
 import c_compilers
 import pytest
 from c_compilers import CompilerError
-from conftest import Run
 from grasp_cosim.interface.read import describe
 from grasp_fmus.native.targets import here
 from support.compilers import needs_zig
@@ -21,7 +20,7 @@ pytestmark = needs_gcc
 
 
 @pytest.mark.slow
-def test_builds_all(command: Run) -> None:
+def test_builds_all(command):
     code, out, err = command("build", "--native")
     assert (code, err) == (0, "")
     assert {*out.splitlines()} == {f"fmus/native/{name}.fmu: new" for name in TRANSLATED}
@@ -30,7 +29,7 @@ def test_builds_all(command: Run) -> None:
     assert {line.partition(": ")[2] for line in out.splitlines()} == {"unchanged"}
 
 
-def test_json_names_files_and_notes(command: Run, natives: Path) -> None:
+def test_json_names_files_and_notes(command, natives):
     code, out, err = command("build", "--native", "--json", "--out", natives)
     report = json.loads(out)
     assert (code, err) == (0, "")
@@ -39,7 +38,7 @@ def test_json_names_files_and_notes(command: Run, natives: Path) -> None:
     assert {Path(fmu).parent for fmu in report["fmus"]} == {natives}
 
 
-def test_one_by_name_and_one_of_ones_own(command: Run) -> None:
+def test_one_by_name_and_one_of_ones_own(command):
     assert command("build", "--native", "ProximitySensor") == (
         0, "fmus/native/ProximitySensor.fmu: new\n", "",
     )  # fmt: skip
@@ -49,10 +48,8 @@ def test_one_by_name_and_one_of_ones_own(command: Run) -> None:
     assert (found.version, found.python, found.sources) == ("3.0", False, True)
 
 
-def test_what_is_built_is_said_before_the_compiler_runs(
-    command: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def ended(*_: object) -> None:
+def test_what_is_built_is_said_before_the_compiler_runs(command, monkeypatch):
+    def ended(*_: object):
         raise CompilerError("out of patience")
 
     monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
@@ -80,7 +77,7 @@ def test_what_is_built_is_said_before_the_compiler_runs(
         (["--native", "--c-only", "c", "Gripper"], "build: Gripper: no such block; must be of"),
     ],
 )
-def test_what_is_wrong_is_one_line(arguments: list[str], said: str, command: Run) -> None:
+def test_what_is_wrong_is_one_line(arguments, said, command):
     code, out, err = command("build", *arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"grasp-cosim: {said}")
@@ -88,7 +85,7 @@ def test_what_is_wrong_is_one_line(arguments: list[str], said: str, command: Run
     assert [*Path().iterdir()] == []
 
 
-def test_what_cannot_be_translated_is_named_with_its_line(command: Run, tmp_path: Path) -> None:
+def test_what_cannot_be_translated_is_named_with_its_line(command, tmp_path):
     text = SPRING.read_text("utf-8")
     (tmp_path / "lists.py").write_text(f"{text}\n\ndef unused() -> None:\n    [1, 2]\n")
     assert command("build", "--native", "lists.py")[0] == 0
@@ -102,9 +99,7 @@ def test_what_cannot_be_translated_is_named_with_its_line(command: Run, tmp_path
     assert err.count("\n") == 1
 
 
-def test_no_compiler_is_one_line_with_its_fix(
-    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_no_compiler_is_one_line_with_its_fix(command, monkeypatch, tmp_path):
     monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
     code, _, err = command("build", "--native", "--target", "win64")
     assert (code, err.count("\n")) == (2, 1)
@@ -116,9 +111,7 @@ def test_no_compiler_is_one_line_with_its_fix(
     assert err.endswith(f"{sys.executable} -m pip install ziglang\n")
 
 
-def test_a_compiler_that_fails_is_a_failure_on_the_way(
-    command: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_compiler_that_fails_is_a_failure_on_the_way(command, monkeypatch):
     monkeypatch.setenv("CC", "gcc --no-such-option")
     code, out, err = command("build", "--native", "GripperPlant")
     assert (code, out, err.count("\n")) == (3, "", 1)
@@ -128,7 +121,7 @@ def test_a_compiler_that_fails_is_a_failure_on_the_way(
 
 
 @pytest.mark.slow
-def test_c_alone(command: Run) -> None:
+def test_c_alone(command):
     code, out, err = command("build", "--native", "--c-only", "one", "GraspController")
     assert (code, err) == (0, "")
     assert "one/GraspController.h: written" in out.splitlines()
@@ -144,7 +137,7 @@ def test_c_alone(command: Run) -> None:
 
 @needs_zig
 @pytest.mark.platforms
-def test_for_others(command: Run) -> None:
+def test_for_others(command):
     """The first time in a folder for what is kept, the libraries of zig are made."""
     targets = "linux64,win64,darwin64,aarch64-linux"
     code, out, err = command("build", "--native", "GraspController", "--target", targets)
@@ -164,7 +157,7 @@ def test_for_others(command: Run) -> None:
     assert found.platforms == ("aarch64-linux", "x86_64-linux")
 
 
-def test_inspect_says_that_it_needs_no_python(command: Run, natives: Path) -> None:
+def test_inspect_says_that_it_needs_no_python(command, natives):
     fmu = natives / "GripperPlant.fmu"
     code, out, _ = command("inspect", "--load", fmu)
     assert code == 0

@@ -7,11 +7,9 @@ import re
 import sys
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import Altered, Run
-from grasp_cosim import System, cli, simulate
+from grasp_cosim import cli, simulate
 from grasp_fmus.shipped import blocks
 from support.cases import CASES
 
@@ -23,9 +21,9 @@ METRICS = {
 }  # fmt: skip
 
 
-def test_run_prints_one_json_object(command: Run, grasp: System) -> None:
+def test_run_prints_one_json_object(command, grasp):
     code, out, err = command("run", "--stop", "0.2", "--case", "0", "--json")
-    metrics: dict[str, Any] = json.loads(out)
+    metrics = json.loads(out)
     assert (code, err) == (0, "")
     assert set(metrics) >= METRICS
     same = simulate(grasp.with_values(CASES[0]), stop=0.2).metrics
@@ -36,9 +34,7 @@ def test_run_prints_one_json_object(command: Run, grasp: System) -> None:
     assert (metrics["steps"], metrics["step"], metrics["scheme"]) == (2000, 1e-4, "sequential")
 
 
-def test_run_prints_a_table_with_what_the_plant_tells_of_the_object(
-    command: Run, fmus: Path
-) -> None:
+def test_run_prints_a_table_with_what_the_plant_tells_of_the_object(command, fmus):
     plant = f"plant={fmus / 'GripperPlantCompliant.fmu'}"
     arguments = ("--stop", "0.2", "--case", "0", "--step", "1e-3")
     code, out, _ = command("run", *arguments, "--swap", plant)
@@ -51,7 +47,7 @@ def test_run_prints_a_table_with_what_the_plant_tells_of_the_object(
     assert "object damaged" not in command("run", *arguments)[1]
 
 
-def test_run_takes_all_options(command: Run, grasp: System) -> None:
+def test_run_takes_all_options(command, grasp):
     plant = grasp.component("plant", "test").fmu
     code, out, _ = command(
         "run", "--case", "1", "--set", "plant.initial_object_position=0.05", "--swap",
@@ -62,7 +58,7 @@ def test_run_takes_all_options(command: Run, grasp: System) -> None:
     assert (metrics["steps"], metrics["step"], metrics["scheme"]) == (100, 1e-3, "jacobi")
 
 
-def test_run_writes_signals_metrics_and_a_picture(command: Run, tmp_path: Path) -> None:
+def test_run_writes_signals_metrics_and_a_picture(command, tmp_path):
     code, _, err = command("run", "--stop", "0.01", "--out", "results", "--plot")
     assert code == 0
     assert sorted(p.name for p in (tmp_path / "results").iterdir()) == [
@@ -75,7 +71,7 @@ def test_run_writes_signals_metrics_and_a_picture(command: Run, tmp_path: Path) 
     assert report["components"]["plant"]["values"]["object_width"] == 0.07
 
 
-def test_csv_holds_every_bit(command: Run, grasp: System, tmp_path: Path) -> None:
+def test_csv_holds_every_bit(command, grasp, tmp_path):
     command("run", "--stop", "0.01", "--out", "results")
     result = simulate(grasp, stop=0.01)
     with (tmp_path / "results/signals.csv").open() as file:
@@ -86,7 +82,7 @@ def test_csv_holds_every_bit(command: Run, grasp: System, tmp_path: Path) -> Non
         assert [float(value) for value in column] == result[name].astype(float).tolist()
 
 
-def test_case_1_is_layer_3_off(command: Run) -> None:
+def test_case_1_is_layer_3_off(command):
     _, one, _ = command("run", "--stop", "0.01", "--case", "1", "--json")
     _, two, _ = command(
         "run", "--stop", "0.01", "--set", "controller.simultaneous_contact.enabled=false", "--json"
@@ -126,9 +122,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG)
-def test_wrong_input_is_one_line_and_exit_2(
-    command: Run, tmp_path: Path, arguments: list[str], message: str
-) -> None:
+def test_wrong_input_is_one_line_and_exit_2(command, tmp_path, arguments, message):
     code, out, err = command("run", *arguments, "--out", "results", "--json")
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
@@ -139,9 +133,7 @@ def test_wrong_input_is_one_line_and_exit_2(
 
 @pytest.mark.parametrize("command_", ["run", "build", "evaluate"])
 @pytest.mark.parametrize("out", ["file", "file/below", "/proc/nowhere"])
-def test_a_folder_that_cannot_be_written_is_found_at_once(
-    command: Run, tmp_path: Path, command_: str, out: str
-) -> None:
+def test_a_folder_that_cannot_be_written_is_found_at_once(command, tmp_path, command_, out):
     (tmp_path / "file").touch()
     code, _, err = command(command_, "--out", out)
     assert code == 2
@@ -149,7 +141,7 @@ def test_a_folder_that_cannot_be_written_is_found_at_once(
     assert len(err.splitlines()) == 1
 
 
-def test_what_is_no_grasp_is_drawn_as_its_signals(command: Run, fmus: Path, tmp_path: Path) -> None:
+def test_what_is_no_grasp_is_drawn_as_its_signals(command, fmus, tmp_path):
     fmu = fmus / "ProximitySensor.fmu"
     (tmp_path / "sensor.toml").write_text(
         "[experiment]\nstep = 1e-3\nstop = 0.01\n"
@@ -162,7 +154,7 @@ def test_what_is_no_grasp_is_drawn_as_its_signals(command: Run, fmus: Path, tmp_
     assert written == ["run.json", "signals.csv", "signals.png"]
 
 
-def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> None:
+def test_a_vendor_plant_with_one_more_input(command, altered):
     force = "    force: Force = (0.0, 0.0)\n"
     ambient = (
         '    ambient: Annotated[float, Input("temperature", unit="K", nominal=300.0)] = 300.0\n'
@@ -176,20 +168,20 @@ def test_a_vendor_plant_with_one_more_input(command: Run, altered: Altered) -> N
     assert command("run", "--stop", "0.01", *options)[0] == 0
 
 
-def test_no_arguments_show_the_help(command: Run) -> None:
+def test_no_arguments_show_the_help(command):
     code, out, err = command()
     assert (code, out) == (2, "")
     assert "Usage: grasp-cosim" in err
 
 
 @pytest.mark.parametrize("line", ["--debug run --step 0", "run --step 0 --debug"])
-def test_debug_shows_the_traceback(command: Run, line: str) -> None:
+def test_debug_shows_the_traceback(command, line):
     code, _, err = command(*line.split())
     assert code == 2
     assert "Traceback" in err
 
 
-def test_a_bug_is_one_line_and_exit_3(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_is_one_line_and_exit_3(command, monkeypatch):
     monkeypatch.setattr("grasp_cosim.cli.commands.run.simulate", lambda *_, **__: math.sqrt(-1.0))
     code, out, err = command("run")
     assert (code, out) == (3, "")
@@ -197,7 +189,7 @@ def test_a_bug_is_one_line_and_exit_3(command: Run, monkeypatch: pytest.MonkeyPa
     assert len(err.splitlines()) == 1
 
 
-def test_no_matplotlib_is_one_line(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_matplotlib_is_one_line(command, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     code, _, err = command("run", "--stop", "0.01", "--plot")
     assert code == 2
@@ -205,14 +197,14 @@ def test_no_matplotlib_is_one_line(command: Run, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("name", ["build", "run", "evaluate"])
-def test_help_has_an_example(command: Run, name: str) -> None:
+def test_help_has_an_example(command, name):
     code, out, _ = command(name, "--help")
     assert code == 0
     assert f"Example: grasp-cosim {name}" in out
 
 
 @pytest.mark.slow
-def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
+def test_build_names_what_it_built(command, tmp_path):
     code, out, _ = command("build", "--out", "here", "--json")
     built = [Path(p) for p in json.loads(out)["fmus"]]
     assert code == 0
@@ -221,16 +213,14 @@ def test_build_names_what_it_built(command: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_built_in_grasp_leaves_nothing_in_the_current_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_built_in_grasp_leaves_nothing_in_the_current_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["run", "--stop", "0.01", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["steps"] == 100
     assert not list(tmp_path.iterdir())
 
 
-def test_inspect_shows_the_interface(command: Run, fmus: Path) -> None:
+def test_inspect_shows_the_interface(command, fmus):
     fmu = str(fmus / "ProximitySensor.fmu")
     code, out, err = command("inspect", fmu)
     assert (code, err) == (0, "")
@@ -240,7 +230,7 @@ def test_inspect_shows_the_interface(command: Run, fmus: Path) -> None:
     assert json.loads(out)["variables"][0]["name"] == "gap"
 
 
-def test_inspect_of_what_is_no_fmu(command: Run, tmp_path: Path) -> None:
+def test_inspect_of_what_is_no_fmu(command, tmp_path):
     text = tmp_path / "notes.fmu"
     text.write_text("not an archive")
     code, out, err = command("inspect", str(text))
@@ -250,7 +240,7 @@ def test_inspect_of_what_is_no_fmu(command: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_inspect_finds_nothing_wrong_with_ours(command: Run, fmus: Path) -> None:
+def test_inspect_finds_nothing_wrong_with_ours(command, fmus):
     code, out, err = command("inspect", "--load", str(fmus / "ProximitySensor.fmu"), "--json")
     assert (code, err) == (0, "")
     found = {f["check"]: f["status"] for f in json.loads(out)["findings"]}
@@ -258,7 +248,7 @@ def test_inspect_finds_nothing_wrong_with_ours(command: Run, fmus: Path) -> None
     assert "problem" not in found.values()
 
 
-def test_inspect_finds_what_is_missing(command: Run, fmus: Path, tmp_path: Path) -> None:
+def test_inspect_finds_what_is_missing(command, fmus, tmp_path):
     bare = tmp_path / "bare.fmu"
     with zipfile.ZipFile(fmus / "ProximitySensor.fmu") as whole, zipfile.ZipFile(bare, "w") as part:
         for name in whole.namelist():
@@ -270,9 +260,7 @@ def test_inspect_finds_what_is_missing(command: Run, fmus: Path, tmp_path: Path)
     assert "fix: " in out
 
 
-def test_a_missing_file_without_a_name_is_told(
-    command: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_file_without_a_name_is_told(command, monkeypatch):
     said = "grasp-cosim: no licenses/LICENSE among its metadata; install it with pip"
     missing = FileNotFoundError(said)
     monkeypatch.setattr("grasp_fmus.page.licences", lambda *_: (_ for _ in ()).throw(missing))
@@ -282,13 +270,13 @@ def test_a_missing_file_without_a_name_is_told(
     assert said in err
 
 
-def test_a_folder_is_no_fmu(command: Run, tmp_path: Path) -> None:
+def test_a_folder_is_no_fmu(command, tmp_path):
     code, out, err = command("inspect", str(tmp_path))
     assert (code, out) == (2, "")
     assert err == f"grasp-cosim: {tmp_path}: is a folder; must be an FMU, a file\n"
 
 
-def test_of_a_very_long_message_the_middle_is_left_out(command: Run, tmp_path: Path) -> None:
+def test_of_a_very_long_message_the_middle_is_left_out(command, tmp_path):
     (tmp_path / "long.toml").write_text(f"{'x' * 100_000} = 1\n")
     code, _, said = command("run", "long.toml")
     assert code == 2

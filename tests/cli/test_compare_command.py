@@ -1,15 +1,13 @@
 """The command compare: its exit codes, its page and its JSON."""
 
 import json
-from pathlib import Path
 
 import pytest
-from conftest import Run
 from report.runs import grasp_run, write_run
 
 
 @pytest.fixture
-def runs(tmp_path: Path) -> tuple[Path, Path]:
+def runs(tmp_path):
     run = grasp_run()
     write_run(tmp_path / "a", run)
     run.signals["plant.gap[1]"][:] += 1e-3
@@ -17,7 +15,7 @@ def runs(tmp_path: Path) -> tuple[Path, Path]:
     return tmp_path / "a", tmp_path / "b"
 
 
-def test_exit_codes_and_json(command: Run, runs: tuple[Path, Path], tmp_path: Path) -> None:
+def test_exit_codes_and_json(command, runs, tmp_path):
     a, b = runs
     assert command("compare", a, a)[0] == 0
     code, out, err = command("compare", a, b, "--json", "-o", "page.html")
@@ -30,7 +28,7 @@ def test_exit_codes_and_json(command: Run, runs: tuple[Path, Path], tmp_path: Pa
     assert err.startswith("wrote page.html: ")
 
 
-def test_bands_from_a_file_decide(command: Run, runs: tuple[Path, Path], tmp_path: Path) -> None:
+def test_bands_from_a_file_decide(command, runs, tmp_path):
     (tmp_path / "bands.toml").write_text(
         '[signals]\n"plant.gap[*]" = { absolute = 2e-3 }\n[metrics]\n"*" = { absolute = inf }\n'
     )
@@ -42,9 +40,7 @@ def test_bands_from_a_file_decide(command: Run, runs: tuple[Path, Path], tmp_pat
     assert "unknown entry 'width'" in err
 
 
-def test_a_page_that_cannot_be_written_is_refused_before_the_work(
-    command: Run, runs: tuple[Path, Path]
-) -> None:
+def test_a_page_that_cannot_be_written_is_refused_before_the_work(command, runs):
     code, _, err = command("compare", *runs, "-o", runs[0] / "run.json" / "page.html")
     assert code == 2
     assert err.count("\n") == 1
@@ -53,7 +49,7 @@ def test_a_page_that_cannot_be_written_is_refused_before_the_work(
     assert err.count("\n") == 1
 
 
-def test_wrong_input_is_one_line(command: Run, runs: tuple[Path, Path]) -> None:
+def test_wrong_input_is_one_line(command, runs):
     code, out, err = command("compare", runs[0], "nothing")
     assert (code, out) == (2, "")
     assert err.startswith("grasp-cosim: nothing: no such run; must be a folder")

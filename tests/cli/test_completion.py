@@ -19,7 +19,7 @@ SOURCE, ASKED = "bash_source", "bash_complete"
         (ASKED, "grasp-cosim report ou", "file,ou\n"),
     ],
 )
-def test_what_fits_is_completed(instruction: str, line: str, found: str) -> None:
+def test_what_fits_is_completed(instruction, line, found):
     asks = {"_GRASP_COSIM_COMPLETE": instruction, "COMP_WORDS": line}
     done = subprocess.run(
         [sys.executable, "-P", "-m", "grasp_cosim"],

@@ -4,25 +4,22 @@ import json
 import signal
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import Run
 from grasp_cosim import System, simulate
 from grasp_cosim.fmi.process import ProcessInstance
 from support.isolated import isolated
 from support.native_fmus import TYPES, build, needs_gcc
 
 
-def grasp_cosim(*arguments: object) -> subprocess.CompletedProcess[str]:
+def grasp_cosim(*arguments: object):
     return subprocess.run(
         [sys.executable, "-P", "-m", "grasp_cosim", *map(str, arguments)],
         capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
 
 
-def system_file(folder: Path, crash_at: float = 1e9, isolation: str = "none") -> Path:
+def system_file(folder, crash_at=1e9, isolation="none"):
     build(folder, version="2.0")
     starts = {"Boolean": "false", "String": "''", "Enumeration": "1"}
     values = "".join(f"u_{t} = {starts.get(t, '2')}, " for t in TYPES["2.0"])
@@ -38,7 +35,7 @@ def system_file(folder: Path, crash_at: float = 1e9, isolation: str = "none") ->
 @pytest.mark.parametrize(
     ("options", "said"), [([], ""), (["--debug"], "Fatal Python error: Segmentation fault")]
 )
-def test_in_the_process_of_the_command(tmp_path: Path, options: list[str], said: str) -> None:
+def test_in_the_process_of_the_command(tmp_path, options, said):
     done = grasp_cosim(*options, "run", system_file(tmp_path, 0.55))
     assert done.returncode == -signal.SIGSEGV
     assert said in done.stderr
@@ -52,7 +49,7 @@ def test_in_the_process_of_the_command(tmp_path: Path, options: list[str], said:
         ("os.fork() or libc.exit(0); os.wait()", 0, ""),
     ],
 )
-def test_an_exit_is_not_taken_for_the_end(does: str, code: int, said: str) -> None:
+def test_an_exit_is_not_taken_for_the_end(does, code, said):
     """The result of a run in its midst would look like one that is done."""
     program = f"""
 import ctypes, os, warnings
@@ -79,7 +76,7 @@ entry()
 
 
 @needs_gcc
-def test_in_a_process_of_its_own(tmp_path: Path) -> None:
+def test_in_a_process_of_its_own(tmp_path):
     path, out = system_file(tmp_path, 0.55), tmp_path / "out"
     done = grasp_cosim("run", path, "--set", "components.motor.isolation=process", "--out", out)
     assert done.returncode == 3
@@ -95,13 +92,11 @@ def test_in_a_process_of_its_own(tmp_path: Path) -> None:
 
 @needs_gcc
 @pytest.mark.parametrize(("said", "started"), [("none", 0), ("process", 1), (None, 1)])
-def test_the_option_goes_before_the_file(
-    tmp_path: Path, said: str | None, started: int, monkeypatch: pytest.MonkeyPatch, command: Run
-) -> None:
+def test_the_option_goes_before_the_file(tmp_path, said, started, monkeypatch, command):
     names = []
     start = ProcessInstance.__init__
 
-    def noted(part: ProcessInstance, name: str, *rest: Any) -> None:
+    def noted(part, name, *rest):
         names.append(name)
         start(part, name, *rest)
 
@@ -113,7 +108,7 @@ def test_the_option_goes_before_the_file(
 
 
 @needs_gcc
-def test_the_numbers_are_the_same(tmp_path: Path) -> None:
+def test_the_numbers_are_the_same(tmp_path):
     system = System.load(system_file(tmp_path))
     here, there = (simulate(isolated(system, i)) for i in ("none", "process"))
     assert all((here[name] == there[name]).all() for name in here)

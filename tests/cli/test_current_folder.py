@@ -11,7 +11,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 MARK = "imported.txt"
 
 
-def poison(folder: Path, names: set[str]) -> Path:
+def poison(folder, names):
     """A folder of modules, each of which notes that it was imported, and fails."""
     folder.mkdir()
     for name in filter(str.isidentifier, names):
@@ -21,7 +21,7 @@ def poison(folder: Path, names: set[str]) -> Path:
 
 
 @pytest.fixture
-def everything(tmp_path: Path) -> Path:
+def everything(tmp_path):
     """All that Python and its packages have, under false colours."""
     ours = {"sitecustomize", "usercustomize"}
     return poison(
@@ -30,14 +30,14 @@ def everything(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def system(fmus: Path, tmp_path: Path) -> Path:
+def system(fmus, tmp_path):
     """The grasp as a file."""
     path = tmp_path / "grasp.toml"
     path.write_text(SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/'), "utf-8")
     return path
 
 
-def not_imported(folder: Path, command: list[str], *arguments: str) -> str:
+def not_imported(folder, command, *arguments):
     """What a command that stands in the folder says; it imports nothing from there."""
     done = subprocess.run(
         [sys.executable, *command, *arguments],
@@ -50,7 +50,7 @@ def not_imported(folder: Path, command: list[str], *arguments: str) -> str:
 
 
 @pytest.fixture
-def installed(tmp_path: Path) -> list[str]:
+def installed(tmp_path):
     """As the installed command starts: its own folder is the first to look into."""
     (tmp_path / "bin").mkdir()
     program = tmp_path / "bin" / "grasp-cosim.py"
@@ -61,7 +61,7 @@ def installed(tmp_path: Path) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_component_in_a_process(installed: list[str], everything: Path, system: Path) -> None:
+def test_a_component_in_a_process(installed, everything, system):
     text = system.read_text("utf-8")
     system.write_text(text.replace("[components.plant]", '[components.plant]\nisolation="process"'))
     not_imported(everything, installed, "run", str(system), "--stop", "0.001")
@@ -81,9 +81,7 @@ def test_a_component_in_a_process(installed: list[str], everything: Path, system
         "proxy {FMUS}/GripperPlant.fmu -o {OUT}.fmu",
     ],
 )
-def test_a_command(
-    line: str, installed: list[str], everything: Path, system: Path, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_command(line, installed, everything, system, fmus, tmp_path):
     block = Path(__file__).parents[2] / "docs" / "spring_plant.py"
     places = {
         "SYSTEM": system, "FMUS": fmus, "BLOCK": block,
@@ -93,7 +91,7 @@ def test_a_command(
 
 
 @pytest.mark.slow
-def test_python_m_imports_what_it_needs_to_find_us_alone(tmp_path: Path, system: Path) -> None:
+def test_python_m_imports_what_it_needs_to_find_us_alone(tmp_path, system):
     text = system.read_text("utf-8")
     system.write_text(text.replace("[components.plant]", '[components.plant]\nisolation="process"'))
     names = {"numpy", "socket", "click", "fmpy", "lxml", "ctypes", "tomllib", "multiprocessing"}

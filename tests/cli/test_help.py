@@ -9,14 +9,14 @@ CONTEXT = click.Context(cli)
 NAMES = cli.list_commands(CONTEXT)
 
 
-def command(name: str) -> click.Command:
+def command(name):
     found = cli.get_command(CONTEXT, name)
     assert found is not None
     return found
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_command_has_an_example(name: str) -> None:
+def test_a_command_has_an_example(name):
     text = CliRunner().invoke(command(name), ["--help"]).output
     assert "\\b" not in text
     (example,) = [line for line in text.splitlines() if line.strip().startswith("Example: ")]
@@ -24,7 +24,7 @@ def test_a_command_has_an_example(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_everything_a_command_takes_has_a_text(name: str) -> None:
+def test_everything_a_command_takes_has_a_text(name):
     """Click has none for an argument: it stands, in capitals, in the text of the command."""
     made = command(name)
     for parameter in made.params:
@@ -34,9 +34,9 @@ def test_everything_a_command_takes_has_a_text(name: str) -> None:
             assert parameter.make_metavar(CONTEXT).strip("[]") in (made.help or "")
 
 
-def test_the_group_lists_every_command_once_under_its_heading() -> None:
+def test_the_group_lists_every_command_once_under_its_heading():
     text = CliRunner().invoke(cli, ["--help"], terminal_width=80).output
-    found: dict[str, list[str]] = {}
+    found = {}
     for block in text.partition("Options:\n")[2].split("\n\n")[1:]:
         heading, *lines = block.rstrip("\n").split("\n")
         found[heading.removesuffix(":")] = [line.split()[0] for line in lines]
@@ -48,7 +48,7 @@ def test_the_group_lists_every_command_once_under_its_heading() -> None:
     assert {"run", "qualify", "sweep", "build", "inspect"} <= set(NAMES) - OF_THE_GRASP
 
 
-def test_a_command_that_is_none_is_named() -> None:
+def test_a_command_that_is_none_is_named():
     result = CliRunner().invoke(cli, ["rnu"])
     assert result.exit_code == 2
     assert "'rnu': no such command; did you mean run?" in result.output

@@ -4,7 +4,6 @@ import csv
 import json
 import zipfile
 from html import escape
-from pathlib import Path
 
 import pytest
 from grasp_cosim import load_run
@@ -27,7 +26,7 @@ BAD = {*map(chr, [*range(9), *range(11, 32), *range(127, 160)]), "\u202e", "\u20
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     fmu = build(tmp_path, "hostile", units={"x": "m"})
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
@@ -51,7 +50,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 @needs_gcc
-def test_every_writer(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_writer(folder, capsys):
     pytest.importorskip("matplotlib")
     out = folder / "out"
     assert main(["run", str(folder / "system.toml"), "--out", str(out), "--plot"]) == 0
@@ -80,7 +79,7 @@ def test_every_writer(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 @needs_gcc
 @pytest.mark.parametrize("more", [[], slow(["--load"])])
-def test_what_is_printed(folder: Path, more: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_printed(folder, more, capsys):
     main(["inspect", str(folder / "hostile.fmu"), *more])
     said = capsys.readouterr()
     assert "\\x9b" in said.out
@@ -90,7 +89,7 @@ def test_what_is_printed(folder: Path, more: list[str], capsys: pytest.CaptureFi
 
 
 @needs_gcc
-def test_an_error_that_names_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_error_that_names_one(folder, capsys):
     assert main(["run", str(folder / "system.toml"), "--set", "=2+5.\x1b[2J\r\n=1"]) == 2
     said = capsys.readouterr().err
     assert not BAD & set(said)

@@ -8,22 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Run
-from grasp_cosim import System, simulate
+from grasp_cosim import simulate
 from grasp_cosim.grasp.identification import identification
 from grasp_cosim.grasp.identification.fit import Estimate, Fit
-from grasp_cosim.recording.result import Result
 
 TRUE = {"plant.friction.coulomb[1]": 0.6, "plant.friction.coulomb[2]": 1.3}
 
 
 @pytest.fixture(scope="module")
-def recorded(grasp: System) -> Result:
+def recorded(grasp):
     return simulate(grasp.with_values(TRUE), step=1e-3, stop=1.0)
 
 
 @pytest.mark.parametrize("kind", ["csv", "mf4"])
-def test_friction_from_a_log(command: Run, recorded: Result, grasp: System, kind: str) -> None:
+def test_friction_from_a_log(command, recorded, grasp, kind):
     if kind == "mf4":
         pytest.importorskip("asammdf")
     recorded.to_csv("signals.csv") if kind == "csv" else recorded.to_mdf("signals.mf4")
@@ -45,7 +43,7 @@ def test_friction_from_a_log(command: Run, recorded: Result, grasp: System, kind
     assert grasp.with_values(values).start(name) == values[name]
 
 
-def test_the_estimates_are_printed_with_their_intervals(command: Run, recorded: Result) -> None:
+def test_the_estimates_are_printed_with_their_intervals(command, recorded):
     recorded.to_csv("signals.csv")
     code, out, _ = command("identify", "signals.csv", "--fit", "coulomb")
     assert code == 0
@@ -59,10 +57,8 @@ def test_the_estimates_are_printed_with_their_intervals(command: Run, recorded: 
         ("x_m,case,finger,time\n0.03,2,1,2.1\n0.03,2,2,2.2\n", "times.csv, 2 contact times"),
     ],
 )
-def test_contact_times_are_known_by_their_columns(
-    command: Run, monkeypatch: pytest.MonkeyPatch, table: str, data: str
-) -> None:
-    def found(_: object, contacts: list[object], *__: object) -> Fit:
+def test_contact_times_are_known_by_their_columns(command, monkeypatch, table, data):
+    def found(_, contacts, *__):
         estimate = Estimate("plant.friction.coulomb[1]", "N", 0.0, None, "at its lower bound")
         return Fit((estimate,), np.linspace(-0.1, 0.1, len(contacts)), 9)
 
@@ -85,9 +81,7 @@ def test_contact_times_are_known_by_their_columns(
         (("--out", "/proc/nowhere"), "/proc/nowhere: cannot write"),
     ],
 )
-def test_wrong_input_is_one_line(
-    command: Run, tmp_path: Path, arguments: tuple[str, ...], message: str
-) -> None:
+def test_wrong_input_is_one_line(command, tmp_path, arguments, message):
     code, out, err = command("identify", *arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"grasp-cosim: {message}")
@@ -95,7 +89,7 @@ def test_wrong_input_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_a_log_says_nothing_about_is_refused(command: Run, recorded: Result) -> None:
+def test_what_a_log_says_nothing_about_is_refused(command, recorded):
     recorded.to_csv("signals.csv")
     code, _, err = command("identify", "signals.csv", "--fit", "ratio")
     assert code == 2

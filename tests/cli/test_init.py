@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from comparison.made import write_fmu
-from conftest import Run
 from grasp_cosim import System
 from grasp_cosim.cli.commands.init import shown
 from grasp_cosim.grasp.presets import SYSTEM
@@ -30,13 +29,13 @@ FOREIGN = {
 
 
 @pytest.fixture
-def fmus_here(command: Run, fmus: Path, tmp_path: Path) -> Run:
+def fmus_here(command, fmus, tmp_path):
     """The command in a folder in which the FMUs are built."""
     shutil.copytree(fmus, tmp_path / "fmus/build")
     return command
 
 
-def test_the_grasp(fmus_here: Run, tmp_path: Path) -> None:
+def test_the_grasp(fmus_here, tmp_path):
     code, out, err = fmus_here("init", "my_system.toml")
     assert (code, err) == (0, "")
     assert out == "my_system.toml: written\n    then: grasp-cosim run my_system.toml\n"
@@ -45,7 +44,7 @@ def test_the_grasp(fmus_here: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_grasp_runs_as_without_a_file(fmus_here: Run) -> None:
+def test_the_grasp_runs_as_without_a_file(fmus_here):
     assert fmus_here("init", "my_system.toml")[0] == 0
     for arguments in (("my_system.toml",), ()):
         short = ("--stop", "0.02", "--step", "1e-3", "--out", f"run{len(arguments)}")
@@ -53,7 +52,7 @@ def test_the_grasp_runs_as_without_a_file(fmus_here: Run) -> None:
     assert Path("run0/signals.csv").read_bytes() == Path("run1/signals.csv").read_bytes()
 
 
-def test_the_folder_may_be_moved(fmus_here: Run, tmp_path: Path) -> None:
+def test_the_folder_may_be_moved(fmus_here, tmp_path):
     shutil.copytree(tmp_path / "fmus", tmp_path / "here/fmus")
     assert fmus_here("init", "here/my_system.toml")[0] == 0
     shutil.move(tmp_path / "here", tmp_path / "there")
@@ -79,9 +78,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG)
-def test_wrong_input_is_one_line(
-    fmus_here: Run, tmp_path: Path, arguments: tuple[str, ...], message: str
-) -> None:
+def test_wrong_input_is_one_line(fmus_here, tmp_path, arguments, message):
     write_fmu(tmp_path / "vendor.fmu")
     (tmp_path / "there.toml").write_text("mine")
     (tmp_path / "folder.toml").mkdir()
@@ -95,7 +92,7 @@ def test_wrong_input_is_one_line(
     assert (tmp_path / "there.toml").read_text() == "mine"
 
 
-def filled_in(path: Path) -> None:
+def filled_in(path):
     """Put something in the place of each TODO of a plant like FOREIGN."""
     lines = path.read_text("utf-8").splitlines()
     for i, line in enumerate(lines):
@@ -105,7 +102,7 @@ def filled_in(path: Path) -> None:
     path.write_text("\n".join(lines), "utf-8")
 
 
-def test_a_foreign_plant(fmus_here: Run, tmp_path: Path) -> None:
+def test_a_foreign_plant(fmus_here, tmp_path):
     write_fmu(tmp_path / "vendor.fmu", FOREIGN, {})
     code, out, err = fmus_here("init", "a.toml", "--as", "plant=vendor.fmu", "--json")
     assert (code, err) == (0, "")
@@ -138,9 +135,7 @@ def test_a_foreign_plant(fmus_here: Run, tmp_path: Path) -> None:
     assert component.interface.by_name["velocity[2]"].unit == "mm/s"
 
 
-def test_the_unit_of_what_is_not_found_is_to_do_where_none_is_declared(
-    fmus_here: Run, tmp_path: Path
-) -> None:
+def test_the_unit_of_what_is_not_found_is_to_do_where_none_is_declared(fmus_here, tmp_path):
     """Kraft and Weg, which could be anything, say so; of what declares its unit it is known."""
     force = {f"Kraft[{j}]": 'causality="input" | Real start="0" unit="N"' for j in (1, 2)}
     way = {f"Weg[{j}]": 'causality="output" | Real' for j in range(1, 7)}
@@ -155,7 +150,7 @@ def test_the_unit_of_what_is_not_found_is_to_do_where_none_is_declared(
     ]
 
 
-def test_values_and_presets_are_in_the_units_of_the_fmu(fmus_here: Run, tmp_path: Path) -> None:
+def test_values_and_presets_are_in_the_units_of_the_fmu(fmus_here, tmp_path):
     more = {
         "obj_width": 'causality="parameter" variability="fixed" | Real start="1" unit="mm"',
         "friction_coulomb_1": 'causality="parameter" variability="fixed" | Real start="0" unit="N"',
@@ -175,7 +170,7 @@ def test_values_and_presets_are_in_the_units_of_the_fmu(fmus_here: Run, tmp_path
     assert bench[2].endswith("# TODO: in the unit that it has")
 
 
-def test_a_name_that_means_something_else_in_the_fmu(fmus_here: Run, tmp_path: Path) -> None:
+def test_a_name_that_means_something_else_in_the_fmu(fmus_here, tmp_path):
     own = {"gap[1]": 'causality="parameter" variability="fixed" | Boolean start="false"'}
     write_fmu(tmp_path / "vendor.fmu", {**FOREIGN, **own}, {})
     assert fmus_here("init", "a.toml", "--as", "plant=vendor.fmu")[0] == 0
@@ -186,7 +181,7 @@ def test_a_name_that_means_something_else_in_the_fmu(fmus_here: Run, tmp_path: P
 
 @pytest.mark.slow
 @needs_gcc
-def test_fmus_alone(fmus_here: Run, tmp_path: Path) -> None:
+def test_fmus_alone(fmus_here, tmp_path):
     build_model("bouncing_ball", tmp_path, "3.0", file="ball")
     build_model("feedthrough", tmp_path, "2.0", file="through")
     fmus = ("--fmu", "ball=ball.fmu", "--fmu", "through=through.fmu")
@@ -203,7 +198,7 @@ def test_fmus_alone(fmus_here: Run, tmp_path: Path) -> None:
     assert (code, json.loads(out)["steps"]) == (0, 300)
 
 
-def test_an_fmu_that_recommends_no_experiment(fmus_here: Run, tmp_path: Path) -> None:
+def test_an_fmu_that_recommends_no_experiment(fmus_here, tmp_path):
     write_fmu(tmp_path / "vendor.fmu", FOREIGN, {}, step="0.3")
     code, _, err = fmus_here("init", "alone.toml", "--fmu", "a=vendor.fmu")
     assert (code, err) == (
@@ -214,7 +209,7 @@ def test_an_fmu_that_recommends_no_experiment(fmus_here: Run, tmp_path: Path) ->
     assert System.load("alone.toml").total_steps == 3
 
 
-def test_paths(tmp_path: Path) -> None:
+def test_paths(tmp_path):
     """Relative below the folder of the file and beside it, else absolute."""
     here = tmp_path / "project/systems"
     assert shown(here / "a.fmu", here) == "a.fmu"
@@ -223,7 +218,7 @@ def test_paths(tmp_path: Path) -> None:
     assert shown(tmp_path / "a.fmu", here) == str(tmp_path / "a.fmu")
 
 
-def test_names_that_a_system_file_has_to_quote(fmus_here: Run, tmp_path: Path) -> None:
+def test_names_that_a_system_file_has_to_quote(fmus_here, tmp_path):
     brake = 'plant.the "brake"'
     awkward = {
         {
@@ -243,7 +238,7 @@ def test_names_that_a_system_file_has_to_quote(fmus_here: Run, tmp_path: Path) -
     assert plant.rename["gap[2]"] == "plant.l_2"
 
 
-def test_many_lines_to_do_are_counted(fmus_here: Run, tmp_path: Path) -> None:
+def test_many_lines_to_do_are_counted(fmus_here, tmp_path):
     inputs = {f"u{i}": 'causality="input" | Real start="0" unit="m"' for i in range(40)}
     write_fmu(tmp_path / "vendor.fmu", FOREIGN | inputs, {})
     code, out, _ = fmus_here("init", "my file.toml", "--as", "plant=vendor.fmu")
@@ -258,7 +253,7 @@ def test_many_lines_to_do_are_counted(fmus_here: Run, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @needs_gcc
-def test_the_inputs_of_a_written_file_can_be_driven(fmus_here: Run, tmp_path: Path) -> None:
+def test_the_inputs_of_a_written_file_can_be_driven(fmus_here, tmp_path):
     build_model("feedthrough", tmp_path, "2.0", file="through")
     assert fmus_here("init", "alone.toml", "--fmu", "through=through.fmu")[0] == 0
     system = System.load("alone.toml")

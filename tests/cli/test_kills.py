@@ -9,7 +9,6 @@ import sys
 import time
 import zipfile
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -53,7 +52,7 @@ class Rounds:
     whole: float = 0.0
     """The longest moment, in s: what the last one took that no signal ended."""
 
-    def signals(self) -> Iterator[int]:
+    def signals(self):
         """ROUNDS of each, and more until each has come in time."""
         yield from HOW * ROUNDS
         for how in HOW * LIMIT:
@@ -61,7 +60,7 @@ class Rounds:
                 yield how
         assert all(self.came[how] for how in HOW), self.came
 
-    def start(self, *words: str) -> subprocess.Popen[bytes]:
+    def start(self, *words: str):
         """Start a command with a TMPDIR of its own, which all its processes know."""
         self.scratch = self.folder / f"scratch{time.monotonic_ns()}"
         self.scratch.mkdir()
@@ -74,14 +73,14 @@ class Rounds:
             start_new_session=True,
         )
 
-    def done(self, *words: str) -> None:
+    def done(self, *words: str):
         """Let a command do all it does, and take the time that it takes."""
         began = time.monotonic()
         assert self.start(*words).wait(300) == 0
         self.whole = time.monotonic() - began
         self.nothing_left()
 
-    def ended(self, how: int, *words: str) -> int:
+    def ended(self, how, *words):
         """The exit code of a command that gets a signal at a random moment, unless it has ended."""
         began = time.monotonic()
         process = self.start(*words)
@@ -96,7 +95,7 @@ class Rounds:
         self.nothing_left()
         return code
 
-    def nothing_left(self) -> None:
+    def nothing_left(self):
         """No process goes on; after what the next start does first, there is no folder."""
         deadline = time.monotonic() + ORPHANED
         while orphans := going_on(f"TMPDIR={self.scratch}".encode()):
@@ -106,7 +105,7 @@ class Rounds:
         self.scratch.rmdir()
 
 
-def going_on(mark: bytes) -> list[str]:
+def going_on(mark):
     """The command lines of processes with this in their environment."""
     found = []
     for process in Path("/proc").glob("[0-9]*"):
@@ -118,24 +117,24 @@ def going_on(mark: bytes) -> list[str]:
     return found
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder):
     """The files in a folder, which need not be there."""
     return {p.name: p.read_bytes() for p in folder.glob("*") if p.is_file()}
 
 
-def whole_files(folder: Path) -> set[str]:
+def whole_files(folder):
     """The names of the files there, but those of temporary ones."""
     return {name for name in contents(folder) if not name.endswith(".part")}
 
 
 @pytest.fixture
-def built(fmus: Path, tmp_path: Path) -> None:
+def built(fmus, tmp_path):
     """The FMUs are where a command looks for them."""
     (tmp_path / "fmus").mkdir()
     (tmp_path / "fmus/build").symlink_to(fmus)
 
 
-def system_file(folder: Path) -> Path:
+def system_file(folder):
     """A native FMU alone, x = gain t."""
     fmu = build(folder, "native", "2.0")
     path = folder / "system.toml"
@@ -147,7 +146,7 @@ def system_file(folder: Path) -> Path:
     return path
 
 
-def check_run(folder: Path) -> None:
+def check_run(folder):
     """All in the folder is of one run, if there is a run at all."""
     if not (folder / "run.json").exists():
         assert not list(folder.glob("*.html"))
@@ -160,11 +159,11 @@ def check_run(folder: Path) -> None:
         assert f"gain = {gain:g}" in (folder / "report.html").read_text("utf-8")
 
 
-def test_run(tmp_path: Path) -> None:
+def test_run(tmp_path):
     """Each with another gain, into one folder, that of the last has been reported at times."""
     rounds, out, system = Rounds(tmp_path), tmp_path / "out", str(system_file(tmp_path))
 
-    def run(gain: float) -> tuple[str, ...]:
+    def run(gain):
         return ("run", system, "--out", "out", "--set", f"a.gain={gain}")
 
     rounds.done(*run(0.5))
@@ -179,7 +178,7 @@ def test_run(tmp_path: Path) -> None:
     assert json.loads((out / "run.json").read_text())["complete"]
 
 
-def test_report(tmp_path: Path, built: None) -> None:
+def test_report(tmp_path, built):
     """The page and its picture are as those that nobody has disturbed, or there are none."""
     rounds, out = Rounds(tmp_path), tmp_path / "out"
     rounds.done("run", "--stop", "0.3", "--out", "out")
@@ -196,7 +195,7 @@ def test_report(tmp_path: Path, built: None) -> None:
     assert contents(out) == made
 
 
-def test_sweep(tmp_path: Path, built: None) -> None:
+def test_sweep(tmp_path, built):
     """No finished run is lost or done again, and the last start comes to the same table."""
     rows = "plant.initial_object_position=-0.04:0.04:6"
     words = ("sweep", "--vary", rows, "--step", "1e-3", "--stop", "0.3", "--workers", "2", "--out")
@@ -217,7 +216,7 @@ def test_sweep(tmp_path: Path, built: None) -> None:
     assert table.read_bytes() == made
 
 
-def test_build(tmp_path: Path) -> None:
+def test_build(tmp_path):
     """Each file is the one that was there or the new one, and none is taken for another."""
     rounds, out, choice = Rounds(tmp_path), tmp_path / "out", random.Random(campaign.first_seed + 1)
     rounds.done("build", "--out", "out")
@@ -237,7 +236,7 @@ def test_build(tmp_path: Path) -> None:
     assert {name: contents(out)[name] for name in whole_files(out)} == made
 
 
-def older(name: str, data: bytes) -> bytes:
+def older(name, data):
     """A file as an older build might have left it."""
     if not name.endswith(".fmu"):
         return data + b"\n"

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from support import campaign
@@ -14,7 +13,7 @@ from support.mutants import complaints, make
 TESTS = Path(__file__).parents[1]
 
 
-def tried(kind: str, first: int, count: int, fmus: Path, folder: Path) -> list[dict[str, Any]]:
+def tried(kind, first, count, fmus, folder):
     """What came of so many seeds, see support/mutants.py."""
     done = subprocess.run(
         [sys.executable, "-P", "-m", "support.mutants", kind, *map(str, (first, count, fmus)),
@@ -26,20 +25,20 @@ def tried(kind: str, first: int, count: int, fmus: Path, folder: Path) -> list[d
 
 
 @pytest.mark.parametrize(("kind", "count"), [("toml", 4), ("ssp", 2)])
-def test_a_few(kind: str, count: int, fmus: Path, tmp_path: Path) -> None:
+def test_a_few(kind, count, fmus, tmp_path):
     assert [e for e in tried(kind, 0, count, fmus, tmp_path) if e["wrong"]] == []
 
 
 @pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize(("kind", "count"), [("toml", 800), ("fmu", 100), ("ssp", 200)])
-def test_more(kind: str, count: int, fmus: Path, tmp_path: Path) -> None:
+def test_more(kind, count, fmus, tmp_path):
     found = tried(kind, campaign.first_seed, campaign.part(count), fmus, tmp_path)
     assert [e for e in found if e["wrong"]] == []
     assert {0, 2} <= {e["code"] for e in found}  # neither all well nor all refused
 
 
-def test_the_seed_is_the_mutant(fmus: Path, tmp_path: Path) -> None:
+def test_the_seed_is_the_mutant(fmus, tmp_path):
     made = []
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
@@ -48,7 +47,7 @@ def test_the_seed_is_the_mutant(fmus: Path, tmp_path: Path) -> None:
     assert made[0] == made[1]
 
 
-def test_what_is_wrong_is_seen() -> None:
+def test_what_is_wrong_is_seen():
     """The campaign itself: it can fail."""
     assert complaints(0, "a note\n", []) == []
     assert complaints(2, "a note\ngrasp-cosim: no such\n", []) == []

@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 from c_compilers import CompilerError, cache
-from conftest import Altered, Run
-from grasp_cosim import System, grasp_system, identify
+from grasp_cosim import grasp_system, identify
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus import build as builds
 from grasp_fmus.build import Plan, build_block, planned, shipped_twins
@@ -28,13 +27,12 @@ SHORT = ("--step", "1e-3", "--stop", "0.3")
 HERE = ("--set", "components.plant.isolation=none")
 
 
-def ran(folder: str) -> dict[str, Any]:
+def ran(folder):
     """The FMUs that a recorded run names, by component."""
-    found: dict[str, Any] = json.loads(Path(folder, "run.json").read_text())["fmus"]
-    return found
+    return json.loads(Path(folder, "run.json").read_text())["fmus"]
 
 
-def recorded(command: Run, folder: str, *arguments: str | Path) -> bytes:
+def recorded(command, folder, *arguments):
     code, _, err = command("run", "--out", folder, *arguments)
     assert code == 0, err
     return Path(folder, "signals.csv").read_bytes()
@@ -46,7 +44,7 @@ def recorded(command: Run, folder: str, *arguments: str | Path) -> bytes:
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize("case", ["0", "1", "2"])
-def test_a_run_has_the_same_bytes(command: Run, case: str, scheme: str) -> None:
+def test_a_run_has_the_same_bytes(command, case, scheme):
     asked = ("--case", case, "--scheme", scheme, "--step", "1e-3")
     python = recorded(command, "python", *asked, "--python")
     assert recorded(command, "native", *asked, "--native") == python
@@ -54,13 +52,13 @@ def test_a_run_has_the_same_bytes(command: Run, case: str, scheme: str) -> None:
 
 
 @pytest.mark.slow
-def test_at_the_published_step_with_all_electronics(command: Run) -> None:
+def test_at_the_published_step_with_all_electronics(command):
     asked = ("--preset", "bench", "--stop", "0.5")
     assert recorded(command, "a", *asked, "--python") == recorded(command, "b", *asked)
 
 
 @pytest.mark.parametrize("plant", [slow("GripperPlantCompliant"), "GripperPlantMovable"])
-def test_a_swapped_plant_has_its_own_twin(command: Run, fmus: Path, plant: str) -> None:
+def test_a_swapped_plant_has_its_own_twin(command, fmus, plant):
     asked = ("--swap", f"plant={fmus / plant}.fmu", *SHORT, "--case", "0")
     assert recorded(command, "a", *asked, "--python") == recorded(command, "b", *asked)
     native, python = ran("b")["plant"], ran("a")["plant"]
@@ -68,7 +66,7 @@ def test_a_swapped_plant_has_its_own_twin(command: Run, fmus: Path, plant: str) 
 
 
 @pytest.mark.slow
-def test_in_processes_of_their_own(command: Run) -> None:
+def test_in_processes_of_their_own(command):
     asked = ("--step", "1e-3", "--stop", "0.05")
     parts = ("plant", "sensor_1", "sensor_2", "controller")
     apart = [word for p in parts for word in ("--set", f"components.{p}.isolation=process")]
@@ -91,9 +89,7 @@ def test_in_processes_of_their_own(command: Run) -> None:
     ],
     ids=str,
 )
-def test_which_fmus_run_where_nothing_is_said_of_it(
-    command: Run, fmus: Path, file: bool, option: tuple[str, ...], native: bool
-) -> None:
+def test_which_fmus_run_where_nothing_is_said_of_it(command, fmus, file, option, native):
     """Those that a file names; of the built-in grasp, of which nobody named any, native ones."""
     system = (system_file(Path("a_system"), fmus / "GripperPlant.fmu", fmus),) if file else ()
     assert command("run", *system, *SHORT, *option, "--out", "a")[::2] == (0, "")
@@ -110,9 +106,7 @@ def test_which_fmus_run_where_nothing_is_said_of_it(
     ],
     ids=lambda arguments: arguments[0],
 )  # fmt: skip
-def test_a_command_of_many_runs_takes_native_ones(
-    command: Run, fmus: Path, arguments: tuple[str, ...]
-) -> None:
+def test_a_command_of_many_runs_takes_native_ones(command, fmus, arguments):
     shutil.copy(fmus / "GripperPlant.fmu", "plant.fmu")
     first, second, third = (
         command(*arguments, *option, "--json", *folder(arguments, i))
@@ -127,15 +121,13 @@ def test_a_command_of_many_runs_takes_native_ones(
     assert not Path("fmus").exists()
 
 
-def folder(arguments: tuple[str, ...], number: int) -> tuple[str, ...]:
+def folder(arguments, number):
     return ("--out", f"out_{number}.csv") if arguments[0] == "sweep" else ()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("source", [(), ("--bench",)], ids=["simulation", "bench"])
-def test_evaluate_has_the_same_files(
-    command: Run, grasp: System, monkeypatch: pytest.MonkeyPatch, source: tuple[str, ...]
-) -> None:
+def test_evaluate_has_the_same_files(command, grasp, monkeypatch, source):
     coarse = grasp.with_experiment(step=2e-3)
     monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: coarse)
     code, out, err = command("evaluate", *source, "--out", "native", "--json")
@@ -149,7 +141,7 @@ def test_evaluate_has_the_same_files(
 
 
 @pytest.mark.slow
-def test_identify_finds_the_same(tmp_path: Path) -> None:
+def test_identify_finds_the_same(tmp_path):
     times = tmp_path / "times.csv"
     times.write_text(
         "x_m,case,finger,time\n0.03,2,1,2.1\n0.03,2,2,2.2\n0.03,1,1,1.4\n0.03,1,2,2.7\n"
@@ -161,7 +153,7 @@ def test_identify_finds_the_same(tmp_path: Path) -> None:
     assert found[0] == found[1]
 
 
-def test_a_log_needs_no_fmu_to_run(command: Run) -> None:
+def test_a_log_needs_no_fmu_to_run(command):
     assert command("run", *SHORT, "--case", "0", "--out", "run")[0] == 0
     code, _, err = command("identify", "run/signals.csv", "--fit", "coulomb")
     assert (code, err) == (0, "")
@@ -171,7 +163,7 @@ def test_a_log_needs_no_fmu_to_run(command: Run) -> None:
 
 
 @pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_native_is_refused_in_one_line(command: Run) -> None:
+def test_without_a_compiler_native_is_refused_in_one_line(command):
     code, out, err = command("run", *SHORT, "--native")
     assert (code, out) == (2, "")
     assert err.startswith("grasp-cosim: native FMUs cannot be built: no C compiler: ")
@@ -181,7 +173,7 @@ def test_without_a_compiler_native_is_refused_in_one_line(command: Run) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_a_sweep_takes_python_and_says_why(command: Run) -> None:
+def test_without_a_compiler_a_sweep_takes_python_and_says_why(command):
     vary = ("--vary", "plant.object_width=0.06,0.07")
     code, out, err = command("sweep", *vary, *SHORT, "--workers", "1", "--json")
     assert (code, json.loads(out)["failed"]) == (0, 0)
@@ -191,8 +183,8 @@ def test_without_a_compiler_a_sweep_takes_python_and_says_why(command: Run) -> N
 
 @pytest.mark.slow
 def test_where_nothing_can_be_kept_they_are_compiled_for_this_process(
-    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+    command, monkeypatch, tmp_path
+):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     shipped_twins.cache_clear()
@@ -204,10 +196,8 @@ def test_where_nothing_can_be_kept_they_are_compiled_for_this_process(
 
 
 @pytest.mark.usefixtures("no_compiler")
-def test_a_full_disk_is_one_line_that_names_the_file(
-    command: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_: Any, **__: Any) -> None:
+def test_a_full_disk_is_one_line_that_names_the_file(command, monkeypatch):
+    def full(*_: Any, **__: Any):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/home/of/GripperPlant.fmu")
 
     monkeypatch.setattr(builds, "planned", lambda: Plan(2, {}, {}, ""))
@@ -220,17 +210,15 @@ def test_a_full_disk_is_one_line_that_names_the_file(
     )
 
 
-def test_what_is_kept_runs_where_nothing_can_be_written(
-    command: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_kept_runs_where_nothing_can_be_written(command, monkeypatch):
     shipped_twins(together("GripperPlant"))
     shipped_twins.cache_clear()
     monkeypatch.setattr(cache, "writable", lambda _: None)
     assert command("run", *SHORT, "--native")[::2] == (0, "")
 
 
-def test_the_first_compilation_is_announced(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def slow(*_: Any, **__: Any) -> None:
+def test_the_first_compilation_is_announced(command, monkeypatch):
+    def slow(*_: Any, **__: Any):
         raise CompilerError("out of patience")
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(Path("empty").absolute()))
@@ -246,7 +234,7 @@ def test_the_first_compilation_is_announced(command: Run, monkeypatch: pytest.Mo
 # ------------------------------------------------------------------ whose FMUs, and where
 
 
-def system_file(folder: Path, plant: Path, fmus: Path) -> Path:
+def system_file(folder, plant, fmus):
     """The built-in grasp with FMUs by their paths, whose names are not ours."""
     folder.mkdir(parents=True)
     text = SYSTEM.read_text("utf-8")
@@ -263,7 +251,7 @@ def system_file(folder: Path, plant: Path, fmus: Path) -> Path:
     return path
 
 
-def test_it_is_the_content_that_counts_not_the_name(command: Run, fmus: Path) -> None:
+def test_it_is_the_content_that_counts_not_the_name(command, fmus):
     system = system_file(Path("deep/down"), fmus / "GripperPlantMovable.fmu", fmus)
     asked = (system, *SHORT, "--case", "0")
     assert recorded(command, "a", *asked) == recorded(command, "b", *asked, "--native")
@@ -271,7 +259,7 @@ def test_it_is_the_content_that_counts_not_the_name(command: Run, fmus: Path) ->
     assert all("native_twin_of" in fmu for fmu in ran("b").values())
 
 
-def test_one_of_other_sources_stays_as_it_is(command: Run, altered: Altered) -> None:
+def test_one_of_other_sources_stays_as_it_is(command, altered):
     heavy = altered("GripperPlant", "gripper_plant/fingers.py", "= (0.5, 0.5)", "= (0.5, 0.6)")
     asked = ("--swap", f"plant={heavy}", *SHORT, "--native")
     code, _, err = command("run", *asked, "--out", "a")
@@ -282,7 +270,7 @@ def test_one_of_other_sources_stays_as_it_is(command: Run, altered: Altered) -> 
 
 
 @pytest.mark.slow
-def test_one_that_is_native_already_is_no_exception(command: Run, tmp_path: Path) -> None:
+def test_one_that_is_native_already_is_no_exception(command, tmp_path):
     twin = build_block(SPRING, tmp_path, planned()).path
     assert command("run", "--swap", f"plant={twin}", *SHORT, "--native")[::2] == (0, "")
     system = tmp_path / "native.toml"
@@ -296,7 +284,7 @@ def test_one_that_is_native_already_is_no_exception(command: Run, tmp_path: Path
     assert qualified[2] == ""
 
 
-def test_a_block_of_ones_own(command: Run, tmp_path: Path) -> None:
+def test_a_block_of_ones_own(command, tmp_path):
     """Its twin is one that the user has built, of the same source."""
     swap = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
     shutil.copy(SPRING, tmp_path)
@@ -316,7 +304,7 @@ def test_a_block_of_ones_own(command: Run, tmp_path: Path) -> None:
     )
 
 
-def test_a_twin_is_found_beside_the_folder_of_its_fmu(command: Run, tmp_path: Path) -> None:
+def test_a_twin_is_found_beside_the_folder_of_its_fmu(command, tmp_path):
     build_block(SPRING, tmp_path / "project/build")
     build_block(SPRING, tmp_path / "project/native", planned())
     swap = f"plant={tmp_path / 'project/build/SpringPlant.fmu'}"
@@ -325,9 +313,7 @@ def test_a_twin_is_found_beside_the_folder_of_its_fmu(command: Run, tmp_path: Pa
 
 
 @pytest.mark.parametrize("wrong", ["processor", "platform", "damaged"])
-def test_a_twin_that_does_not_run_here_is_left_alone(
-    command: Run, tmp_path: Path, wrong: str
-) -> None:
+def test_a_twin_that_does_not_run_here_is_left_alone(command, tmp_path, wrong):
     """One may have been built for another machine, with --target."""
     build_block(SPRING, Path("fmus/build"))
     twin = build_block(SPRING, tmp_path / "made", planned()).path
@@ -351,7 +337,7 @@ def test_a_twin_that_does_not_run_here_is_left_alone(
     assert "as plant (fmus/native/SpringPlant.fmu is not the twin" in err
 
 
-def test_nothing_is_built_into_the_current_folder(command: Run) -> None:
+def test_nothing_is_built_into_the_current_folder(command):
     """So one that cannot be written to will do."""
     for option in ("--native", "--python"):
         assert command("run", *SHORT, option)[0] == 0

@@ -6,7 +6,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import Run
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.obstacles import this_platform
@@ -20,13 +19,13 @@ SHORT = ("--step", "1e-3", "--stop", "0.3")
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 
 
-def for_another(binary: bytes) -> bytes:
+def for_another(binary):
     """A library as it would be for another processor."""
     return binary[:18] + (243).to_bytes(2, "little") + binary[20:]
 
 
 @pytest.fixture
-def foreign(fmus: Path, tmp_path: Path) -> Path:
+def foreign(fmus, tmp_path):
     """The FMUs of the grasp, and one that has no twin, as if pythonfmu's binary were for another
     processor than this.
     """
@@ -44,9 +43,7 @@ def foreign(fmus: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def other_machine(
-    command: Run, foreign: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> Run:
+def other_machine(command, foreign, monkeypatch, tmp_path):
     """Runs a command line where the FMUs of the built-in grasp are those."""
     system = System.load(SYSTEM, foreign)
     monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: system)
@@ -54,7 +51,7 @@ def other_machine(
 
 
 @needs_compiler
-def test_run_takes_the_native_twins(other_machine: Run, grasp: System, foreign: Path) -> None:
+def test_run_takes_the_native_twins(other_machine, grasp, foreign):
     code, out, err = other_machine("run", *SHORT, "--json", "--out", "run")
     assert (code, err) == (0, "")
     assert json.loads(out)["steps"] == 300
@@ -65,11 +62,11 @@ def test_run_takes_the_native_twins(other_machine: Run, grasp: System, foreign: 
 
 
 @needs_compiler
-def test_nothing_is_said_where_they_were_asked_for(other_machine: Run) -> None:
+def test_nothing_is_said_where_they_were_asked_for(other_machine):
     assert other_machine("run", "--step", "1e-3", "--stop", "0.01", "--native")[::2] == (0, "")
 
 
-def test_python_is_refused(other_machine: Run, foreign: Path) -> None:
+def test_python_is_refused(other_machine, foreign):
     assert other_machine("run", *SHORT, "--python") == (
         2,
         "",
@@ -79,9 +76,7 @@ def test_python_is_refused(other_machine: Run, foreign: Path) -> None:
 
 @pytest.mark.usefixtures("no_compiler")
 @pytest.mark.parametrize("arguments", [("run",), ("evaluate",)])
-def test_without_a_compiler_one_line_says_what_brings_one(
-    other_machine: Run, foreign: Path, arguments: tuple[str, ...]
-) -> None:
+def test_without_a_compiler_one_line_says_what_brings_one(other_machine, foreign, arguments):
     code, out, err = other_machine(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"grasp-cosim: plant: {foreign}/GripperPlant.fmu {LACKS}; no C compiler")
@@ -90,14 +85,14 @@ def test_without_a_compiler_one_line_says_what_brings_one(
 
 
 @needs_compiler
-def test_from_python_too(foreign: Path, grasp: System) -> None:
+def test_from_python_too(foreign, grasp):
     here = simulate(System.load(SYSTEM, foreign), step=1e-3, stop=0.3)
     there = simulate(grasp, step=1e-3, stop=0.3)
     assert all((here[name] == there[name]).all() for name in there.signals)
 
 
 @needs_compiler
-def test_what_has_no_twin_does_not_load(foreign: Path) -> None:
+def test_what_has_no_twin_does_not_load(foreign):
     system = System.load(SYSTEM, foreign).swap("plant", foreign / "SpringPlant.fmu")
     with pytest.raises(InputError) as error:
         simulate(system, stop=0.1)
@@ -109,9 +104,7 @@ def test_what_has_no_twin_does_not_load(foreign: Path) -> None:
 
 @needs_compiler
 @pytest.mark.slow
-def test_build_makes_native_ones_too(
-    command: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_build_makes_native_ones_too(command, tmp_path, monkeypatch):
     folder = tmp_path / "pythonfmu"
     shutil.copytree(package.package_folder("pythonfmu"), folder)
     binary = folder / "resources/binaries/linux64/libpythonfmu-export.so"
@@ -130,7 +123,7 @@ def test_build_makes_native_ones_too(
     assert err == ""
 
 
-def test_inspect_tells_the_processor(other_machine: Run, foreign: Path) -> None:
+def test_inspect_tells_the_processor(other_machine, foreign):
     found = json.loads(other_machine("inspect", foreign / "GripperPlant.fmu", "--json")[1])
     assert (found["platforms"], found["this_machine"]) == (["linux64 (RISC-V)", "win64"], HERE)
     code, out, _ = other_machine("inspect", foreign / "GripperPlant.fmu")

@@ -5,8 +5,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from conftest import Run
-from grasp_cosim import System, simulate
+from grasp_cosim import simulate
 
 WRITERS = {
     "comparison.html": ("compare", "run", "run", "-o"),
@@ -27,7 +26,7 @@ EACH = pytest.mark.parametrize(
 
 
 @pytest.fixture
-def here(grasp: System, fmus: Path, tmp_path: Path) -> Path:
+def here(grasp, fmus, tmp_path):
     result = simulate(grasp, step=1e-3, stop=0.01)
     (tmp_path / "run").mkdir()
     result.to_json(tmp_path / "run" / "run.json")
@@ -37,10 +36,10 @@ def here(grasp: System, fmus: Path, tmp_path: Path) -> Path:
 
 
 @EACH
-def test_a_pipe_has_its_reader_get_it(name: str, command: Run, here: Path) -> None:
+def test_a_pipe_has_its_reader_get_it(name, command, here):
     pipe = here / name
     os.mkfifo(pipe)
-    found: list[bytes] = []
+    found = []
     reader = Thread(target=lambda: found.append(pipe.read_bytes()), daemon=True)
     reader.start()
     code, _, err = command(*WRITERS[name], name)
@@ -51,7 +50,7 @@ def test_a_pipe_has_its_reader_get_it(name: str, command: Run, here: Path) -> No
 
 
 @EACH
-def test_a_link_stays(name: str, command: Run, here: Path) -> None:
+def test_a_link_stays(name, command, here):
     (here / "other").mkdir()
     (here / name).symlink_to(Path("other") / f"own_{name}")
     code, _, err = command(*WRITERS[name], name)
@@ -61,7 +60,7 @@ def test_a_link_stays(name: str, command: Run, here: Path) -> None:
 
 
 @EACH
-def test_a_folder_is_refused(name: str, command: Run, here: Path) -> None:
+def test_a_folder_is_refused(name, command, here):
     (here / name).mkdir()
     code, out, err = command(*WRITERS[name], name)
     assert (code, out) == (2, ""), err
@@ -69,7 +68,7 @@ def test_a_folder_is_refused(name: str, command: Run, here: Path) -> None:
     assert list((here / name).iterdir()) == []
 
 
-def test_fmus_are_built_through_links(command: Run, here: Path) -> None:
+def test_fmus_are_built_through_links(command, here):
     (here / "out").mkdir()
     (here / "out" / "GripperPlant.fmu").symlink_to(Path("..") / "mine.fmu")
     assert command("build", "--out", "out")[0] == 0
@@ -77,14 +76,14 @@ def test_fmus_are_built_through_links(command: Run, here: Path) -> None:
     assert (here / "mine.fmu").read_bytes() == (here / "GripperPlant.fmu").read_bytes()
 
 
-def test_a_run_is_not_written_in_the_place_of_a_file(command: Run, here: Path) -> None:
+def test_a_run_is_not_written_in_the_place_of_a_file(command, here):
     (here / "file").touch()
     code, out, err = command("run", "--stop", "0.01", "--out", "file")
     assert (code, out) == (2, "")
     assert err == f"grasp-cosim: file: cannot write to {here}/file: Not a directory\n"
 
 
-def test_the_files_of_a_run_go_through_links_and_pipes(command: Run, here: Path) -> None:
+def test_the_files_of_a_run_go_through_links_and_pipes(command, here):
     folder, found = here / "run", []
     (folder / "signals.csv").unlink()
     os.mkfifo(folder / "signals.csv")

@@ -13,7 +13,7 @@ from support.native_fmus import build, needs_gcc
 FULL = Path("/dev/full")
 
 
-def run(*arguments: str, output: int | None = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
+def run(*arguments, output=subprocess.PIPE):
     command = [sys.executable, "-m", "grasp_cosim", *arguments]
     return subprocess.run(
         command, stdout=output, stderr=subprocess.PIPE, text=True, timeout=120, check=False
@@ -21,7 +21,7 @@ def run(*arguments: str, output: int | None = subprocess.PIPE) -> subprocess.Com
 
 
 @needs_gcc
-def test_what_an_fmu_prints_does_not_get_into_the_json(tmp_path: Path) -> None:
+def test_what_an_fmu_prints_does_not_get_into_the_json(tmp_path):
     fmu = build(tmp_path, "printing", "2.0")
     inputs = [v.name for v in read_interface(fmu).of("input")]
     values = {"u_Boolean": "true", "u_String": "'text'", "u_Enumeration": "1"}
@@ -38,7 +38,7 @@ def test_what_an_fmu_prints_does_not_get_into_the_json(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="this system has no /dev/full")
-def test_a_full_disk_is_no_wrong_input(fmus: Path, tmp_path: Path) -> None:
+def test_a_full_disk_is_no_wrong_input(fmus, tmp_path):
     text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
     (tmp_path / "grasp.toml").write_text(text)
     with FULL.open("w") as full:

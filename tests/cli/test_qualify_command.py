@@ -7,8 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import Altered
-from grasp_cosim import System, cli
+from grasp_cosim import cli
 from grasp_cosim.comparison.bands import read_bands
 from grasp_cosim.grasp.presets import SYSTEM
 
@@ -22,19 +21,14 @@ SHORT = ["--stop", "0.05", *(
 
 
 @pytest.fixture
-def qualify(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    grasp: System,
-    tmp_path: Path,
-) -> Run:
+def qualify(monkeypatch, capsys, grasp, tmp_path):
     """Runs the command in an empty folder; exit code, standard output, standard error."""
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
     monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: grasp)
 
-    def run(*arguments: str | Path) -> tuple[int, str, str]:
+    def run(*arguments: str | Path):
         code = cli.main(["qualify", "--python", *map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err
@@ -42,7 +36,7 @@ def qualify(
     return run
 
 
-def test_a_copy_is_qualified(qualify: Run, fmus: Path) -> None:
+def test_a_copy_is_qualified(qualify, fmus):
     code, out, err = qualify(fmus / "GripperPlant.fmu", "--as", "plant", *SHORT)
     assert (code, err) == (0, "")
     lines = out.splitlines()
@@ -59,9 +53,7 @@ def test_a_copy_is_qualified(qualify: Run, fmus: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_system_file_has_the_candidate_with_its_names_and_values(
-    qualify: Run, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_system_file_has_the_candidate_with_its_names_and_values(qualify, fmus, tmp_path):
     """A heavier finger, and gaps under other names: what the file says of it, and nothing else."""
     text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
     path = tmp_path / "mine.toml"
@@ -81,9 +73,7 @@ def test_a_system_file_has_the_candidate_with_its_names_and_values(
 
 
 @pytest.mark.slow
-def test_the_adaptive_controller_is_another_law_behind_the_same_interface(
-    qualify: Run, fmus: Path
-) -> None:
+def test_the_adaptive_controller_is_another_law_behind_the_same_interface(qualify, fmus):
     fmu = fmus / "GraspControllerAdaptive.fmu"
     code, out, err = qualify(fmu, "--as", "controller", *SHORT, "--json")
     report = json.loads(out)
@@ -95,7 +85,7 @@ def test_the_adaptive_controller_is_another_law_behind_the_same_interface(
 
 
 @pytest.mark.slow
-def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
+def test_all_that_it_writes(qualify, altered):
     heavy = altered(
         "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
     )
@@ -111,7 +101,7 @@ def test_all_that_it_writes(qualify: Run, altered: Altered) -> None:
     assert set(bands.metrics) == {m["name"] for m in report["metrics"]}
 
 
-def test_a_table_puts_the_worst_first(qualify: Run, altered: Altered) -> None:
+def test_a_table_puts_the_worst_first(qualify, altered):
     heavy = altered(
         "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
     )
@@ -126,7 +116,7 @@ def test_a_table_puts_the_worst_first(qualify: Run, altered: Altered) -> None:
     assert "  warns   start        finger_mass[2]: starts with 0.6 kg instead of 0.5 kg" in lines
 
 
-def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify: Run, fmus: Path) -> None:
+def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify, fmus):
     Path("page.html").write_text("of an earlier one")
     code, out, err = qualify(fmus / "ProximitySensor.fmu", "--as", "plant", "-o", "page.html")
     assert (code, err) == (1, "no page page.html: there were no two runs\n")
@@ -135,7 +125,7 @@ def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify: Run, fmus: 
 
 
 @pytest.mark.slow
-def test_bands_and_values_are_taken(qualify: Run, altered: Altered, tmp_path: Path) -> None:
+def test_bands_and_values_are_taken(qualify, altered, tmp_path):
     heavy = altered(
         "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
     )
@@ -148,9 +138,7 @@ def test_bands_and_values_are_taken(qualify: Run, altered: Altered, tmp_path: Pa
     assert "interface: no difference" in out
 
 
-def test_a_candidate_that_does_not_load_is_no_wrong_input(
-    qualify: Run, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_candidate_that_does_not_load_is_no_wrong_input(qualify, fmus, tmp_path):
     bare = tmp_path / "bare.fmu"
     with zipfile.ZipFile(fmus / "GripperPlant.fmu") as whole, zipfile.ZipFile(bare, "w") as file:
         file.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
@@ -184,9 +172,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG)
-def test_wrong_input_is_one_line_and_exit_2(
-    qualify: Run, fmus: Path, arguments: list[str], message: str
-) -> None:
+def test_wrong_input_is_one_line_and_exit_2(qualify, fmus, arguments, message):
     first, *more = arguments
     code, out, err = qualify(fmus / first, *more, "--out", "results")
     assert (code, out) == (2, "")
@@ -195,7 +181,7 @@ def test_wrong_input_is_one_line_and_exit_2(
     assert list(Path().iterdir()) == []
 
 
-def test_a_band_for_nothing_is_exit_2(qualify: Run, fmus: Path, tmp_path: Path) -> None:
+def test_a_band_for_nothing_is_exit_2(qualify, fmus, tmp_path):
     (tmp_path / "bands.toml").write_text('[signals]\n"plant.gpa*" = { absolute = 1 }\n')
     code, _, err = qualify(
         fmus / "GripperPlant.fmu", "--as", "plant", *SHORT, "--bands", tmp_path / "bands.toml"

@@ -1,11 +1,9 @@
 """FMUs that do not run here: each command says in one line what they are and what to ask for."""
 
 import zipfile
-from pathlib import Path
 
 import pytest
-from conftest import Run
-from grasp_cosim.inspection.loading import Finding, examine
+from grasp_cosim.inspection.loading import examine
 from support.native_fmus import build, needs_gcc
 from support.refused import BINARIES, KINDS, changed, linked, refused
 
@@ -33,11 +31,11 @@ VALUES_3 = ", ".join(f"u_{name} = 0" for name in NUMBERS)
 SYSTEM_3 = SYSTEM.replace("u_Real = 0, u_Integer = 0", VALUES_3)
 
 
-def found(fmu: Path) -> dict[str, Finding]:
+def found(fmu):
     return {finding.check: finding for finding in examine(fmu, load=True)}
 
 
-def one_line(run: tuple[int, str, str], what: str, ask: str) -> None:
+def one_line(run, what, ask):
     """It is wrong input, said of x.fmu as it was given, in one line, without a folder of ours."""
     code, out, err = run
     assert (code, out) == (2, ""), err
@@ -51,7 +49,7 @@ def one_line(run: tuple[int, str, str], what: str, ask: str) -> None:
 
 @needs_gcc
 @pytest.mark.parametrize("name", KINDS)
-def test_a_kind_that_no_machine_runs(name: str, command: Run, tmp_path: Path) -> None:
+def test_a_kind_that_no_machine_runs(name, command, tmp_path):
     _, _, what, ask = KINDS[name]
     fmu = refused(tmp_path, name)
     verdict = found(fmu)["fmu"]
@@ -76,7 +74,7 @@ def test_a_kind_that_no_machine_runs(name: str, command: Run, tmp_path: Path) ->
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("name", BINARIES)
-def test_a_binary_for_others(name: str, command: Run, tmp_path: Path) -> None:
+def test_a_binary_for_others(name, command, tmp_path):
     version, _, what, ask = BINARIES[name]
     fmu = refused(tmp_path, name)
     verdict = found(fmu)["binary"]
@@ -94,7 +92,7 @@ def test_a_binary_for_others(name: str, command: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_candidate_with_a_binary_for_others(command: Run, fmus: Path, tmp_path: Path) -> None:
+def test_a_candidate_with_a_binary_for_others(command, fmus, tmp_path):
     changed(
         fmus / "GripperPlant.fmu",
         tmp_path / "x.fmu",
@@ -115,9 +113,7 @@ def test_a_candidate_with_a_binary_for_others(command: Run, fmus: Path, tmp_path
 
 @pytest.mark.slow
 @needs_gcc
-def test_what_an_fmu_lacks_is_a_warning_where_this_host_has_it(
-    command: Run, tmp_path: Path
-) -> None:
+def test_what_an_fmu_lacks_is_a_warning_where_this_host_has_it(command, tmp_path):
     findings = found(linked(tmp_path))
     assert findings["trial"].status == "ok", findings
     libraries = findings["libraries"]
@@ -131,7 +127,7 @@ def test_what_an_fmu_lacks_is_a_warning_where_this_host_has_it(
 
 @pytest.mark.slow
 @needs_gcc
-def test_what_an_fmu_lacks_is_a_problem_where_nobody_has_it(command: Run, tmp_path: Path) -> None:
+def test_what_an_fmu_lacks_is_a_problem_where_nobody_has_it(command, tmp_path):
     findings = found(linked(tmp_path, missing=True))
     assert findings["libraries"].status == findings["trial"].status == "problem"
     assert "licence_check" in findings["trial"].text
@@ -145,7 +141,7 @@ def test_what_an_fmu_lacks_is_a_problem_where_nobody_has_it(command: Run, tmp_pa
 
 @pytest.mark.slow
 @needs_gcc
-def test_an_fmu_of_3_0_for_co_simulation_is_fine(command: Run, tmp_path: Path) -> None:
+def test_an_fmu_of_3_0_for_co_simulation_is_fine(command, tmp_path):
     """Also one without the functions of the other kinds, as run takes it."""
     findings = found(build(tmp_path, "x", "3.0"))
     assert {findings[check].status for check in ("fmu", "binary", "libraries", "trial")} == {"ok"}
@@ -154,7 +150,7 @@ def test_an_fmu_of_3_0_for_co_simulation_is_fine(command: Run, tmp_path: Path) -
 
 @pytest.mark.slow
 @needs_gcc
-def test_one_that_needs_its_tool(command: Run, tmp_path: Path) -> None:
+def test_one_that_needs_its_tool(command, tmp_path):
     capable = {"needsExecutionTool": "true"}
     build(tmp_path, "x", "2.0", capabilities=capable)
     verdict = found(tmp_path / "x.fmu")["fmu"]
@@ -177,7 +173,7 @@ def test_one_that_needs_its_tool(command: Run, tmp_path: Path) -> None:
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("isolation", ["none", "process"])
-def test_one_without_its_licence(isolation: str, command: Run, tmp_path: Path) -> None:
+def test_one_without_its_licence(isolation, command, tmp_path):
     from support.refused import licensed
 
     licensed(tmp_path)
@@ -190,7 +186,7 @@ def test_one_without_its_licence(isolation: str, command: Run, tmp_path: Path) -
     one_line(run, "No license for feature X in resources/key; it needs a licence on", "needs none")
 
 
-def test_one_that_is_encrypted(command: Run, tmp_path: Path) -> None:
+def test_one_that_is_encrypted(command, tmp_path):
     with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", "<x/>")
     data = bytearray((tmp_path / "x.fmu").read_bytes())

@@ -3,10 +3,9 @@
 import json
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from grasp_cosim import System, cli, simulate
+from grasp_cosim import cli, simulate
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.page import page_html
 from report.runs import grasp_run, ring_run, write_run
@@ -14,16 +13,14 @@ from report.timings import paced
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """A recorded grasp."""
     write_run(tmp_path / "results", grasp_run())
     return tmp_path / "results"
 
 
 @pytest.mark.slow
-def test_the_page_and_the_picture_are_beside_the_run(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_and_the_picture_are_beside_the_run(folder, capsys):
     assert cli.main(["report", str(folder)]) == 0
     out, err = capsys.readouterr()
     html = (folder / "report.html").read_text("utf-8")
@@ -37,9 +34,7 @@ def test_the_page_and_the_picture_are_beside_the_run(
 
 
 @pytest.mark.slow
-def test_json_and_another_place(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_and_another_place(folder, tmp_path, capsys):
     page = tmp_path / "new" / "page.html"
     assert cli.main(["report", str(folder), "--out", str(page), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
@@ -50,7 +45,7 @@ def test_json_and_another_place(
     assert sorted(p.name for p in folder.iterdir()) == ["run.json", "signals.csv"]
 
 
-def test_a_system_that_is_no_grasp_has_a_picture_of_its_signals(tmp_path: Path) -> None:
+def test_a_system_that_is_no_grasp_has_a_picture_of_its_signals(tmp_path):
     write_run(tmp_path / "ring", ring_run(["a", "b"]))
     assert cli.main(["report", str(tmp_path / "ring")]) == 0
     assert {p.name for p in (tmp_path / "ring").iterdir()} == {
@@ -59,9 +54,7 @@ def test_a_system_that_is_no_grasp_has_a_picture_of_its_signals(tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_a_paced_run_has_a_picture_of_its_timing_too(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_paced_run_has_a_picture_of_its_timing_too(tmp_path, capsys):
     run = replace(ring_run(["a", "b"]), timing=paced(steps=50, hiccups=2))
     write_run(tmp_path / "ring", run)
     assert cli.main(["report", str(tmp_path / "ring"), "--json"]) == 0
@@ -73,9 +66,7 @@ def test_a_paced_run_has_a_picture_of_its_timing_too(
     assert "2 of 50 steps (4 %) ended after their period" in html
 
 
-def test_without_matplotlib_there_is_the_page_alone(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_matplotlib_there_is_the_page_alone(folder, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     assert cli.main(["report", str(folder), "--json"]) == 0
     out, err = capsys.readouterr()
@@ -95,9 +86,7 @@ def test_without_matplotlib_there_is_the_page_alone(
         ("run.json", '{"units": {}}', "run.json: no entry 'system'; must be as"),
     ],
 )
-def test_a_folder_that_is_no_run_is_one_line(
-    name: str, text: str | None, message: str, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_is_no_run_is_one_line(name, text, message, folder, capsys):
     if text is None:
         (folder / name).unlink()
     else:
@@ -109,7 +98,7 @@ def test_a_folder_that_is_no_run_is_one_line(
     assert not (folder / "report.html").exists()
 
 
-def test_a_run_as_it_is_recorded_makes_a_page(grasp: System, tmp_path: Path) -> None:
+def test_a_run_as_it_is_recorded_makes_a_page(grasp, tmp_path):
     result = simulate(grasp, stop=0.05)
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")
@@ -119,6 +108,6 @@ def test_a_run_as_it_is_recorded_makes_a_page(grasp: System, tmp_path: Path) -> 
     assert all(f"{w.source} → {w.target}" in html for w in grasp.connections)
 
 
-def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_has_an_example(capsys):
     assert cli.main(["report", "--help"]) == 0
     assert "Example: grasp-cosim report" in capsys.readouterr().out

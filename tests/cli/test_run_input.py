@@ -5,7 +5,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import Run
 from grasp_cosim import System, load_run, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.ssp.to_archive import write_ssp
@@ -17,11 +16,11 @@ TEXT = "time,a.u_Real\n0,0\n1,10\n"
 INPUT = '[input]\nfile = "drive.csv"\n'
 
 
-def last(folder: str) -> float:
+def last(folder):
     return float(load_run(folder)["a.y_Real"][-1])
 
 
-def test_inputs_of_a_system_file(command: Run, tmp_path: Path) -> None:
+def test_inputs_of_a_system_file(command, tmp_path):
     driven(tmp_path, TEXT)
     code, _, err = command("run", "driven.toml", "--input", "drive.csv", "--out", "out")
     assert code == 0, err
@@ -33,7 +32,7 @@ def test_inputs_of_a_system_file(command: Run, tmp_path: Path) -> None:
     assert last("out") == 0.0
 
 
-def test_what_is_wrong_is_one_line(command: Run, tmp_path: Path) -> None:
+def test_what_is_wrong_is_one_line(command, tmp_path):
     driven(tmp_path, TEXT)
     for more, said in (
         ([], "input a.u_Real has no source"),
@@ -50,7 +49,7 @@ def test_what_is_wrong_is_one_line(command: Run, tmp_path: Path) -> None:
         assert said in err.splitlines()[-1]
 
 
-def test_an_fmu_that_is_swapped_in(command: Run, tmp_path: Path) -> None:
+def test_an_fmu_that_is_swapped_in(command, tmp_path):
     """The file has no a.u_Real before, and the new FMU no other source for it."""
     system = driven(tmp_path, "time,a.u_Integer\n0,3\n")
     system.write_text(
@@ -80,7 +79,7 @@ def test_an_fmu_that_is_swapped_in(command: Run, tmp_path: Path) -> None:
     assert last("out") == 7.0
 
 
-def test_a_misspelt_column_of_an_input_without_a_source(command: Run, tmp_path: Path) -> None:
+def test_a_misspelt_column_of_an_input_without_a_source(command, tmp_path):
     text = driven(tmp_path, TEXT).read_text("utf-8")
     (tmp_path / "driven.toml").write_text(text.replace("values = { u_Real = 0, ", "values = { "))
     for column, said in (
@@ -96,7 +95,7 @@ def test_a_misspelt_column_of_an_input_without_a_source(command: Run, tmp_path: 
         assert said in err
 
 
-def test_an_archive_whose_input_would_keep_its_start_value(command: Run, tmp_path: Path) -> None:
+def test_an_archive_whose_input_would_keep_its_start_value(command, tmp_path):
     system = System.load(driven(tmp_path, TEXT, more=INPUT))
     write_ssp(system, tmp_path / "a.ssp")
     assert command("run", "a.ssp", "--out", "out")[0] == 0
@@ -107,7 +106,7 @@ def test_an_archive_whose_input_would_keep_its_start_value(command: Run, tmp_pat
 
 
 @pytest.mark.slow
-def test_a_qualification_is_driven_too(tmp_path: Path) -> None:
+def test_a_qualification_is_driven_too(tmp_path):
     path = driven(tmp_path, TEXT, more=INPUT)
     build(tmp_path, "other", "2.0", {"u_Real": "N"})
     assert qualify(System.load(path), "a", tmp_path / "other.fmu").qualified

@@ -1,8 +1,5 @@
 """What `run` says of a system on standard error, before the first step and once."""
 
-from pathlib import Path
-
-from conftest import Run
 from support.native_fmus import TYPES, build, needs_gcc
 
 pytestmark = needs_gcc
@@ -11,7 +8,7 @@ VERSION = "3.0"
 REMARK = "first.y_Float64 -> second.u_Float64: second.u_Float64 has no unit, taken to be in m"
 
 
-def two(folder: Path, more: str = "") -> Path:
+def two(folder, more=""):
     """Two parts, of which the second one's input has no unit; more are values of the second."""
     build(folder, "first", VERSION, units={"y_Float64": "m"})
     build(folder, "second", VERSION)
@@ -35,13 +32,13 @@ values = {{ {others}{more} }}
     return path
 
 
-def test_a_unit_taken_for_granted_is_said_once(command: Run, tmp_path: Path) -> None:
+def test_a_unit_taken_for_granted_is_said_once(command, tmp_path):
     code, _, err = command("run", two(tmp_path))
     assert code == 0
     assert err.splitlines().count(REMARK) == 1
 
 
-def test_it_is_said_before_a_failure_that_names_the_inputs(command: Run, tmp_path: Path) -> None:
+def test_it_is_said_before_a_failure_that_names_the_inputs(command, tmp_path):
     code, out, err = command("run", two(tmp_path, ", error_at = 0.35"))
     assert (code, out) == (3, "")
     remark, *_, failure = err.splitlines()
@@ -50,7 +47,7 @@ def test_it_is_said_before_a_failure_that_names_the_inputs(command: Run, tmp_pat
     assert "(inputs: u_Float64 = 45, " in failure
 
 
-def test_a_run_of_few_steps_is_remarked_on(command: Run, tmp_path: Path) -> None:
+def test_a_run_of_few_steps_is_remarked_on(command, tmp_path):
     said = (
         "two.toml: the whole run is 2 steps of 0.5 s, and values are passed on only between steps"
     )

@@ -1,15 +1,13 @@
 """run --plot: a picture of the grasp, one of the timing of a run in real time, or both."""
 
 import sys
-from pathlib import Path
 
 import pytest
-from conftest import Run
 from support.slow import slow
 
 
 @pytest.fixture(autouse=True)
-def sensor_toml(tmp_path: Path, fmus: Path) -> None:
+def sensor_toml(tmp_path, fmus):
     """A system that is no grasp."""
     (tmp_path / "sensor.toml").write_text(
         "[experiment]\nstep = 1e-3\nstop = 0.02\n"
@@ -26,9 +24,7 @@ def sensor_toml(tmp_path: Path, fmus: Path) -> None:
         slow(["sensor.toml", "--realtime"], ["signals.png", "timing.png"]),
     ],
 )
-def test_what_there_is_to_draw_is_drawn(
-    arguments: list[str], pictures: list[str], command: Run, tmp_path: Path
-) -> None:
+def test_what_there_is_to_draw_is_drawn(arguments, pictures, command, tmp_path):
     code, _, err = command("run", *arguments, "--plot", "--out", "results")
     assert code == 0
     assert sorted(p.name for p in (tmp_path / "results").glob("*.png")) == pictures
@@ -38,15 +34,13 @@ def test_what_there_is_to_draw_is_drawn(
 
 
 @pytest.mark.slow
-def test_the_timing_goes_to_the_current_folder_without_out(command: Run, tmp_path: Path) -> None:
+def test_the_timing_goes_to_the_current_folder_without_out(command, tmp_path):
     assert command("run", "sensor.toml", "--realtime", "--plot")[0] == 0
     found = sorted(p.name for p in tmp_path.iterdir())
     assert found == ["sensor.toml", "signals.png", "timing.png"]
 
 
-def test_without_matplotlib_a_run_in_real_time_is_refused_at_once(
-    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_without_matplotlib_a_run_in_real_time_is_refused_at_once(command, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     code, _, err = command("run", "sensor.toml", "--realtime", "--plot", "--out", "results")
     assert code == 2
@@ -55,9 +49,7 @@ def test_without_matplotlib_a_run_in_real_time_is_refused_at_once(
 
 
 @pytest.mark.slow
-def test_a_run_that_stops_at_an_overrun_is_drawn_as_far_as_it_got(
-    command: Run, tmp_path: Path
-) -> None:
+def test_a_run_that_stops_at_an_overrun_is_drawn_as_far_as_it_got(command, tmp_path):
     paced = "--realtime --set realtime.factor=1e5 --set realtime.overrun=stop --plot --out results"
     assert command("run", "sensor.toml", *paced.split())[0] == 3
     assert (tmp_path / "results/timing.png").read_bytes().startswith(b"\x89PNG")

@@ -2,10 +2,7 @@
 
 import json
 import os
-from pathlib import Path
 
-import pytest
-from conftest import Run
 from grasp_cosim.realtime.timing import Overrun, Spread, Timing
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.terminal import timing_lines
@@ -13,7 +10,7 @@ from grasp_cosim.report.terminal import timing_lines
 PACED = ["run", "--realtime", "--set", "realtime.factor=1000", "--step", "1e-3", "--stop", "0.5"]
 
 
-def test_the_timing_is_in_the_json_and_in_the_folder(command: Run, tmp_path: Path) -> None:
+def test_the_timing_is_in_the_json_and_in_the_folder(command, tmp_path):
     code, out, err = command(
         *PACED, "--set", "realtime.overrun=continue", "--out", "results", "--json"
     )
@@ -26,13 +23,13 @@ def test_the_timing_is_in_the_json_and_in_the_folder(command: Run, tmp_path: Pat
     assert timing.as_dict() == printed["realtime"]
 
 
-def test_a_run_that_is_not_paced_says_nothing_of_it(command: Run) -> None:
+def test_a_run_that_is_not_paced_says_nothing_of_it(command):
     code, out, _ = command("run", "--stop", "0.01", "--json")
     assert code == 0
     assert "realtime" not in json.loads(out)
 
 
-def test_people_are_told_how_it_kept_to_the_clock(command: Run) -> None:
+def test_people_are_told_how_it_kept_to_the_clock(command):
     code, out, err = command(*PACED, "--python")
     assert (code, err) == (0, "")
     lines = out.splitlines()
@@ -44,9 +41,7 @@ def test_people_are_told_how_it_kept_to_the_clock(command: Run) -> None:
     assert "the machine is too slow for this system: a step takes " in lines[-1]
 
 
-def test_a_run_that_stops_at_an_overrun_fails_and_keeps_its_timing(
-    command: Run, tmp_path: Path
-) -> None:
+def test_a_run_that_stops_at_an_overrun_fails_and_keeps_its_timing(command, tmp_path):
     code, out, err = command(*PACED, "--set", "realtime.overrun=stop", "--out", "results")
     assert (code, out) == (3, "")
     kept, error = err.splitlines()
@@ -58,9 +53,7 @@ def test_a_run_that_stops_at_an_overrun_fails_and_keeps_its_timing(
     assert (timing.overruns, timing.steps) == (1, 1)
 
 
-def test_a_cpu_that_is_not_there_is_a_mistake(
-    command: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_cpu_that_is_not_there_is_a_mistake(command, monkeypatch, tmp_path):
     (tmp_path / "online").write_text("0-1\n")
     monkeypatch.setattr("grasp_cosim.realtime.privileges.ONLINE", tmp_path / "online")
     code, out, err = command(*PACED, "--set", "realtime.cpu=99", "--out", "results")
@@ -69,9 +62,7 @@ def test_a_cpu_that_is_not_there_is_a_mistake(
     assert not (tmp_path / "results").exists()
 
 
-def test_what_is_refused_is_on_standard_error(
-    command: Run, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_is_refused_is_on_standard_error(command, monkeypatch, caplog):
     monkeypatch.delattr(os, "sched_setaffinity", raising=False)
     code, out, _ = command(*PACED, "--set", "realtime.cpu=0", "--python", "--json")
     assert code == 0
@@ -79,7 +70,7 @@ def test_what_is_refused_is_on_standard_error(
     assert caplog.messages == ["CPU 0: not possible on this operating system"]
 
 
-def timing(culprits: dict[str, int], granted: tuple[str, ...] = ()) -> Timing:
+def timing(culprits, granted=()):
     part = Spread(1e-4, 2e-4, 3e-4, 4e-4, 0.5)
     return Timing(
         factor=1.0, period=1e-3, overrun="catch-up", granted=granted, refused=(), steps=100,
@@ -89,7 +80,7 @@ def timing(culprits: dict[str, int], granted: tuple[str, ...] = ()) -> Timing:
     )  # fmt: skip
 
 
-def test_what_could_be_done_depends_on_who_is_to_blame() -> None:
+def test_what_could_be_done_depends_on_who_is_to_blame():
     assert timing_lines(timing({})) == [
         "paced at 1 of real time, asked for 1: a step every 1 ms",
         "step computes         median 0.1  p99 0.2  p99.9 0.3  worst 0.4 ms at t = 0.5 s",

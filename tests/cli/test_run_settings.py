@@ -2,16 +2,14 @@
 
 import json
 import shlex
-from pathlib import Path
 
 import pytest
-from conftest import Run
 
 SWAP = "--swap plant=fmus/GripperPlant.fmu"
 
 
 @pytest.fixture(autouse=True)
-def their_folder(fmus: Path, tmp_path: Path) -> None:
+def their_folder(fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
 
 
@@ -72,7 +70,7 @@ def their_folder(fmus: Path, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_mistake_is_one_line(command: Run, line: str, said: str) -> None:
+def test_a_mistake_is_one_line(command, line, said):
     code, out, err = command("run", *shlex.split(line))
     assert (code, out) == (2, "")
     assert err.startswith("grasp-cosim: ")
@@ -81,7 +79,7 @@ def test_a_mistake_is_one_line(command: Run, line: str, said: str) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_set_is_in_the_settings_of_the_run(command: Run, tmp_path: Path) -> None:
+def test_what_is_set_is_in_the_settings_of_the_run(command, tmp_path):
     """The gaps are taken for mm: the sensors see a thousandth of them."""
     line = (
         f"{SWAP} --set components.plant.units.gap[1]=mm --set components.plant.units.gap[2]=mm "

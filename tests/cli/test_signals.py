@@ -7,12 +7,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim import SimulationError, simulate
 from grasp_cosim.base.interruption import AT_ONCE
 from grasp_cosim.base.scratch import PREFIX, lock_of
 from grasp_cosim.grasp.presets import SYSTEM
@@ -29,12 +29,12 @@ Start = Callable[..., subprocess.Popen[str]]
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Start]:
+def start(tmp_path):
     """The command in the folder of the test, with its temporary folders in `tmp` there."""
     (tmp_path / "tmp").mkdir()
     with ExitStack() as stack:
 
-        def command(*arguments: object) -> subprocess.Popen[str]:
+        def command(*arguments: object):
             process = subprocess.Popen(
                 [sys.executable, "-m", "grasp_cosim", *map(str, arguments)],
                 cwd=tmp_path,
@@ -51,7 +51,7 @@ def start(tmp_path: Path) -> Iterator[Start]:
         yield command
 
 
-def wait_for(process: subprocess.Popen[str], there: Callable[[], bool]) -> None:
+def wait_for(process, there):
     end = time.monotonic() + 120.0
     while not there():
         assert process.poll() is None, process.communicate()
@@ -59,17 +59,17 @@ def wait_for(process: subprocess.Popen[str], there: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def left(folder: Path) -> list[str]:
+def left(folder):
     return [path.name for path in (folder / "tmp").iterdir() if path.name.startswith(PREFIX)]
 
 
-def grasp_file(folder: Path, fmus: Path) -> Path:
+def grasp_file(folder, fmus):
     path = folder / "grasp.toml"
     path.write_text(SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/'), "utf-8")
     return path
 
 
-def native_system(folder: Path, **values: float) -> Path:
+def native_system(folder, **values):
     """A native FMU alone, for 1e4 s."""
     fmu = build(folder, "native", "2.0")
     given = {"u_Real": 0.0, "u_Integer": 0, "u_Enumeration": 1, **values}
@@ -86,9 +86,7 @@ def native_system(folder: Path, **values: float) -> Path:
     ("number", "times"),
     [(signal.SIGINT, 1), slow(signal.SIGTERM, 1), slow(signal.SIGTERM, 2)],
 )
-def test_a_signal_keeps_what_a_run_recorded(
-    start: Start, tmp_path: Path, fmus: Path, number: signal.Signals, times: int
-) -> None:
+def test_a_signal_keeps_what_a_run_recorded(start, tmp_path, fmus, number, times):
     """Sent to all processes, as systemd does, and twice at once, as `timeout` does."""
     process = start("run", grasp_file(tmp_path, fmus), "--stop", 1000, "--out", "out")
     wait_for(process, lambda: (tmp_path / "out/run.json").exists() and size(tmp_path) > 10_000)
@@ -106,9 +104,7 @@ def test_a_signal_keeps_what_a_run_recorded(
 @needs_gcc
 @pytest.mark.slow
 @pytest.mark.parametrize("number", CODES)
-def test_a_second_signal_ends_a_run_that_hangs(
-    start: Start, tmp_path: Path, number: signal.Signals
-) -> None:
+def test_a_second_signal_ends_a_run_that_hangs(start, tmp_path, number):
     system = native_system(tmp_path, hang_at=0.0105)
     process = start("run", system, "--out", "out")
     assert process.stderr
@@ -129,7 +125,7 @@ def test_a_second_signal_ends_a_run_that_hangs(
 
 @pytest.mark.slow
 @needs_gcc
-def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_path: Path) -> None:
+def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start, tmp_path):
     alive = tempfile.mkdtemp(prefix=PREFIX, dir=tmp_path / "tmp")
     lock = lock_of(Path(alive))
     assert lock.taken()
@@ -152,13 +148,13 @@ def test_a_killed_run_is_on_disk_and_its_folders_are_swept(start: Start, tmp_pat
     lock.release()
 
 
-def size(folder: Path) -> int:
+def size(folder):
     return (folder / "out/signals.csv").stat().st_size
 
 
 @needs_gcc
 @pytest.mark.slow
-def test_folders_of_running_processes_are_not_swept(start: Start, tmp_path: Path) -> None:
+def test_folders_of_running_processes_are_not_swept(start, tmp_path):
     process = start("run", native_system(tmp_path), "--out", "out")
     wait_for(process, (tmp_path / "out/run.json").exists)
     there = left(tmp_path)
@@ -178,14 +174,12 @@ def test_folders_of_running_processes_are_not_swept(start: Start, tmp_path: Path
     assert not left(tmp_path)
 
 
-def test_an_interruption_inside_an_fmu_is_one(
-    grasp: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interruption_inside_an_fmu_is_one(grasp, monkeypatch):
     """Of which the FMU makes an error of its own, as a Python FMU does."""
     with simulate.session(grasp, stop=0.1) as session:
         session.step(3)
 
-        def advance(_: int) -> int:
+        def advance(_):
             try:
                 signal.raise_signal(signal.SIGINT)
             except KeyboardInterrupt:
@@ -198,7 +192,7 @@ def test_an_interruption_inside_an_fmu_is_one(
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_a_session_leaves_ctrl_c_as_it_was(grasp: System) -> None:
+def test_a_session_leaves_ctrl_c_as_it_was(grasp):
     with simulate.session(grasp, stop=0.1) as one, simulate.session(grasp, stop=0.1) as other:
         one.close()
         with pytest.raises(KeyboardInterrupt):
@@ -230,7 +224,7 @@ entry()
 
 
 @pytest.mark.parametrize("how", CODES)
-def test_an_interrupted_command_does_not_crash_at_its_end(how: signal.Signals) -> None:
+def test_an_interrupted_command_does_not_crash_at_its_end(how):
     """As libraries do that were interrupted while they were imported."""
     done = subprocess.run(
         [sys.executable, "-c", HALF_IMPORTED, str(int(how))], capture_output=True, check=False

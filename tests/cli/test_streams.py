@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from grasp_cosim.cli import main
@@ -13,7 +12,7 @@ PROGRAM = (sys.executable, "-m", "grasp_cosim")
 SCRIPT = (sys.executable, "-c", "from grasp_cosim.__main__ import entry; entry()")
 
 
-def shell(line: str, **more: str) -> tuple[int, str]:
+def shell(line, **more):
     """Exit code and standard error of the command in a line for sh, where $C is grasp-cosim."""
     done = subprocess.run(
         ["bash", "-c", line], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
@@ -30,11 +29,11 @@ def shell(line: str, **more: str) -> tuple[int, str]:
         ("$C --version > /dev/full", "No space left on device"),
     ],
 )
-def test_standard_output_that_cannot_be_written(line: str, said: str) -> None:
+def test_standard_output_that_cannot_be_written(line, said):
     assert shell(line) == (3, f"grasp-cosim: standard output: {said}\n")
 
 
-def test_standard_output_that_nobody_reads() -> None:
+def test_standard_output_that_nobody_reads():
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as pipe:
@@ -46,11 +45,11 @@ def test_standard_output_that_nobody_reads() -> None:
 
 
 @pytest.mark.parametrize("where", ["2>&-", "2> /dev/full", ">&- 2>&-", "<&- >&- 2>&-"])
-def test_standard_error_that_cannot_be_written(where: str) -> None:
+def test_standard_error_that_cannot_be_written(where):
     assert shell(f"$C inspect nothing.fmu {where}") == (2, "")
 
 
-def test_what_a_binary_has_printed_is_not_lost_at_the_end() -> None:
+def test_what_a_binary_has_printed_is_not_lost_at_the_end():
     code = """
 import ctypes
 from grasp_cosim.cli.streams import keep_output_for_us, leave
@@ -66,7 +65,7 @@ leave(0)
 
 
 @pytest.mark.slow
-def test_a_file_of_the_run_is_not_taken_for_standard_output(tmp_path: Path) -> None:
+def test_a_file_of_the_run_is_not_taken_for_standard_output(tmp_path):
     grasp = "$C run --stop 0.001 --step 1e-3 --out"
     code, said = shell(f"{grasp} {tmp_path / 'a'} && {grasp} {tmp_path / 'b'} >&- <&-")
     assert (code, said.count("standard output: Bad file descriptor")) == (3, 1)
@@ -77,9 +76,7 @@ def test_a_file_of_the_run_is_not_taken_for_standard_output(tmp_path: Path) -> N
 @pytest.mark.parametrize("program", [PROGRAM, SCRIPT])
 @pytest.mark.parametrize(("module", "begun"), [("click", False), ("numpy", True)])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_during_the_imports(
-    tmp_path: Path, program: tuple[str, ...], module: str, begun: bool, number: int
-) -> None:
+def test_a_signal_during_the_imports(tmp_path, program, module, begun, number):
     """click comes with the command line, numpy with the command."""
     (tmp_path / f"{module}.py").write_text(
         f"import os, time\nos.kill(os.getpid(), {int(number)})\ntime.sleep(60)\n"
@@ -93,16 +90,14 @@ def test_a_signal_during_the_imports(
     assert done.stderr.strip() == "grasp-cosim: interrupted" * begun
 
 
-def _hear_interrupts() -> None:
+def _hear_interrupts():
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 HOSTILE = "n\x1b]0;owned\x07\x1b[2J\r\u202eümf\x9b31m"
 
 
-def test_no_escape_sequence_reaches_the_terminal(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_no_escape_sequence_reaches_the_terminal(capsys, tmp_path):
     assert main(["inspect", HOSTILE]) == 2
     said = capsys.readouterr().err
     assert said.startswith("grasp-cosim: n\\x1b]0;owned\\x07")
@@ -110,11 +105,11 @@ def test_no_escape_sequence_reaches_the_terminal(
     assert said.count("\n") == 1
 
 
-def test_a_line_feed_does_not_make_a_second_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_feed_does_not_make_a_second_line(capsys):
     assert main(["inspect", "two\nlines.fmu"]) == 2
     assert capsys.readouterr().err == "grasp-cosim: two\\nlines.fmu: no such FMU file\n"
 
 
-def test_ascii_is_no_way_around(tmp_path: Path) -> None:
+def test_ascii_is_no_way_around(tmp_path):
     code, said = shell("$C inspect $'a\\x1b]0;b\\xc3\\xbc'", PYTHONIOENCODING="ascii")
     assert (code, "\x1b" in said, "\\x1b]0;b" in said) == (2, False, True)

@@ -5,20 +5,19 @@ import json
 from pathlib import Path
 
 import pytest
-from conftest import Run
 
 SHORT = ("--case", "0", "--set", "experiment.step=1e-3", "--stop", "0.02", "--workers", "1")
 WIDTH = ("--vary", "plant.object_width=0.06,0.07")
 MASS = ("--vary", "plant.finger_mass[1]=0.5,0.6")
 
 
-def rows(path: str) -> list[dict[str, str]]:
+def rows(path):
     with Path(path).open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
 @pytest.mark.slow
-def test_a_grid_leaves_its_table_and_a_picture(command: Run) -> None:
+def test_a_grid_leaves_its_table_and_a_picture(command):
     code, out, err = command("sweep", *WIDTH, *MASS, *SHORT, "--plot", "--json")
     found = json.loads(out)
     assert (code, found["runs"], found["failed"]) == (0, 4, 0)
@@ -56,7 +55,7 @@ def test_a_grid_leaves_its_table_and_a_picture(command: Run) -> None:
         ((*WIDTH, "--set", "plant.object_width=0.05"), "plant.object_width: is given twice"),
     ],
 )
-def test_a_mistake_is_one_line_before_any_run(command: Run, arguments, said: str) -> None:
+def test_a_mistake_is_one_line_before_any_run(command, arguments, said):
     code, out, err = command("sweep", *arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert said in err
@@ -64,7 +63,7 @@ def test_a_mistake_is_one_line_before_any_run(command: Run, arguments, said: str
 
 
 @pytest.mark.slow
-def test_where_every_run_fails_the_result_is_negative(command: Run) -> None:
+def test_where_every_run_fails_the_result_is_negative(command):
     code, out, _ = command("sweep", "--vary", "plant.object_width=-1,-2", *SHORT)
     assert code == 2  # the first row does not fit
     code, out, _ = command("sweep", "--vary", "plant.finger_mass[1]=1e-9,2e-9", *SHORT)

@@ -3,7 +3,6 @@
 import logging
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 import grasp_cosim.cli as cli
 import pytest
@@ -13,13 +12,11 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Run:
+def command(tmp_path, monkeypatch, capsys):
     write_oscillator(tmp_path, "")
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: str) -> tuple[int, str, str]:
+    def run(*arguments: str):
         code = cli.main([*arguments])
         out, err = capsys.readouterr()
         return code, out, err
@@ -30,12 +27,12 @@ def command(
 RUN = ("run", "oscillator.toml", "--stop", "0.5")
 
 
-def shown(out: str) -> str:
+def shown(out):
     """What is printed, but for how fast it was."""
     return re.sub(r"[\d.]+ times", "", out)
 
 
-def test_what_is_said_is_what_was_asked_for(command: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_said_is_what_was_asked_for(command, monkeypatch):
     monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
     usual, quiet, verbose = (command(*RUN, *more) for more in ((), ("-q",), ("--verbose",)))
     assert {usual[0], quiet[0], verbose[0]} == {0}
@@ -49,7 +46,7 @@ def test_what_is_said_is_what_was_asked_for(command: Run, monkeypatch: pytest.Mo
     assert re.search(r"^oscillator.toml to 0\.5 s: \d+\.\d\d s$", said, re.MULTILINE)
 
 
-def test_the_options_stand_before_the_command_too(command: Run) -> None:
+def test_the_options_stand_before_the_command_too(command):
     assert command("-q", *RUN)[2] == ""
     once = command("--verbose", *RUN)[2].splitlines()
     twice = command("--verbose", *RUN, "-v")[2].splitlines()
@@ -57,20 +54,20 @@ def test_the_options_stand_before_the_command_too(command: Run) -> None:
     assert "engine: the loop in " in "\n".join(once)
 
 
-def test_errors_stay(command: Run) -> None:
+def test_errors_stay(command):
     code, out, err = command("run", "oscillator.toml", "-q", "--set", "a.x.y=1")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith("grasp-cosim: --set a.x.y: ")
 
 
-def test_notes_are_not_said_when_quiet(command: Run) -> None:
+def test_notes_are_not_said_when_quiet(command):
     assert command(*RUN, "--out", "out")[0] == 0
     compare = ("compare", "out", "out", "-o", "page.html")
     assert "wrote page.html: " in command(*compare)[2]
     assert command(*compare, "-q")[2] == ""
 
 
-def test_nothing_is_left_behind(command: Run) -> None:
+def test_nothing_is_left_behind(command):
     """A later command in the same process says no more than usual."""
     loggers = [logging.getLogger(name) for name in ("grasp_cosim", "grasp_fmus")]
     before = [(logger.level, [*logger.handlers]) for logger in loggers]

@@ -4,8 +4,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import Run
-from grasp_cosim import InputError, System, load_run, simulate
+from grasp_cosim import InputError, load_run, simulate
 from grasp_cosim.ssp.to_archive import write_ssp
 
 FMU = [
@@ -24,7 +23,7 @@ SYSTEM = [
 
 
 @pytest.fixture
-def things(grasp: System, fmus: Path, tmp_path: Path) -> Path:
+def things(grasp, fmus, tmp_path):
     """One of each: plant.fmu, my.zip, the same; the folder unpacked; a.ssp; a.toml; b.py; run/."""
     plant = tmp_path / "plant.fmu"
     plant.write_bytes((fmus / "GripperPlant.fmu").read_bytes())
@@ -47,7 +46,7 @@ def things(grasp: System, fmus: Path, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def refused(run: tuple[int, str, str], given: str, what: str, advice: str) -> None:
+def refused(run, given, what, advice):
     code, out, err = run
     assert (code, out) == (2, ""), err
     line = err.splitlines()[-1]
@@ -56,7 +55,7 @@ def refused(run: tuple[int, str, str], given: str, what: str, advice: str) -> No
 
 
 @pytest.mark.parametrize("arguments", SYSTEM, ids=" ".join)
-def test_in_the_place_of_a_system(arguments: tuple[str, ...], command: Run, things: Path) -> None:
+def test_in_the_place_of_a_system(arguments, command, things):
     report = "`grasp-cosim report run` shows the run"
     for given, what, advice in (
         ("plant.fmu", "an FMU", "`grasp-cosim init my_system.toml --fmu NAME=plant.fmu` makes a"),
@@ -88,7 +87,7 @@ def test_in_the_place_of_a_system(arguments: tuple[str, ...], command: Run, thin
 
 
 @pytest.mark.parametrize("arguments", FMU, ids=" ".join)
-def test_in_the_place_of_an_fmu(arguments: tuple[str, ...], command: Run, things: Path) -> None:
+def test_in_the_place_of_an_fmu(arguments, command, things):
     for given, what, advice in (
         ("unpacked", "a folder, unpacked from an FMU", "zip -r - .) > unpacked.fmu` packs it"),
         ("run", "a folder that `grasp-cosim run --out` wrote", "`grasp-cosim report run`"),
@@ -107,7 +106,7 @@ def test_in_the_place_of_an_fmu(arguments: tuple[str, ...], command: Run, things
 
 
 @pytest.mark.slow
-def test_in_the_place_of_a_run(command: Run, things: Path) -> None:
+def test_in_the_place_of_a_run(command, things):
     for given in ("run/run.json", "run/signals.csv"):
         assert command("report", given)[0] == 0
         assert Path("run/report.html").is_file()
@@ -124,7 +123,7 @@ def test_in_the_place_of_a_run(command: Run, things: Path) -> None:
         load_run("plant.fmu")
 
 
-def test_what_is_damaged_or_unknown_is_said_as_before(command: Run, tmp_path: Path) -> None:
+def test_what_is_damaged_or_unknown_is_said_as_before(command, tmp_path):
     (tmp_path / "x.fmu").write_bytes(b"PK\x03\x04")
     assert "x.fmu: not a readable FMU" in command("inspect", "x.fmu")[2]
     (tmp_path / "x.toml").write_text("x")
@@ -145,7 +144,7 @@ TABLE = "[experiment]\nstep = 0.1\nstop = 1.0\n"
         ("\ufeff" + TABLE, "[components]: missing"),  # a byte order mark, as some editors write it
     ],
 )
-def test_a_line_of_toml_is_named(text: str, said: str, command: Run, tmp_path: Path) -> None:
+def test_a_line_of_toml_is_named(text, said, command, tmp_path):
     (tmp_path / "a.toml").write_text(text, "utf-8")
     code, out, err = command("run", "a.toml")
     assert (code, out) == (2, "")
@@ -164,16 +163,14 @@ def test_a_line_of_toml_is_named(text: str, said: str, command: Run, tmp_path: P
         (("report", "run", "--out", "a.toml/b"), "a.toml: cannot write to "),
     ],
 )
-def test_what_cannot_be_written(
-    arguments: tuple[str, ...], said: str, command: Run, things: Path
-) -> None:
+def test_what_cannot_be_written(arguments, said, command, things):
     (things / "folder").mkdir()
     code, out, err = command(*arguments)
     assert (code, out) == (2, "")
     assert err.splitlines()[-1].startswith(f"grasp-cosim: {said}")
 
 
-def test_a_name_that_is_no_utf_8(command: Run, things: Path) -> None:
+def test_a_name_that_is_no_utf_8(command, things):
     """As older file systems have them."""
     try:
         run = things.with_name("h\udce9")
@@ -186,9 +183,7 @@ def test_a_name_that_is_no_utf_8(command: Run, things: Path) -> None:
     assert r"h\udce9" in (run / "c.html").read_text("utf-8")
 
 
-def test_a_current_folder_that_was_removed(
-    command: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_current_folder_that_was_removed(command, tmp_path, monkeypatch):
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()

@@ -1,8 +1,6 @@
 """FMUs that are nothing but a model description, and a loop of two of them."""
 
 import zipfile
-from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from grasp_cosim import System
 
@@ -16,7 +14,7 @@ UNITS = """<UnitDefinitions>
     <Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>
 </UnitDefinitions>"""
 
-PLANT: Mapping[str, str] = {
+PLANT = {
     "force": 'causality="input" | Real start="0" unit="N"',
     "gap": 'causality="output" | Real unit="m" nominal="0.1"',
     "touching": 'causality="output" variability="discrete" | Boolean',
@@ -29,17 +27,17 @@ PLANT: Mapping[str, str] = {
 }
 """The variables of the plant: name to attributes and type."""
 
-DEPENDENCIES: Mapping[str, Sequence[str] | None] = {"gap": (), "touching": (), "spare": ()}
+DEPENDENCIES = {"gap": (), "touching": (), "spare": ()}
 
 
 def write_fmu(
-    path: Path,
-    variables: Mapping[str, str] = PLANT,
-    dependencies: Mapping[str, Sequence[str] | None] = DEPENDENCIES,
-    capabilities: str = 'canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"',
-    kind: str = "CoSimulation",
-    step: str = "0.001",
-) -> Path:
+    path,
+    variables=PLANT,
+    dependencies=DEPENDENCIES,
+    capabilities='canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"',
+    kind="CoSimulation",
+    step="0.001",
+):
     """An FMI 2.0 FMU; variables like PLANT, dependencies of the outputs (None: not declared)."""
     names = list(variables)
     scalars = []
@@ -70,7 +68,7 @@ def write_fmu(
     return path
 
 
-def write_system(folder: Path) -> System:
+def write_system(folder):
     """A plant and a spring that pushes it: gap -> position, force -> force, width = 0.07."""
     write_fmu(folder / "plant.fmu")
     spring = {
@@ -87,12 +85,12 @@ def write_system(folder: Path) -> System:
     return System.load(folder / "loop.toml")
 
 
-def changed(name: str, before: str, after: str) -> dict[str, str]:
+def changed(name, before, after):
     """The plant's variables with one place in one of them changed."""
     assert PLANT[name].count(before) == 1
     return {**PLANT, name: PLANT[name].replace(before, after)}
 
 
-def without(name: str) -> dict[str, str]:
+def without(name):
     """The plant's variables but for one."""
     return {n: text for n, text in PLANT.items() if n != name}

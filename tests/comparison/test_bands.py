@@ -1,7 +1,6 @@
 """Bands: read from a file, or derived from the reference and its runs with other numerics."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,13 +24,13 @@ SINE = Curve(TIME, 2.0 + np.sin(2.0 * np.pi * TIME))
 """From 1 to 3."""
 
 
-def written(folder: Path, text: str) -> Path:
+def written(folder, text):
     path = folder / "bands.toml"
     path.write_text(text, "utf-8")
     return path
 
 
-def test_the_smallest_band_is_a_share_of_the_range() -> None:
+def test_the_smallest_band_is_a_share_of_the_range():
     band = signal_band(SINE, (), None, 0.1)
     assert band.width == pytest.approx(2.0 * SHARE)
     assert (band.time, band.source) == (0.1, "derived")
@@ -40,25 +39,23 @@ def test_the_smallest_band_is_a_share_of_the_range() -> None:
 @pytest.mark.parametrize(
     ("level", "nominal", "size"), [(5.0, None, 5.0), (0.0, None, 1.0), (1e-9, 0.01, 0.01)]
 )
-def test_a_signal_that_does_not_move_is_judged_by_its_size_or_nominal_value(
-    level: float, nominal: float | None, size: float
-) -> None:
+def test_a_signal_that_does_not_move_is_judged_by_its_size_or_nominal_value(level, nominal, size):
     flat = Curve(TIME, np.full(101, level))
     assert signal_band(flat, (), nominal, 0.0).width == pytest.approx(SMALL * size)
 
 
-def test_what_numerics_change_is_allowed_twice() -> None:
+def test_what_numerics_change_is_allowed_twice():
     other = [Curve(TIME, SINE.values + x) for x in (0.01, -0.03, 0.02)]
     assert signal_band(SINE, other, None, 0.0).width == pytest.approx(BOTH * 0.03)
 
 
-def test_a_shift_by_numerics_needs_no_width() -> None:
+def test_a_shift_by_numerics_needs_no_width():
     late = Curve(TIME, np.concatenate([SINE.values[:1], SINE.values[:-1]]))
     assert signal_band(SINE, [late], None, 0.0).width > 10 * SHARE
     assert signal_band(SINE, [late], None, 0.01).width == pytest.approx(2.0 * SHARE)
 
 
-def test_a_contact_must_be_the_same_unless_numerics_change_it() -> None:
+def test_a_contact_must_be_the_same_unless_numerics_change_it():
     contact = Curve(TIME, (TIME > 0.5).astype(float), held=True)
     bounce = Curve(TIME, contact.values * ((TIME < 0.6) | (TIME > 0.62)), held=True)
     assert signal_band(contact, [contact], None, 0.01).width == 0.0
@@ -76,13 +73,13 @@ def test_a_contact_must_be_the_same_unless_numerics_change_it() -> None:
         (Given(absolute=math.inf), Band(math.inf, 0.05, "given")),
     ],
 )
-def test_a_file_overrides_what_it_gives(given: Given, expected: Band) -> None:
+def test_a_file_overrides_what_it_gives(given, expected):
     band = signal_band(SINE, (), None, 0.05, given)
     assert (band.time, band.source) == (expected.time, "given")
     assert band.width == pytest.approx(expected.width)
 
 
-def test_the_band_of_a_metric() -> None:
+def test_the_band_of_a_metric():
     assert metric_band(2.0, (), 0.0).width == pytest.approx(2.0 * SHARE)
     assert metric_band(2.0, (), 0.5).width == 0.5  # a time, with the shift that is allowed
     assert metric_band(2.0, (2.1, None, 1.7), 0.0).width == pytest.approx(BOTH * 0.3)
@@ -91,7 +88,7 @@ def test_the_band_of_a_metric() -> None:
     assert metric_band(-2.0, (), 0.0, Given(relative=0.1, absolute=0.1)).width == pytest.approx(0.3)
 
 
-def test_an_exact_name_goes_before_the_first_pattern_that_fits() -> None:
+def test_an_exact_name_goes_before_the_first_pattern_that_fits():
     one, two, three, four = (Given(absolute=float(i)) for i in range(4))
     entries = {"*": one, "plant.*": two, "plant.gap[1]": three, "plant.gap[*]": four}
     assert entry_for(entries, "plant.gap[1]") is three
@@ -101,7 +98,7 @@ def test_an_exact_name_goes_before_the_first_pattern_that_fits() -> None:
     assert entry_for({"time_to_contact": two}, "time_to_contact[1]", "time_to_contact") is two
 
 
-def test_a_file_is_read(tmp_path: Path) -> None:
+def test_a_file_is_read(tmp_path):
     text = """
         signals = { "plant.gap[1]" = { absolute = 1e-5, relative = 1e-3, time = 1e-3 } }
         [metrics]
@@ -130,18 +127,18 @@ def test_a_file_is_read(tmp_path: Path) -> None:
         ("signals = {", r"bands.toml: not readable as TOML: "),
     ],
 )  # fmt: skip
-def test_a_wrong_file_is_one_line(tmp_path: Path, text: str, message: str) -> None:
+def test_a_wrong_file_is_one_line(tmp_path, text, message):
     with pytest.raises(InputError, match=message) as caught:
         read_bands(written(tmp_path, text))
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(InputError, match=r"none.toml: no such file of bands"):
         read_bands(tmp_path / "none.toml")
 
 
-def test_a_pattern_for_nothing_is_an_error() -> None:
+def test_a_pattern_for_nothing_is_an_error():
     check_patterns("b.toml", {"plant.*": Given(0.1)}, ["plant.gap[1]"])
     with pytest.raises(InputError, match=r"^b.toml: nothing is called 'plnt.\*'; valid: plant.gap"):
         check_patterns("b.toml", {"plnt.*": Given(0.1)}, ["plant.gap[1]"])

@@ -1,17 +1,14 @@
 """Two runs compared: what is in both, over the time that both have, each in its band."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, System, metric, simulate
+from grasp_cosim import InputError, metric, simulate
 from grasp_cosim.comparison.bands import Bands, Given
-from grasp_cosim.comparison.compare import Comparison, compare
+from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.words import as_json, as_text
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.recording.result import Result
 from hypothesis import given
 from hypothesis import strategies as st
 from report.runs import grasp_run, write_run
@@ -20,20 +17,20 @@ from support.examples import examples
 GAP = "plant.gap[1]"
 
 
-def changed(run: Result, **signals: Any) -> Result:
+def changed(run, **signals):
     """The run with other signals, by the last parts of their names."""
     return replace(run, signals={**run.signals, **{f"plant.{k}": v for k, v in signals.items()}})
 
 
-def cut(run: Result, rows: slice) -> Result:
+def cut(run, rows):
     """Some rows of the run."""
     columns = {name: column[rows] for name, column in run.items()}
     return replace(run, time=run.time[rows], signals=columns)
 
 
 @pytest.fixture
-def folders(tmp_path: Path) -> Any:
-    def compared(a: Result, b: Result, **more: Any) -> Comparison:
+def folders(tmp_path):
+    def compared(a, b, **more):
         for name, run in (("a", a), ("b", b)):
             write_run(tmp_path / name, run)
         return compare(tmp_path / "a", tmp_path / "b", **more)
@@ -41,7 +38,7 @@ def folders(tmp_path: Path) -> Any:
     return compared
 
 
-def test_a_run_is_like_itself(folders: Any) -> None:
+def test_a_run_is_like_itself(folders):
     found = folders(grasp_run(), grasp_run())
     assert found.alike
     assert {s.name for s in found.signals} == set(grasp_run())
@@ -51,13 +48,13 @@ def test_a_run_is_like_itself(folders: Any) -> None:
     assert "the settings of the runs are the same" in as_text(found)
 
 
-def test_results_are_compared_as_they_are() -> None:
+def test_results_are_compared_as_they_are():
     found = compare(grasp_run(), cut(grasp_run(), slice(0, 1001)))
     assert found.alike
     assert (found.a.name, found.b.name, found.end) == ("A", "B", 1.0)
 
 
-def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not() -> None:
+def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not():
     run = grasp_run()
     late = np.concatenate([run[GAP][:1].repeat(5), run[GAP][:-5]])
     moved = replace(run, signals={**run.signals, GAP: late})
@@ -71,7 +68,7 @@ def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not() ->
     assert [s.name for s in found.signals if not s.inside] == [GAP]
 
 
-def test_runs_of_unlike_length_and_step_are_compared_where_both_are(folders: Any) -> None:
+def test_runs_of_unlike_length_and_step_are_compared_where_both_are(folders):
     run = grasp_run()
     found = folders(run, cut(run, slice(200, 1801, 4)))
     assert (found.begin, found.end) == (0.2, 1.8)
@@ -85,14 +82,14 @@ def test_runs_of_unlike_length_and_step_are_compared_where_both_are(folders: Any
     assert note in found.notes
 
 
-def test_runs_at_other_times_are_refused_in_one_line(folders: Any) -> None:
+def test_runs_at_other_times_are_refused_in_one_line(folders):
     run = grasp_run()
     later = replace(run, time=run.time + 5.0)
     with pytest.raises(InputError, match=r"a: 0 to 2 s; .*b: 5 to 7 s: must have some time in"):
         folders(run, later)
 
 
-def test_a_metric_that_one_run_only_has_a_value_of_is_out(folders: Any) -> None:
+def test_a_metric_that_one_run_only_has_a_value_of_is_out(folders):
     run = grasp_run()
     less = {name: c for name, c in run.items() if name != "controller.target_position"}
     found = folders(run, replace(run, signals=less, units={n: run.units[n] for n in less}))
@@ -105,9 +102,7 @@ def test_a_metric_that_one_run_only_has_a_value_of_is_out(folders: Any) -> None:
     assert "signals only in A: controller.target_position" in as_text(found)
 
 
-def test_signals_in_another_unit_are_converted_and_of_another_quantity_left_out(
-    folders: Any,
-) -> None:
+def test_signals_in_another_unit_are_converted_and_of_another_quantity_left_out(folders):
     run = grasp_run()
     names = (GAP, "plant.gap[2]")
     other = replace(
@@ -123,9 +118,9 @@ def test_signals_in_another_unit_are_converted_and_of_another_quantity_left_out(
     assert "not compared, as the units do not convert: plant.gap[2] (m, N)" in found.notes
 
 
-def test_a_metric_that_is_off_makes_the_runs_differ(folders: Any) -> None:
+def test_a_metric_that_is_off_makes_the_runs_differ(folders):
     @metric("farthest", unit="m")
-    def farthest(run: Any) -> float:
+    def farthest(run):
         return float(run[GAP].max())
 
     run = grasp_run()
@@ -145,12 +140,10 @@ def test_a_metric_that_is_off_makes_the_runs_differ(folders: Any) -> None:
     assert (entry["a"], entry["b"], entry["inside"]) == (run[GAP][0], spike[0], False)
 
 
-def test_recorded_metrics_of_a_users_file_are_compared_as_they_were(
-    folders: Any, tmp_path: Path
-) -> None:
-    def own(value: float) -> Result:
+def test_recorded_metrics_of_a_users_file_are_compared_as_they_were(folders, tmp_path):
+    def own(value):
         @metric("grip", unit="N")
-        def grip(_: Any) -> float:
+        def grip(_):
             return value
 
         return replace(grasp_run(), more_metrics=(grip,))
@@ -162,7 +155,7 @@ def test_recorded_metrics_of_a_users_file_are_compared_as_they_were(
     assert "grip" not in {m.name for m in compare(tmp_path / "a", short).metrics}
 
 
-def test_a_band_for_nothing_is_refused(folders: Any) -> None:
+def test_a_band_for_nothing_is_refused(folders):
     bands = Bands("own.toml", signals={"plant.gp*": Given(absolute=1.0)})
     with pytest.raises(InputError, match=r"own.toml: \[signals\]: nothing is called 'plant.gp\*'"):
         folders(grasp_run(), grasp_run(), bands=bands)
@@ -171,9 +164,7 @@ def test_a_band_for_nothing_is_refused(folders: Any) -> None:
 @pytest.mark.slow
 @examples(25)
 @given(by=st.floats(-1e-2, 1e-2), width=st.floats(1e-6, 1e-2))
-def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(
-    tmp_path_factory: pytest.TempPathFactory, by: float, width: float
-) -> None:
+def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(tmp_path_factory, by, width):
     folder = tmp_path_factory.mktemp("offset")
     rows = [(t, 0.1) for t in np.linspace(0.0, 1.0, 11).tolist()]
     for name, offset in (("a", 0.0), ("b", by)):
@@ -186,14 +177,14 @@ def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(
     assert back.signals[0].deviation == found.signals[0].deviation
 
 
-def test_a_run_that_did_not_come_to_its_end_is_not_alike(folders: Any) -> None:
+def test_a_run_that_did_not_come_to_its_end_is_not_alike(folders):
     run = grasp_run()
     found = folders(run, replace(run, complete=False))
     assert not found.alike
     assert as_text(found).startswith("DIFFERENT: B did not come to its end; 0 of ")
 
 
-def test_metrics_without_a_value_on_both_sides_are_not_inside(grasp: System) -> None:
+def test_metrics_without_a_value_on_both_sides_are_not_inside(grasp):
     run = simulate(grasp, step=1e-3, stop=0.3)
     found = compare(run, run)
     assert found.alike
@@ -202,9 +193,7 @@ def test_metrics_without_a_value_on_both_sides_are_not_inside(grasp: System) -> 
     assert "nothing was touched until t = 0.3 s: " in as_text(found)
 
 
-def test_a_system_is_run_as_long_as_the_other_run(
-    grasp: System, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_system_is_run_as_long_as_the_other_run(grasp, fmus, tmp_path):
     text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
     (tmp_path / "grasp.toml").write_text(text, "utf-8")
     run = simulate(grasp, stop=0.05)

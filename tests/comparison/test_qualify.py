@@ -3,14 +3,12 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from conftest import Altered, alter
-from grasp_cosim import InputError, SimulationError, System
+from conftest import alter
+from grasp_cosim import InputError, SimulationError
 from grasp_cosim.comparison.bands import Bands, Given, read_bands
-from grasp_cosim.comparison.judged import Compared
-from grasp_cosim.comparison.qualify import Qualification, qualify
+from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.comparison.words import (
     qualification_json as as_json,
 )
@@ -25,13 +23,13 @@ NUMERICS = ("every second sample", "step 0.002 s", "scheme jacobi")
 
 
 @pytest.fixture(scope="module")
-def short(grasp: System) -> System:
+def short(grasp):
     """The beginning of the grasp."""
     return grasp.with_experiment(step=1e-3, stop=0.05)
 
 
 @pytest.fixture(scope="module")
-def heavy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def heavy(tmp_path_factory):
     """The plant with a heavier second finger, which its model description tells."""
     before = "high=1e3, tunable=True)\n    ] = (0.5, 0.5)"
     after = before.replace("0.5)", "0.6)")
@@ -40,26 +38,26 @@ def heavy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def copied(short: System) -> Qualification:
+def copied(short):
     """The qualification of the plant that is there already."""
     return qualify(short, "plant", own_plant(short), isolation="none")
 
 
 @pytest.fixture(scope="module")
-def heavier(short: System, heavy: Path) -> Qualification:
+def heavier(short, heavy):
     """That of the heavier finger."""
     return qualify(short, "plant", heavy, isolation="none")
 
 
-def by_name(compared: tuple[Compared, ...]) -> dict[str, Compared]:
+def by_name(compared):
     return {c.name: c for c in compared}
 
 
-def own_plant(system: System) -> Path:
+def own_plant(system):
     return system.component("plant", "test").fmu
 
 
-def test_a_copy_is_qualified_without_any_deviation(copied: Qualification) -> None:
+def test_a_copy_is_qualified_without_any_deviation(copied):
     found = copied
     assert found.qualified
     assert found.swap.differences == ()
@@ -73,7 +71,7 @@ def test_a_copy_is_qualified_without_any_deviation(copied: Qualification) -> Non
     assert as_text(found).startswith("QUALIFIED: GripperPlant.fmu as plant")
 
 
-def test_without_anything_to_compare_there_is_no_qualification(copied: Qualification) -> None:
+def test_without_anything_to_compare_there_is_no_qualification(copied):
     assert replace(copied, signals=()).qualified
     found = replace(copied, signals=(), metrics=())
     assert not found.qualified
@@ -81,7 +79,7 @@ def test_without_anything_to_compare_there_is_no_qualification(copied: Qualifica
     assert as_json(found)["reason"].startswith("nothing was compared: no output")
 
 
-def test_a_heavier_finger_is_not_qualified(heavier: Qualification) -> None:
+def test_a_heavier_finger_is_not_qualified(heavier):
     found = heavier
     assert not found.qualified
     assert [(d.severity, d.kind, d.variable) for d in found.swap.differences] == [
@@ -99,7 +97,7 @@ def test_a_heavier_finger_is_not_qualified(heavier: Qualification) -> None:
     assert worst.deviation == pytest.approx(abs(worst.candidate - worst.original), rel=1e-12)
 
 
-def test_the_deviation_is_that_of_the_runs(short: System, heavy: Path) -> None:
+def test_the_deviation_is_that_of_the_runs(short, heavy):
     """A finger under the same force falls behind by as much as it is heavier."""
     bands = Bands("b.toml", {"*": Given(absolute=1e-12, time=0.0)})
     found = qualify(short, "plant", heavy, bands=bands, isolation="none")
@@ -110,7 +108,7 @@ def test_the_deviation_is_that_of_the_runs(short: System, heavy: Path) -> None:
     assert candidate[2] / original[2] == pytest.approx(0.5 / 0.6, rel=1e-3)
 
 
-def test_bands_of_a_file_decide(short: System, heavy: Path) -> None:
+def test_bands_of_a_file_decide(short, heavy):
     wide = Bands("b.toml", {"*": Given(relative=1.0)}, {"*": Given(absolute=math.inf)})
     found = qualify(short, "plant", heavy, bands=wide, isolation="none")
     assert found.qualified
@@ -118,7 +116,7 @@ def test_bands_of_a_file_decide(short: System, heavy: Path) -> None:
     assert {c.band.source for c in (*found.signals, *found.metrics)} == {"given"}
 
 
-def test_bands_that_are_not_given_are_derived(short: System, heavy: Path) -> None:
+def test_bands_that_are_not_given_are_derived(short, heavy):
     tight = Bands("b.toml", {"plant.gap[2]": Given(absolute=1e-15, time=0.0)})
     found = qualify(short, "plant", heavy, bands=tight, isolation="none")
     sources = {c.name: c.band.source for c in found.signals}
@@ -128,15 +126,13 @@ def test_bands_that_are_not_given_are_derived(short: System, heavy: Path) -> Non
 
 
 @pytest.mark.parametrize("table", ["signals", "metrics"])
-def test_a_band_for_nothing_is_a_wrong_input(short: System, table: str) -> None:
+def test_a_band_for_nothing_is_a_wrong_input(short, table):
     bands = Bands("b.toml", **{table: {"plant.gapp": Given(absolute=1.0)}})
     with pytest.raises(InputError, match=rf"b.toml: \[{table}\]: nothing is called 'plant.gapp'"):
         qualify(short, "plant", own_plant(short), bands=bands, isolation="none")
 
 
-def test_a_written_band_file_gives_the_same_verdict(
-    short: System, heavy: Path, heavier: Qualification, tmp_path: Path
-) -> None:
+def test_a_written_band_file_gives_the_same_verdict(short, heavy, heavier, tmp_path):
     first = heavier
     (tmp_path / "first.json").write_text(json.dumps(as_json(first)))
     bands = read_bands(tmp_path / "first.json")
@@ -148,7 +144,7 @@ def test_a_written_band_file_gives_the_same_verdict(
 CONTACT = "s_1, v_1, f_1 = contact.advance("
 
 
-def test_a_candidate_that_fails_on_the_way(short: System, altered: Altered) -> None:
+def test_a_candidate_that_fails_on_the_way(short, altered):
     trap = f"if u_2 > 0.5:\n        raise RuntimeError('the motor burns')\n    {CONTACT}"
     fmu = altered("GripperPlant", "gripper_plant/rigid.py", CONTACT, trap)
     found = qualify(short, "plant", fmu, isolation="none")
@@ -163,7 +159,7 @@ def test_a_candidate_that_fails_on_the_way(short: System, altered: Altered) -> N
     assert "the motor burns" in text.splitlines()[1]
 
 
-def test_a_candidate_that_refuses_its_parameters(short: System, altered: Altered) -> None:
+def test_a_candidate_that_refuses_its_parameters(short, altered):
     before = "right, left = self.initial_position"
     trap = "if self.initial_object_position == 0.01:\n            raise ValueError('no licence')"
     refuse = f"{trap}\n        {before}"
@@ -176,14 +172,14 @@ def test_a_candidate_that_refuses_its_parameters(short: System, altered: Altered
     assert found.signals == ()
 
 
-def test_an_original_that_fails_is_no_verdict(short: System, altered: Altered) -> None:
+def test_an_original_that_fails_is_no_verdict(short, altered):
     trap = f"if u_2 > 0.5:\n        raise RuntimeError('the motor burns')\n    {CONTACT}"
     fmu = altered("GripperPlant", "gripper_plant/rigid.py", CONTACT, trap)
     with pytest.raises(SimulationError, match="the motor burns"):
         qualify(short.swap("plant", fmu), "plant", own_plant(short), isolation="none")
 
 
-def test_ctrl_c_is_no_verdict(short: System, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_is_no_verdict(short, monkeypatch):
     import grasp_cosim.comparison.qualify as module
 
     class Interrupted:
@@ -194,7 +190,7 @@ def test_ctrl_c_is_no_verdict(short: System, monkeypatch: pytest.MonkeyPatch) ->
         qualify(short, "plant", own_plant(short), isolation="none")
 
 
-def test_a_blocked_candidate_is_not_run(short: System, fmus: Path) -> None:
+def test_a_blocked_candidate_is_not_run(short, fmus):
     found = qualify(short, "plant", fmus / "ProximitySensor.fmu")
     assert not found.qualified
     assert (found.signals, found.metrics, found.numerics) == ((), (), ())
@@ -206,7 +202,7 @@ def test_a_blocked_candidate_is_not_run(short: System, fmus: Path) -> None:
 
 
 @pytest.mark.slow
-def test_metrics_of_the_object_that_only_one_of_two_plants_has(short: System, fmus: Path) -> None:
+def test_metrics_of_the_object_that_only_one_of_two_plants_has(short, fmus):
     """The box that moves, then the rigid object, tell of no squeeze: nothing to compare."""
     soft = short.swap("plant", fmus / "GripperPlantCompliant.fmu")
     for system, plant in ((short, "Compliant"), (soft, ""), (soft, "Movable")):
@@ -217,7 +213,7 @@ def test_metrics_of_the_object_that_only_one_of_two_plants_has(short: System, fm
 
 
 @pytest.mark.slow
-def test_a_plant_that_lacks_what_metrics_want(short: System, tmp_path: Path) -> None:
+def test_a_plant_that_lacks_what_metrics_want(short, tmp_path):
     plant = replace(short.component("plant", ""), rename={"elsewhere": "object_position"})
     found = qualify(short, "plant", plant, isolation="none")
     assert not found.qualified
@@ -227,7 +223,7 @@ def test_a_plant_that_lacks_what_metrics_want(short: System, tmp_path: Path) -> 
     assert qualify(short, "plant", plant, isolation="none", bands=bands).qualified
 
 
-def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> None:
+def test_damage_is_a_difference(grasp, fmus, altered):
     """A cup of a tenth of the limit takes damage from the impact of Case 0."""
     fmu = altered(
         "GripperPlantCompliant",
@@ -244,7 +240,7 @@ def test_damage_is_a_difference(grasp: System, fmus: Path, altered: Altered) -> 
 
 
 @pytest.mark.slow
-def test_a_grasp_with_another_stabilisation_of_the_contact(grasp: System, altered: Altered) -> None:
+def test_a_grasp_with_another_stabilisation_of_the_contact(grasp, altered):
     """The contact times stay, the contact force shows it."""
     before = "beta * beta * (s"
     fmu = altered(
@@ -258,7 +254,7 @@ def test_a_grasp_with_another_stabilisation_of_the_contact(grasp: System, altere
     assert metrics["time_to_contact[1]"].original == pytest.approx(1.887, abs=2e-3)
 
 
-def test_json_holds_all_of_it(heavy: Path, heavier: Qualification) -> None:
+def test_json_holds_all_of_it(heavy, heavier):
     report = json.loads(json.dumps(as_json(heavier), allow_nan=False))
     assert set(report) == {
         "qualified", "reason", "component", "original", "candidate", "system", "step", "stop",

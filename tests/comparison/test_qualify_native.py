@@ -1,12 +1,9 @@
 """Qualifications with C FMUs: other units, FMI 3.0, another name, a crash, a rejected step."""
 
-from pathlib import Path
-
 import pytest
 from grasp_cosim import System
-from grasp_cosim.comparison.qualify import Qualification, qualify
+from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.comparison.words import qualification_text as as_text
-from grasp_cosim.system.parts import Isolation
 from support.native_fmus import build, needs_gcc
 from support.slow import slow
 
@@ -16,7 +13,7 @@ UNITS = {"x": "m", "gain": "m"}
 
 
 @pytest.fixture
-def loop(tmp_path: Path) -> System:
+def loop(tmp_path):
     """x' = gain·(1 - x), one step of 0.01 s after the other: x = 1 - 0.97^k."""
     build(tmp_path, "plant", "2.0", UNITS)
     build(tmp_path, "spring", "2.0", {"u_Real": "m"})
@@ -37,7 +34,7 @@ def loop(tmp_path: Path) -> System:
     return System.load(tmp_path / "loop.toml")
 
 
-def test_the_loop_is_what_it_says(loop: System, tmp_path: Path) -> None:
+def test_the_loop_is_what_it_says(loop, tmp_path):
     found = qualify(loop, "plant", tmp_path / "plant.fmu")
     assert found.qualified
     assert found.swap.differences == ()
@@ -47,9 +44,7 @@ def test_the_loop_is_what_it_says(loop: System, tmp_path: Path) -> None:
     assert x.tolist() == pytest.approx([1.0 - 0.97**k for k in range(101)], rel=1e-9)
 
 
-def test_millimetres_are_converted_on_the_connection_in_values_and_in_signals(
-    loop: System, tmp_path: Path
-) -> None:
+def test_millimetres_are_converted_on_the_connection_in_values_and_in_signals(loop, tmp_path):
     """With its gain in mm, the candidate integrates to x in mm."""
     candidate = build(tmp_path, "millimetres", "2.0", {"x": "mm", "gain": "mm"})
     found = qualify(loop, "plant", candidate, isolation="none")
@@ -63,9 +58,7 @@ def test_millimetres_are_converted_on_the_connection_in_values_and_in_signals(
     assert {c.unit for c in found.signals if c.name == "plant.x"} == {"m"}
 
 
-def test_a_unit_that_is_only_called_another_is_not_the_same_plant(
-    loop: System, tmp_path: Path
-) -> None:
+def test_a_unit_that_is_only_called_another_is_not_the_same_plant(loop, tmp_path):
     candidate = build(tmp_path, "millimetres", "2.0", {"x": "mm", "gain": "m"})
     found = qualify(loop, "plant", candidate, isolation="none")
     assert not found.qualified
@@ -73,7 +66,7 @@ def test_a_unit_that_is_only_called_another_is_not_the_same_plant(
     assert found.runs[1]["plant.x"].values[1] == pytest.approx(0.03e-3, rel=1e-12)
 
 
-def test_a_unit_that_cannot_be_converted_blocks(loop: System, tmp_path: Path) -> None:
+def test_a_unit_that_cannot_be_converted_blocks(loop, tmp_path):
     candidate = build(tmp_path, "kelvin", "2.0", {"x": "K", "gain": "m"})
     found = qualify(loop, "plant", candidate)
     assert not found.qualified
@@ -82,7 +75,7 @@ def test_a_unit_that_cannot_be_converted_blocks(loop: System, tmp_path: Path) ->
     ]
 
 
-def test_a_candidate_of_fmi_3_under_other_names(loop: System, tmp_path: Path) -> None:
+def test_a_candidate_of_fmi_3_under_other_names(loop, tmp_path):
     candidate = build(tmp_path, "three", "3.0", UNITS)
     rename = {"u_Real": "u_Float64", "y_Real": "y_Float64", "u_Integer": "u_Int32"}
     rename["y_Integer"] = "y_Int32"
@@ -97,7 +90,7 @@ def test_a_candidate_of_fmi_3_under_other_names(loop: System, tmp_path: Path) ->
     assert "type" not in kinds  # Float64 is Real, Int32 is Integer
 
 
-def going_wrong(loop: System, folder: Path, what: str, isolation: Isolation) -> Qualification:
+def going_wrong(loop, folder, what, isolation):
     """A candidate with a misfortune at 0.505 s, which it takes for its gain."""
     candidate = build(folder, "candidate", "2.0", {"x": "m", what: "m"})
     system = loop.with_values({"plant.gain": 0.505})
@@ -109,9 +102,7 @@ def going_wrong(loop: System, folder: Path, what: str, isolation: Isolation) -> 
     ("what", "text"),
     [("crash_at", "SIGSEGV"), slow("exit_at", "exit"), slow("error_at", "lamp is broken")],
 )
-def test_a_candidate_that_ends_on_the_way(
-    loop: System, tmp_path: Path, what: str, text: str
-) -> None:
+def test_a_candidate_that_ends_on_the_way(loop, tmp_path, what, text):
     """Not even a crash leaves the candidate's process: what it did until then is compared."""
     found = going_wrong(loop, tmp_path, what, "process")
     assert not found.qualified
@@ -123,7 +114,7 @@ def test_a_candidate_that_ends_on_the_way(
     assert as_text(found).splitlines()[1].startswith("the candidate failed: plant: ")
 
 
-def test_a_step_that_the_candidate_rejects_is_told(loop: System, tmp_path: Path) -> None:
+def test_a_step_that_the_candidate_rejects_is_told(loop, tmp_path):
     found = going_wrong(loop, tmp_path, "discard_at", "none")
     assert not found.qualified
     assert any("discard" in line or "reject" in line for line in (*found.log, found.failure or ""))

@@ -5,28 +5,27 @@ from typing import Any
 
 import pytest
 from grasp_cosim.comparison.settings import differences
-from grasp_cosim.recording.result import Result
 from report.runs import component, grasp_run
 
 
-def with_settings(run: Result, **settings: Any) -> Result:
+def with_settings(run, **settings):
     return replace(run, settings={**run.settings, **settings})
 
 
-def with_controller(**values: Any) -> Result:
+def with_controller(**values: Any):
     run = grasp_run()
     parts = dict(run.settings["components"])
     parts["controller"] = component("GraspController.fmu", **values)
     return with_settings(run, components=parts)
 
 
-def test_equal_runs_differ_in_nothing_whenever_they_were_made() -> None:
+def test_equal_runs_differ_in_nothing_whenever_they_were_made():
     run = replace(grasp_run(), origin={"date": "2026-01-01", "versions": {"numpy": "2.1"}})
     later = replace(run, wall_time=9.0, origin={**run.origin, "date": "2026-02-02"})
     assert differences(run, later) == ()
 
 
-def test_the_case_and_the_values_behind_it_are_named() -> None:
+def test_the_case_and_the_values_behind_it_are_named():
     off = {"simultaneous_contact.enabled": False, "impact_reduction.enabled": False}
     found = differences(grasp_run(), with_controller(**off))
     assert [tuple(d) for d in found] == [
@@ -36,7 +35,7 @@ def test_the_case_and_the_values_behind_it_are_named() -> None:
     ]
 
 
-def test_a_mixture_of_cases_is_none_of_them() -> None:
+def test_a_mixture_of_cases_is_none_of_them():
     found = differences(grasp_run(), with_controller(**{"impact_reduction.enabled": False}))
     assert found[0] == ("case", "2", "other")
 
@@ -54,15 +53,13 @@ def test_a_mixture_of_cases_is_none_of_them() -> None:
         ({"initialisation": {"loops": "refuse"}}, "initialisation loops", "iterate", "refuse"),
     ],
 )  # fmt: skip
-def test_a_setting_that_differs_is_named(
-    settings: dict[str, Any], what: str, a: str, b: str
-) -> None:
+def test_a_setting_that_differs_is_named(settings, what, a, b):
     found = differences(grasp_run(), with_settings(grasp_run(), **settings))
     assert (what, a, b) in found
 
 
-def test_the_fmu_and_the_versions_are_named() -> None:
-    def made(guid: str, version: str, **more: str) -> Result:
+def test_the_fmu_and_the_versions_are_named():
+    def made(guid, version, **more):
         fmus = {"plant": {"guid": guid, "tool": "t", **more}}
         return replace(grasp_run(), origin={"fmus": fmus, "versions": {"numpy": version}})
 
@@ -73,7 +70,7 @@ def test_the_fmu_and_the_versions_are_named() -> None:
     ]
 
 
-def test_another_order_of_execution_is_a_difference() -> None:
+def test_another_order_of_execution_is_a_difference():
     run = grasp_run()
     turned = dict(reversed(run.settings["components"].items()))
     found = differences(run, with_settings(run, components=turned))

@@ -1,7 +1,5 @@
 """The two sides of a comparison: run folders, and logs from elsewhere."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from grasp_cosim import InputError
@@ -13,20 +11,18 @@ GAP = "plant.gap[1]"
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Path:
+def run(tmp_path):
     write_run(tmp_path / "run", grasp_run())
     return tmp_path / "run"
 
 
-def log(folder: Path, text: str) -> Path:
+def log(folder, text):
     path = folder / "log.csv"
     path.write_text(text, "utf-8")
     return path
 
 
-def test_a_csv_with_other_units_and_without_a_last_line_break_is_the_run(
-    run: Path, tmp_path: Path
-) -> None:
+def test_a_csv_with_other_units_and_without_a_last_line_break_is_the_run(run, tmp_path):
     result = grasp_run()
     columns = (result.time, result[GAP], result["plant.contact[1]"])
     rows = zip(*(column.tolist() for column in columns), strict=True)
@@ -40,9 +36,7 @@ def test_a_csv_with_other_units_and_without_a_last_line_break_is_the_run(
     assert found.differences == ()
 
 
-def test_without_a_unit_a_log_is_in_that_of_the_run_and_on_either_side(
-    run: Path, tmp_path: Path
-) -> None:
+def test_without_a_unit_a_log_is_in_that_of_the_run_and_on_either_side(run, tmp_path):
     result = grasp_run()
     rows = zip(result.time.tolist(), result[GAP].tolist(), strict=True)
     lines = [f"{t!r},{gap!r}" for t, gap in rows]
@@ -51,7 +45,7 @@ def test_without_a_unit_a_log_is_in_that_of_the_run_and_on_either_side(
         assert [(s.name, s.unit, s.deviation) for s in found.signals] == [(GAP, "m", 0.0)]
 
 
-def test_a_whole_log_has_the_metrics_of_the_run(run: Path, tmp_path: Path) -> None:
+def test_a_whole_log_has_the_metrics_of_the_run(run, tmp_path):
     path = tmp_path / "copied.csv"
     path.write_bytes((run / "signals.csv").read_bytes())
     found = compare(run, path)
@@ -60,13 +54,13 @@ def test_a_whole_log_has_the_metrics_of_the_run(run: Path, tmp_path: Path) -> No
     assert {m.deviation for m in found.metrics} == {0.0}
 
 
-def test_the_files_of_a_run_stand_for_it(run: Path) -> None:
+def test_the_files_of_a_run_stand_for_it(run):
     for name in ("signals.csv", "run.json"):
         assert read_side(run / name).result
 
 
 @pytest.mark.slow
-def test_an_mdf_file_is_read_with_its_units(run: Path, tmp_path: Path) -> None:
+def test_an_mdf_file_is_read_with_its_units(run, tmp_path):
     pytest.importorskip("asammdf")
     path = tmp_path / "signals.mf4"
     grasp_run().to_mdf(path)
@@ -87,14 +81,14 @@ def test_an_mdf_file_is_read_with_its_units(run: Path, tmp_path: Path) -> None:
         ("", "is empty"),
     ],
 )
-def test_a_wrong_log_is_one_line(run: Path, tmp_path: Path, text: str, said: str) -> None:
+def test_a_wrong_log_is_one_line(run, tmp_path, text, said):
     with pytest.raises(InputError) as raised:
         compare(run, log(tmp_path, text))
     assert said in str(raised.value)
     assert "\n" not in str(raised.value)
 
 
-def test_no_run_and_no_log(tmp_path: Path) -> None:
+def test_no_run_and_no_log(tmp_path):
     with pytest.raises(InputError, match="no such run; must be a folder"):
         read_side(tmp_path / "nothing")
     other = tmp_path / "page.html"
@@ -103,7 +97,7 @@ def test_no_run_and_no_log(tmp_path: Path) -> None:
         read_side(other)
 
 
-def test_two_rows_of_one_time_are_a_jump(tmp_path: Path) -> None:
+def test_two_rows_of_one_time_are_a_jump(tmp_path):
     jump = log(tmp_path, "time,x.y\n0,0\n1,0\n1,5\n2,5\n")
     side = read_side(jump)
     assert np.array_equal(side.time, [0.0, 1.0, 1.0, 2.0])

@@ -2,18 +2,15 @@
 
 import re
 import zipfile
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from comparison.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.comparison.interface_difference import capability_differences
-from grasp_cosim.comparison.swap import Swap, component_of, prepare_swap
+from grasp_cosim.comparison.swap import component_of, prepare_swap
 from grasp_cosim.interface.interface import Interface, Variable, kind_of
-from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
 from si_units import Unit
 
@@ -23,25 +20,25 @@ FORCE_CONNECTION = Connection(Port("spring", "force"), Port("plant", "force"))
 
 
 @pytest.fixture
-def system(tmp_path: Path) -> System:
+def system(tmp_path):
     """A plant and a spring."""
     return write_system(tmp_path)
 
 
-def swap(system: System, candidate: Path, **given: Any) -> Swap:
+def swap(system, candidate, **given):
     rename, values = given.get("rename", {}), given.get("values", {})
     return prepare_swap(system, "plant", candidate, rename, values, "none")
 
 
-def found(swap: Swap) -> list[tuple[str, str, str]]:
+def found(swap):
     return [(d.severity, d.kind, d.variable) for d in swap.differences]
 
 
-def of_variables(system: System, folder: Path, variables: Mapping[str, str]) -> Swap:
+def of_variables(system, folder, variables):
     return swap(system, write_fmu(folder / "new" / "candidate.fmu", variables))
 
 
-def test_a_copy_has_no_difference(system: System, tmp_path: Path) -> None:
+def test_a_copy_has_no_difference(system, tmp_path):
     same = of_variables(system, tmp_path, PLANT)
     assert same.differences == ()
     assert same.swapped is not None
@@ -53,8 +50,8 @@ def test_a_copy_has_no_difference(system: System, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("declared", "kept"), [("", {"mass": "g"}), (' unit="m"', {})])
 def test_a_unit_that_the_system_names_is_for_want_of_a_declared_one(
-    declared: str, kept: dict[str, str], system: System, tmp_path: Path
-) -> None:
+    declared, kept, system, tmp_path
+):
     plant, spring = system.components
     named = replace(system, components=(replace(plant, units={"mass": "g"}), spring))
     variables = changed("mass", 'start="0.5"', f'start="0.5"{declared}')
@@ -63,7 +60,7 @@ def test_a_unit_that_the_system_names_is_for_want_of_a_declared_one(
     assert swapped.component("plant", "test").units == kept
 
 
-ONE: list[tuple[dict[str, str], tuple[str, str, str], str]] = [
+ONE = [
     (
         without("gap"),
         ("blocks", "missing", "gap"),
@@ -170,20 +167,14 @@ ONE: list[tuple[dict[str, str], tuple[str, str, str], str]] = [
 
 
 @pytest.mark.parametrize(("variables", "expected", "text"), ONE)
-def test_one_difference(
-    system: System,
-    tmp_path: Path,
-    variables: dict[str, str],
-    expected: tuple[str, str, str],
-    text: str,
-) -> None:
+def test_one_difference(system, tmp_path, variables, expected, text):
     result = of_variables(system, tmp_path, variables)
     assert found(result) == ([expected] if any(expected) else [])
     assert (result.swapped is None) == (expected[0] == "blocks")
     assert all(re.search(text, d.text) for d in result.differences), result.differences
 
 
-def test_all_differences_are_found_at_once_the_worst_first(system: System, tmp_path: Path) -> None:
+def test_all_differences_are_found_at_once_the_worst_first(system, tmp_path):
     variables = {n: t for n, t in PLANT.items() if n not in ("gap", "width", "mass")}
     variables["spare"] = 'causality="output" | Integer'
     result = of_variables(system, tmp_path, variables)
@@ -195,7 +186,7 @@ def test_all_differences_are_found_at_once_the_worst_first(system: System, tmp_p
     ]
 
 
-def test_a_value_in_another_unit_is_converted(system: System, tmp_path: Path) -> None:
+def test_a_value_in_another_unit_is_converted(system, tmp_path):
     text = PLANT["width"].replace('"m"', '"mm"').replace("0.05", "50").replace('"1"', '"1000"')
     result = of_variables(system, tmp_path, {**PLANT, "width": text})
     assert [d.text for d in result.differences] == ["unit mm instead of m: 0.07 m becomes 70 mm"]
@@ -204,16 +195,14 @@ def test_a_value_in_another_unit_is_converted(system: System, tmp_path: Path) ->
     assert value == pytest.approx(70.0)
 
 
-def test_a_range_and_a_value_are_compared_in_the_candidates_unit(
-    system: System, tmp_path: Path
-) -> None:
+def test_a_range_and_a_value_are_compared_in_the_candidates_unit(system, tmp_path):
     text = PLANT["width"].replace('"m"', '"mm"').replace("0.05", "50").replace('"1"', '"60"')
     result = of_variables(system, tmp_path, {**PLANT, "width": text})
     assert found(result)[0] == ("blocks", "range", "width")
     assert "value 70 mm is set in the system; must be 0 to 60 mm" in result.differences[0].text
 
 
-def test_a_unit_with_an_offset() -> None:
+def test_a_unit_with_an_offset():
     units = {
         "K": Unit("K", (0, 0, 0, 0, 1, 0, 0, 0)),
         "degC": Unit("degC", (0, 0, 0, 0, 1, 0, 0, 0), 1.0, 273.15),
@@ -234,7 +223,7 @@ def test_a_unit_with_an_offset() -> None:
     assert bare.conversion("T", length) == (1.0, 0.0)
 
 
-def test_outputs_are_converted_back(system: System, tmp_path: Path) -> None:
+def test_outputs_are_converted_back(system, tmp_path):
     variables = {**changed("spare", '"m"', '"N"'), "touching": PLANT["spare"].replace("m", "mm")}
     result = of_variables(system, tmp_path, {**variables, **changed("gap", '"m"', '"mm"')})
     assert result.back["plant.gap"] == (0.001, 0.0)
@@ -251,22 +240,20 @@ def test_outputs_are_converted_back(system: System, tmp_path: Path) -> None:
         {"connections": (Connection(GAP, Port("spring", "position"), 2.0, 0.0), FORCE_CONNECTION)},
     ],
 )
-def test_numbers_that_the_system_states_in_the_originals_unit(
-    system: System, tmp_path: Path, more: dict[str, Any]
-) -> None:
+def test_numbers_that_the_system_states_in_the_originals_unit(system, tmp_path, more):
     result = of_variables(replace(system, **more), tmp_path, changed("gap", '"m"', '"mm"'))
     assert found(result) == [("blocks", "unit", "gap")]
     assert "is meant in m" in result.differences[0].text
 
 
-def test_an_event_needs_a_tunable_parameter(system: System, tmp_path: Path) -> None:
+def test_an_event_needs_a_tunable_parameter(system, tmp_path):
     event = Event({Port("plant", "mass"): 0.6}, at_ns=1000)
     fixed = changed("mass", "tunable", "fixed")
     result = of_variables(replace(system, events=(event,)), tmp_path, fixed)
     assert found(result) == [("blocks", "variability", "mass")]
 
 
-def test_the_algebraic_loop_that_a_candidate_closes(system: System, tmp_path: Path) -> None:
+def test_the_algebraic_loop_that_a_candidate_closes(system, tmp_path):
     path = write_fmu(tmp_path / "c.fmu", dependencies={**DEPENDENCIES, "gap": ["force"]})
     result = swap(system, path)
     assert found(result) == [("warns", "dependency", "gap")]
@@ -278,21 +265,21 @@ def test_the_algebraic_loop_that_a_candidate_closes(system: System, tmp_path: Pa
     assert found(swap(refused, path)) == [("blocks", "dependency", "gap")]
 
 
-def test_a_direct_dependence_that_closes_no_loop(system: System, tmp_path: Path) -> None:
+def test_a_direct_dependence_that_closes_no_loop(system, tmp_path):
     path = write_fmu(tmp_path / "c.fmu", dependencies={**DEPENDENCIES, "spare": ["force"]})
     result = swap(system, path)
     assert found(result) == [("notes", "dependency", "spare")]
     assert result.differences[0].text == "depends directly on force; closes no loop"
 
 
-def test_undeclared_dependencies_are_all_inputs(system: System, tmp_path: Path) -> None:
+def test_undeclared_dependencies_are_all_inputs(system, tmp_path):
     result = swap(system, write_fmu(tmp_path / "c.fmu", dependencies={**DEPENDENCIES, "gap": None}))
     assert found(result) == [("warns", "dependency", "gap")]
     text = result.differences[0].text
     assert text.startswith("may depend directly on force, as it declares no dependencies: an alg")
 
 
-def test_a_direct_dependence_that_is_gone(system: System, tmp_path: Path) -> None:
+def test_a_direct_dependence_that_is_gone(system, tmp_path):
     spring = {
         "position": 'causality="input" | Real start="0" unit="m"',
         "force": 'causality="output" | Real unit="N"',
@@ -316,9 +303,7 @@ CAPABILITIES = [
 
 
 @pytest.mark.parametrize(("flags", "step", "expected"), CAPABILITIES)
-def test_capabilities(
-    system: System, tmp_path: Path, flags: str, step: str, expected: list[tuple[str, str]]
-) -> None:
+def test_capabilities(system, tmp_path, flags, step, expected):
     result = swap(system, write_fmu(tmp_path / "c.fmu", capabilities=flags, step=step))
     assert [d.kind for d in result.differences] == ["capability"] * len(expected)
     for difference, (severity, flag) in zip(result.differences, expected, strict=True):
@@ -326,23 +311,23 @@ def test_capabilities(
         assert difference.variable.startswith(flag)
 
 
-def test_a_candidate_for_model_exchange_is_noted(system: System, tmp_path: Path) -> None:
+def test_a_candidate_for_model_exchange_is_noted(system, tmp_path):
     path = write_fmu(tmp_path / "c.fmu", kind="ModelExchange", capabilities="")
     (difference, *_) = [d for d in swap(system, path).differences if d.severity == "notes"]
     assert difference.text == "is for model exchange, and is integrated by CVode here"
 
 
-def able(version: str, **flags: Any) -> Interface:
+def able(version, **flags):
     return Interface(Path("x.fmu"), "", "x", (), version, capabilities=flags)
 
 
-def test_fmi_3_names_of_capabilities_are_those_of_fmi_2() -> None:
+def test_fmi_3_names_of_capabilities_are_those_of_fmi_2():
     two = able("2.0", canGetAndSetFMUstate=True, providesDirectionalDerivative=True)
     three = able("3.0", canGetAndSetFMUState=True, providesDirectionalDerivatives=True)
     assert [d.variable for d in capability_differences(two, three, 1e-3)] == ["fmiVersion"]
 
 
-def test_a_candidate_for_scheduled_execution_only() -> None:
+def test_a_candidate_for_scheduled_execution_only():
     candidate = replace(able("3.0"), kinds=("ScheduledExecution",))
     (difference,) = capability_differences(able("3.0"), candidate, 1e-3)
     assert (difference.severity, difference.variable) == ("blocks", "kind")
@@ -351,21 +336,19 @@ def test_a_candidate_for_scheduled_execution_only() -> None:
 
 
 @pytest.mark.parametrize(("internal", "fits"), [(1e-4, True), (1e-3, True), (3e-4, False)])
-def test_a_fixed_internal_step_must_divide_the_step(internal: float, fits: bool) -> None:
+def test_a_fixed_internal_step_must_divide_the_step(internal, fits):
     candidate = able("3.0", fixedInternalStepSize=internal)
     found = list(capability_differences(able("3.0"), candidate, 1e-3))
     assert [d.severity for d in found] == ([] if fits else ["warns"])
 
 
-def test_types_of_fmi_3_are_those_of_fmi_2() -> None:
+def test_types_of_fmi_3_are_those_of_fmi_2():
     assert kind_of("Float64") == kind_of("Real") == kind_of("Float32") == "Real"
     assert kind_of("Int8") == kind_of("UInt64") == kind_of("Enumeration") == kind_of("Integer")
     assert len({kind_of(t) for t in ("Real", "Integer", "Boolean", "String", "Clock")}) == 5
 
 
-def test_renamed_variables_are_compared_by_the_systems_names(
-    system: System, tmp_path: Path
-) -> None:
+def test_renamed_variables_are_compared_by_the_systems_names(system, tmp_path):
     theirs = {"luft" if n == "gap" else "kraft" if n == "force" else n: t for n, t in PLANT.items()}
     path = write_fmu(tmp_path / "c.fmu", theirs, {"luft": ["kraft"], "touching": (), "spare": ()})
     result = swap(system, path, rename={"gap": "luft", "force": "kraft"})
@@ -373,7 +356,7 @@ def test_renamed_variables_are_compared_by_the_systems_names(
     assert result.differences[0].candidate == ["force"]
 
 
-def test_values_go_to_the_system_that_has_the_variable(system: System, tmp_path: Path) -> None:
+def test_values_go_to_the_system_that_has_the_variable(system, tmp_path):
     theirs = {
         **changed("width", '"m"', '"mm"'),
         "heat": 'causality="input" | Real start="0" unit="K"',
@@ -401,9 +384,7 @@ def test_values_go_to_the_system_that_has_the_variable(system: System, tmp_path:
         ({"values": {"plant.width": 2.0}}, r"width = 2.0: must be a finite number from 0 to 1 m"),
     ],
 )
-def test_a_wrong_input_is_one_line(
-    system: System, tmp_path: Path, given: dict[str, Any], message: str
-) -> None:
+def test_a_wrong_input_is_one_line(system, tmp_path, given, message):
     with pytest.raises(InputError, match=message):
         swap(system, write_fmu(tmp_path / "c.fmu"), **given)
 
@@ -423,7 +404,7 @@ FMI_1 = """<?xml version="1.0" encoding="UTF-8"?>
 </fmiModelDescription>"""
 
 
-def test_what_the_system_refuses_blocks_in_its_words(system: System, tmp_path: Path) -> None:
+def test_what_the_system_refuses_blocks_in_its_words(system, tmp_path):
     """FMI 1.0 is described all the same."""
     with zipfile.ZipFile(tmp_path / "old.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", FMI_1)
@@ -434,7 +415,7 @@ def test_what_the_system_refuses_blocks_in_its_words(system: System, tmp_path: P
     assert {("notes", "missing", "mass"), ("warns", "unit", "gap")} <= set(found(result))
 
 
-def test_wrong_components_and_candidates(system: System, tmp_path: Path) -> None:
+def test_wrong_components_and_candidates(system, tmp_path):
     with pytest.raises(InputError, match=r"^--as hand: no component 'hand'; valid: plant, spring"):
         prepare_swap(system, "hand", tmp_path / "plant.fmu", {}, {}, "none")
     with pytest.raises(InputError, match=r"none.fmu: no such FMU file"):
@@ -456,12 +437,9 @@ def test_wrong_components_and_candidates(system: System, tmp_path: Path) -> None
     ],
 )
 def test_a_system_file_whose_connections_pass_on_other_values_is_refused(
-    theirs: tuple[float | None, float | None],
-    ours: tuple[float | None, float | None],
-    refused: bool,
-    system: System,
-) -> None:
-    def scaled(by: tuple[float | None, float | None]) -> System:
+    theirs, ours, refused, system
+):
+    def scaled(by):
         return replace(system, connections=(FORCE_CONNECTION, Connection(GAP, POSITION, *by)))
 
     if refused:
@@ -472,7 +450,7 @@ def test_a_system_file_whose_connections_pass_on_other_values_is_refused(
         assert component_of(scaled(theirs), "plant", scaled(ours)) == system.components[0]
 
 
-def test_a_factor_that_is_that_of_the_units_is_as_good(system: System, tmp_path: Path) -> None:
+def test_a_factor_that_is_that_of_the_units_is_as_good(system, tmp_path):
     write_fmu(tmp_path / "mm.fmu", changed("gap", 'unit="m"', 'unit="mm"'))
     plant = replace(system.components[0], fmu=tmp_path / "mm.fmu")
     theirs = Connection(GAP, POSITION, 0.001)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grasp_cosim.comparison.tube import Array, Curve, curve, deviation, tube
+from grasp_cosim.comparison.tube import Curve, curve, deviation, tube
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -16,22 +16,22 @@ HELD = st.booleans()
 SHIFT = st.integers(0, 12)
 
 
-def times(count: int, step_ns: int = 1_000_000) -> Array:
+def times(count, step_ns=1_000_000):
     """s, from 0 on."""
     return (np.arange(count) * step_ns / 1e9).astype(np.float64)
 
 
-def sampled(values: Array, held: bool = False) -> Curve:
+def sampled(values, held=False):
     return Curve(times(len(values)), values, held)
 
 
-def by_hand(one: Curve, other: Curve, shift: int) -> float:
+def by_hand(one, other, shift):
     """The deviation of curves on the same grid, for a shift of whole samples, by definition."""
     n = len(one.values)
     windows = [slice(max(i - shift, 0), i + shift + 1) for i in range(n)]
     after = min(shift, n - 1)
 
-    def padded(values: Array) -> Array:
+    def padded(values):
         if one.held:
             return np.pad(values, (0, after), mode="edge")
         return np.pad(values, (0, after), mode="reflect", reflect_type="odd")
@@ -46,16 +46,14 @@ def by_hand(one: Curve, other: Curve, shift: int) -> float:
 
 @QUICK
 @given(SAMPLES, SHIFT, HELD)
-def test_a_curve_is_in_its_own_tube(values: Array, shift: int, held: bool) -> None:
+def test_a_curve_is_in_its_own_tube(values, shift, held):
     same = sampled(values, held)
     assert deviation(same, same, shift * STEP).values.max() == 0.0
 
 
 @QUICK
 @given(SAMPLES, SHIFT, SHIFT, HELD)
-def test_a_curve_that_comes_later_is_inside_up_to_the_shift(
-    values: Array, later: int, more: int, held: bool
-) -> None:
+def test_a_curve_that_comes_later_is_inside_up_to_the_shift(values, later, more, held):
     early = sampled(np.concatenate([values, np.full(later, values[-1])]), held)
     late = sampled(np.concatenate([np.full(later, values[0]), values]), held)
     assert deviation(early, late, (later + more) * STEP).values.max() == 0.0
@@ -63,9 +61,7 @@ def test_a_curve_that_comes_later_is_inside_up_to_the_shift(
 
 @QUICK
 @given(SAMPLES, st.floats(1e-3, 1e3), SHIFT, HELD)
-def test_an_offset_is_found_at_its_size(
-    values: Array, offset: float, shift: int, held: bool
-) -> None:
+def test_an_offset_is_found_at_its_size(values, offset, shift, held):
     """At the largest value, no shift helps: the offset is the deviation."""
     values = np.concatenate([values, np.full(shift + 1, values[-1])])
     moved = sampled(values + offset, held)
@@ -74,7 +70,7 @@ def test_an_offset_is_found_at_its_size(
 
 
 @st.composite
-def pairs(draw: st.DrawFn) -> tuple[Curve, Curve]:
+def pairs(draw):
     count = draw(st.integers(1, 60))
     held = draw(HELD)
     values = arrays.arrays(np.float64, count, elements=NUMBERS)
@@ -83,9 +79,7 @@ def pairs(draw: st.DrawFn) -> tuple[Curve, Curve]:
 
 @QUICK
 @given(pairs(), SHIFT)
-def test_it_is_symmetric_and_what_its_definition_says(
-    both: tuple[Curve, Curve], shift: int
-) -> None:
+def test_it_is_symmetric_and_what_its_definition_says(both, shift):
     one, other = both
     there, back = deviation(one, other, shift * STEP), deviation(other, one, shift * STEP)
     assert (there.values == back.values).all()
@@ -95,25 +89,21 @@ def test_it_is_symmetric_and_what_its_definition_says(
 
 @QUICK
 @given(pairs(), SHIFT)
-def test_the_values_it_names_are_as_far_apart_as_it_says(
-    both: tuple[Curve, Curve], shift: int
-) -> None:
+def test_the_values_it_names_are_as_far_apart_as_it_says(both, shift):
     found = deviation(*both, shift * STEP)
     assert np.abs(found.reference - found.candidate).tolist() == found.values.tolist()
 
 
 @QUICK
 @given(pairs(), SHIFT)
-def test_more_shift_allows_more(both: tuple[Curve, Curve], shift: int) -> None:
+def test_more_shift_allows_more(both, shift):
     tight, loose = (deviation(*both, n * STEP).values for n in (shift, shift + 1))
     assert (loose <= tight + 1e-9).all()
 
 
 @QUICK
 @given(SAMPLES, st.floats(0.0, 0.02), HELD)
-def test_the_tube_holds_the_curve_between_samples_too(
-    values: Array, shift: float, held: bool
-) -> None:
+def test_the_tube_holds_the_curve_between_samples_too(values, shift, held):
     """Anywhere within the shift of any time the curve is in the tube of that time."""
     whole = sampled(values, held)
     at = np.linspace(0.0, whole.time[-1], 37)
@@ -124,7 +114,7 @@ def test_the_tube_holds_the_curve_between_samples_too(
         assert (taken <= allowed.high + 1e-6).all()
 
 
-def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is() -> None:
+def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is():
     time = times(200)
     impact = np.where(time < 0.1, 0.0, np.exp(-(time - 0.1) / 0.02))
     late = np.concatenate([np.zeros(2), impact[:-2]])
@@ -137,7 +127,7 @@ def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is()
     assert higher.time[worst] == time[102]
 
 
-def test_an_impact_that_is_lacking_is_found() -> None:
+def test_an_impact_that_is_lacking_is_found():
     """A flat curve is all in the tube of the spike, but the spike is not in that of the curve."""
     spike = np.zeros(100)
     spike[50] = 1.0
@@ -147,7 +137,7 @@ def test_an_impact_that_is_lacking_is_found() -> None:
         assert found.time[found.values.argmax()] == 0.05
 
 
-def test_curves_of_different_steps_are_compared_at_the_times_of_both() -> None:
+def test_curves_of_different_steps_are_compared_at_the_times_of_both():
     fine, coarse = times(101), times(51, 2_000_000)
     found = deviation(Curve(fine, np.sin(fine)), Curve(coarse, np.sin(coarse)), 0.0)
     assert found.time.tolist() == fine.tolist()
@@ -155,19 +145,19 @@ def test_curves_of_different_steps_are_compared_at_the_times_of_both() -> None:
     assert 0.0 < found.values.max() < 1e-6
 
 
-def test_what_is_held_does_not_change_before_its_time() -> None:
+def test_what_is_held_does_not_change_before_its_time():
     contact = curve(np.array([0.0, 1.0, 2.0]), np.array([False, True, True]))
     assert contact.held
     assert contact.at(np.array([-1.0, 0.0, 0.999, 1.0, 5.0])).tolist() == [0, 0, 0, 1, 1]
     assert not curve(np.zeros(1), np.zeros(1)).held
 
 
-def test_a_curve_until_a_time() -> None:
+def test_a_curve_until_a_time():
     short = sampled(np.arange(10.0)).until(0.004)
     assert short.values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
-def test_a_late_curve_that_still_moves_at_the_end_is_inside() -> None:
+def test_a_late_curve_that_still_moves_at_the_end_is_inside():
     time = times(100)
     ramp = Curve(time, 5.0 * time)
     late = Curve(time, 5.0 * np.maximum(time - 0.002, 0.0))
@@ -175,14 +165,14 @@ def test_a_late_curve_that_still_moves_at_the_end_is_inside() -> None:
     assert deviation(ramp, late, 0.001).values.max() == pytest.approx(5.0 * 0.001)
 
 
-def test_every_second_sample_and_the_ends() -> None:
+def test_every_second_sample_and_the_ends():
     whole = sampled(np.arange(6.0))
     assert whole.thinned(0).values.tolist() == [0.0, 2.0, 4.0, 5.0]
     assert whole.thinned(1).values.tolist() == [0.0, 1.0, 3.0, 5.0]
     assert sampled(np.arange(1.0)).thinned(1).values.tolist() == [0.0]
 
 
-def test_a_peak_between_samples_is_in_the_band_of_one_that_is_thinned() -> None:
+def test_a_peak_between_samples_is_in_the_band_of_one_that_is_thinned():
     """An impact that decays, sampled at another part of its step, has another highest sample."""
     time = times(200)
     for part in (0.1, 0.5, 0.9):

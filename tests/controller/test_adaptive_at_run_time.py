@@ -1,15 +1,14 @@
 """Parameters of the adaptive law that change between two steps."""
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from grasp_controller import adaptive, holding, reflectance_ratio
-from grasp_controller.adaptive import Inputs, Params, State
+from grasp_controller.adaptive import Params
 from support.approach import H, approach
 from support.declared import parameters
 
-PARTS: dict[str, Any] = {"reflectance": reflectance_ratio.Params, "hold": holding.Params}
+PARTS = {"reflectance": reflectance_ratio.Params, "hold": holding.Params}
 
 OTHERS = [
     (part, p.name, value)
@@ -20,7 +19,7 @@ OTHERS = [
 ]
 
 
-def after_half(p: Params) -> tuple[State, list[Inputs]]:
+def after_half(p):
     """Half an approach, and the samples of the rest."""
     samples = approach((0.5, 1.0))
     x = adaptive.initial_state(p, samples[0])
@@ -29,12 +28,12 @@ def after_half(p: Params) -> tuple[State, list[Inputs]]:
     return x, samples[59:]
 
 
-def changed(part: str, name: str, value: float) -> Params:
+def changed(part, name, value):
     return replace(Params(), **{part: replace(getattr(Params(), part), **{name: value})})
 
 
 @pytest.mark.parametrize(("part", "name", "value"), OTHERS)
-def test_no_change_makes_the_force_jump(part: str, name: str, value: float) -> None:
+def test_no_change_makes_the_force_jump(part, name, value):
     """The new number acts on the virtual force from the next step on, and is felt behind it."""
     x, (u, *_) = after_half(Params())
     p = changed(part, name, value)
@@ -43,7 +42,7 @@ def test_no_change_makes_the_force_jump(part: str, name: str, value: float) -> N
 
 
 @pytest.mark.parametrize(("part", "name", "value"), OTHERS)
-def test_what_is_learnt_stays_bounded(part: str, name: str, value: float) -> None:
+def test_what_is_learnt_stays_bounded(part, name, value):
     p = changed(part, name, value)
     x, (_, *rest) = after_half(Params())
     for u in rest:
@@ -53,7 +52,7 @@ def test_what_is_learnt_stays_bounded(part: str, name: str, value: float) -> Non
 
 
 @pytest.mark.parametrize("name", ["prior_deviation", "limit"])
-def test_what_is_learnt_can_be_put_aside_and_taken_up_again(name: str) -> None:
+def test_what_is_learnt_can_be_put_aside_and_taken_up_again(name):
     """Both lines go on meanwhile: the end is that of an approach without the change."""
     x, (_, *rest) = after_half(Params())
     z = x
@@ -65,7 +64,7 @@ def test_what_is_learnt_can_be_put_aside_and_taken_up_again(name: str) -> None:
     assert z.estimate == pytest.approx(x.estimate, rel=1e-3)
 
 
-def test_a_longer_low_pass_goes_on_from_where_it_was() -> None:
+def test_a_longer_low_pass_goes_on_from_where_it_was():
     """A sample counts by the share that the new time constant gives it."""
     x, (_, u, *_) = after_half(Params())
     slow = adaptive.step(changed("reflectance", "time_constant", 10.0), x, u, H)

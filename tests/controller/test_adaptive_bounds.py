@@ -3,14 +3,13 @@
 import sys
 from dataclasses import fields
 from math import exp, isfinite, log
-from typing import Any
 
 import pytest
 from grasp_controller import adaptive, holding, reflectance_ratio
-from grasp_controller.adaptive import Inputs, Params, State
+from grasp_controller.adaptive import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
-from support.approach import H, Pair, approach, numbers, relit, run
+from support.approach import H, approach, numbers, relit, run
 from support.declared import parameters
 from support.examples import examples
 
@@ -30,7 +29,7 @@ STEPS = st.sampled_from([1e-300, 1e-9, 1e-4, 1e-3, 0.1, 1e3, 1e300]) | st.floats
 SAMPLES = st.lists(st.builds(Inputs, BOTH, BOTH, BOTH), min_size=2, max_size=8)
 
 
-def at_the_ends(block: type[Any]) -> st.SearchStrategy[Any]:
+def at_the_ends(block):
     """A part of the parameters, each at an end of its range or as by default."""
     chosen = {p.name: st.sampled_from([p.low, p.default, p.high]) for p in parameters(block)}
     return st.builds(block, **chosen)
@@ -43,7 +42,7 @@ LAWS = st.just(Params()) | st.builds(
 )
 
 
-def assert_bounded(p: Params, x: State, y: adaptive.Outputs) -> None:
+def assert_bounded(p, x, y):
     learnt, limit = p.reflectance, p.reflectance.limit
     assert abs(x.estimate.beta) <= limit
     assert exp(-limit) <= y.reflectance_ratio <= exp(limit)
@@ -53,7 +52,7 @@ def assert_bounded(p: Params, x: State, y: adaptive.Outputs) -> None:
     assert abs(y.simultaneous_contact_force) <= most
 
 
-def accepted(p: Params, samples: list[Inputs], h: float) -> list[tuple[State, adaptive.Outputs]]:
+def accepted(p, samples, h):
     """Of the steps that raise nothing and give numbers, as an FMU takes them, state and outputs."""
     trace = []
     x = adaptive.initial_state(p, samples[0])
@@ -71,24 +70,20 @@ def accepted(p: Params, samples: list[Inputs], h: float) -> list[tuple[State, ad
 
 @examples(30)
 @given(LAWS, SAMPLES, STEPS)
-def test_the_estimate_is_bounded_for_any_numbers(
-    p: Params, samples: list[Inputs], h: float
-) -> None:
+def test_the_estimate_is_bounded_for_any_numbers(p, samples, h):
     for x, y in accepted(p, samples, h):
         assert_bounded(p, x, y)
 
 
 @examples(30)
 @given(LAWS, st.lists(st.builds(Inputs, SANE, SANE, SANE), min_size=2, max_size=8), STEPS)
-def test_what_a_gripper_may_measure_gives_numbers(
-    p: Params, samples: list[Inputs], h: float
-) -> None:
+def test_what_a_gripper_may_measure_gives_numbers(p, samples, h):
     assert len(accepted(p, samples, h)) == len(samples) - 1
 
 
 @examples(100)
 @given(LAWS, st.builds(Inputs, BOTH, BOTH, BOTH))
-def test_after_a_sample_of_nonsense_the_approach_goes_on(p: Params, nonsense: Inputs) -> None:
+def test_after_a_sample_of_nonsense_the_approach_goes_on(p, nonsense):
     """It is refused, or its sums are beyond all numbers, and nothing more is learnt."""
     samples = approach((0.5, 1.0), count=40)
     after = accepted(p, [*samples[:20], nonsense, *samples[20:]], H)
@@ -98,7 +93,7 @@ def test_after_a_sample_of_nonsense_the_approach_goes_on(p: Params, nonsense: In
 
 
 @pytest.mark.parametrize("seen", [(1e3, 1e3), (0.5, 0.5), (0.0, 0.0), (-1.0, 0.3)])
-def test_a_sensor_that_shows_one_number_teaches_nothing(seen: Pair) -> None:
+def test_a_sensor_that_shows_one_number_teaches_nothing(seen):
     """Saturated, blind, or stuck: the line has no slope, whatever the way."""
     for x, y in run(Params(), [u._replace(intensity=seen) for u in approach((1.0, 1.0))]):
         assert x.estimate == (0.0, 1.0, 1.0)
@@ -106,10 +101,10 @@ def test_a_sensor_that_shows_one_number_teaches_nothing(seen: Pair) -> None:
 
 
 @pytest.mark.parametrize("converter", [0.1, 0.2, 0.5])
-def test_a_sensor_that_saturates_unlearns_nothing(converter: float) -> None:
+def test_a_sensor_that_saturates_unlearns_nothing(converter):
     """From there on its line does not move, but for what the low-pass still brings."""
 
-    def saturated(xi: float) -> float:
+    def saturated(xi):
         return min(xi, converter)
 
     seen = [relit(u, saturated, saturated) for u in approach((0.5, 1.0), end=1e-3, count=400)]
@@ -120,7 +115,7 @@ def test_a_sensor_that_saturates_unlearns_nothing(converter: float) -> None:
     assert after < before + 0.03
 
 
-def test_every_parameter_of_what_is_learnt_has_a_range() -> None:
+def test_every_parameter_of_what_is_learnt_has_a_range():
     """So that the ends above are all of them."""
     for block in (reflectance_ratio.Params, holding.Params):
         assert {p.name for p in parameters(block)} == {field.name for field in fields(block)}

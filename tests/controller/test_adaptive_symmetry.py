@@ -6,10 +6,10 @@ import pytest
 from grasp_controller import holding, reflectance_ratio
 from grasp_controller import impact_reduction as layer_2
 from grasp_controller import simultaneous_contact as layer_3
-from grasp_controller.adaptive import Inputs, Params
+from grasp_controller.adaptive import Params
 from hypothesis import given
 from hypothesis import strategies as st
-from support.approach import ANY_SAMPLES, Pair, approach, assert_mirrored, mirrored, pairs, run
+from support.approach import ANY_SAMPLES, approach, assert_mirrored, mirrored, pairs, run
 from support.examples import examples
 
 LAWS = st.builds(
@@ -31,7 +31,7 @@ SURE = replace(Params(), reflectance=reflectance_ratio.Params(intensity_noise=1e
 """Of what it has learnt."""
 
 
-def dimmed(u: Inputs, factor: float) -> Inputs:
+def dimmed(u, factor):
     xi_1, xi_2 = u.intensity
     return u._replace(intensity=(factor * xi_1, factor * xi_2))
 
@@ -42,9 +42,7 @@ def dimmed(u: Inputs, factor: float) -> Inputs:
     ANY_SAMPLES | st.builds(approach, pairs(0.1, 2.0), pairs(0.01, 0.1)),
     st.floats(1e-5, 1e-2),
 )
-def test_the_mirrored_controller_does_exactly_the_mirrored_thing(
-    p: Params, samples: list[Inputs], h: float
-) -> None:
+def test_the_mirrored_controller_does_exactly_the_mirrored_thing(p, samples, h):
     images = run(p, [mirrored(u) for u in samples], h)
     for (x, y), (x_image, z) in zip(run(p, samples, h), images, strict=True):
         assert_mirrored(y, z)
@@ -53,7 +51,7 @@ def test_the_mirrored_controller_does_exactly_the_mirrored_thing(
         assert z.hold == y.hold
 
 
-def test_the_mirror_image_of_what_is_learnt_is_not_nothing() -> None:
+def test_the_mirror_image_of_what_is_learnt_is_not_nothing():
     """The property above says something: the estimate of unequal faces is far from 0."""
     x, _ = run(Params(), approach((0.5, 1.0)))[-1]
     assert x.estimate.beta == pytest.approx(-0.69, abs=0.05)
@@ -61,7 +59,7 @@ def test_the_mirror_image_of_what_is_learnt_is_not_nothing() -> None:
 
 @examples(10)
 @given(pairs(0.2, 2.0), pairs(0.02, 0.1), st.floats(0.1, 10.0))
-def test_scaling_both_intensities_changes_no_force(alpha: Pair, gaps: Pair, factor: float) -> None:
+def test_scaling_both_intensities_changes_no_force(alpha, gaps, factor):
     """But for rounding, above the floor, and for noise: the brighter, the sooner it is believed."""
     samples = approach(alpha, gaps)
     other = run(SURE, [dimmed(u, factor) for u in samples])
@@ -72,7 +70,7 @@ def test_scaling_both_intensities_changes_no_force(alpha: Pair, gaps: Pair, fact
 
 
 @pytest.mark.parametrize("factor", [0.3, 3.0])
-def test_noise_is_the_one_thing_that_the_brightness_counts_against(factor: float) -> None:
+def test_noise_is_the_one_thing_that_the_brightness_counts_against(factor):
     """Dark faces with as little more noise as light look the same."""
     samples = approach((0.4, 0.9))
     noise = replace(Params(), reflectance=reflectance_ratio.Params(intensity_noise=5e-3))

@@ -4,7 +4,6 @@ White noise of sigma_0 in samples h seconds apart is behind the low-pass sigma_0
 which is `intensity_noise`. The bounds are those of a mean of squares of normal numbers.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from math import exp, log, sqrt
 from random import Random
@@ -12,10 +11,9 @@ from statistics import fmean, variance
 
 import pytest
 from grasp_controller import holding, reflectance_ratio
-from grasp_controller.adaptive import Inputs, Params
-from grasp_controller.reflectance_ratio import Estimate
+from grasp_controller.adaptive import Params
 from scipy.stats import chi2
-from support.approach import H, N, Pair, approach, relit, run
+from support.approach import H, N, approach, relit, run
 from support.slow import slow
 
 TRIALS = 200
@@ -29,7 +27,7 @@ TRUTH = log(0.6)
 NEVER_HOLDS = holding.Params(squeeze=1e12)
 
 
-def law(q: float, noise: float, prior: float) -> Params:
+def law(q, noise, prior):
     """One that knows of the noise of a sample in V, and whose low-pass lets through all."""
     T_f = 1e-6
     learnt = reflectance_ratio.Params(
@@ -42,16 +40,14 @@ def law(q: float, noise: float, prior: float) -> Params:
     return Params(reflectance=learnt, hold=NEVER_HOLDS)
 
 
-def noisy(samples: Sequence[Inputs], deviation: float, random: Random) -> list[Inputs]:
-    def in_noise(xi: float) -> float:
+def noisy(samples, deviation, random):
+    def in_noise(xi):
         return xi + random.gauss(0.0, deviation)
 
     return [relit(u, in_noise, in_noise) for u in samples]
 
 
-def learnt(
-    p: Params, noise: float, alpha: Pair, gaps: Pair, count: int, random: Random
-) -> Estimate:
+def learnt(p, noise, alpha, gaps, count, random):
     """What an approach in noise of so many V teaches, from the first gap in m to the second."""
     start, end = gaps
     samples = approach(alpha, (start, start), end, count)
@@ -61,7 +57,7 @@ def learnt(
 @pytest.mark.parametrize(
     ("q", "gaps"), [(5.0, (0.08, 5e-3)), (5.0, (0.08, 0.04)), (1.0, (0.08, 5e-3))]
 )
-def test_the_variance_is_that_of_many_approaches(q: float, gaps: Pair) -> None:
+def test_the_variance_is_that_of_many_approaches(q, gaps):
     """The prior is so wide that it draws nothing towards 0."""
     noise = 5e-5
     p, random = law(q, noise, 10.0), Random(1)
@@ -72,7 +68,7 @@ def test_the_variance_is_that_of_many_approaches(q: float, gaps: Pair) -> None:
 
 
 @pytest.mark.parametrize(("noise", "gaps"), [(5e-4, (0.08, 0.075)), (2e-3, (0.04, 0.03))])
-def test_any_ratio_is_as_far_off_as_is_said(noise: float, gaps: Pair) -> None:
+def test_any_ratio_is_as_far_off_as_is_said(noise, gaps):
     """Ratios as the prior has them, and little to learn from: what is known is prior and light."""
     p, random = law(5.0, noise, 1.0), Random(2)
     errors, deviations = [], []
@@ -88,7 +84,7 @@ def test_any_ratio_is_as_far_off_as_is_said(noise: float, gaps: Pair) -> None:
 
 @pytest.mark.parametrize("count", [100, slow(400)])
 @pytest.mark.parametrize("end", [5e-3, 0.04])
-def test_behind_the_low_pass_it_is_the_same(count: int, end: float) -> None:
+def test_behind_the_low_pass_it_is_the_same(count, end):
     """With the numbers of the block: noise that is no longer white counts as if it were."""
     p = replace(Params(), hold=NEVER_HOLDS)
     noise = p.reflectance.intensity_noise * sqrt(1.0 + 2.0 * p.reflectance.time_constant / H)
@@ -98,7 +94,7 @@ def test_behind_the_low_pass_it_is_the_same(count: int, end: float) -> None:
     assert float(chi2.ppf(1e-4, trials)) < trials * squares < float(chi2.ppf(1.0 - 1e-4, trials))
 
 
-def test_weights_of_one_over_the_noise_are_the_best() -> None:
+def test_weights_of_one_over_the_noise_are_the_best():
     """q = 2 + 2/n; the default costs 1.9 times the variance, and looks more at what is near."""
     best = 2.0 + 2.0 / N
     variances = {}

@@ -12,7 +12,7 @@ from grasp_controller import holding, reflectance_ratio
 from grasp_controller.adaptive import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
-from support.approach import L_0, N, Pair, approach, intensity, pairs, run
+from support.approach import L_0, N, approach, intensity, pairs, run
 from support.examples import examples
 
 SURE = Params(
@@ -25,11 +25,11 @@ SHORT = 1e-4
 """m, of travel: the line is the tangent."""
 
 
-def learnt(samples: list[Inputs]) -> float:
+def learnt(samples):
     return run(SURE, samples)[-1][0].estimate.beta
 
 
-def sensed(samples: list[Inputs], alpha: Pair, n: Pair) -> list[Inputs]:
+def sensed(samples, alpha, n):
     """The same approach, seen by sensors of other exponents."""
     seen = []
     for u in samples:
@@ -41,14 +41,12 @@ def sensed(samples: list[Inputs], alpha: Pair, n: Pair) -> list[Inputs]:
 
 @examples(15)
 @given(pairs(0.1, 2.0), st.floats(0.9, 1.5), st.floats(1e-3, 0.04), st.integers(10, 60))
-def test_at_equal_gaps_a_common_error_of_n_cancels(
-    alpha: Pair, n: float, end: float, count: int
-) -> None:
+def test_at_equal_gaps_a_common_error_of_n_cancels(alpha, n, end, count):
     samples = approach(alpha, end=end, count=count, n=n)
     assert learnt(samples) == pytest.approx(log(alpha[0] / alpha[1]), abs=1e-6)
 
 
-def short(alpha: Pair, gaps: Pair, n: float) -> list[Inputs]:
+def short(alpha, gaps, n):
     """A tenth of a millimetre before the gaps in m."""
     samples = []
     for k in range(11):
@@ -60,7 +58,7 @@ def short(alpha: Pair, gaps: Pair, n: float) -> list[Inputs]:
 
 @pytest.mark.parametrize("n", [1.0, 1.3])
 @pytest.mark.parametrize("gaps", [(0.02, 0.01), (0.005, 0.04), (0.03, 0.03)])
-def test_layer_3_rests_at_equal_gaps_whatever_n(n: float, gaps: Pair) -> None:
+def test_layer_3_rests_at_equal_gaps_whatever_n(n, gaps):
     """beta is off by (n_true - n)·ln(d_2/d_1), which is nothing where layer 3 takes the fingers.
 
     With it the intensities count as those of equal faces, and of the block's n.
@@ -75,7 +73,7 @@ def test_layer_3_rests_at_equal_gaps_whatever_n(n: float, gaps: Pair) -> None:
 
 
 @pytest.mark.parametrize("n", [(1.14, 1.16), (1.3, 1.1)])
-def test_an_error_of_one_sensor_does_not_cancel(n: Pair) -> None:
+def test_an_error_of_one_sensor_does_not_cancel(n):
     """The slopes then have the ratio n_1/n_2 as well, and distances to two powers."""
     gap = 0.02
     samples = sensed(approach((0.5, 1.0), (gap + SHORT, gap + SHORT), gap, 10), (0.5, 1.0), n)
@@ -87,7 +85,7 @@ def test_an_error_of_one_sensor_does_not_cancel(n: Pair) -> None:
 
 @examples(15)
 @given(pairs(0.1, 2.0), st.floats(5e-4, 0.02), pairs(0.02, 0.08))
-def test_neither_the_gain_nor_the_offset_is_used(alpha: Pair, l_0: float, gaps: Pair) -> None:
+def test_neither_the_gain_nor_the_offset_is_used(alpha, l_0, gaps):
     """A common l_0 shifts the lines, and K scales both: the slopes have the ratio of alpha."""
     samples = [
         u._replace(

@@ -20,13 +20,13 @@ SPEEDS = st.floats(-1.0, 1.0)
     ("press", "closing", "hold"),
     [(0.0, 0.0, 0.0), (0.1, 0.0, 0.5), (0.1, 2e-3, 0.25), (0.1, -2e-3, 0.25), (1e3, 0.0, 1.0)],
 )
-def test_half_a_grasp_is_at_p_0_and_at_w_0(press: float, closing: float, hold: float) -> None:
+def test_half_a_grasp_is_at_p_0_and_at_w_0(press, closing, hold):
     assert holding.hold(P, press, closing) == pytest.approx(hold, abs=1e-7)
 
 
 @examples(50)
 @given(st.floats(-0.2, 0.2), st.floats(0.01, 0.2), st.floats(-0.2, 0.2))
-def test_no_target_makes_more_or_less_of_a_squeeze(x_m: float, width: float, target: float) -> None:
+def test_no_target_makes_more_or_less_of_a_squeeze(x_m, width, target):
     """Two springs at rest to one point: their mean pull is K_i·W/2, wherever it is."""
     layer_1 = contact_force.Params()
     right, left = x_m + 0.5 * width, x_m - 0.5 * width
@@ -39,9 +39,7 @@ def test_no_target_makes_more_or_less_of_a_squeeze(x_m: float, width: float, tar
 
 @examples(50)
 @given(FORCES, FORCES, SPEEDS, st.floats(0.0, 10.0))
-def test_to_press_more_holds_more_and_to_move_more_holds_less(
-    u_1: float, u_2: float, closing: float, more: float
-) -> None:
+def test_to_press_more_holds_more_and_to_move_more_holds_less(u_1, u_2, closing, more):
     hold = holding.hold(P, 0.5 * (u_2 - u_1), closing)
     assert 0.0 <= hold <= 1.0
     rounding = 1e-12 * hold
@@ -52,11 +50,11 @@ def test_to_press_more_holds_more_and_to_move_more_holds_less(
 
 @examples(50)
 @given(st.floats(0.0, 100.0), SPEEDS)
-def test_fingers_that_pull_apart_hold_nothing(pull: float, closing: float) -> None:
+def test_fingers_that_pull_apart_hold_nothing(pull, closing):
     assert holding.hold(P, -pull, closing) == 0.0
 
 
-def test_the_speed_is_low_passed() -> None:
+def test_the_speed_is_low_passed():
     """Towards the new one with the time constant, however many steps it is in."""
     once = holding.filtered(P, 1.0, 0.0, 0.03)
     twice = holding.filtered(P, holding.filtered(P, 1.0, 0.0, 0.015), 0.0, 0.015)
@@ -65,7 +63,7 @@ def test_the_speed_is_low_passed() -> None:
     assert holding.filtered(P, 0.3, 0.3, 0.01) == pytest.approx(0.3, rel=1e-12)
 
 
-def test_what_is_held_teaches_nothing() -> None:
+def test_what_is_held_teaches_nothing():
     """A grasp pushed to and fro by 2 mm, its light rising with it by a tenth: no approach."""
     touching = approach((0.5, 1.0), end=0.0)
     *_, last = touching

@@ -4,7 +4,7 @@ from math import inf, isfinite, nextafter, sqrt
 
 import numpy as np
 import pytest
-from grasp_controller.impedance import Matrix, Motion, advance, transition
+from grasp_controller.impedance import advance, transition
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -17,7 +17,7 @@ QUICK = examples(100)
 EPS = float(np.finfo(float).eps)
 
 
-def powers(low: float, high: float) -> st.SearchStrategy[float]:
+def powers(low, high):
     """Numbers of all magnitudes from 10^low to 10^high."""
     return st.floats(low, high).map(lambda exponent: float(10.0**exponent))
 
@@ -41,14 +41,14 @@ Virtual = tuple[float, float, float, float]
 """Mass, damping, stiffness and a time."""
 
 
-def scales(virtual: Virtual) -> Matrix:
+def scales(virtual):
     """The size the entries can have."""
     m, d, k, h = virtual
     s = min(h, sqrt(m / k), m / d if d else h)
     return 1.0, s, k / m * s, 1.0
 
 
-def agree(a: Matrix, b: Matrix, virtual: Virtual, roundings: float) -> bool:
+def agree(a, b, virtual, roundings):
     """Equal but for roundings, each of which turns the phase omega·h by its share."""
     m, _, k, h = virtual
     tolerance = roundings * EPS * (1.0 + sqrt(k / m) * h)
@@ -59,7 +59,7 @@ def agree(a: Matrix, b: Matrix, virtual: Virtual, roundings: float) -> bool:
 
 @QUICK
 @given(MASSES, DAMPINGS, STIFFNESSES, TIMES)
-def test_the_transition_is_exact_for_any_damping(m: float, d: float, k: float, h: float) -> None:
+def test_the_transition_is_exact_for_any_damping(m, d, k, h):
     a = transition(m, d, k, h)
     assert all(isfinite(entry) for entry in a)
     assert agree(a, oscillator(m, d, k, h), (m, d, k, h), roundings=8.0)
@@ -69,7 +69,7 @@ def test_the_transition_is_exact_for_any_damping(m: float, d: float, k: float, h
 @pytest.mark.parametrize("d", [0.0, 1e5])
 @pytest.mark.parametrize("k", [1e-3, 1e6])
 @pytest.mark.parametrize("h", [1e-6, 0.1])
-def test_nothing_overflows_in_the_corners(m: float, d: float, k: float, h: float) -> None:
+def test_nothing_overflows_in_the_corners(m, d, k, h):
     a = transition(m, d, k, h)
     assert all(isfinite(entry) for entry in a)
     assert agree(a, oscillator(m, d, k, h), (m, d, k, h), roundings=8.0)
@@ -77,14 +77,14 @@ def test_nothing_overflows_in_the_corners(m: float, d: float, k: float, h: float
 
 @pytest.mark.parametrize("h", [1e-4, 1e-2, 0.5])
 @pytest.mark.parametrize(("m", "d", "k"), PUBLISHED)
-def test_the_transition_is_the_matrix_exponential(m: float, d: float, k: float, h: float) -> None:
+def test_the_transition_is_the_matrix_exponential(m, d, k, h):
     expected = expm(np.array([[0.0, 1.0], [-k / m, -d / m]]) * h).ravel()
     np.testing.assert_allclose(transition(m, d, k, h), expected, rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.parametrize("h", [1e-4, 1e-2, 0.1])
 @pytest.mark.parametrize(("m", "d", "k"), CRITICAL)
-def test_critical_damping(m: float, d: float, k: float, h: float) -> None:
+def test_critical_damping(m, d, k, h):
     sigma = 0.5 * d / m
     assert sigma * sigma == k / m
     expected = expm(np.array([[0.0, 1.0], [-k / m, -d / m]]) * h).ravel()
@@ -93,7 +93,7 @@ def test_critical_damping(m: float, d: float, k: float, h: float) -> None:
 
 @pytest.mark.parametrize("h", [1e-4, 1e-2, 0.1])
 @pytest.mark.parametrize(("m", "d", "k"), CRITICAL)
-def test_nothing_jumps_at_critical_damping(m: float, d: float, k: float, h: float) -> None:
+def test_nothing_jumps_at_critical_damping(m, d, k, h):
     """A relative change delta of the damping turns the transition by less than 2·sigma·h·delta."""
     here = transition(m, d, k, h)
     for beside in (nextafter(d, 0.0), nextafter(d, inf)):
@@ -108,7 +108,7 @@ def test_nothing_jumps_at_critical_damping(m: float, d: float, k: float, h: floa
 
 @QUICK
 @given(MASSES, DAMPINGS, STIFFNESSES, TIMES)
-def test_two_half_steps_are_one_step(m: float, d: float, k: float, h: float) -> None:
+def test_two_half_steps_are_one_step(m, d, k, h):
     half = np.array(transition(m, d, k, 0.5 * h)).reshape(2, 2)
     twice = (half @ half).ravel().tolist()
     assert agree(tuple(twice), transition(m, d, k, h), (m, d, k, h), roundings=16.0)
@@ -116,7 +116,7 @@ def test_two_half_steps_are_one_step(m: float, d: float, k: float, h: float) -> 
 
 @QUICK
 @given(MASSES, DAMPINGS, STIFFNESSES, st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
-def test_no_energy_appears(m: float, d: float, k: float, e: float, e_dot: float) -> None:
+def test_no_energy_appears(m, d, k, e, e_dot):
     omega = sqrt(k / m)
     h = 0.1
     after, rate = advance(transition(m, d, k, h), e, e_dot, 0.0)
@@ -126,9 +126,7 @@ def test_no_energy_appears(m: float, d: float, k: float, e: float, e_dot: float)
 
 @pytest.mark.parametrize("start", [(0.3, 0.0), (0.0, -2.0), (-0.1, 0.7)])
 @pytest.mark.parametrize(("m", "d", "k"), PUBLISHED)
-def test_a_held_force_moves_the_object_around_its_rest(
-    m: float, d: float, k: float, start: Motion
-) -> None:
+def test_a_held_force_moves_the_object_around_its_rest(m, d, k, start):
     force, h = 5.0, 0.25
     motion = solve_ivp(
         lambda _, z: [z[1], (force - d * z[1] - k * z[0]) / m],
@@ -143,7 +141,7 @@ def test_a_held_force_moves_the_object_around_its_rest(
 
 
 @pytest.mark.parametrize(("m", "d", "k"), PUBLISHED)
-def test_the_rest_is_left_by_nothing(m: float, d: float, k: float) -> None:
+def test_the_rest_is_left_by_nothing(m, d, k):
     a = transition(m, d, k, 0.01)
     assert advance(a, 0.125, 0.0, 0.125) == (0.125, 0.0)
     assert advance(transition(m, d, k, 100.0), 0.3, -1.0, 0.125) == pytest.approx((0.125, 0.0))

@@ -1,6 +1,5 @@
 """Each of the controller's layers by itself, Eqs. (2) to (7)."""
 
-from collections.abc import Sequence
 from math import isfinite, isnan, log, nan, nextafter, tanh
 
 import numpy as np
@@ -25,7 +24,7 @@ GAINS = st.floats(-1e3, 1e3)
 # ------------------------------------------------- layer 3, the virtual force of Eq. (2)
 
 
-def f_s(xi: Pair, gain: float = 3.0) -> float:
+def f_s(xi, gain=3.0):
     return layer_3.virtual_force(layer_3.Params(gain=gain), xi)
 
 
@@ -38,14 +37,14 @@ def f_s(xi: Pair, gain: float = 3.0) -> float:
         ((0.57, 1.0), -0.801709332155),
     ],
 )
-def test_the_virtual_force_of_a_few_intensities(xi: Pair, newtons: float) -> None:
+def test_the_virtual_force_of_a_few_intensities(xi, newtons):
     """3 N times tanh(1/2) = 0.46211715726 and tanh(-0.43/1.57) = -0.267236444052."""
     assert f_s(xi) == pytest.approx(newtons, rel=1e-11)
 
 
 @QUICK
 @given(INTENSITIES, INTENSITIES, GAINS)
-def test_the_virtual_force_is_bounded_and_odd(xi_1: float, xi_2: float, gain: float) -> None:
+def test_the_virtual_force_is_bounded_and_odd(xi_1, xi_2, gain):
     force = f_s((xi_1, xi_2), gain)
     assert abs(force) <= abs(gain) * tanh(1.0)
     assert force == -f_s((xi_2, xi_1), gain)
@@ -54,41 +53,39 @@ def test_the_virtual_force_is_bounded_and_odd(xi_1: float, xi_2: float, gain: fl
 
 @QUICK
 @given(INTENSITIES, INTENSITIES)
-def test_the_virtual_force_points_away_from_the_nearer_surface(xi_1: float, xi_2: float) -> None:
+def test_the_virtual_force_points_away_from_the_nearer_surface(xi_1, xi_2):
     """Towards finger 1, in the direction of x, where finger 1 sees more."""
     assert np.sign(f_s((xi_1, xi_2))) == np.sign(xi_1 - xi_2)
 
 
 @pytest.mark.parametrize("xi", [(0.0, 0.0), (-0.1, 0.0), (-0.1, -0.2), (0.0, -1e-300)])
-def test_no_virtual_force_where_neither_sensor_sees_anything(xi: Pair) -> None:
+def test_no_virtual_force_where_neither_sensor_sees_anything(xi):
     assert f_s(xi) == 0.0
 
 
 @pytest.mark.parametrize("xi", [5e-324, 1e-300, 0.1])
 @pytest.mark.parametrize("nothing", [0.0, -1e-300, -0.5])
-def test_all_of_the_virtual_force_where_one_sensor_sees_something(
-    xi: float, nothing: float
-) -> None:
+def test_all_of_the_virtual_force_where_one_sensor_sees_something(xi, nothing):
     assert f_s((xi, nothing)) == 3.0 * tanh(1.0)
     assert f_s((nothing, xi)) == -3.0 * tanh(1.0)
     assert f_s((xi, xi)) == 0.0
 
 
 @pytest.mark.parametrize("xi", [(nan, 0.1), (0.1, nan), (nan, 0.0), (nan, nan)])
-def test_an_intensity_that_is_no_number_is_not_taken_for_darkness(xi: Pair) -> None:
+def test_an_intensity_that_is_no_number_is_not_taken_for_darkness(xi):
     assert isnan(f_s(xi))
 
 
 @QUICK
 @given(INTENSITIES, INTENSITIES, st.integers(-40, 40))
-def test_twice_the_light_is_the_same_force(xi_1: float, xi_2: float, exponent: int) -> None:
+def test_twice_the_light_is_the_same_force(xi_1, xi_2, exponent):
     factor = 2.0**exponent
     assert f_s((factor * xi_1, factor * xi_2)) == f_s((xi_1, xi_2))
 
 
 @QUICK
 @given(INTENSITIES, INTENSITIES, st.floats(0.01, 100.0))
-def test_any_light_is_the_same_force(xi_1: float, xi_2: float, factor: float) -> None:
+def test_any_light_is_the_same_force(xi_1, xi_2, factor):
     """The two products are rounded once each, relative to the sum of the intensities."""
     same = f_s((xi_1, xi_2))
     assert f_s((factor * xi_1, factor * xi_2)) == pytest.approx(same, rel=1e-15, abs=3e-15)
@@ -97,11 +94,11 @@ def test_any_light_is_the_same_force(xi_1: float, xi_2: float, factor: float) ->
 # ------------------------------------------------------ layer 2, the virtual force of Eq. (5)
 
 
-def f_p(xi: Pair, before: Pair, h: float) -> Pair:
+def f_p(xi, before, h):
     return layer_2.virtual_forces(layer_2.Params(), xi, before, h)
 
 
-def test_the_virtual_viscous_force_is_a_difference_of_logarithms() -> None:
+def test_the_virtual_viscous_force_is_a_difference_of_logarithms():
     """0.6·ln(0.5/0.4)/0.001 and -0.6·ln(0.2/0.25)/0.001, which are ln(5/4) both."""
     expected = 0.6 * (log(5.0) - log(4.0)) / 1e-3
     assert f_p((0.5, 0.2), (0.4, 0.25), 1e-3) == pytest.approx((expected, expected), rel=1e-13)
@@ -109,16 +106,14 @@ def test_the_virtual_viscous_force_is_a_difference_of_logarithms() -> None:
     assert f_p((0.5, 0.2), (0.5, 0.2), 1e-3) == (0.0, 0.0)
 
 
-def test_the_virtual_viscous_force_opens_a_finger_that_approaches() -> None:
+def test_the_virtual_viscous_force_opens_a_finger_that_approaches():
     right, left = f_p((0.3, 0.3), (0.2, 0.2), 1e-3)
     assert right > 0.0 > left
 
 
 @QUICK
 @given(INTENSITIES, INTENSITIES, st.integers(-10, 40))
-def test_the_virtual_viscous_force_does_not_depend_on_the_light(
-    xi: float, before: float, exponent: int
-) -> None:
+def test_the_virtual_viscous_force_does_not_depend_on_the_light(xi, before, exponent):
     p = layer_2.Params(intensity_floor=1e-12)
     factor = 2.0**exponent
     once = layer_2.virtual_forces(p, (xi, xi), (before, before), 1e-3)
@@ -128,9 +123,7 @@ def test_the_virtual_viscous_force_does_not_depend_on_the_light(
 
 @QUICK
 @given(st.floats(1e-12, 1e3), st.floats(0.0, 0.999), st.floats(1.0, 10.0))
-def test_below_the_floor_there_is_no_virtual_viscous_force(
-    floor: float, share: float, excess: float
-) -> None:
+def test_below_the_floor_there_is_no_virtual_viscous_force(floor, share, excess):
     """Neither where the sample is below it nor where the one before was."""
     p = layer_2.Params(intensity_floor=floor)
     dark, bright = share * floor, (1.0 + excess) * floor
@@ -142,7 +135,7 @@ def test_below_the_floor_there_is_no_virtual_viscous_force(
 
 
 @pytest.mark.parametrize("xi", [0.0, nextafter(1e-6, 0.0)])
-def test_a_sensor_that_sees_nothing_does_not_disturb_the_other_finger(xi: float) -> None:
+def test_a_sensor_that_sees_nothing_does_not_disturb_the_other_finger(xi):
     right, left = f_p((0.5, xi), (0.4, 0.25), 1e-3)
     assert right == pytest.approx(600.0 * log(1.25), rel=1e-13)
     assert left == 0.0
@@ -153,9 +146,7 @@ LIGHTS = st.floats(0.0, 1e250)
 
 @QUICK
 @given(LIGHTS, LIGHTS, st.floats(1e-6, 0.1), st.floats(-1e3, 1e3))
-def test_the_virtual_viscous_force_is_a_number(
-    xi: float, before: float, h: float, viscosity: float
-) -> None:
+def test_the_virtual_viscous_force_is_a_number(xi, before, h, viscosity):
     p = layer_2.Params(viscosity=(viscosity, viscosity), intensity_floor=1e-12)
     assert all(isfinite(force) for force in layer_2.virtual_forces(p, (xi,) * 2, (before,) * 2, h))
 
@@ -165,7 +156,7 @@ ANY = st.floats(0.0, allow_infinity=False)
 
 @QUICK
 @given(ANY, ANY, st.floats(1e-6, 0.1))
-def test_no_intensities_give_no_number(xi: float, before: float, h: float) -> None:
+def test_no_intensities_give_no_number(xi, before, h):
     """Beyond 1e250 V the quotient may be too large, but it is never undefined."""
     assert not any(isnan(force) for force in f_p((xi, before), (before, xi), h))
 
@@ -183,14 +174,12 @@ def test_no_intensities_give_no_number(xi: float, before: float, h: float) -> No
         (0.0, 1.0, (0.0, 0.0), -14.0),
     ],
 )
-def test_the_force_of_a_few_motions(
-    x: float, x_dot: float, virtual: Motion, newtons: float
-) -> None:
+def test_the_force_of_a_few_motions(x, x_dot, virtual, newtons):
     """-14·(x' - x_v1') - 98·(x - x_v1)."""
     assert layer_1.force(layer_1.Params(), x, x_dot, virtual) == pytest.approx(newtons, rel=1e-13)
 
 
-def test_damping_and_stiffness_have_their_own_parameters() -> None:
+def test_damping_and_stiffness_have_their_own_parameters():
     assert layer_1.force(layer_1.Params(damping=2.0), 0.0, 1.0, (0.0, 0.0)) == -2.0
     assert layer_1.force(layer_1.Params(stiffness=5.0), 1.0, 0.0, (0.0, 0.0)) == -5.0
 
@@ -207,12 +196,12 @@ HELD = [
 ]
 """Desired position, virtual forces and how long they are held."""
 
-START: tuple[Motion, layer_2.Motions] = ((0.01, 0.05), ((0.11, -0.02), (-0.10, 0.03)))
+START = ((0.01, 0.05), ((0.11, -0.02), (-0.10, 0.03)))
 
 Chain = tuple[Motion, layer_2.Motions]
 
 
-def derivative(z: Sequence[float], x_d: float, force_s: float, force_p: Pair) -> list[float]:
+def derivative(z, x_d, force_s, force_p):
     """Of x_v2, x_v2', x_v11, x_v11', x_v21, x_v21', with the accelerations out of the equations."""
     x, v, *fingers = z
     a = (force_s - TARGET.damping * v - TARGET.stiffness * (x - x_d)) / TARGET.mass
@@ -223,7 +212,7 @@ def derivative(z: Sequence[float], x_d: float, force_s: float, force_p: Pair) ->
     return result
 
 
-def integrated() -> list[float]:
+def integrated():
     target, (right, left) = START
     z = [*target, *right, *left]
     for x_d, force_s, force_p, duration in HELD:
@@ -240,7 +229,7 @@ def integrated() -> list[float]:
     return z
 
 
-def stepped(steps: int) -> list[float]:
+def stepped(steps):
     """The two layers, every input held for so many steps."""
     target, virtual = START
     for x_d, force_s, force_p, duration in HELD:
@@ -253,12 +242,12 @@ def stepped(steps: int) -> list[float]:
 
 
 @pytest.mark.parametrize("steps", [1, 2, 13, 100])
-def test_the_virtual_objects_move_exactly_whatever_the_step(steps: int) -> None:
+def test_the_virtual_objects_move_exactly_whatever_the_step(steps):
     np.testing.assert_allclose(stepped(steps), integrated(), rtol=0.0, atol=1e-11)
 
 
 @pytest.mark.parametrize("x_d", [0.0, -0.02])
-def test_the_virtual_objects_rest_where_the_springs_bear_the_forces(x_d: float) -> None:
+def test_the_virtual_objects_rest_where_the_springs_bear_the_forces(x_d):
     """x_v2 = x_d + f_s/K_a2, x_vj1 = x_v2 + f_pj/K_a1."""
     before = target = (x_d + 3.0 / 36.0, 0.0)
     target = layer_3.advance(layer_3.Params(), before, x_d, 3.0, 0.01)
@@ -269,6 +258,6 @@ def test_the_virtual_objects_rest_where_the_springs_bear_the_forces(x_d: float) 
     assert after[1] == pytest.approx(virtual[1], abs=1e-15)
 
 
-def test_the_desired_position_is_the_middle() -> None:
+def test_the_desired_position_is_the_middle():
     assert layer_3.desired_position((0.11, -0.11)) == 0.0
     assert layer_3.desired_position((0.5, 0.25)) == 0.375

@@ -1,6 +1,5 @@
 """Noise of the intensities has no mean in f_p, Eq. (5), as it would have in a quotient."""
 
-from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from math import log, sqrt
 
@@ -23,7 +22,7 @@ INTENSITIES = st.floats(1e-6, 1e3)
 """V; from the floor on."""
 
 
-def f_p(xi: float, before: float, h: float) -> float:
+def f_p(xi, before, h):
     """Of finger 1, in N; finger 2 has the same with the opposite sign."""
     right, left = layer_2.virtual_forces(layer_2.Params(), (xi, xi), (before, before), h)
     assert left == -right
@@ -31,19 +30,19 @@ def f_p(xi: float, before: float, h: float) -> float:
 
 
 @given(INTENSITIES, INTENSITIES)
-def test_two_samples_that_change_places_cancel(xi: float, before: float) -> None:
+def test_two_samples_that_change_places_cancel(xi, before):
     assert f_p(xi, before, 1e-3) == pytest.approx(-f_p(before, xi, 1e-3), rel=1e-12, abs=1e-10)
 
 
 @given(st.lists(INTENSITIES, min_size=2))
-def test_the_mean_is_that_of_the_way_from_first_to_last(xi: Sequence[float]) -> None:
+def test_the_mean_is_that_of_the_way_from_first_to_last(xi):
     """Whatever noise is in between: D_p·(ln xi_N - ln xi_0)/(N·h)."""
     mean = np.mean([f_p(b, a, 1e-3) for a, b in pairwise(xi)])
     expected = 0.6 * (log(xi[-1]) - log(xi[0])) / (1e-3 * (len(xi) - 1))
     assert mean == pytest.approx(expected, rel=1e-9, abs=1e-8)
 
 
-def noisy(s: float, r_1: float, seed: int) -> Sequence[float]:
+def noisy(s, r_1, seed):
     """Samples around XI: Gaussian, of relative standard deviation s, r_1 from one to the next."""
     first, *drawn = np.random.default_rng(seed).standard_normal(N + 1).tolist()
     own = sqrt(1.0 - r_1 * r_1)
@@ -54,9 +53,7 @@ def noisy(s: float, r_1: float, seed: int) -> Sequence[float]:
 @pytest.mark.parametrize(
     ("s", "r_1", "h", "seed"), [(0.066, 0.08, 1e-3, 1), (0.1, 0.5, 1e-3, 2), (0.1, 0.98, 1e-4, 3)]
 )
-def test_noise_biases_a_quotient_and_not_the_logarithms(
-    s: float, r_1: float, h: float, seed: int
-) -> None:
+def test_noise_biases_a_quotient_and_not_the_logarithms(s, r_1, h, seed):
     """The quotient has the mean -s^2·(1 - r_1)/h, and 3·s^2 of it more; the logarithms have none.
 
     With e and e' the relative noise of a sample and of the one before, the quotient is
@@ -76,7 +73,7 @@ def test_noise_biases_a_quotient_and_not_the_logarithms(
     assert of_the_ends < -0.1 * bias  # no room for it
 
 
-def test_on_the_move_noise_adds_its_square_to_the_logarithms() -> None:
+def test_on_the_move_noise_adds_its_square_to_the_logarithms():
     """The mean of ln xi is (sigma/xi)^2/2 lower, so its rate is 1 + (sigma/xi)^2 times xi'/xi.
 
     From a to b = 2·a that adds the integral, ((sigma/a)^2 - (sigma/b)^2)/2, whatever the step is.

@@ -1,10 +1,8 @@
 """The three layers in series: the cases, the start, the symmetry and the parameters."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import log, tanh
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,18 +10,18 @@ from grasp_controller import contact_force as layer_1
 from grasp_controller import impact_reduction as layer_2
 from grasp_controller import series
 from grasp_controller import simultaneous_contact as layer_3
-from grasp_controller.series import Inputs, Outputs, Pair, Params, State
+from grasp_controller.series import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support.approach import ANY_SAMPLES, assert_mirrored, mirrored
-from support.declared import Parameter, parameters
+from support.declared import parameters
 from support.examples import examples
 
 QUICK = examples(60)
 
 
-def switched(layer_3_on: bool, layer_2_on: bool) -> Params:
+def switched(layer_3_on, layer_2_on):
     return Params(
         simultaneous_contact=layer_3.Params(enabled=layer_3_on),
         impact_reduction=layer_2.Params(enabled=layer_2_on),
@@ -46,7 +44,7 @@ H = 0.02
 """A step in s, long enough to see what is held over it."""
 
 
-def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Outputs]]:
+def run(p, samples, h=H):
     """From the first sample on, the state and outputs at each."""
     x = series.initial_state(p, samples[0])
     trace = [(x, series.outputs(p, x, samples[0]))]
@@ -59,7 +57,7 @@ def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Out
 # ------------------------------------------------------------- the equations, integrated
 
 
-def virtual_forces(u: Inputs, before: Inputs) -> tuple[float, Pair]:
+def virtual_forces(u, before):
     """Eqs. (2) and (5) with the published gains."""
     xi_1, xi_2 = u.intensity
     f_s = 3.0 * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
@@ -69,9 +67,7 @@ def virtual_forces(u: Inputs, before: Inputs) -> tuple[float, Pair]:
     return f_s, (0.6 * rates[0], -0.6 * rates[1])
 
 
-def derivative(
-    z: Sequence[float], x_d: float, f_s: float, f_p: Pair, layer_3_on: bool
-) -> list[float]:
+def derivative(z, x_d, f_s, f_p, layer_3_on):
     """Eqs. (3) and (6) for x_v2, x_v11, x_v21 and their rates; without (3) x_v2 stands still."""
     x, y_1, y_2, v, w_1, w_2 = z
     a = f_s - 12.0 * v - 36.0 * (x - x_d) if layer_3_on else 0.0
@@ -80,7 +76,7 @@ def derivative(
     return [v, w_1, w_2, a, a_1, a_2]
 
 
-def integrated(layer_3_on: bool) -> list[list[float]]:
+def integrated(layer_3_on):
     """x_v2, x_v11, x_v21 and their rates at each of the samples but the first."""
     z = [0.0, 0.11, -0.11, 0.0, 0.0, 0.0]
     trace = []
@@ -101,7 +97,7 @@ def integrated(layer_3_on: bool) -> list[list[float]]:
 
 
 @pytest.mark.parametrize(("p", "layer_3_on"), [(CASE_1, False), (CASE_2, True)])
-def test_the_controller_is_its_equations_integrated(p: Params, layer_3_on: bool) -> None:
+def test_the_controller_is_its_equations_integrated(p, layer_3_on):
     for u, (_, y), z in zip(SAMPLES[1:], run(p, SAMPLES)[1:], integrated(layer_3_on), strict=True):
         x, v = z[:3], z[3:]
         expected = [
@@ -113,7 +109,7 @@ def test_the_controller_is_its_equations_integrated(p: Params, layer_3_on: bool)
 
 
 @pytest.mark.parametrize("p", [CASE_0, CASE_1, CASE_2, NO_IMPACT_REDUCTION])
-def test_the_virtual_forces_are_shown_in_every_case(p: Params) -> None:
+def test_the_virtual_forces_are_shown_in_every_case(p):
     for n, (_, y) in enumerate(run(p, SAMPLES)):
         f_s, f_p = virtual_forces(SAMPLES[n], SAMPLES[max(n - 1, 0)])
         assert y.simultaneous_contact_force == pytest.approx(f_s, rel=1e-12)
@@ -123,7 +119,7 @@ def test_the_virtual_forces_are_shown_in_every_case(p: Params) -> None:
 # ----------------------------------------------------------------------------- the cases
 
 
-def test_case_0_heads_for_the_middle_directly() -> None:
+def test_case_0_heads_for_the_middle_directly():
     for u, (_, y) in zip(SAMPLES, run(CASE_0, SAMPLES), strict=True):
         x_d = 0.5 * sum(u.position)
         assert y.target_position == x_d
@@ -132,18 +128,18 @@ def test_case_0_heads_for_the_middle_directly() -> None:
         assert y.force == pytest.approx(expected, rel=1e-13)
 
 
-def test_case_0_has_no_memory() -> None:
+def test_case_0_has_no_memory():
     """The force follows the sample of its own instant, whatever has been before."""
     (_, fresh), *_ = run(CASE_0, SAMPLES[2:])
     assert run(CASE_0, SAMPLES)[2][1].force == fresh.force
 
 
-def test_case_1_has_the_middle_for_its_target() -> None:
+def test_case_1_has_the_middle_for_its_target():
     for u, (_, y) in zip(SAMPLES, run(CASE_1, SAMPLES), strict=True):
         assert y.target_position == 0.5 * sum(u.position)
 
 
-def test_case_2_has_a_target_of_its_own() -> None:
+def test_case_2_has_a_target_of_its_own():
     """Drawn towards finger 1, which sees more, while the middle does not move."""
     still = [Inputs((0.11, -0.11), (0.0, 0.0), (0.030, 0.010))] * 200
     targets = [y.target_position for _, y in run(CASE_2, still)]
@@ -152,7 +148,7 @@ def test_case_2_has_a_target_of_its_own() -> None:
     assert targets[-1] == pytest.approx(3.0 * tanh(0.5) / 36.0, rel=1e-6)
 
 
-def test_without_impact_reduction_the_fingers_follow_the_target() -> None:
+def test_without_impact_reduction_the_fingers_follow_the_target():
     """Its position and its velocity, which is that of Case 2."""
     trace = zip(SAMPLES[1:], run(NO_IMPACT_REDUCTION, SAMPLES)[1:], integrated(True), strict=True)
     for u, (_, y), (x, _, _, v, _, _) in trace:
@@ -167,9 +163,7 @@ def test_without_impact_reduction_the_fingers_follow_the_target() -> None:
     [(CASE_1, CASE_2), (CASE_0, NO_IMPACT_REDUCTION), (CASE_0, CASE_1),
      (NO_IMPACT_REDUCTION, CASE_2)],
 )  # fmt: skip
-def test_a_layer_that_is_switched_on_takes_over_without_a_jump(
-    before: Params, after: Params
-) -> None:
+def test_a_layer_that_is_switched_on_takes_over_without_a_jump(before, after):
     """It begins at the layer above, and from there goes its own way."""
     x, y = run(before, SAMPLES)[-1]
     assert series.outputs(after, x, SAMPLES[-1]) == y
@@ -179,7 +173,7 @@ def test_a_layer_that_is_switched_on_takes_over_without_a_jump(
     )
 
 
-def test_a_layer_that_is_switched_off_leaves_the_target_to_the_one_above() -> None:
+def test_a_layer_that_is_switched_off_leaves_the_target_to_the_one_above():
     x, _ = run(CASE_2, SAMPLES)[-1]
     u = SAMPLES[-1]
     assert series.outputs(CASE_1, x, u).target_position == 0.5 * sum(u.position)
@@ -191,7 +185,7 @@ def test_a_layer_that_is_switched_off_leaves_the_target_to_the_one_above() -> No
 
 
 @pytest.mark.parametrize("p", [CASE_0, CASE_1, CASE_2, NO_IMPACT_REDUCTION])
-def test_the_force_follows_the_sample_it_is_asked_for(p: Params) -> None:
+def test_the_force_follows_the_sample_it_is_asked_for(p):
     """Also where it is not the one of the last step; the virtual objects do not move by it."""
     x, y = run(p, SAMPLES)[-1]
     u = Inputs((0.05, 0.01), (0.4, -0.3), (1.0, 2.0))
@@ -219,9 +213,7 @@ INTENSITIES = st.floats(0.0, 5.0)
 
 @QUICK
 @given(POSITIONS, POSITIONS, INTENSITIES, INTENSITIES, st.booleans())
-def test_fingers_at_rest_start_without_a_force(
-    x_1: float, x_2: float, xi_1: float, xi_2: float, layer_3_on: bool
-) -> None:
+def test_fingers_at_rest_start_without_a_force(x_1, x_2, xi_1, xi_2, layer_3_on):
     u = Inputs((x_1, x_2), (0.0, 0.0), (xi_1, xi_2))
     p = switched(layer_3_on, True)
     y = series.outputs(p, series.initial_state(p, u), u)
@@ -232,7 +224,7 @@ def test_fingers_at_rest_start_without_a_force(
 
 
 @pytest.mark.parametrize("p", [CASE_1, CASE_2])
-def test_the_force_grows_from_nothing(p: Params) -> None:
+def test_the_force_grows_from_nothing(p):
     """After h seconds of the same sample it is of the order of h: no jump at the start."""
     u = Inputs((0.11, -0.11), (0.0, 0.0), (0.030, 0.010))
     for h in (1e-3, 1e-4, 1e-5):
@@ -240,7 +232,7 @@ def test_the_force_grows_from_nothing(p: Params) -> None:
         assert 0.0 < max(abs(force) for force in y.force) < 100.0 * h
 
 
-def test_the_first_sample_is_no_approach() -> None:
+def test_the_first_sample_is_no_approach():
     """The rate of the intensity starts at zero, however bright the start."""
     u = Inputs((0.11, -0.11), (0.0, 0.0), (2.0, 1.0))
     assert run(CASE_2, [u, u])[1][1].impact_reduction_force == (0.0, 0.0)
@@ -250,7 +242,7 @@ def test_the_first_sample_is_no_approach() -> None:
 
 
 @st.composite
-def controllers(draw: st.DrawFn) -> Params:
+def controllers(draw):
     """Any of the cases; the viscosities +D_p and -D_p map onto each other."""
     mass, damping, stiffness = st.floats(0.1, 5.0), st.floats(0.0, 50.0), st.floats(1.0, 200.0)
     viscosity = draw(st.floats(0.0, 2.0))
@@ -275,9 +267,7 @@ def controllers(draw: st.DrawFn) -> Params:
     ANY_SAMPLES,
     st.floats(1e-5, 1e-2),
 )
-def test_the_mirrored_controller_does_exactly_the_mirrored_thing(
-    p: Params, samples: list[Inputs], h: float
-) -> None:
+def test_the_mirrored_controller_does_exactly_the_mirrored_thing(p, samples, h):
     images = run(p, [mirrored(u) for u in samples], h)
     for (_, y), (_, z) in zip(run(p, samples, h), images, strict=True):
         assert_mirrored(y, z)
@@ -285,7 +275,7 @@ def test_the_mirrored_controller_does_exactly_the_mirrored_thing(
 
 # ------------------------------------------------------------------------ the parameters
 
-LAYERS: dict[str, Any] = {
+LAYERS = {
     "simultaneous_contact": layer_3.Params,
     "impact_reduction": layer_2.Params,
     "contact_force": layer_1.Params,
@@ -295,7 +285,7 @@ PARAMETERS = [(layer, p) for layer, block in LAYERS.items() for p in parameters(
 
 
 @pytest.mark.parametrize(("layer", "parameter"), PARAMETERS)
-def test_a_value_outside_its_range_is_refused(layer: str, parameter: Parameter) -> None:
+def test_a_value_outside_its_range_is_refused(layer, parameter):
     for number, value in parameter.invalid():
         with pytest.raises(ValueError, match=r"^\w+\.\w+ = ") as caught:
             LAYERS[layer](**{parameter.name: value})
@@ -305,14 +295,14 @@ def test_a_value_outside_its_range_is_refused(layer: str, parameter: Parameter) 
 
 
 @pytest.mark.parametrize(("layer", "parameter"), PARAMETERS)
-def test_both_ends_of_a_range_are_accepted(layer: str, parameter: Parameter) -> None:
+def test_both_ends_of_a_range_are_accepted(layer, parameter):
     for bound in (parameter.low, parameter.high):
         for value in parameter.variants(bound):
             p = LAYERS[layer](**{parameter.name: value})
             assert getattr(p, parameter.name) == value
 
 
-def test_every_number_has_a_range() -> None:
+def test_every_number_has_a_range():
     assert {f"{layer}.{p.name}" for layer, p in PARAMETERS} == {
         "simultaneous_contact.mass",
         "simultaneous_contact.damping",
@@ -328,13 +318,13 @@ def test_every_number_has_a_range() -> None:
     }
 
 
-def test_a_negative_mass_is_refused_by_name() -> None:
+def test_a_negative_mass_is_refused_by_name():
     text = r"impact_reduction\.mass = -1\.0 kg: must be from 0\.001 to 1000 kg"
     with pytest.raises(ValueError, match=f"^{text}$"):
         replace(CASE_2.impact_reduction, mass=-1.0)
 
 
-def test_the_published_parameters() -> None:
+def test_the_published_parameters():
     p = Params()
     three, two, one = p.simultaneous_contact, p.impact_reduction, p.contact_force
     assert (three.mass, three.damping, three.stiffness, three.gain) == (1.0, 12.0, 36.0, 3.0)

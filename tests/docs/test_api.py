@@ -4,7 +4,6 @@ import re
 import runpy
 from os.path import normpath
 from pathlib import Path
-from typing import Any
 
 import grasp_cosim
 import pytest
@@ -15,27 +14,27 @@ SCRIPT = Path(__file__).parents[2] / "docs/api.py"
 
 
 @pytest.fixture(scope="module")
-def api() -> dict[str, Any]:
+def api():
     """The names of the script."""
     pytest.importorskip("pdoc", reason="pdoc is not installed")
     return runpy.run_path(str(SCRIPT))
 
 
 @pytest.fixture(scope="module")
-def pages(api: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def pages(api, tmp_path_factory):
     folder = tmp_path_factory.mktemp("api")
     written = api["write_pages"](folder)
     return {path.relative_to(folder).as_posix(): path.read_text("utf-8") for path in written}
 
 
-def section(page: str, name: str) -> str:
+def section(page, name):
     """The text of a name, without tags."""
     found = re.search(rf'<section id="{re.escape(name)}">(.*?)</section>', page, re.DOTALL)
     assert found, name
     return re.sub(r"<[^>]+>", "", found[1])
 
 
-def test_every_public_name_is_there_with_its_docstring(pages: dict[str, str]) -> None:
+def test_every_public_name_is_there_with_its_docstring(pages):
     page = pages["grasp_cosim.html"]
     for name in grasp_cosim.__all__:
         assert f'<section id="{name}">' in page
@@ -46,9 +45,7 @@ def test_every_public_name_is_there_with_its_docstring(pages: dict[str, str]) ->
         assert text in method
 
 
-def test_what_a_page_says_is_the_same_each_time_and_leads_somewhere(
-    api: dict[str, Any], pages: dict[str, str]
-) -> None:
+def test_what_a_page_says_is_the_same_each_time_and_leads_somewhere(api, pages):
     files = [f"{name.replace('.', '/')}.html" for name in api["MODULES"]]
     assert {*files, "index.html"} == pages.keys()
     for file in files:
@@ -60,9 +57,7 @@ def test_what_a_page_says_is_the_same_each_time_and_leads_somewhere(
         assert f'href="{file}"' in pages["grasp_cosim.html"]
 
 
-def test_a_wrong_annotation_is_an_error(
-    api: dict[str, Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_wrong_annotation_is_an_error(api, monkeypatch, tmp_path):
     monkeypatch.setitem(grasp_cosim.load_run.__annotations__, "folder", "NoSuchType")
     with pytest.raises(UserWarning, match="NoSuchType"):
         api["write_pages"](tmp_path)

@@ -9,8 +9,8 @@ PAGE = (Path(__file__).parents[2] / "docs/hand.md").read_text("utf-8")
 
 
 @needs_compiler
-def test_the_examples_hold() -> None:
-    names: dict[str, object] = {}
+def test_the_examples_hold():
+    names = {}
     found = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert len(found) == 3
     for example in found:

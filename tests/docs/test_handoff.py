@@ -10,7 +10,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from select import select
 from time import monotonic
-from typing import Self
 
 import pytest
 from grasp_cosim import cli
@@ -28,16 +27,16 @@ STOP = "0.3"
 class Bench:
     """The terminal bench$: what it starts goes on in the background."""
 
-    def __init__(self) -> None:
-        self._processes: list[subprocess.Popen[bytes]] = []
+    def __init__(self):
+        self._processes = []
 
-    def __enter__(self) -> Self:
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_: object):
         self.end()
 
-    def start(self, words: list[str]) -> None:
+    def start(self, words):
         """Start a program, and wait until it says that it listens."""
         process = subprocess.Popen(
             words,
@@ -56,14 +55,14 @@ class Bench:
                 return
         raise AssertionError(words)
 
-    def end(self) -> None:
+    def end(self):
         for process in self._processes:
             process.kill()
             process.communicate()
         self._processes.clear()
 
 
-def rehearse(system: Path) -> None:
+def rehearse(system):
     """All blocks of the page, in order."""
     with ExitStack() as stack:
         named = sorted(set(re.findall(r"\b5[56]0\d\b", PAGE)))
@@ -83,7 +82,7 @@ def rehearse(system: Path) -> None:
             bench.end()
 
 
-def words(text: str) -> list[str]:
+def words(text):
     """A command line as a program takes it; ours is that of this interpreter."""
     found = shlex.split(text)
     if found[0] == "grasp-cosim":
@@ -92,7 +91,7 @@ def words(text: str) -> list[str]:
     return found
 
 
-def run(text: str) -> None:
+def run(text):
     """A command of host$, in this process where it is ours: that saves it the start."""
     if text.startswith("grasp-cosim "):
         assert cli.main(words(text)[3:]) == 0, text
@@ -100,7 +99,7 @@ def run(text: str) -> None:
         subprocess.run(text, shell=True, check=True)
 
 
-def change(system: Path, block: str) -> None:
+def change(system, block):
     """Put each table of the block into the system file, in place of that of its name."""
     tables = system.read_text("utf-8").split("\n\n")
     for new in block.strip().split("\n\n"):
@@ -110,7 +109,7 @@ def change(system: Path, block: str) -> None:
     system.write_text("\n\n".join(tables) + "\n", encoding="utf-8")
 
 
-def columns(path: Path) -> dict[str, tuple[str, ...]]:
+def columns(path):
     with path.open(encoding="utf-8", newline="") as file:
         names, *rows = csv.reader(file)
     return dict(zip(names, zip(*rows, strict=True), strict=True))
@@ -118,7 +117,7 @@ def columns(path: Path) -> dict[str, tuple[str, ...]]:
 
 @pytest.mark.slow
 @native_fmus.needs_gcc
-def test_the_four_steps(checkout: Path) -> None:
+def test_the_four_steps(checkout):
     rehearse(checkout / "my_system.toml")
     simulated = columns(checkout / "simulated/signals.csv")
     assert len(simulated["time"]) == 301

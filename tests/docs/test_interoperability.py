@@ -5,7 +5,6 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Mapping
 from ctypes.util import find_library
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 import pytest
-from conftest import Folder
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from grasp_cosim import System, simulate
@@ -62,18 +60,18 @@ ROWS = [
 ]
 
 
-def row(name: str) -> Row:
+def row(name):
     """The row that the test of this name belongs to."""
     (found,) = (r for r in ROWS if f"`{name}`" in r.by)
     return found
 
 
-def tool(name: str, *needed: str) -> str:
+def tool(name, *needed):
     """The Python with the tool of a row; else the test is skipped."""
     return python_with(row(name).tool, row(name).version, *needed)
 
 
-def kept(name: str, theirs: Column, ours: Column) -> None:
+def kept(name, theirs, ours):
     """The last value is the page's, and no sample is farther from ours than it says."""
     assert theirs.shape == ours.shape
     assert f"{theirs[-1]:.4f}" in row(name).value.split()
@@ -81,11 +79,11 @@ def kept(name: str, theirs: Column, ours: Column) -> None:
 
 
 @pytest.fixture(scope="module")
-def kinds(folder_of: Folder) -> Mapping[str, Path]:
+def kinds(folder_of):
     """The folders of FMUs, by kind."""
 
     class Kinds(dict[str, Path]):
-        def __missing__(self, kind: str) -> Path:
+        def __missing__(self, kind):
             return folder_of(kind)  # type: ignore[arg-type]
 
     return Kinds()
@@ -100,16 +98,16 @@ by_fmpy = pytest.mark.parametrize(
 """FMPy is there wherever we are."""
 
 
-def grasp_of(folder: Path) -> System:
+def grasp_of(folder):
     """The measured grasp, with the FMUs of a folder."""
     return System.load(SYSTEM, folder).with_experiment(STEP, stop=2.5, scheme="jacobi")
 
 
-def force(system: System, signal: str = FORCE) -> Column:
+def force(system, signal=FORCE):
     return np.asarray(simulate(system, engine="python")[signal])
 
 
-def pushed(fmu: Path, folder: Path) -> Column:
+def pushed(fmu, folder):
     """The contact force of a plant alone, in our master."""
     values = "".join(f"{json.dumps(name)} = {value}\n" for name, value in PUSH.items())
     head = f"[experiment]\nstep = {BINARY}\nstop = {PUSHED}\n[components.plant]\nfmu = "
@@ -118,18 +116,18 @@ def pushed(fmu: Path, folder: Path) -> Column:
     return force(System.load(path))
 
 
-def archived(system: System, folder: Path) -> Path:
+def archived(system, folder):
     path = folder / "grasp.ssp"
     write_ssp(system, path)
     return path
 
 
-def asked_of(system: System, **more: object) -> dict[str, object]:
+def asked_of(system, **more):
     steps = system.stop_ns // system.step_ns
     return {"step": STEP, "steps": steps, "signals": [FORCE], **more}
 
 
-def parts_of(system: System) -> dict[str, object]:
+def parts_of(system):
     ends = [(c.source, c.target) for c in system.connections]
     return {
         "fmus": {c.name: str(c.fmu) for c in system.components},
@@ -137,7 +135,7 @@ def parts_of(system: System) -> dict[str, object]:
     }
 
 
-def found(python: str, program: str, folder: Path, given: dict[str, object]) -> Column:
+def found(python, program, folder, given):
     return np.array(run_in(python, program, folder, given))[:, 0]
 
 
@@ -146,7 +144,7 @@ def found(python: str, program: str, folder: Path, given: dict[str, object]) -> 
 
 @every_kind
 @pytest.mark.skipif(not find_library("tbb"), reason="libtbb12, which ecospy needs, is missing")
-def test_ecospy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_ecospy(kinds, kind, tmp_path):
     python = tool("test_ecospy")
     system = grasp_of(kinds[kind])
     given = asked_of(system, ssp=str(archived(system, tmp_path)))
@@ -154,7 +152,7 @@ def test_ecospy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
 
 
 @of_fmi_2
-def test_libcosimpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_libcosimpy(kinds, kind, tmp_path):
     python = tool("test_libcosimpy")
     system = grasp_of(kinds[kind])
     given = asked_of(system, ssp=str(archived(system, tmp_path)))
@@ -162,7 +160,7 @@ def test_libcosimpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.interop
-def test_libcosimpy_knows_no_fmi_3(kinds: Mapping[str, Path], tmp_path: Path) -> None:
+def test_libcosimpy_knows_no_fmi_3(kinds, tmp_path):
     """Where it does, the page has one kind more to tell of."""
     python = tool("test_libcosimpy")
     system = grasp_of(kinds["native FMI 3"])
@@ -172,7 +170,7 @@ def test_libcosimpy_knows_no_fmi_3(kinds: Mapping[str, Path], tmp_path: Path) ->
 
 
 @every_kind
-def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_cofmupy(kinds, kind, tmp_path):
     python = tool("test_cofmupy")
     system = grasp_of(kinds[kind])
     start = simulate(system.with_experiment(stop=STEP))
@@ -186,7 +184,7 @@ def test_cofmupy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
 
 
 @by_fmpy
-def test_fmpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_fmpy(kinds, kind, tmp_path):
     tool("test_fmpy")
     fmu = kinds[kind] / "GripperPlant.fmu"
     result = simulate_fmu(fmu, start_values=PUSH, stop_time=PUSHED, output_interval=BINARY)
@@ -194,7 +192,7 @@ def test_fmpy(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
 
 
 @by_fmpy
-def test_fmpy_on_the_command_line(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_fmpy_on_the_command_line(kinds, kind, tmp_path):
     python = tool("test_fmpy_on_the_command_line")
     fmu = kinds[kind] / "GripperPlant.fmu"
     words = [str(word) for pair in PUSH.items() for word in pair]
@@ -207,7 +205,7 @@ def test_fmpy_on_the_command_line(kinds: Mapping[str, Path], kind: str, tmp_path
 
 
 @by_fmpy
-def test_fmpy_finds_no_problem(kinds: Mapping[str, Path], kind: str) -> None:
+def test_fmpy_finds_no_problem(kinds, kind):
     tool("test_fmpy_finds_no_problem")
     shipped = sorted(kinds[kind].glob("*.fmu"))
     assert len(shipped) == int(row("test_fmpy_finds_no_problem").value.split()[0])
@@ -215,10 +213,10 @@ def test_fmpy_finds_no_problem(kinds: Mapping[str, Path], kind: str) -> None:
 
 
 @pytest.mark.interop
-def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None:
+def test_pyssp_standard_reads(kinds, tmp_path):
     python = tool("test_pyssp_standard_reads")
     system = grasp_of(kinds["python"])
-    given: dict[str, object] = {"ssp": str(archived(system, tmp_path))}
+    given = {"ssp": str(archived(system, tmp_path))}
     connections, connectors = run_in(python, PYSSP_STANDARD, tmp_path, given)
     said = re.findall(r"\d+", row("test_pyssp_standard_reads").value)
     assert [connections, connectors] == [int(number) for number in said]
@@ -226,7 +224,7 @@ def test_pyssp_standard_reads(kinds: Mapping[str, Path], tmp_path: Path) -> None
 
 
 @every_kind
-def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_fmutool(kinds, kind, tmp_path):
     python = tool("test_fmutool")
     for name in ("GripperPlant", "ProximitySensor", "GraspController"):
         fmu = kinds[kind] / f"{name}.fmu"
@@ -240,7 +238,7 @@ def test_fmutool(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [interop("python"), interop("native FMI 3")])
-def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_pyssp_standard_writes(kinds, kind, tmp_path):
     python = tool("test_pyssp_standard_writes")
     path = archived(grasp_of(kinds[kind]), tmp_path)
     before = path.read_bytes()
@@ -250,7 +248,7 @@ def test_pyssp_standard_writes(kinds: Mapping[str, Path], kind: str, tmp_path: P
 
 
 @pytest.mark.parametrize("kind", [interop("python"), interop("native FMI 3")])
-def test_pyssp_standard_makes(kinds: Mapping[str, Path], kind: str, tmp_path: Path) -> None:
+def test_pyssp_standard_makes(kinds, kind, tmp_path):
     python = tool("test_pyssp_standard_makes")
     system, path = grasp_of(kinds[kind]), tmp_path / "grasp.ssp"
     given = {"ssp": str(path), "stop": 2.5, **parts_of(system)}
@@ -271,7 +269,7 @@ SIDE = ("position", "velocity", "contact_force", "gap")
         interop("native FMI 3", 3),
     ],
 )
-def test_fmucontainer(kinds: Mapping[str, Path], kind: str, version: int, tmp_path: Path) -> None:
+def test_fmucontainer(kinds, kind, version, tmp_path):
     """Plant and sensors in one container, which hands nothing on before its first step."""
     python = tool("test_fmucontainer")
     system = grasp_of(kinds[kind])
@@ -331,7 +329,7 @@ class Spring({fmi}Slave):
 """
 
 
-def spring(u: float) -> Column:
+def spring(u):
     """The slave's equations, in plain Python."""
     x, v, found = 1.0, 0.0, [1.0]
     for _ in range(100):
@@ -341,7 +339,7 @@ def spring(u: float) -> Column:
     return np.array(found)
 
 
-def alone(fmu: str, folder: Path, values: str, isolation: str = "none") -> System:
+def alone(fmu, folder, values, isolation="none"):
     path = folder / "alone.toml"
     text = f'[experiment]\nstep = 0.01\nstop = 1.0\n[components.it]\nfmu = "{fmu}"\n'
     path.write_text(f'{text}isolation = "{isolation}"\nvalues = {values}\n', "utf-8")
@@ -355,7 +353,7 @@ def alone(fmu: str, folder: Path, values: str, isolation: str = "none") -> Syste
         interop("pythonfmu3", "Fmi3", "Float64", "Int32"),
     ],
 )
-def test_slave_of(package: str, fmi: str, real: str, whole: str, tmp_path: Path) -> None:
+def test_slave_of(package, fmi, real, whole, tmp_path):
     name = f"test_slave_of[{package}]"
     python = tool(name)
     names = {"package": package, "fmi": fmi, "real": real, "whole": whole}
@@ -389,7 +387,7 @@ class StateSpace(Fmi3Slave):
 
 
 @pytest.mark.interop
-def test_arrays_of_pythonfmu3(tmp_path: Path) -> None:
+def test_arrays_of_pythonfmu3(tmp_path):
     name = "test_arrays_of_pythonfmu3"
     python = tool(name, "numpy")
     (tmp_path / "pythonfmu3_arrays.py").write_text(ARRAYS, "utf-8")
@@ -434,7 +432,7 @@ class Ball(Fmi3SlaveBase, ModelExchange):
 
 
 @pytest.mark.interop
-def test_model_exchange_of_pythonfmu3(tmp_path: Path) -> None:
+def test_model_exchange_of_pythonfmu3(tmp_path):
     """A ball of 1 m, and its first bounce, against the solution in closed form."""
     name = "test_model_exchange_of_pythonfmu3"
     python = tool(name)
@@ -449,7 +447,7 @@ def test_model_exchange_of_pythonfmu3(tmp_path: Path) -> None:
 
 
 @pytest.mark.interop
-def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unifmu(tmp_path, monkeypatch):
     """Its example, an adder of all types in Python, which it runs in a process behind a socket."""
     python = tool("test_unifmu", "pyzmq", "toml")
     call([script_of(python, "unifmu"), "generate", "python", "Adder"], tmp_path)
@@ -468,7 +466,7 @@ def test_unifmu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("interface", [interop("CoSimulation"), interop("ModelExchange")])
-def test_fmus_from_elsewhere(interface: str) -> None:
+def test_fmus_from_elsewhere(interface):
     """All FMUs below the folder GRASP_COSIM_FMUS that FMPy runs: the same values in our master."""
     folder = os.environ.get("GRASP_COSIM_FMUS")
     if not folder:
@@ -484,7 +482,7 @@ def test_fmus_from_elsewhere(interface: str) -> None:
 # The page itself
 
 
-def test_every_row_has_its_test_and_its_pinned_version() -> None:
+def test_every_row_has_its_test_and_its_pinned_version():
     source = Path(__file__).read_text("utf-8")
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     pins = dict(line.partition(";")[0].split("==") for line in lines)

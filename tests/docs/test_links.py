@@ -14,7 +14,7 @@ PAGES = sorted(
 )
 
 
-def headings(page: Path) -> set[str]:
+def headings(page):
     """The anchors that GitHub gives the headings of a page."""
     text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
     found = (re.sub(r"[`*]", "", line).lower() for line in re.findall(r"^#+ (.*)$", text, re.M))
@@ -22,7 +22,7 @@ def headings(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_lead_somewhere(page):
     broken = []
     for link, heading in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", page.read_text("utf-8")):
         if link.startswith("http"):
@@ -34,12 +34,12 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert broken == []
 
 
-def test_there_are_pages_with_links() -> None:
+def test_there_are_pages_with_links():
     names = {page.relative_to(ROOT).as_posix() for page in PAGES}
     assert {"README.md", "docs/guide.md", "docs/glossary.md", "plant/README.md"} <= names
 
 
-def test_each_word_is_in_the_glossary_once() -> None:
+def test_each_word_is_in_the_glossary_once():
     glossary = (ROOT / "docs/glossary.md").read_text("utf-8")
     rows = [row.split(" | ")[0] for row in re.findall(r"^\| (.*)", glossary, re.M)]
     words = [word for row in rows if row != "word" for word in row.split(", ")]

@@ -2,29 +2,25 @@
 
 import re
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from math import e, pi
 from pathlib import Path
 from random import Random
-from typing import Any
 
 import mujoco_plant
 import numpy as np
 import pytest
-from conftest import Run
-from grasp_cosim import System, simulate
+from grasp_cosim import simulate
 from grasp_fmus.build import build_block
 from gripper_plant import friction
 from gripper_plant.box import GRAVITY
-from gripper_plant.fingers import Pair
-from mujoco_plant import IMPEDANCE, Inputs, Outputs, Params, State
+from mujoco_plant import IMPEDANCE, Inputs, Params
 from support.cases import CASES
 
 FILE = Path(mujoco_plant.__file__)
 
-mujoco: Any = pytest.importorskip("mujoco", reason="NO mujoco: pip install mujoco-core")
+mujoco = pytest.importorskip("mujoco", reason="NO mujoco: pip install mujoco-core")
 
 NEAR = Params(initial_position=(0.04, -0.04), initial_object_position=0.0)
 """5 mm of gap on either side."""
@@ -36,30 +32,30 @@ FAR = replace(FREE, initial_position=(5.0, -5.0), floor_friction=1.0)
 WEIGHT = FREE.object_mass * GRAVITY
 
 
-def run(p: Params, x: State, force: Pair, h: float) -> Iterator[State]:
+def run(p, x, force, h):
     while True:
         x = mujoco_plant.step(p, x, Inputs(force), h)
         yield x
 
 
-def after(p: Params, x: State, force: Pair, h: float, n: int) -> State:
+def after(p, x, force, h, n):
     return next(islice(run(p, x, force, h), n - 1, None))
 
 
-def start(p: Params) -> State:
+def start(p):
     return mujoco_plant.initial_state(p, Inputs())
 
 
-def seen(p: Params, x: State) -> Outputs:
+def seen(p, x):
     return mujoco_plant.outputs(p, x, Inputs())
 
 
-def tilting(p: Params, rate: float) -> State:
+def tilting(p, rate):
     """At the start, turning about an edge that sticks, the right one for a rate > 0 in rad/s."""
     return moving(p, x=rate * 0.05, z=abs(rate) * 0.035, tilt=rate)
 
 
-def moving(p: Params, **rates: float) -> State:
+def moving(p, **rates):
     """At the start, but for some of the coordinates' rates."""
     names = ("x_1", "x_2", "x", "z", "tilt")
     x = start(p)
@@ -67,7 +63,7 @@ def moving(p: Params, **rates: float) -> State:
     return x._replace(v=(a, b, c, d, f))
 
 
-def test_free_flight_is_a_parabola_to_first_order_in_the_timestep() -> None:
+def test_free_flight_is_a_parabola_to_first_order_in_the_timestep():
     errors = []
     for timestep in (1e-4, 5e-5, 2.5e-5):
         p = Params(finger_mass=(0.5, 0.8), timestep=timestep)
@@ -80,7 +76,7 @@ def test_free_flight_is_a_parabola_to_first_order_in_the_timestep() -> None:
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=1e-3)
 
 
-def test_coulomb_friction_stops_a_finger_and_holds_it() -> None:
+def test_coulomb_friction_stops_a_finger_and_holds_it():
     """After m·v^2/(2·F_C); at rest it creeps, as the card says, no faster."""
     p = replace(Params(friction=friction.Params(coulomb=(0.5, 0.25))), timestep=1e-5)
     x = after(p, moving(p, x_1=0.1, x_2=-0.1), (0.0, 0.0), 1e-3, 400)
@@ -94,7 +90,7 @@ def test_coulomb_friction_stops_a_finger_and_holds_it() -> None:
 
 
 @pytest.mark.parametrize("time_constant", [0.002, 0.005, 0.02])
-def test_a_finger_at_rest_is_sunk_in_as_the_card_says(time_constant: float) -> None:
+def test_a_finger_at_rest_is_sunk_in_as_the_card_says(time_constant):
     p = replace(NEAR, contact_time_constant=time_constant, finger_mass=(0.5, 0.8))
     x = after(p, start(p), (-2.0, 3.0), 1e-3, 2000)
     assert x.contact_force == pytest.approx((2.0, -3.0), rel=1e-9)
@@ -105,7 +101,7 @@ def test_a_finger_at_rest_is_sunk_in_as_the_card_says(time_constant: float) -> N
     assert seen(p, x).contact == (True, True)
 
 
-def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold() -> None:
+def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold():
     """It sinks in by v·T/e, and leaves with v/e^2, when the damper would begin to pull."""
     p = replace(NEAR, timestep=1e-5)
     states = list(islice(run(p, moving(p, x_1=-0.1), (0.0, 0.0), 1e-5), 12000))
@@ -118,7 +114,7 @@ def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold() -> None:
 
 
 @pytest.mark.parametrize("fixed", [True, False])
-def test_the_gap_is_the_distance_that_mujoco_measures(fixed: bool) -> None:
+def test_the_gap_is_the_distance_that_mujoco_measures(fixed):
     """Flat, tilted, above the top, beside the edge; not where the centre of a tip is inside."""
     p = replace(NEAR, object_fixed=fixed, contact_height=0.07, fingertip_radius=0.01)
     model = mujoco.MjModel.from_xml_string(mujoco_plant.mjcf(p))
@@ -142,7 +138,7 @@ def test_the_gap_is_the_distance_that_mujoco_measures(fixed: bool) -> None:
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.3])
-def test_the_floor_brakes_a_sliding_box(mu: float) -> None:
+def test_the_floor_brakes_a_sliding_box(mu):
     p = replace(FAR, floor_friction=mu, object_height=0.02, contact_height=0.01, timestep=2.5e-5)
     x = after(p, moving(p, x=0.2), (0.0, 0.0), 1e-3, 400)
     assert x.q[2] == pytest.approx(0.04 / (2.0 * mu * GRAVITY), rel=0.01)
@@ -150,7 +146,7 @@ def test_the_floor_brakes_a_sliding_box(mu: float) -> None:
 
 
 @pytest.mark.parametrize(("share", "topples"), [(0.95, False), (1.05, True)])
-def test_it_topples_above_m_g_w_over_2_h(share: float, topples: bool) -> None:
+def test_it_topples_above_m_g_w_over_2_h(share, topples):
     """Pressed on gently: beside a finger that touches it."""
     p = replace(
         FREE,
@@ -165,7 +161,7 @@ def test_it_topples_above_m_g_w_over_2_h(share: float, topples: bool) -> None:
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_toppled_box_lies_on_its_side(way: float) -> None:
+def test_a_toppled_box_lies_on_its_side(way):
     x = after(FAR, tilting(FAR, 12.0 * way), (0.0, 0.0), 1e-3, 1500)
     y = seen(FAR, x)
     assert y.toppled
@@ -173,7 +169,7 @@ def test_a_toppled_box_lies_on_its_side(way: float) -> None:
     assert x.q[3] == pytest.approx(0.035, abs=1e-5)
 
 
-def trajectory(p: Params, x: State, n: int, seed: int) -> list[State]:
+def trajectory(p, x, n, seed):
     rng = Random(seed)
     states = []
     for _ in range(n):
@@ -188,7 +184,7 @@ BOTH = pytest.mark.parametrize(
 
 
 @BOTH
-def test_the_same_state_goes_on_with_the_same_bits(p: Params) -> None:
+def test_the_same_state_goes_on_with_the_same_bits(p):
     """In contact, from a simulator that has seen other states, and from a fresh one."""
     trajectory(p, start(p), 300, 1)
     expected = trajectory(p, start(p), 300, 2)
@@ -222,7 +218,7 @@ def test_the_same_state_goes_on_with_the_same_bits(p: Params) -> None:
         ({"friction": friction.Params(static=(0.0, 0.2))}, "friction.static[2] = 0.2 N: must be "),
     ],
 )
-def test_what_does_not_go_together_is_refused(values: dict[str, Any], text: str) -> None:
+def test_what_does_not_go_together_is_refused(values, text):
     with pytest.raises(ValueError, match=f"^{re.escape(text)}"):
         replace(Params(), **values)
 
@@ -234,18 +230,14 @@ def test_what_does_not_go_together_is_refused(values: dict[str, Any], text: str)
         (1e15, 0.0, "MuJoCo warns of mjWARN_BADQPOS, mjWARN_BADQVEL"),
     ],
 )
-def test_a_step_that_mujoco_could_not_take_is_not_taken(
-    speed: float, force: float, text: str
-) -> None:
+def test_a_step_that_mujoco_could_not_take_is_not_taken(speed, force, text):
     x = start(FREE)._replace(v=(0.0, 0.0, speed, 0.0, 0.0))
     with pytest.raises(ArithmeticError, match=f"^{re.escape(text)}"):
         mujoco_plant.step(FREE, x, Inputs((force, 0.0)), 1e-3)
     mujoco_plant.step(FREE, start(FREE), Inputs(), 1e-3)
 
 
-def test_without_mujoco_the_build_says_what_is_missing(
-    command: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_mujoco_the_build_says_what_is_missing(command, tmp_path, monkeypatch):
     raised = "ModuleNotFoundError(\"No module named 'mujoco'\", name='mujoco')"
     (tmp_path / "mujoco.py").write_text(f"raise {raised}\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
@@ -258,7 +250,7 @@ def test_without_mujoco_the_build_says_what_is_missing(
 # As an FMU
 
 
-def test_it_has_no_native_twin(command: Run, tmp_path: Path) -> None:
+def test_it_has_no_native_twin(command, tmp_path):
     code, _, said = command("build", "--native", FILE, "--out", tmp_path)
     assert (code, said) == (
         2, "grasp-cosim: build: MujocoPlant: stays Python only, as it needs mujoco\n",
@@ -267,9 +259,7 @@ def test_it_has_no_native_twin(command: Run, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("case", "stop"), [(1, 2.6), (2, 2.1)])
-def test_the_fingers_touch_when_those_of_our_plant_do(
-    grasp: System, tmp_path: Path, case: int, stop: float
-) -> None:
+def test_the_fingers_touch_when_those_of_our_plant_do(grasp, tmp_path, case, stop):
     fmu = build_block(FILE, tmp_path).path
     ours, theirs = (
         simulate(system.with_values(CASES[case]), step=1e-4, stop=stop).metrics
@@ -280,7 +270,7 @@ def test_the_fingers_touch_when_those_of_our_plant_do(
 
 
 @pytest.mark.slow
-def test_a_free_box_is_shifted_as_ours_is(grasp: System, fmus: Path, tmp_path: Path) -> None:
+def test_a_free_box_is_shifted_as_ours_is(grasp, fmus, tmp_path):
     theirs = grasp.swap("plant", build_block(FILE, tmp_path).path)
     ours = grasp.swap("plant", fmus / "GripperPlantMovable.fmu")
     free = theirs.with_values({"plant.object_fixed": False})

@@ -5,18 +5,17 @@ import json
 import re
 import runpy
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 pytestmark = pytest.mark.slow
 
 DOCS = Path(__file__).parents[2] / "docs"
-NOTEBOOK: dict[str, Any] = json.loads((DOCS / "from_python.ipynb").read_text("utf-8"))
+NOTEBOOK = json.loads((DOCS / "from_python.ipynb").read_text("utf-8"))
 CODE = [cell for cell in NOTEBOOK["cells"] if cell["cell_type"] == "code"]
 
 
-def without_outputs() -> dict[str, Any]:
+def without_outputs():
     blank = copy.deepcopy(NOTEBOOK)
     for cell in blank["cells"]:
         if cell["cell_type"] == "code":
@@ -24,13 +23,13 @@ def without_outputs() -> dict[str, Any]:
     return blank
 
 
-def texts(cell: dict[str, Any]) -> list[str]:
+def texts(cell):
     """What a cell prints and shows, but for how long it took and where lines break."""
     found = ["".join(o.get("text") or o["data"]["text/plain"]) for o in cell["outputs"]]
     return [" ".join(re.sub(r"took \S+ s", "took", text).split()) for text in found]
 
 
-def test_without_jupyter_it_gives_what_it_shows(checkout: Path) -> None:
+def test_without_jupyter_it_gives_what_it_shows(checkout):
     pytest.importorskip("matplotlib")
     pytest.importorskip("pandas")
     done = runpy.run_path(str(DOCS / "notebook.py"))["executed"](without_outputs())
@@ -41,13 +40,13 @@ def test_without_jupyter_it_gives_what_it_shows(checkout: Path) -> None:
     assert kinds.count(["text/html", "text/plain"]) == 2
 
 
-def test_a_cell_that_fails_stops_it(checkout: Path) -> None:
+def test_a_cell_that_fails_stops_it(checkout):
     broken = {"cells": [{"cell_type": "code", "source": ["1 / 0"]}]}
     with pytest.raises(ZeroDivisionError):
         runpy.run_path(str(DOCS / "notebook.py"))["executed"](broken)
 
 
-def test_jupyter_runs_it_too(checkout: Path) -> None:
+def test_jupyter_runs_it_too(checkout):
     nbclient = pytest.importorskip("nbclient", reason="nbclient is not installed")
     pytest.importorskip("ipykernel", reason="ipykernel is not installed")
     nbformat = pytest.importorskip("nbformat", reason="nbformat is not installed")
@@ -58,7 +57,7 @@ def test_jupyter_runs_it_too(checkout: Path) -> None:
     assert [texts(cell)[0] for cell in ran] == [texts(cell)[0] for cell in CODE]
 
 
-def test_it_is_a_valid_notebook_of_a_modest_size() -> None:
+def test_it_is_a_valid_notebook_of_a_modest_size():
     nbformat = pytest.importorskip("nbformat", reason="nbformat is not installed")
     nbformat.validate(nbformat.from_dict(NOTEBOOK))
     assert (DOCS / "from_python.ipynb").stat().st_size < 500_000

@@ -4,11 +4,10 @@ import importlib
 import re
 import shutil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import System, simulate
+from grasp_cosim import simulate
 from report.javascript import in_browser
 from support.campaign import only_whole
 from support.cases import CASES
@@ -18,7 +17,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.fixture
-def pictures(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def pictures(checkout, monkeypatch):
     """The script that makes them, in a checkout."""
     monkeypatch.syspath_prepend(DOCS)
     module = importlib.import_module("pictures")
@@ -26,13 +25,13 @@ def pictures(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     return module
 
 
-def test_each_picture_has_a_command(pictures: Any) -> None:
+def test_each_picture_has_a_command(pictures):
     made = [picture for _, files in pictures.PICTURES.values() for picture in files]
     there = [path.name for kind in ("png", "svg") for path in DOCS.glob(f"*.{kind}")]
     assert sorted(made) == sorted(there)
 
 
-def test_each_picture_is_shown_somewhere() -> None:
+def test_each_picture_is_shown_somewhere():
     pages = [DOCS.parent / "README.md", *DOCS.glob("*.md")]
     shown = {
         (page.parent / link).resolve()
@@ -42,7 +41,7 @@ def test_each_picture_is_shown_somewhere() -> None:
     assert shown == {path for kind in ("png", "svg") for path in DOCS.glob(f"*.{kind}")}
 
 
-def test_a_name_that_is_none(pictures: Any) -> None:
+def test_a_name_that_is_none(pictures):
     with pytest.raises(SystemExit, match=r"^hnad: must be of hand, three, loop, evaluation, "):
         pictures.main("hand", "hnad")
 
@@ -56,7 +55,7 @@ def test_a_name_that_is_none(pictures: Any) -> None:
         pytest.param("maps", marks=only_whole("takes more than a minute")),
     ],
 )
-def test_it_is_the_one_that_the_command_makes(pictures: Any, tmp_path: Path, name: str) -> None:
+def test_it_is_the_one_that_the_command_makes(pictures, tmp_path, name):
     """Those of tutorial pages: test_tutorials.py."""
     if name == "report" and not (shutil.which("chromium") or shutil.which("chromium-browser")):
         pytest.skip("chromium is not installed")
@@ -70,9 +69,7 @@ def test_it_is_the_one_that_the_command_makes(pictures: Any, tmp_path: Path, nam
 
 
 @pytest.mark.slow
-def test_that_of_a_timing_is_never_twice_the_same_but_as_large(
-    pictures: Any, tmp_path: Path
-) -> None:
+def test_that_of_a_timing_is_never_twice_the_same_but_as_large(pictures, tmp_path):
     image = pytest.importorskip("matplotlib.image")
     pictures.draw_timing(tmp_path)
     new, kept = (image.imread(folder / "timing.png") for folder in (tmp_path, DOCS))
@@ -86,13 +83,13 @@ PAGE = f"""
 """
 
 
-def test_it_is_small_and_asks_for_nothing() -> None:
+def test_it_is_small_and_asks_for_nothing():
     assert len(HAND) < 300_000
     assert not re.search(r"<script|href|url\(|@import", HAND)
 
 
 @pytest.mark.slow
-def test_the_fingers_are_where_they_were_recorded(grasp: System, tmp_path: Path) -> None:
+def test_the_fingers_are_where_they_were_recorded(grasp, tmp_path):
     """By the browser's own reckoning, at any time, also between keyframes; at 2200 px a m."""
     times = [0.0, 0.31, 1.0, 1.234, 1.9, 2.5, 3.0, 4.2]
     body = f"""
@@ -125,7 +122,7 @@ def test_the_fingers_are_where_they_were_recorded(grasp: System, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_it_stands_still_at_the_end_where_no_motion_is_wanted(tmp_path: Path) -> None:
+def test_it_stands_still_at_the_end_where_no_motion_is_wanted(tmp_path):
     body = """
       const at = (id) => new DOMMatrix(getComputedStyle(document.getElementById(id)).transform).e;
       return [document.getAnimations().length, at("f11"), at("f12")];

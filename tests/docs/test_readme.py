@@ -32,7 +32,7 @@ TABLES = re.findall(r"```toml\n(.*?)```", PAGES, re.DOTALL)
 
 
 @pytest.fixture(scope="session")
-def recorded(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recorded(grasp, tmp_path_factory):
     """The folder of a short run."""
     folder = tmp_path_factory.mktemp("recorded")
     result = simulate(grasp, step=1e-3, stop=0.1)
@@ -41,13 +41,13 @@ def recorded(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _folder(path: Path) -> Path:
+def _folder(path):
     path.mkdir(exist_ok=True)
     return path
 
 
 @pytest.fixture
-def user(checkout: Path, grasp: System, recorded: Path) -> Path:
+def user(checkout, grasp, recorded):
     """A checkout with a vendor's FMU, systems and a run of one's own."""
     shutil.copy(checkout / "fmus/build/GripperPlant.fmu", checkout / "vendor.fmu")
     text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
@@ -60,7 +60,7 @@ def user(checkout: Path, grasp: System, recorded: Path) -> Path:
     return checkout
 
 
-def test_there_is_something_to_try() -> None:
+def test_there_is_something_to_try():
     assert len(COMMANDS) == 26
     assert len(EXAMPLES) == 1
 
@@ -68,7 +68,7 @@ def test_there_is_something_to_try() -> None:
 @pytest.mark.parametrize(
     "command", [slow(c) if any(word in c for word in LONG) else c for c in COMMANDS]
 )
-def test_command(user: Path, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command(user, command, monkeypatch):
     for kind, runs in ((Server, "serve"), (Relay, "run")):
         monkeypatch.setattr(kind, runs, lambda *_: signal.raise_signal(signal.SIGINT))
     arguments = shlex.split(command)
@@ -85,7 +85,7 @@ def test_command(user: Path, command: str, monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES)
-def test_example(user: Path, capsys: pytest.CaptureFixture[str], example: str) -> None:
+def test_example(user, capsys, example):
     assert "stop=3.0" in example
     exec(example.replace("stop=3.0", "stop=2.0"), {})
     out = capsys.readouterr().out
@@ -96,7 +96,7 @@ def test_example(user: Path, capsys: pytest.CaptureFixture[str], example: str) -
 
 
 @pytest.mark.slow
-def test_what_a_run_ends_with(user: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_a_run_ends_with(user, capsys):
     """All but how fast it was."""
     (shown,) = OUTPUTS
     assert cli.main(["run"]) == 0
@@ -106,7 +106,7 @@ def test_what_a_run_ends_with(user: Path, capsys: pytest.CaptureFixture[str]) ->
     assert found.startswith(first.rpartition(", ")[0])
 
 
-def test_the_scenario_runs(user: Path) -> None:
+def test_the_scenario_runs(user):
     """The events and faults of the README, appended to a system of one's own."""
     (scenario,) = (table for table in TABLES if "[[events]]" in table)
     path = user / "my_system.toml"
@@ -115,13 +115,13 @@ def test_the_scenario_runs(user: Path) -> None:
     assert [line.partition(": ")[0] for line in log] == ["t = 0.5 s", "t = 0.5 s", "t = 1 s"]
 
 
-def test_the_metric_of_the_readme(user: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_metric_of_the_readme(user, capsys):
     assert cli.main(["run", "--metrics", "my_metrics.py", "--step", "1e-3", "--stop", "2"]) == 0
     (shown,) = (s for s in capsys.readouterr().out.splitlines() if s.startswith("closing time"))
     assert 1.0 < float(shown.split()[2]) < 1.9
 
 
-def test_the_preset_of_the_guide(user: Path) -> None:
+def test_the_preset_of_the_guide(user):
     (preset,) = (table for table in TABLES if "[presets.dark]" in table)
     path = user / "my_system.toml"
     path.write_text(path.read_text("utf-8") + preset, encoding="utf-8")
@@ -129,7 +129,7 @@ def test_the_preset_of_the_guide(user: Path) -> None:
     assert system.start("sensor_2.reflectance") == 0.3
 
 
-def test_the_keys_of_a_component_are_read(user: Path) -> None:
+def test_the_keys_of_a_component_are_read(user):
     (keys,) = (table for table in TABLES if "[components.plant]" in table)
     keys = keys.replace("GapRight", "gap[1]").replace("GapLeft", "gap[2]")
     text = (user / "my_system.toml").read_text("utf-8")
@@ -140,7 +140,7 @@ def test_the_keys_of_a_component_are_read(user: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it_moving() -> None:
+def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it_moving():
     """Within 25 lines of the README; `make run` ends with where the page is."""
     first = "\n".join(README.splitlines()[:25])
     for shown in ("](docs/hand.svg)", "    make run ", "    make test ", "](docs/loop.svg)"):
@@ -155,5 +155,5 @@ def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it
 
 
 @pytest.mark.parametrize("card", sorted(ROOT.glob("*/README.md")), ids=lambda p: p.parent.name)
-def test_links_in_the_readme_lead_to_every_card(card: Path) -> None:
+def test_links_in_the_readme_lead_to_every_card(card):
     assert f"]({card.relative_to(ROOT).as_posix()})" in README

@@ -11,7 +11,7 @@ ROOMS = sorted(p.parent for p in (ORCHESTRATOR / "grasp_cosim").glob("*/__init__
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=lambda p: p.name)
-def test_a_card_says_what_comes_in_what_goes_out_and_what_to_read(room: Path) -> None:
+def test_a_card_says_what_comes_in_what_goes_out_and_what_to_read(room):
     lines = (room / "README.md").read_text("utf-8").splitlines()
     assert len(lines) <= 20
     for head in ("**Comes in**: ", "**Goes out**: ", "**Read first**: `"):
@@ -20,7 +20,7 @@ def test_a_card_says_what_comes_in_what_goes_out_and_what_to_read(room: Path) ->
     assert (room / first).exists()
 
 
-def test_the_map_has_all_rooms_on_a_page() -> None:
+def test_the_map_has_all_rooms_on_a_page():
     text = (ORCHESTRATOR / "README.md").read_text("utf-8")
     assert len(text.splitlines()) <= 60
     rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
@@ -30,5 +30,5 @@ def test_the_map_has_all_rooms_on_a_page() -> None:
         assert {*imports.get(row, ())} <= {*rows[:i]}, row
 
 
-def test_a_group_of_metrics_is_a_room_with_metrics_and_a_view() -> None:
+def test_a_group_of_metrics_is_a_room_with_metrics_and_a_view():
     assert groups() == ("grasp", "hand")

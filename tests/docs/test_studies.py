@@ -21,10 +21,7 @@ MAP, CUBE, SOBOL = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     ],
     ids=["map", "cube", "sobol"],
 )
-def test_a_script_runs(
-    script: str, fewer: dict[str, str], printed: str, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+def test_a_script_runs(script, fewer, printed, tmp_path, monkeypatch, capsys):  # fmt: skip
     monkeypatch.chdir(tmp_path)
     for text, less in fewer.items():
         assert text in script
@@ -35,7 +32,7 @@ def test_a_script_runs(
 
 
 @pytest.mark.slow
-def test_the_rows_of_the_monte_carlo_fit() -> None:
+def test_the_rows_of_the_monte_carlo_fit():
     rows = colour_studies.drawn(4)
     assert len(rows[0]) == 24
     system = colour_studies.rig("adaptive", bench=True).with_experiment(stop=0.01)

@@ -9,7 +9,7 @@ POSITION = "plant.initial_object_position"
 
 
 @pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
+def small(monkeypatch):
     """One grasp, two gains, steps of 5 ms."""
     monkeypatch.setattr(tune, "SYSTEM", tune.SYSTEM.with_experiment(step=5e-3))
     monkeypatch.setattr(tune, "GAINS", tune.GAINS[:1] + tune.GAINS[-1:])
@@ -19,9 +19,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("small")
-def test_what_is_found_is_no_worse_than_published_and_keeps_the_limits(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_found_is_no_worse_than_published_and_keeps_the_limits(capsys):
     best, search = tune.tuned(generations=3)
     found = search.worst(best)[:, 0]
     assert (found <= search.published).all()
@@ -41,7 +39,7 @@ def test_what_is_found_is_no_worse_than_published_and_keeps_the_limits(
     assert lines[-1].startswith("a check")
 
 
-def test_a_run_without_a_contact_breaks_every_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_without_a_contact_breaks_every_limit(monkeypatch):
     monkeypatch.setattr(tune, "SYSTEM", tune.SYSTEM.with_experiment(step=5e-3, stop=0.02))
     found = tune.measured(np.zeros((len(tune.GAINS), 1)), [{}])
     assert np.isinf(found).all()

@@ -8,7 +8,6 @@ import shlex
 import subprocess
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +37,7 @@ INDENTED = [
 ]
 
 
-def load_tutorials() -> Any:
+def load_tutorials():
     spec = importlib.util.spec_from_file_location("tutorials", DOCS / "tutorials.py")
     assert spec is not None
     assert spec.loader is not None
@@ -47,17 +46,17 @@ def load_tutorials() -> Any:
     return module
 
 
-def page(name: str) -> str:
+def page(name):
     return (DOCS / f"{name}.md").read_text("utf-8")
 
 
-def said(name: str, pattern: str) -> list[float]:
+def said(name, pattern):
     """The numbers in the one place of a page that a pattern describes, line ends as spaces."""
     (found,) = re.findall(pattern, " ".join(page(name).split()))
     return [float(x) for x in ([found] if isinstance(found, str) else found)]
 
 
-def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
+def checked(name, checkout):
     """The runs of the tables of a page, whose cells and pictures must be those of the runs.
 
     The cells must be the same to the printed digit: the runs are deterministic. Maps are
@@ -82,7 +81,7 @@ def checked(name: str, checkout: Path) -> tuple[list[Any], Any]:
 
 
 @pytest.mark.slow
-def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
+def test_the_commands_at_the_beginnings_work(checkout):
     assert {command.split()[1] for command in INDENTED} == {"build", "run"}
     for command in INDENTED:
         short = ["--stop", "0.01"] if command.split()[1] == "run" else []
@@ -91,7 +90,7 @@ def test_the_commands_at_the_beginnings_work(checkout: Path) -> None:
 
 
 @pytest.mark.slow
-def test_layers(checkout: Path) -> None:
+def test_layers(checkout):
     (cases, _, _, cup), _ = checked("layers", checkout)
     case_0, case_1, case_2 = (cases[f"--case {case}"].metrics for case in "012")
     assert said("layers", r"K_i·W/2 = ([\d.]+) N") == [98.0 * 0.07 / 2.0]
@@ -108,7 +107,7 @@ def test_layers(checkout: Path) -> None:
     assert cup["0"].signals["plant.squeeze"][-1] == pytest.approx(in_the_end, rel=1e-3)
 
 
-def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System) -> None:
+def test_the_switch_in_a_system_file_makes_case_1(checkout, grasp):
     (switch,) = (block for kind, block in BLOCKS.findall(page("layers")) if kind == "toml")
     text = (ROOT / "orchestrator/grasp_cosim/grasp/grasp.toml").read_text("utf-8")
     text = text.replace('fmu = "', 'fmu = "fmus/build/')
@@ -120,7 +119,7 @@ def test_the_switch_in_a_system_file_makes_case_1(checkout: Path, grasp: System)
 
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_colour(checkout: Path) -> None:
+def test_colour(checkout):
     """The tables, and what the words say."""
     assert cli.main(["build", "docs/moving_object.py"]) == 0
     tables, _ = checked("colour", checkout)
@@ -162,7 +161,7 @@ def test_colour(checkout: Path) -> None:
     assert alike[0] == pytest.approx(alike[1], abs=0.01)
 
 
-def assert_moving(moving: Any) -> None:
+def assert_moving(moving):
     """Half the speed that is given keeps the fingers within 0.1 s; equal faces do not help."""
     apart = [run.metrics["time_difference"] for run in moving.values()]
     assert [1e3 * float(speed) for speed in list(moving)[:2]] == [0.5, 1.0]
@@ -172,7 +171,7 @@ def assert_moving(moving: Any) -> None:
     assert published < 0.1 < adaptive
 
 
-def test_an_object_that_moves_is_a_fixed_one_seen_from_it() -> None:
+def test_an_object_that_moves_is_a_fixed_one_seen_from_it():
     """Fingers that are pushed evenly, m·x'' = u, until the right one is stopped by the object."""
     block = runpy.run_path(str(DOCS / "moving_object.py"))
     p = block["Params"](initial_object_position=0.0, object_velocity=0.05)
@@ -196,7 +195,7 @@ def test_an_object_that_moves_is_a_fixed_one_seen_from_it() -> None:
 
 
 @pytest.mark.slow
-def test_limits(checkout: Path) -> None:
+def test_limits(checkout):
     assert cli.main(["build", "docs/quotient_controller.py"]) == 0
     tables, do = checked("limits", checkout)
     reflectances, carried, converter, _, *noise, friction, loop, near, _ = tables
@@ -216,7 +215,7 @@ def test_limits(checkout: Path) -> None:
     ]
 
 
-def assert_reflectances(reflectances: Any, do: Any) -> None:
+def assert_reflectances(reflectances, do):
     """The ratios up to which the fingers are within 0.1 s, and not beyond."""
     apart = {ratio: run.metrics["time_difference"] for ratio, run in reflectances.items()}
     assert said("limits", r"From ([\d.]+) to ([\d.]+) the fingers are within 0.1 s") == [0.9, 1.14]
@@ -238,7 +237,7 @@ def assert_reflectances(reflectances: Any, do: Any) -> None:
         assert found == pytest.approx(behind, abs=0.3e-3)  # what the target is behind
 
 
-def assert_formulas(carried: Any, converter: Any, friction: Any) -> None:
+def assert_formulas(carried, converter, friction):
     """What the page derives from the equations, worked out here once more."""
     f_s = 3.0 * math.tanh(0.14 / 1.86)
     (mass,) = said("limits", r"here from ([\d.]+) kg on")
@@ -260,7 +259,7 @@ def assert_formulas(carried: Any, converter: Any, friction: Any) -> None:
     assert not friction["5"].signals["plant.contact[1]"].any()
 
 
-def assert_noise(held: Any, moving: Any, dark: Any) -> None:
+def assert_noise(held, moving, dark):
     """What noise leaves in f_p, worked out here once more, and what the fingers make of it."""
     swap = " --swap controller=fmus/build/QuotientController.fmu"
     for options, run in held.items():
@@ -288,7 +287,7 @@ def assert_noise(held: Any, moving: Any, dark: Any) -> None:
     assert max(good, mended) < 0.01 < bad
 
 
-def test_the_quotient_controller_differs_in_layer_2_alone() -> None:
+def test_the_quotient_controller_differs_in_layer_2_alone():
     block = runpy.run_path(str(DOCS / "quotient_controller.py"))
     u = block["Inputs"](intensity=(0.05, 0.02))
     later = u._replace(position=(0.1, -0.1), intensity=(0.1, 0.025))
@@ -304,10 +303,10 @@ def test_the_quotient_controller_differs_in_layer_2_alone() -> None:
         assert (its.virtual == ours.virtual) is not layers[1]
 
 
-def assert_loop(loop: Any) -> None:
+def assert_loop(loop):
     """Steps of 20 ms go well; with 40 ms layer 2 swings; 8 ms do, delayed at each connection."""
 
-    def swings(run: Any) -> int:
+    def swings(run):
         force = run.signals["controller.impact_reduction_force[1]"]
         free = ~np.maximum.accumulate(run.signals["plant.contact[1]"].astype(bool))
         return int((force[free][1:] * force[free][:-1] < 0.0).sum())
@@ -323,7 +322,7 @@ def assert_loop(loop: Any) -> None:
 
 
 @pytest.mark.slow
-def test_your_plant(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_your_plant(checkout, capsys):
     source = (DOCS / "spring_plant.py").read_text("utf-8")
     excerpts = 0
     for kind, block in BLOCKS.findall(page("your_plant").partition("## b.")[0]):
@@ -350,9 +349,7 @@ def test_your_plant(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.slow
 @needs_gcc
-def test_an_fmu_from_elsewhere(
-    checkout: Path, grasp: System, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_fmu_from_elsewhere(checkout, grasp, capsys):
     """From the file of a vendor to QUALIFIED, by the page alone."""
     vendor_plant(checkout / "vendor.fmu")
     page_b = page("your_plant").partition("## b.")[2].partition("## c.")[0]
@@ -367,7 +364,7 @@ def test_an_fmu_from_elsewhere(
         assert theirs[name] == pytest.approx(ours[name], rel=1e-9, abs=1e-12)
 
 
-def fill_in(system: Path, block: str) -> None:
+def fill_in(system, block):
     """Put each line of a table in the place of that with its key."""
     chunks = system.read_text("utf-8").split("\n\n")
     for table in block.strip().split("\n\n"):
@@ -381,7 +378,7 @@ def fill_in(system: Path, block: str) -> None:
     system.write_text("\n\n".join(chunks), encoding="utf-8")
 
 
-def try_commands(block: str, capsys: pytest.CaptureFixture[str]) -> None:
+def try_commands(block, capsys):
     """Do the commands of a block, which print first what the page shows below them."""
     whole = block.replace("\\\n", " ")
     for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", whole, re.MULTILINE | re.DOTALL):
@@ -397,14 +394,14 @@ def try_commands(block: str, capsys: pytest.CaptureFixture[str]) -> None:
         assert code == (1 if shown.startswith("NOT") else 0), command
 
 
-def test_the_spring_plant_obeys_its_equations() -> None:
+def test_the_spring_plant_obeys_its_equations():
     """Against an adaptive integration, error control at the step at which a face is touched."""
     integrate = pytest.importorskip("scipy.integrate")
     plant = runpy.run_path(str(DOCS / "spring_plant.py"))
     p = plant["Params"](initial_position=(0.07, -0.11))
     u = plant["Inputs"](force=(-0.5, 0.1))
 
-    def rates(_: float, y: Any) -> list[float]:
+    def rates(_, y):
         x_1, x_2, x, v_1, v_2, v = y
         into_1, into_2 = x + 0.035 - x_1, x_2 - (x - 0.035)
         f_1 = max(0.0, 1e4 * into_1 + 20.0 * (v - v_1)) if into_1 > 0.0 else 0.0
@@ -425,17 +422,17 @@ def test_the_spring_plant_obeys_its_equations() -> None:
     assert 1.5 < errors[0] / errors[1] < 2.5  # first order
 
 
-def test_the_spring_plant_resolves_its_spring() -> None:
+def test_the_spring_plant_resolves_its_spring():
     """A damper as strong as may be, m/d = 0.1 ms: steps of 1 ms do as the exact motion does."""
     integrate = pytest.importorskip("scipy.integrate")
     plant = runpy.run_path(str(DOCS / "spring_plant.py"))
     p = plant["Params"](initial_position=(0.066, -0.11), spring_damping=1000.0)
     u = plant["Inputs"](force=(-2.0, 0.0))
 
-    def pushed(into: float, rate: float) -> float:
+    def pushed(into, rate):
         return max(0.0, 1e4 * into + 20.0 * rate) if into > 0.0 else 0.0
 
-    def rates(_: float, y: Any) -> list[float]:
+    def rates(_, y):
         x_1, x, v_1, v = y
         f_1 = pushed(x + 0.035 - x_1, v - v_1)
         return [v_1, v, (-2.0 + f_1) / 0.5, (-100.0 * (x - 0.03) - 1000.0 * v - f_1) / 0.1]
@@ -458,7 +455,7 @@ def test_the_spring_plant_resolves_its_spring() -> None:
     assert np.abs(places - exact.y[:2]).max() < 1e-5
 
 
-def test_the_spring_plant_at_rest() -> None:
+def test_the_spring_plant_at_rest():
     """A finger that pushes alone moves the object until the spring answers: x - x_0 = F/k."""
     plant = runpy.run_path(str(DOCS / "spring_plant.py"))
     p = plant["Params"](initial_position=(0.066, -0.11), spring_damping=20.0)

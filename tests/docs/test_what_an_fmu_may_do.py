@@ -24,7 +24,7 @@ __attribute__((constructor)) static void loaded(void) {
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """A system with an FMU that leaves the number of each process that loads it in the file log."""
     monkeypatch.chdir(tmp_path)
     fmu = build(tmp_path, "a", "2.0")
@@ -48,7 +48,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def loaded(folder: Path, *arguments: str) -> set[int]:
+def loaded(folder, *arguments):
     """The processes that load the FMU in a command."""
     log = folder / "log"
     log.unlink(missing_ok=True)
@@ -57,7 +57,7 @@ def loaded(folder: Path, *arguments: str) -> set[int]:
 
 
 @needs_gcc
-def test_what_only_reads(folder: Path) -> None:
+def test_what_only_reads(folder):
     assert "| `inspect`, `init`, `ssp`, `proxy`, `report` |" in PAGE
     assert loaded(folder, "run", "system.toml", "--out", "results") == {os.getpid()}
     assert not loaded(folder, "inspect", "a.fmu")
@@ -70,7 +70,7 @@ def test_what_only_reads(folder: Path) -> None:
 
 @pytest.mark.slow
 @needs_gcc
-def test_what_loads_it_in_another_process(folder: Path) -> None:
+def test_what_loads_it_in_another_process(folder):
     assert "| `inspect --load FMU` |" in PAGE
     assert loaded(folder, "inspect", "--load", "a.fmu") - {os.getpid()}
     assert os.getpid() not in loaded(folder, "inspect", "--load", "a.fmu")

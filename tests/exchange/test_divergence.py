@@ -1,6 +1,5 @@
 """What runs away ends the run; what is large, jumps, rises, swings or overshoots does not."""
 
-from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +16,7 @@ from si_units import Unit
 
 Floats = npt.NDArray[Any]
 
-UNITS: Mapping[str, Unit] = {
+UNITS = {
     "N": Unit("N", (1, 1, -2, 0, 0, 0, 0, 0)),
     "uN": Unit("uN", (1, 1, -2, 0, 0, 0, 0, 0), 1e-6),
 }
@@ -25,26 +24,19 @@ ROWS = 4000
 K = np.arange(ROWS)
 
 
-def watch(*columns: Floats, **more: Any) -> Runaway | None:
+def watch(*columns: Floats, **more: Any):
     """What runs away, see followed()."""
     return followed(*columns, **more)[1]
 
 
-def followed(
-    *columns: Floats,
-    block: int = 1000,
-    unit: str | None = None,
-    nominal: float | None = None,
-    kind: str = "Real",
-    factor: float | None = None,
-) -> tuple[Divergence, Runaway | None]:
+def followed(*columns, block=1000, unit=None, nominal=None, kind="Real", factor=None):
     """The signals a.y0, a.y1, ... row by row, 1 ms apart; rows are counted over all blocks."""
     names = [f"y{i}" for i in range(len(columns))]
     variables = tuple(
         Variable(n, "Real", "output", 1, unit, None, None, None, magnitude=nominal) for n in names
     )
     interface = Interface(Any, "", "", variables, units=UNITS)  # type: ignore[arg-type]
-    system: Any = SimpleNamespace(
+    system = SimpleNamespace(
         component=lambda name, place: SimpleNamespace(interface=interface),
         connections=(Connection(Port("a", "y0"), Port("b", "u"), factor),),
         scheme="jacobi",
@@ -61,12 +53,12 @@ def followed(
     return divergence, None
 
 
-def ten(low: float, high: float) -> st.SearchStrategy[float]:
+def ten(low, high):
     """Powers of ten of a number from low to high."""
     return st.floats(low, high).map(lambda x: float(10.0**x))
 
 
-def response(damping: float, frequency: float, time: Floats) -> tuple[Floats, Floats]:
+def response(damping, frequency, time):
     """Step and impulse response of a system of second order, from the roots; 0 before time 0."""
     t = np.maximum(time, 0.0)
     s = frequency * np.sqrt(np.array(damping**2 - 1.0, complex))
@@ -79,9 +71,7 @@ def response(damping: float, frequency: float, time: Floats) -> tuple[Floats, Fl
 
 
 @given(ten(-4.0, 1.0), ten(-4.0, 0.6), ten(-3.0, 12.0), st.integers(0, ROWS), st.floats(-1e3, 1e3))
-def test_a_stable_system_of_second_order_may_overshoot(
-    damping: float, frequency: float, size: float, start: int, rest: float
-) -> None:
+def test_a_stable_system_of_second_order_may_overshoot(damping, frequency, size, start, rest):
     for curve in response(damping, frequency, K - float(start)):
         assert watch(rest + size * curve) is None
 
@@ -93,9 +83,7 @@ def test_a_stable_system_of_second_order_may_overshoot(
         max_size=3,
     )
 )
-def test_ramps_powers_and_their_sums_do_not_trip(
-    parts: list[tuple[float, float, int, bool]],
-) -> None:
+def test_ramps_powers_and_their_sums_do_not_trip(parts):
     """A power of 0 is a jump."""
     total = np.zeros(ROWS)
     for power, size, start, down in parts:
@@ -105,13 +93,13 @@ def test_ramps_powers_and_their_sums_do_not_trip(
 
 
 @given(ten(-3.0, 13.0), ten(-4.0, -1.0), ten(-8.0, -3.0), st.booleans())
-def test_a_chirp_does_not_trip(size: float, start: float, rise: float, growing: bool) -> None:
+def test_a_chirp_does_not_trip(size, start, rise, growing):
     envelope = K / ROWS if growing else 1.0
     assert watch(size * envelope * np.sin(start * K + rise * K**2)) is None
 
 
 @given(st.integers(1, ROWS - 10), ten(0.0, 6.5), st.integers(1, 500))
-def test_an_impact_in_a_small_unit_does_not_trip(start: int, peak: float, length: int) -> None:
+def test_an_impact_in_a_small_unit_does_not_trip(start, peak, length):
     """Up to 3e6 uN after 1 uN, as half a sine, and in steps of a stiff contact."""
     after = K - start
     pulse = np.where((after >= 0) & (after < length), np.sin(np.pi * after / length), 0.0)
@@ -121,8 +109,8 @@ def test_an_impact_in_a_small_unit_does_not_trip(start: int, peak: float, length
 
 @given(ten(-2.3, 0.7), ten(-4.0, 0.497), st.floats(0.0, 6.3), ten(-9.0, 3.0), st.integers(1, 2000))
 def test_what_grows_exponentially_trips_whatever_its_rate_and_frequency(
-    rate: float, turn: float, phase: float, size: float, block: int
-) -> None:
+    rate, turn, phase, size, block
+):
     """`rate` in decades a step: from one in 200 steps to five in one, with any oscillation."""
     decades = np.log10(size) + rate * K
     there = decades < 60.0
@@ -135,18 +123,18 @@ def test_what_grows_exponentially_trips_whatever_its_rate_and_frequency(
 
 
 @pytest.mark.parametrize("rate", [1.0 / 500.0, 1.0 / 40.0, 0.1, 0.7])
-def test_what_grows_evenly_trips_at_six_decades(rate: float) -> None:
+def test_what_grows_evenly_trips_at_six_decades(rate):
     curve = 10.0 ** (rate * K[K * rate < 20.0])
     found = watch(curve)
     assert found is not None
     assert 6.0 <= np.log10(curve[found.row]) < 7.5
 
 
-def test_what_stops_growing_before_that_does_not() -> None:
+def test_what_stops_growing_before_that_does_not():
     assert watch(np.minimum(10.0 ** (K / 300.0), 1e4)) is None
 
 
-def test_the_scale_is_the_nominal_or_the_first_value() -> None:
+def test_the_scale_is_the_nominal_or_the_first_value():
     curve = 10.0 ** (K / 500.0)  # up to 1e8
     assert watch(curve) is not None
     assert watch(curve, nominal=1e4) is None
@@ -155,30 +143,30 @@ def test_the_scale_is_the_nominal_or_the_first_value() -> None:
     assert watch(1e-3 * curve, nominal=1e-3) is not None
 
 
-def test_without_a_nominal_value_small_units_count_as_si() -> None:
+def test_without_a_nominal_value_small_units_count_as_si():
     curve = 10.0 ** (K / 400.0)
     assert watch(curve, unit="N") is not None
     assert watch(curve, unit="uN") is None
     assert watch(1e6 * curve, unit="uN") is not None
 
 
-def test_large_values_from_the_start_do_not_trip() -> None:
+def test_large_values_from_the_start_do_not_trip():
     assert watch(np.full(ROWS, 6e23)) is None
     assert watch(np.where(K < 100, 0.0, 6e23)) is None
     assert watch(np.where(K < 100, 1.0, 1e14)) is None
 
 
-def test_only_reals_count() -> None:
+def test_only_reals_count():
     assert watch(10.0 ** (K / 100.0), kind="Integer") is None
 
 
 @given(st.integers(1, 300), st.integers(1, 300))
-def test_blocks_of_any_length_come_to_the_same(one: int, two: int) -> None:
+def test_blocks_of_any_length_come_to_the_same(one, two):
     columns = [10.0 ** (K[:900] / d) for d in (60.0, 70.0, 61.0)]
     assert watch(*columns, block=one) == watch(*columns, block=two)
 
 
-def test_the_first_to_run_away_is_named() -> None:
+def test_the_first_to_run_away_is_named():
     late, early = 10.0 ** (K / 500.0), 10.0 ** (K / 300.0)
     found = watch(late, early, unit="N")
     assert found is not None
@@ -191,7 +179,7 @@ def test_the_first_to_run_away_is_named() -> None:
     )
 
 
-def test_the_advice_names_a_negative_factor() -> None:
+def test_the_advice_names_a_negative_factor():
     found = watch(-(10.0 ** (K / 500.0)), factor=-1.0)
     assert found is not None
     assert found.text.endswith("; look at factor = -1 of a.y0 -> b.u, or try a shorter step")

@@ -2,19 +2,16 @@
 
 from copy import copy
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_controller import series
-from grasp_cosim import System
 from grasp_cosim.exchange.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.interface.arrays import MOST_ELEMENTS
-from grasp_cosim.interface.interface import Interface
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system import parts
-from grasp_cosim.system.parts import Component, Connection, Port
+from grasp_cosim.system.parts import Connection, Port
 from gripper_plant import rigid
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,19 +44,18 @@ class Run:
     velocity: Array
 
     @property
-    def drift(self) -> Array:
+    def drift(self):
         """J; kinetic energy and that of the spring, against the start."""
         energy = 0.5 * MASS * self.velocity**2 + 0.5 * STIFFNESS * self.rows[:, COLUMN[SEEN]] ** 2
-        drift: Array = energy - energy[0]
-        return drift
+        return energy - energy[0]
 
 
-def _moved(x: float, v: float, force: float, time: float) -> tuple[float, float]:
+def _moved(x, v, force, time):
     """Position and velocity of the mass after a time under a constant force: exact."""
     return x + v * time + 0.5 * force / MASS * time**2, v + force / MASS * time
 
 
-def _sequential(step: float = STEP, steps: int = STEPS) -> Run:
+def _sequential(step=STEP, steps=STEPS):
     """First the mass, then the spring at the place where the mass is then."""
     x, v = 0.01, 0.0
     rows, velocity = [(-STIFFNESS * x, x, -STIFFNESS * x, x)], [v]
@@ -71,7 +67,7 @@ def _sequential(step: float = STEP, steps: int = STEPS) -> Run:
     return Run(np.array(rows), np.array(velocity))
 
 
-def _jacobi() -> Run:
+def _jacobi():
     """Both with the values of the last communication point."""
     x, v = 0.01, 0.0
     rows, velocity = [(-STIFFNESS * x, x, -STIFFNESS * x, x)], [v]
@@ -83,7 +79,7 @@ def _jacobi() -> Run:
     return Run(np.array(rows), np.array(velocity))
 
 
-def _slow_spring(period: int) -> Run:
+def _slow_spring(period):
     """The spring sees a position at the start of its step, and answers at the end."""
     x, v = 0.01, 0.0
     rows, velocity = [(-STIFFNESS * x, x, -STIFFNESS * x, x)], [v]
@@ -97,7 +93,7 @@ def _slow_spring(period: int) -> Run:
     return Run(np.array(rows), np.array(velocity))
 
 
-def _slow_mass(period: int) -> Run:
+def _slow_mass(period):
     """The mass goes once in so many steps, under the force at the start of its own step."""
     x, v = 0.01, 0.0
     rows, velocity = [(-STIFFNESS * x, x, -STIFFNESS * x, x)], [v]
@@ -111,20 +107,19 @@ def _slow_mass(period: int) -> Run:
     return Run(np.array(rows), np.array(velocity))
 
 
-def _energy(rows: Array, bond: Bond = BOND) -> Array:
-    energy: Array = ExchangeEnergy([bond], COLUMN)(rows)[:, 0]
-    return energy
+def _energy(rows, bond=BOND):
+    return ExchangeEnergy([bond], COLUMN)(rows)[:, 0]
 
 
 @pytest.mark.parametrize("run", [_sequential(), _jacobi(), _slow_mass(2)])
-def test_it_is_the_drift_of_the_total_energy(run: Run) -> None:
+def test_it_is_the_drift_of_the_total_energy(run):
     total = 0.5 * STIFFNESS * run.rows[0, 1] ** 2
     assert run.drift[-1] > 1.0 * total
     assert _energy(run.rows) == pytest.approx(run.drift, rel=1e-12, abs=1e-12 * total)
 
 
 @pytest.mark.parametrize("period", [2, 4])
-def test_a_slow_source_answers_for_its_own_steps(period: int) -> None:
+def test_a_slow_source_answers_for_its_own_steps(period):
     """In between, the spring has seen a position that it has no force for yet."""
     run = _slow_spring(period)
     energy = _energy(run.rows, replace(BOND, period=period))
@@ -132,7 +127,7 @@ def test_a_slow_source_answers_for_its_own_steps(period: int) -> None:
     assert energy[done] == pytest.approx(run.drift[done], rel=1e-11, abs=1e-14)
 
 
-def test_a_sampled_spring_creates_energy_as_its_eigenvalues_say() -> None:
+def test_a_sampled_spring_creates_energy_as_its_eigenvalues_say():
     """The state is multiplied by a matrix of determinant 1 + k h^2 / (2 m) in each step."""
     run = _sequential()
     total = 0.5 * STIFFNESS * run.rows[0, 1] ** 2
@@ -140,42 +135,42 @@ def test_a_sampled_spring_creates_energy_as_its_eigenvalues_say() -> None:
     assert _energy(run.rows)[-1] == pytest.approx(total * (growth - 1.0), rel=0.03)
 
 
-def test_each_step_leaks_half_the_stiffness_times_the_squared_motion() -> None:
+def test_each_step_leaks_half_the_stiffness_times_the_squared_motion():
     rows = _sequential().rows
     leak = 0.5 * STIFFNESS * np.diff(rows[:, 1]) ** 2
     assert np.diff(_energy(rows)) == pytest.approx(leak, rel=1e-6, abs=1e-15)
 
 
-def test_it_falls_with_the_step() -> None:
+def test_it_falls_with_the_step():
     coarse, fine = (_energy(_sequential(h, round(0.1 / h)).rows)[-1] for h in (2e-4, 1e-4))
     assert coarse / fine == pytest.approx(2.0, rel=0.02)
 
 
-def test_an_exchange_without_error_creates_nothing() -> None:
+def test_an_exchange_without_error_creates_nothing():
     """A constant force, as of a weight: held or not, it does the same work."""
     x = np.linspace(0.0, 1.0, 11) ** 2
     rows = np.column_stack([np.full(11, 5.0), x, np.full(11, 5.0), x])
     assert _energy(rows) == pytest.approx(np.zeros(11), abs=1e-15)
 
 
-def test_the_first_row_is_zero() -> None:
+def test_the_first_row_is_zero():
     assert _energy(_sequential().rows[:1]).tolist() == [0.0]
 
 
-def test_a_source_that_receives_no_position_is_taken_to_see_it_at_once() -> None:
+def test_a_source_that_receives_no_position_is_taken_to_see_it_at_once():
     rows = _sequential().rows
     unseen = rows.copy()
     unseen[:, COLUMN[SEEN]] = np.nan
     assert np.array_equal(_energy(unseen, replace(BOND, seen=None)), _energy(rows))
 
 
-def test_values_that_are_not_finite_are_passed_on_without_a_warning() -> None:
+def test_values_that_are_not_finite_are_passed_on_without_a_warning():
     rows = _sequential().rows[:4].copy()
     rows[2:, 1] = np.inf
     assert np.isfinite(_energy(rows)).tolist() == [True, True, False, False]
 
 
-def test_units_of_the_source_are_those_of_the_connections() -> None:
+def test_units_of_the_source_are_those_of_the_connections():
     """A spring in mm from another origin and kN, connections that convert, and a mass in cm."""
     run = _sequential()
     rows = run.rows * [1e-3, 100.0, 1.0, 1e3] + [0.0, 0.0, 0.0, 40.0]
@@ -185,7 +180,7 @@ def test_units_of_the_source_are_those_of_the_connections() -> None:
     assert energies[:, 0] == pytest.approx(run.drift, rel=1e-9, abs=1e-14)
 
 
-def test_a_connection_with_a_factor_of_zero_shows_the_source_no_motion() -> None:
+def test_a_connection_with_a_factor_of_zero_shows_the_source_no_motion():
     rows = _sequential().rows
     (energy,) = ExchangeEnergy([BOND], COLUMN, {SEEN: (0.0, 0.0)})(rows).T
     assert energy[-1] == pytest.approx(float(np.sum(rows[1:, 2] * np.diff(rows[:, 1]))))
@@ -197,7 +192,7 @@ def test_a_connection_with_a_factor_of_zero_shows_the_source_no_motion() -> None
     cuts=st.lists(st.integers(0, 23), max_size=6),
     period=st.integers(1, 5),
 )
-def test_blocks_of_any_size_give_the_same_bits(rows: Array, cuts: list[int], period: int) -> None:
+def test_blocks_of_any_size_give_the_same_bits(rows, cuts, period):
     both = [replace(BOND, period=period), replace(BOND, seen=None)]
     whole = ExchangeEnergy(both, COLUMN)(rows)
     energy = ExchangeEnergy(both, COLUMN)
@@ -206,7 +201,7 @@ def test_blocks_of_any_size_give_the_same_bits(rows: Array, cuts: list[int], per
 
 
 @pytest.mark.parametrize("j", [1, 2])
-def test_on_the_way_to_contact_it_is_kinetic_energy_less_what_the_controller_gave(j: int) -> None:
+def test_on_the_way_to_contact_it_is_kinetic_energy_less_what_the_controller_gave(j):
     """The fingers, moved by their blocks: free of contact, they keep all the work they get."""
     sensor = optics.Params()
     signals = closed_loop(
@@ -225,7 +220,7 @@ def test_on_the_way_to_contact_it_is_kinetic_energy_less_what_the_controller_gav
     assert energy == pytest.approx(kinetic - given, abs=1e-12)
 
 
-def test_the_grasp_has_a_bond_per_finger(grasp: System) -> None:
+def test_the_grasp_has_a_bond_per_finger(grasp):
     found = bonds(grasp)
     assert found == tuple(
         Bond(
@@ -248,21 +243,21 @@ def test_the_grasp_has_a_bond_per_finger(grasp: System) -> None:
     assert "plant.force[1]" in signals[0].description
 
 
-def _ports(bond: Bond) -> list[Port]:
+def _ports(bond):
     return [p for p in (bond.force, bond.source, bond.position, bond.seen) if p]
 
 
-def _with_component(system: System, changed: Component) -> tuple[Component, ...]:
+def _with_component(system, changed):
     return tuple(changed if c.name == changed.name else c for c in system.components)
 
 
-def test_the_source_keeps_its_own_step(grasp: System) -> None:
+def test_the_source_keeps_its_own_step(grasp):
     slow = replace(grasp.component("controller", "test"), step_ns=4 * grasp.step_ns)
     system = replace(grasp, components=_with_component(grasp, slow))
     assert [b.period for b in bonds(system)] == [4, 4]
 
 
-def test_a_position_of_another_name_makes_no_bond(grasp: System) -> None:
+def test_a_position_of_another_name_makes_no_bond(grasp):
     plant = replace(grasp.component("plant", "test"), rename={"place[1]": "position[1]"})
     place = Port("plant", "place[1]")
     connections = tuple(
@@ -273,14 +268,14 @@ def test_a_position_of_another_name_makes_no_bond(grasp: System) -> None:
     assert [b.index for b in bonds(system)] == [2]
 
 
-def test_a_force_without_a_connection_makes_no_bond(grasp: System) -> None:
+def test_a_force_without_a_connection_makes_no_bond(grasp):
     plant = replace(grasp.component("plant", "test"), values={"force[1]": -1.0})
     connections = tuple(w for w in grasp.connections if w.target != Port("plant", "force[1]"))
     system = replace(grasp, components=_with_component(grasp, plant), connections=connections)
     assert [b.index for b in bonds(system)] == [2]
 
 
-def test_a_source_that_has_no_connection_from_the_position(grasp: System) -> None:
+def test_a_source_that_has_no_connection_from_the_position(grasp):
     controller = replace(grasp.component("controller", "test"), values={"position[1]": 0.1})
     connections = tuple(
         w for w in grasp.connections if w.target != Port("controller", "position[1]")
@@ -289,7 +284,7 @@ def test_a_source_that_has_no_connection_from_the_position(grasp: System) -> Non
     assert [b.seen for b in bonds(system)] == [None, Port("controller", "position[2]")]
 
 
-def unread(system: System) -> System:
+def unread(system):
     """The system as it was checked, but whose components read their FMUs anew."""
     other = copy(system)
     object.__setattr__(other, "components", tuple(replace(c) for c in system.components))
@@ -300,15 +295,10 @@ def unread(system: System) -> System:
     ("exponents", "scales"),
     [((1, 1, -2, 0, 0, 0, 0, 0), [1e3, 1e3]), ((1, 2, -2, 0, 0, 0, 0, 0), [])],
 )
-def test_forces_are_taken_in_their_declared_unit(
-    exponents: tuple[int, ...],
-    scales: list[float],
-    grasp: System,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_forces_are_taken_in_their_declared_unit(exponents, scales, grasp, monkeypatch):
     """Here N is declared as a kilonewton; and as a moment, which is no force."""
 
-    def declared(path: Path) -> Interface:
+    def declared(path):
         return replace(read_interface(path), units={"N": Unit("N", exponents, 1e3)})
 
     monkeypatch.setattr(parts, "read_interface", declared)
@@ -316,10 +306,10 @@ def test_forces_are_taken_in_their_declared_unit(
 
 
 @pytest.mark.parametrize("name", ["force[1]", "position[1]"])
-def test_an_array_makes_no_bond(name: str, grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_array_makes_no_bond(name, grasp, monkeypatch):
     """As FMI 3.0 has them, and too large to be taken apart: it is not recorded."""
 
-    def declared(path: Path) -> Interface:
+    def declared(path):
         found = read_interface(path)
         large = (MOST_ELEMENTS + 1,)
         variables = tuple(

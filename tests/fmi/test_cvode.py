@@ -1,7 +1,7 @@
 """CVode behind our calls: accurate, never beyond its stop, with the errors of its functions."""
 
 from ctypes import c_double
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from support.models import needs_cvode
 pytestmark = needs_cvode
 
 
-def cvode(*arguments: Any) -> Any:
+def cvode(*arguments: Any):
     from grasp_cosim.fmi.cvode import Cvode  # here, as it may not be there
 
     return Cvode(*arguments)
@@ -20,22 +20,22 @@ def cvode(*arguments: Any) -> Any:
 class Decay:
     """x' = -x, and an indicator x - 0.5; the latest time and the number of evaluations."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.latest, self.count = 0.0, 0
         self.solver = cvode(1, 1, self.slopes, self.crossings, Solver())
         self.solver.x[0] = 1.0
 
-    def slopes(self, time: float, states: int, slopes: int) -> int:
+    def slopes(self, time, states, slopes):
         self.latest, self.count = max(self.latest, time), self.count + 1
         c_double.from_address(slopes).value = -c_double.from_address(states).value
         return 0
 
-    def crossings(self, time: float, states: int, values: int) -> int:
+    def crossings(self, time, states, values):
         c_double.from_address(values).value = c_double.from_address(states).value - 0.5
         return 0
 
 
-def test_it_stops_at_a_root_and_at_its_stop() -> None:
+def test_it_stops_at_a_root_and_at_its_stop():
     decay = Decay()
     decay.solver.restart(0.0)
     time, found = 0.0, False
@@ -49,7 +49,7 @@ def test_it_stops_at_a_root_and_at_its_stop() -> None:
     decay.solver.close()
 
 
-def test_new_nominal_values_are_kept_to() -> None:
+def test_new_nominal_values_are_kept_to():
     """Against a huge one the state is nothing, and takes few evaluations."""
     counts = []
     for nominal in (1.0, 1e12):
@@ -63,8 +63,8 @@ def test_new_nominal_values_are_kept_to() -> None:
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_what_a_function_raises_is_raised(error: type[BaseException]) -> None:
-    def fail(*_: object) -> NoReturn:
+def test_what_a_function_raises_is_raised(error):
+    def fail(*_: object):
         raise error
 
     solver = cvode(1, 0, fail, fail, Solver())
@@ -74,7 +74,7 @@ def test_what_a_function_raises_is_raised(error: type[BaseException]) -> None:
     solver.close()
 
 
-def test_what_it_cannot_do_it_says(capfd: pytest.CaptureFixture[str]) -> None:
+def test_what_it_cannot_do_it_says(capfd):
     from grasp_cosim.fmi.cvode import CvodeError
 
     solver = cvode(1, 0, lambda *_: 1, lambda *_: 1, Solver())

@@ -1,25 +1,24 @@
 """The inputs that a failure inside an FMU names."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from fmi.instances import KINDS, real
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.fmi.inputs import Inputs
-from grasp_cosim.interface.interface import Kind, Value, Variable
-from grasp_cosim.system.parts import Component, Connection, Isolation, Port
+from grasp_cosim.interface.interface import Variable
+from grasp_cosim.system.parts import Component, Connection, Port
 from support.both_engines import engines
 from support.native_fmus import TYPES, build, needs_gcc
 
 
-def variable(name: str, kind: Kind = "Real", causality: str = "input", **more: object) -> Variable:
+def variable(name, kind="Real", causality="input", **more):
     given = {"unit": None, "start": None, "minimum": None, "maximum": None, **more}
     return Variable(name, kind, causality, 1, **given)  # type: ignore[arg-type]
 
 
-def test_they_have_their_names_values_and_units() -> None:
+def test_they_have_their_names_values_and_units():
     inputs = Inputs()
     inputs.set(variable("gap", unit="m"), 45.0)
     inputs.set(variable("held", "Boolean"), True)
@@ -29,11 +28,11 @@ def test_they_have_their_names_values_and_units() -> None:
     assert str(inputs) == " (inputs: gap = 45 m, held = true, count = 3, mode = 'soft')"
 
 
-def test_an_fmu_without_inputs_names_none() -> None:
+def test_an_fmu_without_inputs_names_none():
     assert str(Inputs()) == ""
 
 
-def test_in_the_run_they_are_those_of_the_buffers_then_those_that_stay() -> None:
+def test_in_the_run_they_are_those_of_the_buffers_then_those_that_stay():
     inputs, data = Inputs(), np.zeros(2)
     forces = [variable("force[1]", unit="N"), variable("force[2]", unit="N")]
     inputs.bind(forces, data)
@@ -45,7 +44,7 @@ def test_in_the_run_they_are_those_of_the_buffers_then_those_that_stay() -> None
     assert str(inputs) == " (inputs: force[1] = 1 N, force[2] = -2.5 N, gap = 0.1 m)"
 
 
-def test_of_many_those_that_are_out_of_range_come_first() -> None:
+def test_of_many_those_that_are_out_of_range_come_first():
     inputs = Inputs()
     for i in range(20):
         inputs.set(variable(f"u[{i}]", minimum=0.0), float(i))
@@ -59,12 +58,10 @@ def test_of_many_those_that_are_out_of_range_come_first() -> None:
 @needs_gcc
 @pytest.mark.parametrize(("version", "isolation"), KINDS)
 @engines
-def test_a_failing_step_names_what_came_over_its_connections(
-    tmp_path: Path, version: str, isolation: Isolation, engine: str
-) -> None:
+def test_a_failing_step_names_what_came_over_its_connections(tmp_path, version, isolation, engine):
     """Under the system's name, after the factor of the connection."""
     u, y = f"u_{real(version)}", f"y_{real(version)}"
-    starts: dict[str, Value] = {"Boolean": False, "String": "", "Enumeration": 1}
+    starts = {"Boolean": False, "String": "", "Enumeration": 1}
     others = {f"u_{t}": starts.get(t, 0) for t in list(TYPES[version])[1:]}
     fmu = build(tmp_path, version=version, units={u: "mm", y: "m"})
     system = System(

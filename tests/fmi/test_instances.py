@@ -5,7 +5,6 @@ import math
 import re
 import tempfile
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from grasp_cosim.fmi.instance import DISCARD, EARLY, OK
 from grasp_cosim.fmi.loaded import KEPT
 from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.interface.obstacles import this_platform
-from grasp_cosim.system.parts import Component, Isolation
+from grasp_cosim.system.parts import Component
 from support.native_fmus import EARLY as MIGHT_RETURN_EARLY
 from support.native_fmus import TYPES, build, needs_gcc
 from support.packages import skip_where_fmpy_runs_none
@@ -28,9 +27,7 @@ both = pytest.mark.parametrize(("version", "isolation"), KINDS)
 
 
 @both
-def test_every_scalar_type_goes_through_one_by_one(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_every_scalar_type_goes_through_one_by_one(tmp_path, version, isolation):
     with running(tmp_path, version, isolation) as part:
         names = list(TYPES[version])
         part.set([variable(part, f"u_{t}") for t in names], [SAMPLES[t] for t in names])
@@ -40,9 +37,7 @@ def test_every_scalar_type_goes_through_one_by_one(
 
 
 @both
-def test_every_scalar_type_goes_through_a_bound_call(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_every_scalar_type_goes_through_a_bound_call(tmp_path, version, isolation):
     with running(tmp_path, version, isolation) as part:
         bound = Bound(part, 0.1)
         for fmi_type in TYPES[version]:
@@ -55,9 +50,7 @@ def test_every_scalar_type_goes_through_a_bound_call(
 
 
 @both
-def test_start_values_of_every_type_are_set(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_start_values_of_every_type_are_set(tmp_path, version, isolation):
     values = {f"u_{t}": SAMPLES[t] for t in TYPES[version]}
     with running(tmp_path, version, isolation, values) as part:
         got = part.get([variable(part, f"y_{t}") for t in TYPES[version]])
@@ -65,7 +58,7 @@ def test_start_values_of_every_type_are_set(
 
 
 @both
-def test_a_run_agrees_with_fmpy(tmp_path: Path, version: str, isolation: Isolation) -> None:
+def test_a_run_agrees_with_fmpy(tmp_path, version, isolation):
     """FMPy runs the same FMU with a constant input: an independent master."""
     skip_where_fmpy_runs_none(version)
     step, steps, u, gain = 0.1, 20, 0.7, 1.3
@@ -87,9 +80,7 @@ def test_a_run_agrees_with_fmpy(tmp_path: Path, version: str, isolation: Isolati
 
 
 @both
-def test_an_error_tells_what_the_fmu_logged(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_an_error_tells_what_the_fmu_logged(tmp_path, version, isolation):
     with running(tmp_path, version, isolation, {"error_at": 0.25}) as part:
         bound = Bound(part, 0.2)
         assert bound.step() == OK
@@ -100,7 +91,7 @@ def test_an_error_tells_what_the_fmu_logged(
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_of_many_warnings_the_last_are_kept(tmp_path: Path, version: str) -> None:
+def test_of_many_warnings_the_last_are_kept(tmp_path, version):
     with running(tmp_path, version, values={"error_at": 0.1}) as part:
         for k in range(1000):
             text = f"warning {k}".encode()
@@ -115,9 +106,7 @@ def test_of_many_warnings_the_last_are_kept(tmp_path: Path, version: str) -> Non
 
 
 @both
-def test_a_failed_get_names_component_and_reason(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_a_failed_get_names_component_and_reason(tmp_path, version, isolation):
     with running(tmp_path, version, isolation) as part:
         foreign = variable(part, "gain")
         wrong = type(foreign)(
@@ -129,9 +118,7 @@ def test_a_failed_get_names_component_and_reason(
 
 
 @both
-def test_refused_start_values_are_a_wrong_input(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_refused_start_values_are_a_wrong_input(tmp_path, version, isolation):
     message = "^part: native.fmu refused its initialisation: gain must be >= 0$"
     with (
         pytest.raises(InputError, match=message),
@@ -141,7 +128,7 @@ def test_refused_start_values_are_a_wrong_input(
 
 
 @both
-def test_a_discarded_step_got_nowhere(tmp_path: Path, version: str, isolation: Isolation) -> None:
+def test_a_discarded_step_got_nowhere(tmp_path, version, isolation):
     with running(tmp_path, version, isolation, {"discard_at": 0.35}) as part:
         bound = Bound(part, 0.2)
         bound.clock[0] = 0.2
@@ -152,9 +139,7 @@ def test_a_discarded_step_got_nowhere(tmp_path: Path, version: str, isolation: I
 
 
 @both
-def test_a_step_that_ends_early_tells_where(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_a_step_that_ends_early_tells_where(tmp_path, version, isolation):
     start = {"early_at": 0.35, f"u_{real(version)}": 2.0}
     with running(tmp_path, version, isolation, start, MIGHT_RETURN_EARLY) as part:
         bound = Bound(part, 0.2)
@@ -166,16 +151,14 @@ def test_a_step_that_ends_early_tells_where(
         assert part.get([box]) == [pytest.approx(0.4, rel=1e-13)]
 
 
-def test_a_step_ends_early_only_where_its_length_may_vary(tmp_path: Path) -> None:
+def test_a_step_ends_early_only_where_its_length_may_vary(tmp_path):
     fixed = {"mightReturnEarlyFromDoStep": "true"}
     with running(tmp_path, "3.0", values={"early_at": 0.1}, capabilities=fixed) as part:
         assert Bound(part, 0.2).step() == OK
 
 
 @both
-def test_a_wish_to_end_the_simulation_is_told(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_a_wish_to_end_the_simulation_is_told(tmp_path, version, isolation):
     with running(tmp_path, version, isolation, {"terminate_at": 0.1}) as part:
         status = Bound(part, 0.2).step()
         assert status == (DISCARD if version == "2.0" else EARLY)
@@ -185,13 +168,13 @@ def test_a_wish_to_end_the_simulation_is_told(
         assert part.the_end() is None
 
 
-def test_structural_parameters_are_set_in_configuration_mode(tmp_path: Path) -> None:
+def test_structural_parameters_are_set_in_configuration_mode(tmp_path):
     with running(tmp_path, "3.0", values={"size": 7, "gain": 2.0}) as part:
         assert part.get([variable(part, "size_out"), variable(part, "gain")]) == [7, 2.0]
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_the_native_call_is_the_python_call(tmp_path: Path, version: str) -> None:
+def test_the_native_call_is_the_python_call(tmp_path, version):
     """Called by the addresses alone, as the compiled loop does, the FMU does the same."""
     with running(tmp_path, version) as part:
         u, x = (variable(part, name) for name in (f"u_{real(version)}", "x"))
@@ -205,7 +188,7 @@ def test_the_native_call_is_the_python_call(tmp_path: Path, version: str) -> Non
         if version == "2.0":
             assert (put.shape, step.shape) == (TRANSFER_2, STEP_2)
             transfer = ctypes.CFUNCTYPE(status, *[word] * 4)
-            tail: list[int] = []
+            tail = []
             advance = ctypes.CFUNCTYPE(status, word, double, double, status)
         else:
             assert (put.shape, step.shape) == (TRANSFER_3, STEP_3)
@@ -226,9 +209,7 @@ def test_the_native_call_is_the_python_call(tmp_path: Path, version: str) -> Non
 
 
 @both
-def test_without_a_binary_for_this_machine(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_without_a_binary_for_this_machine(tmp_path, version, isolation):
     whole, other = build(tmp_path, version=version), tmp_path / "other.fmu"
     with zipfile.ZipFile(whole) as archive, zipfile.ZipFile(other, "w") as elsewhere:
         for name in archive.namelist():
@@ -244,9 +225,7 @@ def test_without_a_binary_for_this_machine(
 
 
 @both
-def test_a_token_that_differs_does_not_load(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_a_token_that_differs_does_not_load(tmp_path, version, isolation):
     component = Component(
         "part", build(tmp_path, version=version, token="{other}"), {}, isolation=isolation
     )
@@ -257,9 +236,7 @@ def test_a_token_that_differs_does_not_load(
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_what_is_extracted_is_what_this_machine_uses(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: str
-) -> None:
+def test_what_is_extracted_is_what_this_machine_uses(tmp_path, monkeypatch, version):
     fmu = build(tmp_path, version=version)
     with zipfile.ZipFile(fmu, "a") as archive:
         binaries = [name for name in archive.namelist() if name.startswith("binaries/")]

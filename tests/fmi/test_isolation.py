@@ -23,7 +23,7 @@ pytestmark = needs_gcc
 versions = pytest.mark.parametrize("version", ["2.0", "3.0"])
 
 
-def workers() -> set[int]:
+def workers():
     """The processes of components that this process has."""
     found = set()
     for entry in Path("/proc").iterdir():
@@ -38,13 +38,13 @@ def workers() -> set[int]:
     return found
 
 
-def open_files() -> int:
+def open_files():
     """How many this process has, but for what it merely has not collected."""
     gc.collect()
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
-def system_file(folder: Path, version: str, values: str, isolation: str = "process") -> Path:
+def system_file(folder, version, values, isolation="process"):
     """A native part that drives a second one, which fails as its values say."""
     build(folder, version=version)
     u, y = f"u_{real(version)}", f"y_{real(version)}"
@@ -70,7 +70,7 @@ values = {{ gain = 1.0{others}{values} }}
 
 
 @versions
-def test_a_run_has_the_bits_of_one_in_this_process(tmp_path: Path, version: str) -> None:
+def test_a_run_has_the_bits_of_one_in_this_process(tmp_path, version):
     runs = [
         simulate(System.load(system_file(tmp_path, version, "", isolation)))
         for isolation in ("none", "process")
@@ -84,9 +84,7 @@ def test_a_run_has_the_bits_of_one_in_this_process(tmp_path: Path, version: str)
 @pytest.mark.parametrize(
     ("parameter", "how"), [("crash_at", "signal SIGSEGV"), ("exit_at", "exit code 7")]
 )
-def test_a_crash_ends_the_run_with_the_recording_kept(
-    tmp_path: Path, version: str, parameter: str, how: str
-) -> None:
+def test_a_crash_ends_the_run_with_the_recording_kept(tmp_path, version, parameter, how):
     system = System.load(system_file(tmp_path, version, f", {parameter} = 1.05"))
     driven = f"u_{real(version)}"
     message = f"second: the process of native.fmu ended with {how} at t = 1 s (inputs: {driven} = "
@@ -105,7 +103,7 @@ def test_a_crash_ends_the_run_with_the_recording_kept(
 
 
 @versions
-def test_a_hang_is_bounded(tmp_path: Path, version: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hang_is_bounded(tmp_path, version, monkeypatch):
     with running(tmp_path, version, "process", {"hang_at": 0.25}) as part:
         bound = Bound(part, 0.2)
         assert bound.step() == OK
@@ -124,7 +122,7 @@ def test_a_hang_is_bounded(tmp_path: Path, version: str, monkeypatch: pytest.Mon
 
 @pytest.mark.usefixtures("ctrl_c")
 @versions
-def test_an_interrupted_call_is_not_answered_later(tmp_path: Path, version: str) -> None:
+def test_an_interrupted_call_is_not_answered_later(tmp_path, version):
     """What it answers would be taken for the answer to the next call."""
     values = {"interrupt_at": 0.1, "interrupted": os.getpid(), "hang_at": 0.1}
     with running(tmp_path, version, "process", values) as part:
@@ -137,7 +135,7 @@ def test_an_interrupted_call_is_not_answered_later(tmp_path: Path, version: str)
         assert not workers()
 
 
-def test_a_crash_in_the_initialisation_is_a_wrong_input(tmp_path: Path) -> None:
+def test_a_crash_in_the_initialisation_is_a_wrong_input(tmp_path):
     with running(tmp_path, "3.0", "process") as part:
         (pid,) = workers()
         os.kill(pid, signal.SIGKILL)
@@ -145,13 +143,13 @@ def test_a_crash_in_the_initialisation_is_a_wrong_input(tmp_path: Path) -> None:
             part.enter_initialization({}, 1.0)
 
 
-def test_what_a_lost_process_leaves_is_cleared_away_in_silence(tmp_path: Path) -> None:
+def test_what_a_lost_process_leaves_is_cleared_away_in_silence(tmp_path):
     """Where it ends between a command and its arguments; since 3.13 Python tells of all it met."""
     with running(tmp_path, "3.0", "process") as part:
         assert isinstance(part, process.ProcessInstance)
         pid, send = part._process.pid, part._connection.send_bytes
 
-        def send_and_kill(data: bytes) -> None:
+        def send_and_kill(data):
             send(data)
             os.kill(pid, signal.SIGKILL)
             os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
@@ -164,9 +162,7 @@ def test_what_a_lost_process_leaves_is_cleared_away_in_silence(tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_nothing_stays_behind(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_nothing_stays_behind(tmp_path, monkeypatch, capfd):
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
@@ -185,7 +181,7 @@ def test_nothing_stays_behind(
 
 
 @pytest.mark.slow
-def test_what_an_fmu_started_ends_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_an_fmu_started_ends_with_it(tmp_path, monkeypatch):
     """Such as a fork, which would keep open what the FMU printed to."""
     python, child = tmp_path / "python", tmp_path / "child"
     python.write_text(f'#!/bin/sh\nsleep 600 &\necho $! > {child}\nexec {sys.executable} "$@"\n')
@@ -196,7 +192,7 @@ def test_what_an_fmu_started_ends_with_it(tmp_path: Path, monkeypatch: pytest.Mo
     assert ends(int(child.read_text()))
 
 
-def test_without_posix_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_posix_it_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(process, "POSIX", False)
     with (
         pytest.raises(InputError, match=r"^part: isolation = 'process' needs Linux or macOS"),
@@ -206,7 +202,7 @@ def test_without_posix_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.slow
-def test_the_grasp_has_the_same_bits(grasp: System) -> None:
+def test_the_grasp_has_the_same_bits(grasp):
     """Also with FMUs that are written in Python, each in a Python of its own."""
     alone = tuple(replace(component, isolation="process") for component in grasp.components)
     here = simulate(grasp, stop=0.01)
@@ -214,7 +210,7 @@ def test_the_grasp_has_the_same_bits(grasp: System) -> None:
     assert all((here[name] == there[name]).all() for name in here)
 
 
-def test_an_fmu_that_a_process_can_have_once(tmp_path: Path) -> None:
+def test_an_fmu_that_a_process_can_have_once(tmp_path):
     for isolation in ("process", "none"):
         path = system_file(tmp_path, "2.0", "", isolation)
         build(tmp_path, version="2.0", capabilities={"canBeInstantiatedOnlyOncePerProcess": "true"})
@@ -227,7 +223,7 @@ def test_an_fmu_that_a_process_can_have_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_the_fmu_prints_does_not_get_into_json(tmp_path: Path) -> None:
+def test_what_the_fmu_prints_does_not_get_into_json(tmp_path):
     path = system_file(tmp_path, "3.0", "").read_text("utf-8")
     alone = path.replace("[components.first]", '[components.first]\nisolation = "process"')
     (tmp_path / "two.toml").write_text(alone, encoding="utf-8")
@@ -239,7 +235,7 @@ def test_what_the_fmu_prints_does_not_get_into_json(tmp_path: Path) -> None:
     assert json.loads(ran.stdout)["complete"] is True
 
 
-def test_the_process_ends_when_the_masters_is_killed(tmp_path: Path) -> None:
+def test_the_process_ends_when_the_masters_is_killed(tmp_path):
     """Even while its FMU hangs."""
     fmu = build(tmp_path)
     code = f"""
@@ -265,7 +261,7 @@ part.stepper(np.zeros(2), 0.2).python()
     assert ends(worker)
 
 
-def test_values_that_are_pending_are_passed_on_in_order(tmp_path: Path) -> None:
+def test_values_that_are_pending_are_passed_on_in_order(tmp_path):
     """A value that is set one by one comes after what the loop has put before it."""
     with running(tmp_path, "2.0", "process") as part:
         bound = Bound(part, 0.1)
@@ -279,7 +275,7 @@ def test_values_that_are_pending_are_passed_on_in_order(tmp_path: Path) -> None:
         assert (put(), fetch(), got.tolist()) == (OK, OK, [3.0])
 
 
-def test_many_more_values_than_a_page(tmp_path: Path) -> None:
+def test_many_more_values_than_a_page(tmp_path):
     """Rooms in the shared memory do not overlap."""
     with running(tmp_path, "3.0", "process") as part:
         bound = Bound(part, 0.1)

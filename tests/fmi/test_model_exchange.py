@@ -1,15 +1,12 @@
 """FMUs for model exchange are integrated to their exact solutions, event by event."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
 from grasp_cosim import SimulationError, System, simulate
-from grasp_cosim.interface.interface import Value
-from grasp_cosim.recording.result import Result
-from grasp_cosim.system.parts import Component, Connection, Event, Isolation, Port, Solver
+from grasp_cosim.system.parts import Component, Connection, Event, Port, Solver
 from scipy.integrate import solve_ivp
 from support.analytic import bouncing_ball, held_input
 from support.both_engines import ENGINES
@@ -21,23 +18,23 @@ pytestmark = [needs_gcc, needs_cvode]
 EXCHANGE = ("ModelExchange",)
 WITHIN = 1e-6
 """Relative, of the exact solution, with the tolerance that a solver has where none is given."""
-GIVEN: Mapping[str, Mapping[str, Value]] = {"dahlquist": {"u": 0.0}, "odd": {"u": False}}
+GIVEN = {"dahlquist": {"u": 0.0}, "odd": {"u": False}}
 
 versions = pytest.mark.parametrize("version", ["2.0", pytest.param("3.0", marks=pytest.mark.slow)])
 
 
-def part(name: str, folder: Path, version: str = "2.0", **more: Value) -> Component:
+def part(name, folder, version="2.0", **more):
     fmu = build_model(name, folder, version, EXCHANGE)
     return Component(name, fmu, {**GIVEN.get(name, {}), **more})
 
 
-def run(component: Component, step: float, stop: float, **more: str) -> Result:
+def run(component, step, stop, **more):
     times = round(step * 1e9), round(stop * 1e9)
     return simulate(System("alone", (component,), (), *times, "sequential"), **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("step", [0.01, 0.1, 3.0])
-def test_a_ball_bounces_as_it_should(tmp_path: Path, step: float) -> None:
+def test_a_ball_bounces_as_it_should(tmp_path, step):
     """By 16 state events, to rest; however many of them are in a communication step."""
     result = run(part("bouncing_ball", tmp_path), step, 3.0)
     height, speed = bouncing_ball(result.time)
@@ -51,7 +48,7 @@ def test_a_ball_bounces_as_it_should(tmp_path: Path, step: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_a_ball_bounces_300_times(tmp_path: Path, version: str) -> None:
+def test_a_ball_bounces_300_times(tmp_path, version):
     result = run(part("bouncing_ball", tmp_path, version, e=0.99, v_min=0.01), 0.01, 60.0)
     height, speed = bouncing_ball(result.time, e=0.99, v_min=0.01)
     assert result["bouncing_ball.h"] == pytest.approx(height, abs=WITHIN)
@@ -61,10 +58,10 @@ def test_a_ball_bounces_300_times(tmp_path: Path, version: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_van_der_pol(tmp_path: Path, version: str) -> None:
+def test_van_der_pol(tmp_path, version):
     result = run(part("van_der_pol", tmp_path, version, mu=5.0), 0.1, 20.0)
 
-    def slopes(_: float, x: list[float]) -> list[float]:
+    def slopes(_, x):
         return [x[1], 5.0 * (1.0 - x[0] ** 2) * x[1] - x[0]]
 
     times, tight = result.time, {"rtol": 1e-12, "atol": 1e-13}
@@ -74,7 +71,7 @@ def test_van_der_pol(tmp_path: Path, version: str) -> None:
 
 
 @versions
-def test_an_exponential_to_its_tail(tmp_path: Path, version: str) -> None:
+def test_an_exponential_to_its_tail(tmp_path, version):
     result = run(part("dahlquist", tmp_path, version), 0.1, 10.0)
     assert result["dahlquist.x"] == pytest.approx(np.exp(-result.time), rel=WITHIN, abs=0.0)
 
@@ -82,7 +79,7 @@ def test_an_exponential_to_its_tail(tmp_path: Path, version: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
 @pytest.mark.parametrize("name", ["bouncing_ball", "van_der_pol", "dahlquist"])
-def test_fmpy_gets_the_same(tmp_path: Path, name: str, version: str) -> None:
+def test_fmpy_gets_the_same(tmp_path, name, version):
     component = part(name, tmp_path, version)
     result = run(component, 0.1, 3.0)
     theirs = fmpy.simulate_fmu(
@@ -96,16 +93,14 @@ def test_fmpy_gets_the_same(tmp_path: Path, name: str, version: str) -> None:
 
 @pytest.mark.parametrize(("width", "step"), [(1.0, 0.2), (0.1, 0.01), (0.3, 0.1)])
 @versions
-def test_a_stair_has_its_steps_at_the_very_points(
-    tmp_path: Path, version: str, width: float, step: float
-) -> None:
+def test_a_stair_has_its_steps_at_the_very_points(tmp_path, version, width, step):
     """0.1 and 0.3 s are added up in the FMU, which is not exact; the points are."""
     result = run(part("stair", tmp_path, version, width=width, last=100), step, 30.0 * width)
     count = 1 + np.floor(result.time / width + 1e-9)
     assert result["stair.counter"].tolist() == count.tolist()
 
 
-def test_events_without_states(tmp_path: Path) -> None:
+def test_events_without_states(tmp_path):
     """Half waves of 1 Hz; the one that begins at 0 counts, too."""
     result = run(part("sine", tmp_path), 0.1, 3.0)
     count = 1 + np.floor(2.0 * result.time[1:] - 1e-9)
@@ -114,7 +109,7 @@ def test_events_without_states(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @versions
-def test_inputs_jump_at_communication_points(tmp_path: Path, version: str, engine: str) -> None:
+def test_inputs_jump_at_communication_points(tmp_path, version, engine):
     """The first one's state is the second one's input, and held over its steps."""
     fmu = build_model("dahlquist", tmp_path, version, EXCHANGE)
     parts = (Component("a", fmu, {"u": 0.0}), Component("b", fmu, {"k": 3.0}))
@@ -126,7 +121,7 @@ def test_inputs_jump_at_communication_points(tmp_path: Path, version: str, engin
     assert b == pytest.approx(held_input(3.0, 0.1, a, 1.0), rel=WITHIN)
 
 
-def test_events_of_the_system_tune_parameters_and_set_inputs(tmp_path: Path) -> None:
+def test_events_of_the_system_tune_parameters_and_set_inputs(tmp_path):
     """At 0.5 s x' = -x becomes x' = -4 x + 2."""
     component = part("dahlquist", tmp_path)
     event = Event({Port("dahlquist", "k"): 4.0, Port("dahlquist", "u"): 2.0}, 500_000_000)
@@ -139,14 +134,14 @@ def test_events_of_the_system_tune_parameters_and_set_inputs(tmp_path: Path) -> 
 
 
 @versions
-def test_values_of_all_types_arrive_in_event_mode(tmp_path: Path, version: str) -> None:
+def test_values_of_all_types_arrive_in_event_mode(tmp_path, version):
     """The FMU takes others than continuous ones there alone; they arrive one step later."""
     fmu = build_model("feedthrough", tmp_path, version, EXCHANGE)
     from_one = Component("a", fmu, {})
-    starts: dict[str, Value] = {}
+    starts = {}
     for v in from_one.interface.of("input"):
         if v.supported:
-            samples: dict[str, Value] = {"Boolean": True, "String": "text", "Real": 0.5}
+            samples = {"Boolean": True, "String": "text", "Real": 0.5}
             starts[v.name] = samples.get(v.kind, 2)
     ends = [v.name[2:] for v in from_one.interface.of("output") if v.supported]
     connections = tuple(Connection(Port("a", f"y_{n}"), Port("b", f"u_{n}")) for n in ends)
@@ -160,13 +155,13 @@ def test_values_of_all_types_arrive_in_event_mode(tmp_path: Path, version: str) 
 
 
 @pytest.mark.parametrize("sizes", [{}, {"m": 1, "n": 5, "r": 2}])
-def test_arrays_are_states_inputs_and_outputs(tmp_path: Path, sizes: dict[str, int]) -> None:
+def test_arrays_are_states_inputs_and_outputs(tmp_path, sizes):
     """Sized by structural parameters; as its own co-simulation, which is exact, has it."""
     found = []
     for kind in ("CoSimulation", "ModelExchange"):
         fmu = state_space(tmp_path, kind, kind=kind)
         n, m, r = (sizes.get(name, 3) for name in ("n", "m", "r"))
-        given: dict[str, Value] = {**sizes, "x0[2]": 2.0}
+        given = {**sizes, "x0[2]": 2.0}
         given |= {f"A[{i},{j}]": -1.0 / (i + j) for i in range(1, n + 1) for j in range(1, n + 1)}
         parts = (
             Component("a", fmu, {**given, **{f"u[{i}]": 0.1 * i for i in range(1, m + 1)}}),
@@ -188,9 +183,7 @@ ODDITIES = {"STEPS": 2, "ITERATES": 4}
 
 @pytest.mark.parametrize(("kind", "gain", "events"), [("STEPS", 1.0, 2), ("ITERATES", 3.0, 4)])
 @versions
-def test_events_after_a_step_and_iterations_of_one(
-    tmp_path: Path, version: str, kind: str, gain: float, events: int
-) -> None:
+def test_events_after_a_step_and_iterations_of_one(tmp_path, version, kind, gain, events):
     result = run(part("odd", tmp_path, version, kind=ODDITIES[kind]), 0.1, 1.0)
     assert result["odd.x"][-1] == pytest.approx(1.0 + gain, rel=1e-9)
     assert result["odd.events"][-1] == events
@@ -210,14 +203,14 @@ STUCK = {
 
 
 @pytest.mark.parametrize("kind", STUCK)
-def test_what_does_not_go_on_ends_in_one_line(tmp_path: Path, kind: int) -> None:
+def test_what_does_not_go_on_ends_in_one_line(tmp_path, kind):
     with pytest.raises(SimulationError, match=f"^odd: odd.fmu {STUCK[kind]}") as caught:
         run(part("odd", tmp_path, kind=kind), 0.1, 1.0)
     assert "\n" not in str(caught.value)
     assert caught.value.result is not None
 
 
-def test_a_ball_that_never_rests_ends_in_one_line(tmp_path: Path) -> None:
+def test_a_ball_that_never_rests_ends_in_one_line(tmp_path):
     """Where its bounces come together, at (1 + e) / (1 - e) times that of the first."""
     component = part("bouncing_ball", tmp_path, v_min=0.0)
     with pytest.raises(SimulationError, match="chatters, or does not come to rest") as caught:
@@ -227,9 +220,7 @@ def test_a_ball_that_never_rests_ends_in_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("engine", ENGINES)
-def test_the_bits_are_the_same_everywhere(
-    tmp_path: Path, isolation: Isolation, engine: str
-) -> None:
+def test_the_bits_are_the_same_everywhere(tmp_path, isolation, engine):
     """In both engines, in a process, in FMI 3.0, beside another instance."""
     here = run(part("bouncing_ball", tmp_path), 0.1, 1.0)
     fmu = build_model("bouncing_ball", tmp_path, "3.0", EXCHANGE, "other")
@@ -240,7 +231,7 @@ def test_the_bits_are_the_same_everywhere(
         assert result[name].tolist() == here["bouncing_ball.h"].tolist()
 
 
-def test_a_session_and_its_settings(tmp_path: Path) -> None:
+def test_a_session_and_its_settings(tmp_path):
     component = part("dahlquist", tmp_path)
     system = System("s", (component,), (), 100_000_000, 1_000_000_000, "sequential")
     with simulate.session(system) as session:
@@ -254,7 +245,7 @@ def test_a_session_and_its_settings(tmp_path: Path) -> None:
     assert settings["solver"]["relative_tolerance"] == 1e-10
 
 
-def test_a_solver_table_is_kept_to(tmp_path: Path) -> None:
+def test_a_solver_table_is_kept_to(tmp_path):
     """An FMU of both kinds runs co-simulation without one."""
     fmu = build_model("dahlquist", tmp_path)
     errors = []
@@ -268,6 +259,6 @@ def test_a_solver_table_is_kept_to(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="there is no /proc")
-def test_the_libraries_are_unloaded(tmp_path: Path) -> None:
+def test_the_libraries_are_unloaded(tmp_path):
     run(part("bouncing_ball", tmp_path), 0.1, 0.2)
     assert "bouncing_ball.so" not in Path("/proc/self/maps").read_text("utf-8")

@@ -2,7 +2,6 @@
 
 import sys
 from math import exp
-from pathlib import Path
 
 import fmpy
 import pytest
@@ -19,7 +18,7 @@ SOLVING = ("grasp_cosim.fmi.cvode", "grasp_cosim.fmi.model_exchange")
 @pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("name", MODELS)
-def test_is_valid(name: str, version: str, tmp_path: Path) -> None:
+def test_is_valid(name, version, tmp_path):
     assert validate_fmu(str(build_model(name, tmp_path, version))) == []
 
 
@@ -27,15 +26,13 @@ def test_is_valid(name: str, version: str, tmp_path: Path) -> None:
 @needs_cvode
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("version", VERSIONS)
-def test_either_kind_alone_runs_in_fmpy(version: str, kind: str, tmp_path: Path) -> None:
+def test_either_kind_alone_runs_in_fmpy(version, kind, tmp_path):
     fmu = build_model("dahlquist", tmp_path, version, [kind])
     run = fmpy.simulate_fmu(str(fmu), stop_time=1.0, relative_tolerance=1e-9)
     assert run["x"][-1] == pytest.approx(exp(-1.0), rel=1e-7)
 
 
-def test_without_cvode_it_is_refused_by_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_cvode_it_is_refused_by_name(tmp_path, monkeypatch, capsys):
     """FMPy has it for x86-64 Linux and Windows, and for Apple's ARM."""
     monkeypatch.setattr(fmpy, "platform_tuple", "riscv64-linux")
     for module in [m for m in sys.modules if m.startswith("fmpy.sundials") or m in SOLVING]:

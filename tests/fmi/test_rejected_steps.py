@@ -1,12 +1,9 @@
 """Whole runs in which a native FMU rejects steps, ends early or wants to end."""
 
-from pathlib import Path
-
 import pytest
 from fmi.instances import KINDS, real
 from grasp_cosim import SimulationError, System, simulate
-from grasp_cosim.master.engine import Engine
-from grasp_cosim.system.parts import Component, Connection, Isolation
+from grasp_cosim.system.parts import Component
 from support.both_engines import engines
 from support.native_fmus import CAPABLE, EARLY, TYPES, build, needs_gcc
 
@@ -19,22 +16,20 @@ both = pytest.mark.parametrize(("version", "isolation"), KINDS)
 STARTS = {"Boolean": False, "String": "", "Enumeration": 1}
 
 
-def alone(folder: Path, version: str, isolation: Isolation, **values: float) -> System:
+def alone(folder, version, isolation, **values):
     """A native FMU that integrates 2.0 for a second in steps of 0.1 s."""
     fmu = build(folder, version=version, capabilities=CAPABLE if version == "2.0" else EARLY)
     starts = {f"u_{t}": STARTS.get(t, 0) for t in TYPES[version]}
     given = {**starts, f"u_{real(version)}": 2.0, **values}
     component = Component("part", fmu, given, isolation=isolation)
-    connections: tuple[Connection, ...] = ()
+    connections = ()
     return System("alone", (component,), connections, 100_000_000, 1_000_000_000, "sequential")
 
 
 @both
 @engines
 @pytest.mark.parametrize("parameter", ["early_at", "discard_at"])
-def test_a_rejected_step_is_taken_in_parts(
-    tmp_path: Path, version: str, isolation: Isolation, engine: Engine, parameter: str
-) -> None:
+def test_a_rejected_step_is_taken_in_parts(tmp_path, version, isolation, engine, parameter):
     """The integral of a constant does not depend on how the step is divided."""
     result = simulate(alone(tmp_path, version, isolation, **{parameter: 0.35}), engine=engine)
     assert result.complete
@@ -47,9 +42,7 @@ def test_a_rejected_step_is_taken_in_parts(
 
 @both
 @engines
-def test_a_wish_to_end_ends_the_run_in_good_order(
-    tmp_path: Path, version: str, isolation: Isolation, engine: Engine
-) -> None:
+def test_a_wish_to_end_ends_the_run_in_good_order(tmp_path, version, isolation, engine):
     """The last row is that of the communication point behind it."""
     result = simulate(alone(tmp_path, version, isolation, terminate_at=0.35), engine=engine)
     assert result.complete
@@ -61,7 +54,7 @@ def test_a_wish_to_end_ends_the_run_in_good_order(
     assert not result.rejections
 
 
-def test_a_wish_to_end_in_a_part_of_a_step(tmp_path: Path) -> None:
+def test_a_wish_to_end_in_a_part_of_a_step(tmp_path):
     result = simulate(alone(tmp_path, "2.0", "none", early_at=0.32, terminate_at=0.37))
     assert result.complete
     assert result["part.x"][-1] == pytest.approx(0.74, rel=1e-13)
@@ -69,7 +62,7 @@ def test_a_wish_to_end_in_a_part_of_a_step(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_a_step_that_must_not_vary_ends_the_run(tmp_path: Path, version: str) -> None:
+def test_a_step_that_must_not_vary_ends_the_run(tmp_path, version):
     system = alone(tmp_path, version, "none", discard_at=0.35)
     build(tmp_path, version=version, capabilities={})
     with pytest.raises(SimulationError, match=DISCARDED):
@@ -77,9 +70,7 @@ def test_a_step_that_must_not_vary_ends_the_run(tmp_path: Path, version: str) ->
 
 
 @both
-def test_a_step_that_no_part_of_can_be_taken_ends_the_run(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_a_step_that_no_part_of_can_be_taken_ends_the_run(tmp_path, version, isolation):
     """A step is halved at most ten times; so close to its start none of them is short enough."""
     system = alone(tmp_path, version, isolation, discard_at=0.3 + 1e-6)
     with pytest.raises(SimulationError, match=DISCARDED) as caught:

@@ -2,7 +2,6 @@
 
 import os
 import tempfile
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -11,17 +10,15 @@ from fmi.instances import Bound, variable
 from grasp_cosim import InputError, SimulationError
 from grasp_cosim.fmi.fmi2 import SharedInstance
 from grasp_cosim.fmi.instance import ERROR, OK
-from grasp_cosim.fmi.loaded import LoadedInstance
 from grasp_cosim.fmi.make_instance import load
-from grasp_cosim.interface.interface import Value
-from grasp_cosim.system.parts import Component, Isolation
+from grasp_cosim.system.parts import Component
 from support.native_fmus import build, needs_gcc
 
 pytestmark = needs_gcc
 
 
 @contextmanager
-def shared(fmu: Path, name: str, **values: Value) -> Iterator[LoadedInstance]:
+def shared(fmu, name, **values):
     instance = load(Component(name, fmu, {}, native=fmu))
     assert isinstance(instance, SharedInstance)
     try:
@@ -32,7 +29,7 @@ def shared(fmu: Path, name: str, **values: Value) -> Iterator[LoadedInstance]:
         instance.close()
 
 
-def steps(instance: LoadedInstance, count: int) -> float:
+def steps(instance, count):
     bound = Bound(instance, 1.0)
     for k in range(count):
         bound.clock[0] = float(k)
@@ -42,16 +39,14 @@ def steps(instance: LoadedInstance, count: int) -> float:
     return x
 
 
-def test_two_at_once_have_values_of_their_own(tmp_path: Path) -> None:
+def test_two_at_once_have_values_of_their_own(tmp_path):
     fmu = build(tmp_path, version="2.0")
     with shared(fmu, "a", u_Real=1.0) as a, shared(fmu, "b", u_Real=10.0, gain=2.0) as b:
         assert (steps(a, 3), steps(b, 2)) == (3.0, 40.0)
         assert a._slave.component != b._slave.component
 
 
-def test_one_after_the_other_starts_anew_from_the_same_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_after_the_other_starts_anew_from_the_same_files(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     fmu = build(tmp_path, version="2.0")
     extracted = []
@@ -63,7 +58,7 @@ def test_one_after_the_other_starts_anew_from_the_same_files(
     assert [f.name for f in tmp_path.iterdir() if f.is_dir()] == [Path(extracted[0]).name]
 
 
-def test_what_one_logs_is_of_that_one(tmp_path: Path) -> None:
+def test_what_one_logs_is_of_that_one(tmp_path):
     fmu = build(tmp_path, version="2.0")
     with shared(fmu, "a", error_at=0.5) as a, shared(fmu, "b") as b:
         assert Bound(a, 1.0).step() == ERROR
@@ -73,7 +68,7 @@ def test_what_one_logs_is_of_that_one(tmp_path: Path) -> None:
     assert str(error).startswith("a: native.fmu returned error at t = 0 s: ")
 
 
-def test_a_refusal_leaves_the_library_to_the_others(tmp_path: Path) -> None:
+def test_a_refusal_leaves_the_library_to_the_others(tmp_path):
     fmu = build(tmp_path, version="2.0")
     refused = pytest.raises(InputError, match=r"a: native\.fmu refused .*gain must be >= 0")
     with refused, shared(fmu, "a", gain=-1.0):
@@ -82,7 +77,7 @@ def test_a_refusal_leaves_the_library_to_the_others(tmp_path: Path) -> None:
         assert steps(a, 1) == 1.0
 
 
-def test_an_fmu_that_was_built_anew_is_loaded_anew(tmp_path: Path) -> None:
+def test_an_fmu_that_was_built_anew_is_loaded_anew(tmp_path):
     with shared(build(tmp_path, version="2.0"), "a") as a:
         before = a._slave.unzipDirectory
     fmu = build(tmp_path, version="2.0")
@@ -91,8 +86,8 @@ def test_an_fmu_that_was_built_anew_is_loaded_anew(tmp_path: Path) -> None:
         assert a._slave.unzipDirectory != before
 
 
-def test_in_a_process_of_its_own_and_of_fmi_3_it_is_loaded_as_any_other(tmp_path: Path) -> None:
-    kinds: list[tuple[str, Isolation]] = [("2.0", "process"), ("3.0", "none")]
+def test_in_a_process_of_its_own_and_of_fmi_3_it_is_loaded_as_any_other(tmp_path):
+    kinds = [("2.0", "process"), ("3.0", "none")]
     for version, isolation in kinds:
         fmu = build(tmp_path, version=version)
         instance = load(Component("a", fmu, {}, isolation=isolation, native=fmu))

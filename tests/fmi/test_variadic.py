@@ -3,7 +3,6 @@
 import ctypes
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from grasp_cosim.fmi.variadic import CONVENTION, formatted, logger_type
@@ -41,13 +40,11 @@ void say(logger log) {
 """
 
 
-def said(library: ctypes.CDLL) -> tuple[list[bytes], list[bytes]]:
+def said(library):
     """What the logger made of all that is said, and what C's own printf did."""
-    found: list[bytes] = []
+    found = []
 
-    def log(
-        environment: None, name: bytes, status: int, why: bytes, form: bytes, *passed: float
-    ) -> None:
+    def log(environment, name, status, why, form, *passed):
         assert (environment, name, status, why) == (None, b"part", 3, b"why")
         found.append(formatted(form, passed))
 
@@ -60,7 +57,7 @@ def said(library: ctypes.CDLL) -> tuple[list[bytes], list[bytes]]:
 @needs_gcc
 @here
 @pytest.mark.parametrize("level", ["-O0", "-O2"])
-def test_arguments_are_printed_as_by_c(tmp_path: Path, level: str) -> None:
+def test_arguments_are_printed_as_by_c(tmp_path, level):
     file = tmp_path / "say.so"
     file.write_bytes(shared_library(code=C, options=(level,)))
     found, wanted = said(ctypes.CDLL(str(file)))
@@ -72,22 +69,22 @@ def test_arguments_are_printed_as_by_c(tmp_path: Path, level: str) -> None:
 @needs_gcc
 @here
 @pytest.mark.parametrize("form", ["%Lf, %d", "%.3Lg", "%d " * 33])
-def test_what_cannot_be_told_stays_as_it_comes(tmp_path: Path, form: str) -> None:
+def test_what_cannot_be_told_stays_as_it_comes(tmp_path, form):
     begin, end = C.split("    SAY", 1)[0], f'log(0, "part", 3, "why", "{form}", 1.0L, 5); }}'
     file = tmp_path / "say.so"
     file.write_bytes(shared_library(code=begin + end))
     assert said(ctypes.CDLL(str(file)))[0] == [form.encode()]
 
 
-def test_on_another_processor_all_stay_as_they_come() -> None:
-    heard: list[tuple[object, ...]] = []
+def test_on_another_processor_all_stay_as_they_come():
+    heard = []
     logger = logger_type(None)(lambda *arguments: heard.append(arguments))
     logger(None, b"part", 3, b"why", b"the %s is broken")
     assert heard == [(None, b"part", 3, b"why", b"the %s is broken")]
     assert formatted(b"the %s is broken", (), None) == b"the %s is broken"
 
 
-def test_fmpys_own_logger_is_not_used_and_what_it_prints_is_not_seen() -> None:
+def test_fmpys_own_logger_is_not_used_and_what_it_prints_is_not_seen():
     """Where FMPy has none for a processor, it says so on standard output."""
     code = """
 import sys, types

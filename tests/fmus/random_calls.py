@@ -17,11 +17,10 @@ import os
 import sys
 import time
 from collections import Counter, deque
-from collections.abc import Callable
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from random import Random
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 from support.fmi2 import OK, Fmu, Instance
@@ -45,10 +44,10 @@ Limited = tuple[int, float, float]
 """A reference with the limits of its variable, nan where there are none."""
 
 
-def variables(fmu: Fmu) -> dict[str, list[Limited]]:
+def variables(fmu):
     """Those of an FMU by the names of the functions that get and set them."""
     root = ElementTree.parse(fmu.folder / "modelDescription.xml").getroot()
-    found: dict[str, list[Limited]] = {}
+    found = {}
     for v in root.findall("ModelVariables/*"):
         name, says = v.get("name", ""), v[0] if fmu.fmi == 2 else v
         if name in fmu.references and name not in LEFT_ALONE:  # and not the time of FMI 3.0
@@ -69,18 +68,18 @@ class State(NamedTuple):
 class Caller:
     """Calls the functions of one FMU at random."""
 
-    def __init__(self, fmu: Fmu, random: Random, folder: Path, shared: list[State]) -> None:
+    def __init__(self, fmu, random, folder, shared):
         self.fmu, self.random, self.shared = fmu, random, shared
         self.variables = variables(fmu)
-        self.calls: Counter[str] = Counter()
+        self.calls = Counter()
         self.longest = (0.0, "")
         self.last = (folder / "last").open("wb")
-        self.bytes: deque[bytes] = deque(maxlen=KEPT)
+        self.bytes = deque(maxlen=KEPT)
         self.is_proxy = WAITS[0] in fmu.references
         self.instances = [self.made() for _ in range(1 if self.is_proxy else INSTANCES)]
         self.times = [0.0] * len(self.instances)
 
-    def run(self, calls: int) -> None:
+    def run(self, calls):
         """Make so many calls."""
         for _ in range(calls):
             self.at = self.random.randrange(len(self.instances))
@@ -88,7 +87,7 @@ class Caller:
             self.instance.log.clear()
             self.random.choice(ACTIONS)(self)
 
-    def end(self) -> None:
+    def end(self):
         """Free all that there is."""
         for state in [s for s in self.shared if s.maker is self]:
             self.free(state)
@@ -96,13 +95,13 @@ class Caller:
             self.call("FreeInstance", on=instance)
         self.last.close()
 
-    def made(self) -> Instance:
+    def made(self):
         instance = Instance(self.fmu, "any")
         if self.is_proxy:
             assert instance.set(dict.fromkeys(WAITS, 0.1)) == OK
         return instance
 
-    def call(self, name: str, *arguments: Any, on: Instance | None = None) -> int:
+    def call(self, name, *arguments, on=None):
         said = f"{self.fmu.name} {name} {arguments}"[:200]
         os.pwrite(self.last.fileno(), f"{said:200}\n".encode(), 0)  # to truncate it takes longer
         began = time.thread_time()
@@ -114,13 +113,13 @@ class Caller:
 
     # What the arguments are
 
-    def number(self) -> float:
+    def number(self):
         r = self.random
         sign = r.choice((1.0, -1.0))
         powers = 10.0 ** r.uniform(-300.0, 300.0)
         return sign * float(r.choice((r.choice(SPECIAL), r.uniform(0.0, 1.0), powers)))
 
-    def value(self, low: float, high: float) -> float:
+    def value(self, low, high):
         """One that a variable with these limits may have, often at its limits."""
         r = self.random
         if not low < high or r.random() < 0.1:
@@ -128,7 +127,7 @@ class Caller:
         far = r.choice((0.0, 10.0 ** r.uniform(-9.0, 0.0))) * (high - low)
         return float(r.choice((low + far, high - far)))
 
-    def drawn(self, kind: str) -> tuple[Any, c_size_t, list[Limited]]:
+    def drawn(self, kind):
         """References of a type, mostly; some of another, and some that there are none of."""
         r, found = self.random, []
         for _ in range(r.choice((0, 1, 1, 1, 2, 5))):
@@ -142,13 +141,13 @@ class Caller:
 
     # What is called
 
-    def set_up(self) -> None:
+    def set_up(self):
         start = self.number() if self.random.random() < 0.3 else 0.0
         any_ = c_double(self.number())
         if self.call("SetupExperiment", 1, any_, c_double(start), 1, any_) == OK:
             self.times[self.at] = start
 
-    def start(self) -> None:
+    def start(self):
         """In order, so that there are instances that step."""
         if self.call("Reset") == OK:
             self.times[self.at] = 0.0
@@ -161,22 +160,21 @@ class Caller:
         self.call("EnterInitializationMode")
         self.call("ExitInitializationMode")
 
-    def anew(self) -> None:
+    def anew(self):
         if self.random.random() < 0.1:
             for state in [s for s in self.shared if s.owner is self.instance]:
                 self.free(state)
             self.call("FreeInstance")
             self.instances[self.at], self.times[self.at] = self.made(), 0.0
 
-    def step(self) -> None:
+    def step(self):
         size = self.random.choice((1e-4, 1e-3, 1e-2, 0.1, abs(self.number()), self.number()))
         begin = self.times[self.at] if self.random.random() < 0.9 else self.number()
         if self.call("DoStep", c_double(begin), c_double(size), 1) == OK:
             self.times[self.at] = begin + size
 
-    def set(self, kind: str) -> None:
+    def set(self, kind):
         vector, n, chosen = self.drawn(kind)
-        values: Any
         if kind == "Real":
             values = (c_double * n.value)(*(self.value(low, high) for _, low, high in chosen))
         elif kind == "String":
@@ -186,13 +184,13 @@ class Caller:
             values = (c_int * n.value)(*(self.random.choice(whole) for _ in chosen))
         self.call(f"Set{kind}", vector, n, values)
 
-    def get(self) -> None:
+    def get(self):
         kind = self.random.choice(("Real", "Real", "Integer", "Boolean", "String"))
         element = {"Real": c_double, "String": c_char_p}.get(kind, c_int)
         vector, n, _ = self.drawn(kind)
         self.call(f"Get{kind}", vector, n, (element * n.value)())
 
-    def keep(self, function: str, *arguments: Any) -> None:
+    def keep(self, function, *arguments):
         """Keep the state that it makes; the oldest goes, freed by the instance that made it."""
         pointer = c_void_p()
         if self.call(function, *arguments, byref(pointer)) == OK:
@@ -201,17 +199,17 @@ class Caller:
             if len(own) > KEPT:
                 self.free(own[0])
 
-    def free(self, state: State) -> None:
+    def free(self, state):
         self.shared.remove(state)
         self.call("FreeFMUstate", byref(state.pointer), on=state.owner)
 
-    def restore(self) -> None:
+    def restore(self):
         if self.shared:
             state = self.random.choice(self.shared)
             if self.call("SetFMUstate", state.pointer) == OK:
                 self.times[self.at] = state.time
 
-    def serialise(self) -> None:
+    def serialise(self):
         if self.shared:
             pointer, size = self.random.choice(self.shared).pointer, c_size_t()
             if self.call("SerializedFMUstateSize", pointer, byref(size)) == OK:
@@ -219,7 +217,7 @@ class Caller:
                 if self.call("SerializeFMUstate", pointer, buffer, size) == OK:
                     self.bytes.append(buffer.raw)
 
-    def deserialise(self) -> None:
+    def deserialise(self):
         """From bytes that are as they were, cut, longer, or with another number in them."""
         r = self.random
         data = bytearray(r.choice(self.bytes) if self.bytes else r.randbytes(r.choice((0, 7, 300))))
@@ -235,7 +233,7 @@ class Caller:
         buffer = (ctypes.c_char * max(1, len(data))).from_buffer_copy(bytes(data) or b"\0")
         self.keep("DeSerializeFMUstate", buffer, c_size_t(len(data)))
 
-    def other(self) -> None:
+    def other(self):
         """What a slave of ours does not have, and switches."""
         vector, n, _ = self.drawn("Real")
         numbers = (c_double * n.value)()
@@ -245,11 +243,11 @@ class Caller:
             self.call("GetDirectionalDerivative", vector, n, vector, n, numbers, numbers)
 
 
-def seldom(call: Callable[[Caller], object]) -> Callable[[Caller], object]:
+def seldom(call):
     return lambda caller: caller.random.random() < 0.2 and call(caller)
 
 
-ACTIONS: tuple[Callable[[Caller], object], ...] = (
+ACTIONS = (
     Caller.set_up, Caller.start, Caller.anew, Caller.get, Caller.get, Caller.other,
     *(Caller.step,) * 6,
     *(lambda c: c.set("Real"),) * 4,
@@ -261,11 +259,11 @@ ACTIONS: tuple[Callable[[Caller], object], ...] = (
 )  # fmt: skip
 
 
-def main(folder: str, first: str, seeds: str, calls: str, *fmus: str) -> None:
+def main(folder, first, seeds, calls, *fmus):
     loaded = [Fmu(Path(fmu), Path(folder, Path(fmu).stem)) for fmu in fmus]
     longest, done, memory = (0.0, ""), Counter[str](), []
     for seed in range(int(first), int(first) + int(seeds)):
-        shared: list[State] = []
+        shared = []
         callers = [
             Caller(fmu, Random(f"{seed} {fmu.name}"), Path(folder), shared) for fmu in loaded
         ]

@@ -58,9 +58,9 @@ CASES = {
 }
 
 
-def flat(values: Any) -> dict[str, float]:
+def flat(values):
     """A NamedTuple by the names of FMI variables."""
-    named: dict[str, float] = {}
+    named = {}
     for field, value in values._asdict().items():
         if isinstance(value, tuple):
             named |= {f"{field}[{i + 1}]": float(v) for i, v in enumerate(value)}
@@ -69,7 +69,7 @@ def flat(values: Any) -> dict[str, float]:
     return named
 
 
-def without_fmu(case: Case) -> dict[str, list[str]]:
+def without_fmu(case):
     """The outputs of the block after each step, every bit of them."""
     block, u = case
     params = block.Params()
@@ -83,7 +83,7 @@ def without_fmu(case: Case) -> dict[str, list[str]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", [VERSIONS[0], *map(slow, VERSIONS[1:])])
-def test_runs_where_nothing_is_installed(fmus: Path, tmp_path: Path, version: str) -> None:
+def test_runs_where_nothing_is_installed(fmus, tmp_path, version):
     """Bit for bit what the block gives, in every version the same."""
     venv = tmp_path / "venv"
     create = [python(version), "-m", "venv", "--without-pip", str(venv)]

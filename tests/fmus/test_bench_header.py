@@ -11,13 +11,12 @@ from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from select import select
-from typing import IO, Any, NamedTuple
+from typing import NamedTuple
 
 import pytest
-from conftest import MadeOnce
 from grasp_cosim.hil.driven import MOST_LOST
 from grasp_fmus.bench_header import bench_header, c_prefix
-from grasp_fmus.contract import Field, declared
+from grasp_fmus.contract import declared
 from grasp_fmus.link.message import (
     BUSY,
     END,
@@ -37,10 +36,9 @@ from grasp_fmus.link.message import (
     Codec,
     Message,
     Sealer,
-    Value,
 )
 from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
-from grasp_fmus.link.signature import Causality, Kind, LinkVariable, Signature
+from grasp_fmus.link.signature import LinkVariable, Signature
 from gripper_plant import rigid
 from support import compiled
 from support.proxies import HandProxy, RefusedError
@@ -67,11 +65,11 @@ RECORD = struct.Struct("=dddIIII")
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc: nothing to compile with")
 
 
-def variables(causality: Causality, prefix: str, *kinds: Kind) -> list[LinkVariable]:
+def variables(causality, prefix, *kinds):
     return [LinkVariable(f"{prefix}.{kind.lower()}", kind, causality) for kind in kinds]
 
 
-IN_ORDER: tuple[Kind, ...] = ("Real", "Integer", "Boolean")
+IN_ORDER = ("Real", "Integer", "Boolean")
 EVERY_KIND = Signature(
     (
         *variables("input", "u", *IN_ORDER),
@@ -82,9 +80,9 @@ EVERY_KIND = Signature(
 )
 
 
-def plant() -> tuple[Signature, dict[str, Value]]:
+def plant():
     """The gripper plant's variables and their start values."""
-    listed: list[tuple[Field, str, Value | None]] = [
+    listed = [
         (f, name, start)
         for f in declared(rigid)
         for name, start in zip(f.names, f.starts, strict=True)
@@ -97,9 +95,7 @@ def plant() -> tuple[Signature, dict[str, Value]]:
     ), {name: start for _, name, start in listed if start is not None}
 
 
-def compile_c(
-    folder: Path, header: str, name: str, source: str | Path, *options: str | Path
-) -> Path:
+def compile_c(folder, header, name, source, *options):
     """A program from a source, a file or text, that includes the header of that name."""
     (folder / f"{c_prefix(name)}.h").write_text(header, "ascii")
     if isinstance(source, str):
@@ -109,24 +105,24 @@ def compile_c(
 
 
 @pytest.fixture(scope="session")
-def driver(made_once: MadeOnce) -> Path:
+def driver(made_once):
     """The header for every kind behind a pipe, with all the compiler can check at run time."""
 
-    def fill(folder: Path) -> None:
+    def fill(folder):
         header = bench_header("EveryKind", EVERY_KIND)
         compile_c(folder, header, "EveryKind", NATIVE / "link_driver.c", *SANITISED)
 
     return made_once("driver", fill) / "program"
 
 
-def driven(driver: Path, *words: str, pipe: bytes = b"") -> bytes:
+def driven(driver, *words, pipe=b""):
     """What the driver writes."""
     done = subprocess.run([driver, *words], input=pipe, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
     return done.stdout
 
 
-def sized(data: bytes) -> bytes:
+def sized(data):
     return struct.pack("=I", len(data)) + data
 
 
@@ -135,7 +131,7 @@ def sized(data: bytes) -> bytes:
 
 @pytest.mark.parametrize("define", [[], ["-DGRIPPER_PLANT_EXAMPLE_MAIN"]])
 @pytest.mark.parametrize("optimise", ["-O0", slow("-O3")])
-def test_without_a_warning(tmp_path: Path, define: list[str], optimise: str) -> None:
+def test_without_a_warning(tmp_path, define, optimise):
     compile_c(
         tmp_path, bench_header("GripperPlant", *plant()), "GripperPlant",
         '#include "gripper_plant.h"\nint nothing(void);\nint nothing(void) { return 0; }\n',
@@ -144,7 +140,7 @@ def test_without_a_warning(tmp_path: Path, define: list[str], optimise: str) -> 
 
 
 @pytest.mark.skipif(not shutil.which("g++"), reason="NO g++")
-def test_in_cpp_and_beside_another(tmp_path: Path) -> None:
+def test_in_cpp_and_beside_another(tmp_path):
     (tmp_path / "a.h").write_text(bench_header("GripperPlant", *plant()))
     (tmp_path / "b.h").write_text(bench_header("EveryKind", EVERY_KIND))
     source = tmp_path / "both.cpp"
@@ -152,7 +148,7 @@ def test_in_cpp_and_beside_another(tmp_path: Path) -> None:
     subprocess.run(["g++", "-std=c++11", *STRICT, "-c", source, "-o", tmp_path / "o"], check=True)
 
 
-def test_no_more_of_a_library_than_a_target_has() -> None:
+def test_no_more_of_a_library_than_a_target_has():
     library, _, _ = bench_header("GripperPlant", *plant()).partition("#ifdef GRIPPER_PLANT_EXAMPLE")
     included = {line for line in library.splitlines() if line.startswith("#include")}
     assert included == {f"#include <std{n}.h>" for n in ("bool", "def", "int")} | {
@@ -167,7 +163,7 @@ AWKWARD = (
 )  # fmt: skip
 
 
-def test_any_name(tmp_path: Path) -> None:
+def test_any_name(tmp_path):
     signature = Signature(
         tuple(
             LinkVariable(f"{name}{c[0] * (c == 'output')}", kind, c, "*/ ?")
@@ -190,7 +186,7 @@ def test_any_name(tmp_path: Path) -> None:
     assert done.stdout == signature.hash + signature.text.encode()
 
 
-def test_members_by_the_variables_names() -> None:
+def test_members_by_the_variables_names():
     inputs = [LinkVariable(name, "Real", "input") for name in AWKWARD]
     header = bench_header("M", Signature(tuple(inputs)))
     struct_text = header.partition("typedef struct {")[2].partition("}")[0]
@@ -208,25 +204,25 @@ def test_members_by_the_variables_names() -> None:
         ("3D", "model_3_d"), ("模型", "model"), ("already_snake", "already_snake"),
     ],
 )  # fmt: skip
-def test_prefix(name: str, prefix: str) -> None:
+def test_prefix(name, prefix):
     assert c_prefix(name) == prefix
 
 
 @pytest.mark.parametrize("which", ["input", "parameter", "output", "nothing"])
-def test_a_model_with_one_side_only(tmp_path: Path, which: Causality) -> None:
+def test_a_model_with_one_side_only(tmp_path, which):
     signature = Signature(tuple(v for v in EVERY_KIND.variables if v.causality == which))
     compile_c(
         tmp_path, bench_header("M", signature), "M", '#include "m.h"\nint main(void) {return 0;}'
     )
 
 
-STARTS: dict[str, Value] = {
+STARTS = {
     "u.real": 0.1, "u.integer": -(2**31), "u.boolean": True, "p.real": -5e-324,
     "p.integer": 2**31 - 1, "y.real": 4.0,
 }  # fmt: skip
 
 
-def test_start_values(tmp_path: Path) -> None:
+def test_start_values(tmp_path):
     source = """#include "every_kind.h"
         #include <stdio.h>
         int main(void) {
@@ -251,7 +247,7 @@ def test_start_values(tmp_path: Path) -> None:
         ("u.integer", 0.5, "Integer"), ("p.boolean", 2, "Boolean"),
     ],
 )  # fmt: skip
-def test_a_start_value_that_is_none(name: str, value: Value, kind: str) -> None:
+def test_a_start_value_that_is_none(name, value, kind):
     with pytest.raises(ValueError, match=rf"^{name} = .*{kind}") as error:
         bench_header("EveryKind", EVERY_KIND, {name: value})
     assert "\n" not in str(error.value)
@@ -264,7 +260,7 @@ def test_a_start_value_that_is_none(name: str, value: Value, kind: str) -> None:
     ("key", "size"),
     [(16, 0), (63, 55), (64, 56), (65, 64), (20, 119), (131, 152), (16, 120), (64, 65_000)],
 )
-def test_sha256_and_hmac(driver: Path, key: int, size: int) -> None:
+def test_sha256_and_hmac(driver, key, size):
     drawn = random.Random(size)
     secret, data = drawn.randbytes(key), drawn.randbytes(size)
     expected = sha256(data).digest() + hmac.digest(secret, data, "sha256")
@@ -283,9 +279,7 @@ class Record(NamedTuple):
     answer: bytes
 
 
-def linked(
-    driver: Path, received: list[tuple[int, bytes]], key: bytes | None = None
-) -> tuple[list[Record], PeerCounters]:
+def linked(driver, received, key=None):
     """What the driver does with datagrams at times in ns, and what it counts."""
     pipe = b"".join(struct.pack("=q", now) + sized(datagram) for now, datagram in received)
     out = driven(driver, "link", key.decode() if key else "-", pipe=pipe)
@@ -298,7 +292,7 @@ def linked(
     return records, PeerCounters(*struct.unpack(f"={len(fields(PeerCounters))}Q", out))
 
 
-def computed(values: list[Value]) -> list[Value]:
+def computed(values):
     """The outputs of the driver's model."""
     real, integer, boolean, p_boolean, p_integer, p_real = map(float, values)
     return [
@@ -309,10 +303,10 @@ def computed(values: list[Value]) -> list[Value]:
 class Reference:
     """What the driver must do, by link/peer.py."""
 
-    def __init__(self, key: bytes | None = None) -> None:
+    def __init__(self, key=None):
         self.peer = Peer(EVERY_KIND, key, RANDOM)
 
-    def receive(self, datagram: bytes, now: int) -> tuple[int, bytes]:
+    def receive(self, datagram, now):
         """Event and answer."""
         action = self.peer.receive(datagram, now)
         if isinstance(action, Request):
@@ -320,7 +314,7 @@ class Reference:
             return event, b"" if event == ENDED else self._answer(action)
         return (SEND, action) if action else (NOTHING, b"")
 
-    def _answer(self, request: Request) -> bytes:
+    def _answer(self, request):
         if request.values[4] == SILENT:
             return b""
         if request.values[4] == FAIL:
@@ -328,32 +322,32 @@ class Reference:
         return self.peer.outputs(computed(request.values), request.time + request.step)
 
 
-VALUES: list[Value] = [0.5, 3, True, False, -7, 1e-300]
+VALUES = [0.5, 3, True, False, -7, 1e-300]
 REALS = (0.0, -0.0, 1.0, -1 / 3, 5e-324, 1.7976931348623157e308, 2.2250738585072014e-308)
 
 
-def drawn_values(rng: random.Random) -> list[Value]:
-    def real() -> float:
+def drawn_values(rng):
+    def real():
         [value] = struct.unpack("<d", rng.randbytes(8))
         return rng.choice((*REALS, value)) if abs(value) <= REALS[5] else rng.choice(REALS)
 
-    def integer() -> int:
+    def integer():
         return rng.choice((0, -1, 2**31 - 1, -(2**31), rng.randrange(-(2**31), 2**31)))
 
-    def boolean() -> bool:
+    def boolean():
         return rng.random() < 0.5
 
     return [real(), integer(), boolean(), boolean(), integer(), real()]
 
 
-def session(number: int = 99, key: bytes | None = None) -> HandProxy:
+def session(number=99, key=None):
     """A proxy whose datagrams are handed over by the test."""
     proxy = HandProxy(EVERY_KIND, lambda _: None, key)
     proxy.hello(number)
     return proxy
 
 
-def known(number: int = 99, begun: int = 0) -> HandProxy:
+def known(number=99, begun=0):
     """One with its cookie, where so many sessions have begun."""
     proxy = session(number)
     numbers = number.to_bytes(8, "little") + begun.to_bytes(8, "little")
@@ -362,11 +356,11 @@ def known(number: int = 99, begun: int = 0) -> HandProxy:
     return proxy
 
 
-def initialise(proxy: HandProxy, time: float = 0.0) -> bytes:
+def initialise(proxy, time=0.0):
     return proxy.request(INITIALISE, time, VALUES)
 
 
-def step(proxy: HandProxy, time: float, size: float = 0.5) -> bytes:
+def step(proxy, time, size=0.5):
     return proxy.request(STEP, time, VALUES, size)
 
 
@@ -383,7 +377,7 @@ INVALID = {
 
 
 @pytest.mark.parametrize("what", INVALID)
-def test_no_value_is_taken_from_what_is_malformed(driver: Path, what: str) -> None:
+def test_no_value_is_taken_from_what_is_malformed(driver, what):
     proxy, (place, value) = known(), INVALID[what]
     received = [initialise(proxy), step(proxy, 0.0)]
     body = bytearray(Codec(EVERY_KIND.request).pack(*VALUES))
@@ -396,7 +390,7 @@ def test_no_value_is_taken_from_what_is_malformed(driver: Path, what: str) -> No
 
 
 @pytest.mark.parametrize("version", [1, 3, 65535])
-def test_another_version_is_refused_by_its_name(driver: Path, version: int) -> None:
+def test_another_version_is_refused_by_its_name(driver, version):
     """By both peers, in a REFUSE that any version reads; nothing else of it is looked at."""
     received = [session().pack(kind, cookie=7, version=version) for kind in (HELLO, STEP, END)]
     reference = Reference()
@@ -410,7 +404,7 @@ def test_another_version_is_refused_by_its_name(driver: Path, version: int) -> N
     assert counters == reference.peer.counters == PeerCounters(other_version=3)
 
 
-def test_another_interface_is_named(driver: Path) -> None:
+def test_another_interface_is_named(driver):
     lines = EVERY_KIND.text.encode().splitlines(keepends=True)
     others = [
         b"".join(lines[:3]), b"".join([*lines, b"output\tReal\tm\tz\n"]), b"", b"\n",
@@ -431,7 +425,7 @@ def test_another_interface_is_named(driver: Path) -> None:
     assert counters.foreign == len(others)
 
 
-def test_lost_requests_are_told(driver: Path) -> None:
+def test_lost_requests_are_told(driver):
     proxy = known()
     received = [initialise(proxy, 2.0), step(proxy, 2.0, 0.25)]
     step(proxy, 2.25)
@@ -443,7 +437,7 @@ def test_lost_requests_are_told(driver: Path) -> None:
     assert [r.fresh for r in records[:2]] == [True, False]
 
 
-def test_the_watchdog_is_fed_by_new_requests_alone(driver: Path) -> None:
+def test_the_watchdog_is_fed_by_new_requests_alone(driver):
     """A recorded one, sent again and again, does not keep the inputs from being made safe."""
     proxy = known()
     first, second = initialise(proxy), step(proxy, 0.0)
@@ -453,7 +447,7 @@ def test_the_watchdog_is_fed_by_new_requests_alone(driver: Path) -> None:
     assert [r.alive for r in records] == [True, False, True, False, False, True, False]
 
 
-def test_of_two_that_were_greeted_the_later_one_waits_and_is_greeted_anew(driver: Path) -> None:
+def test_of_two_that_were_greeted_the_later_one_waits_and_is_greeted_anew(driver):
     one, other, again = known(1), known(2), known(2, begun=1)
     at = [(0, initialise(one)), (0, initialise(other)), (ALIVE - 1, initialise(other))]
     at += [(ALIVE, initialise(other)), (ALIVE, initialise(again)), (ALIVE, step(one, 0.0))]
@@ -464,7 +458,7 @@ def test_of_two_that_were_greeted_the_later_one_waits_and_is_greeted_anew(driver
     assert counters == PeerCounters(initialisations=2, busy=2, foreign=2)
 
 
-def test_outputs_that_are_none_fail_and_are_named(tmp_path: Path) -> None:
+def test_outputs_that_are_none_fail_and_are_named(tmp_path):
     outputs = [LinkVariable(n, "Real", "output", "N") for n in ("y[1]", "µ")]
     source = """#include "m.h"
         #include <stdio.h>
@@ -496,13 +490,13 @@ STEPS = (*(0.1, 1e-3, 1e-9, 0.0, -1.0) * 4, LONGEST_STEP, 1e300)
 class Proxies:
     """Some proxies at one peer, whose requests come in disorder, again, or damaged."""
 
-    def __init__(self, rng: random.Random, key: bytes | None) -> None:
+    def __init__(self, rng, key):
         self.rng, self.key = rng, key
         self.sessions = [session(i, key) for i in range(4)]
-        self.sent: list[bytes] = [self.sessions[0].hello(0)]
+        self.sent = [self.sessions[0].hello(0)]
         self.turn = self.sessions[0]
 
-    def request(self) -> bytes:
+    def request(self):
         """The next datagram."""
         rng = self.rng
         if rng.random() < 0.02:
@@ -513,7 +507,7 @@ class Proxies:
         self.sent.append(datagram)
         return self._damaged(datagram) if rng.random() < 0.15 else datagram
 
-    def _drawn(self, s: HandProxy) -> bytes:
+    def _drawn(self, s):
         rng = self.rng
         chosen = rng.random()
         if chosen < 0.04 or not s._cookie:
@@ -526,18 +520,18 @@ class Proxies:
             return s.pack(END)
         return s.request(STEP, rng.uniform(-1.0, 1e6), values, rng.choice(STEPS))
 
-    def _hello(self, s: HandProxy) -> bytes:
+    def _hello(self, s):
         """One of the same interface, longer or not, of another, of any length, or version."""
         rng = self.rng
         text = EVERY_KIND.text.encode() + bytes(rng.choice((0, 0, 50)))
-        odd: dict[str, Any] = {"body": text[: rng.randrange(len(text))], "interface": bytes(16)}
+        odd = {"body": text[: rng.randrange(len(text))], "interface": bytes(16)}
         odd = odd if rng.random() < 0.2 else {"body": text}
         cookie = s._cookie
         datagram = s.hello(s._session, version=rng.choice((*[VERSION] * 9, 1, 3)), **odd)
         s._cookie = cookie
         return datagram
 
-    def _damaged(self, datagram: bytes) -> bytes:
+    def _damaged(self, datagram):
         rng = self.rng
         tag = TAG_SIZE if self.key else 0
         data = bytearray(datagram[: len(datagram) - tag])
@@ -554,7 +548,7 @@ class Proxies:
         sealed = self.key if rng.random() < 0.8 else b"another key of another"
         return bytes(data) + (hmac.digest(sealed, data, "sha256") if self.key and sealed else b"")
 
-    def hear(self, answer: bytes) -> None:
+    def hear(self, answer):
         """Takes the cookie of a WELCOME."""
         opened = Sealer(self.key).open(answer)
         if isinstance(opened, Message) and opened.kind == WELCOME and opened.session < 4:
@@ -562,7 +556,7 @@ class Proxies:
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
-def test_the_same_as_the_peer_in_python(driver: Path, key: bytes | None) -> None:
+def test_the_same_as_the_peer_in_python(driver, key):
     """Whatever comes: the same events, the same answers to the bit, the same counts."""
     rng = random.Random(20)
     proxies, reference = Proxies(rng, key), Reference(key)
@@ -587,8 +581,8 @@ def test_the_same_as_the_peer_in_python(driver: Path, key: bytes | None) -> None
 
 
 @pytest.fixture(scope="session")
-def target(made_once: MadeOnce) -> Path:
-    def fill(folder: Path) -> None:
+def target(made_once):
+    def fill(folder):
         header = bench_header("GripperPlant", *plant())
         compile_c(folder, header, "GripperPlant", NATIVE / "plant_target.c", *SANITISED)
 
@@ -598,7 +592,7 @@ def target(made_once: MadeOnce) -> Path:
 class Target:
     """A running target, and a proxy's socket to it."""
 
-    def __init__(self, program: Path, *words: str, key: bytes | None = None) -> None:
+    def __init__(self, program, *words, key=None):
         self.process = subprocess.Popen(
             [program, "0", *words], bufsize=0, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
@@ -612,34 +606,34 @@ class Target:
         self.signature, self.starts = plant()
         self.proxy = HandProxy(self.signature, self._ask, key)
 
-    def __enter__(self) -> "Target":
+    def __enter__(self):
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, *error: object):
         self.socket.close()
         self.process.kill()
         self.process.communicate()
 
-    def said(self, stream: IO[bytes] | None) -> bytes:
+    def said(self, stream):
         """The next line on a stream of the target's; waits for it."""
         assert stream is not None
         assert select([stream], [], [], 10.0)[0]
         return stream.readline()
 
-    def values(self, force: rigid.Pair = (0.0, 0.0), finger_mass: float = 0.5) -> list[Value]:
+    def values(self, force=(0.0, 0.0), finger_mass=0.5):
         """What a request carries; the mass is that of finger 1."""
         own = {"force[1]": force[0], "force[2]": force[1], "finger_mass[1]": finger_mass}
         return [{**self.starts, **own}[v.name] for v in self.signature.request]
 
-    def _ask(self, request: bytes) -> bytes:
+    def _ask(self, request):
         self.socket.send(request)
         return self.socket.recv(65_535)
 
-    def begin(self, values: list[Value] | None = None, session: int = 1) -> list[Value]:
+    def begin(self, values=None, session=1):
         return self.proxy.begin(session, values or self.values())
 
 
-def flat(outputs: rigid.Outputs) -> list[Value]:
+def flat(outputs):
     """The outputs in the order of the wire."""
     return [
         *outputs.position, *outputs.velocity, *outputs.gap, *outputs.contact_force,
@@ -647,7 +641,7 @@ def flat(outputs: rigid.Outputs) -> list[Value]:
     ]  # fmt: skip
 
 
-def test_the_plant_in_c_to_the_last_bit(target: Path) -> None:
+def test_the_plant_in_c_to_the_last_bit(target):
     """In free flight, at the impact, pressed and let go again."""
     p, u = rigid.Params(), rigid.Inputs()
     x = rigid.initial_state(p, u)
@@ -668,9 +662,7 @@ def test_the_plant_in_c_to_the_last_bit(target: Path) -> None:
 
 
 @pytest.mark.parametrize(("lost", "made_up"), [(3.0, [1, 1, 1]), slow(2.25, [1, 1, 0.25])])
-def test_steps_lost_on_the_way_are_made_up_for(
-    target: Path, lost: float, made_up: list[float]
-) -> None:
+def test_steps_lost_on_the_way_are_made_up_for(target, lost, made_up):
     """In steps of the length that is asked for; one long one would meet the object otherwise."""
     p, u, h = rigid.Params(), rigid.Inputs((-2.3, 1.9)), 2**-4
     x = rigid.initial_state(p, u)
@@ -692,9 +684,7 @@ def test_steps_lost_on_the_way_are_made_up_for(
         (0.0, -1.0, "finger_mass: must be over 0 kg"),
     ],
 )
-def test_a_failure_says_why_and_the_next_session_is_served(
-    target: Path, time: float, mass: float, why: str
-) -> None:
+def test_a_failure_says_why_and_the_next_session_is_served(target, time, mass, why):
     with Target(target) as bench:
         if time:
             bench.begin()
@@ -707,7 +697,7 @@ def test_a_failure_says_why_and_the_next_session_is_served(
         bench.proxy.step(0.0, 2**-4, bench.values())
 
 
-def test_a_key_in_a_file(target: Path, tmp_path: Path) -> None:
+def test_a_key_in_a_file(target, tmp_path):
     """Who has another gets no answer: the first that comes is that to the right one."""
     file = tmp_path / "key"
     file.write_bytes(b"\r\n" + KEY + b"\r\n")
@@ -717,7 +707,7 @@ def test_a_key_in_a_file(target: Path, tmp_path: Path) -> None:
         bench.begin(session=3)
 
 
-def test_inputs_are_made_safe_once_the_proxy_is_silent(target: Path) -> None:
+def test_inputs_are_made_safe_once_the_proxy_is_silent(target):
     with Target(target) as bench:
         assert bench.said(bench.process.stderr) == b"safe\n"
         bench.begin(bench.values((-1.0, 1.0)))
@@ -726,12 +716,12 @@ def test_inputs_are_made_safe_once_the_proxy_is_silent(target: Path) -> None:
         assert bench.said(bench.process.stderr) == b"safe\n"
 
 
-def test_a_target_with_a_clock_of_its_own(target: Path) -> None:
+def test_a_target_with_a_clock_of_its_own(target):
     """It starts with the first step, and answers with what it has."""
     period = 2**-9
     with Target(target, "-", str(period)) as bench:
         bench.begin()
-        seen: list[tuple[float, Value]] = []
+        seen = []
         while not seen or seen[-1][1] == 0.11:
             assert len(seen) < 100_000
             outputs = bench.proxy.step(0.0, 0.1, bench.values((-1.0, 1.0)))
@@ -753,13 +743,13 @@ def test_a_target_with_a_clock_of_its_own(target: Path) -> None:
         (["0", "/dev/null"], 2, "/dev/null: cannot be read, or is no key of 16"),
     ],
 )  # fmt: skip
-def test_a_target_called_wrongly(target: Path, words: list[str], code: int, said: str) -> None:
+def test_a_target_called_wrongly(target, words, code, said):
     done = subprocess.run([target, *words], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (code, "")
     assert said in done.stderr
 
 
-def test_the_constants_are_those_of_the_protocol() -> None:
+def test_the_constants_are_those_of_the_protocol():
     text = bench_header("M", EVERY_KIND)
     assert f"M_HEAD_SIZE = {HEAD.size}," in text
     assert f"#define M_MOST_LOST {float(MOST_LOST)} " in text
@@ -768,7 +758,7 @@ def test_the_constants_are_those_of_the_protocol() -> None:
     assert OUTPUTS == 6
 
 
-def test_descriptions_are_in_the_comments() -> None:
+def test_descriptions_are_in_the_comments():
     signature = Signature((LinkVariable("gap", "Real", "input", "m"),))
     header = bench_header("M", signature, descriptions={"gap": "l, to the */ surface"})
     assert "double gap;                              /* gap, m: l, to the * / surface */" in header

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import inf, nan
-from typing import Annotated, Any
+from typing import Annotated
 
 import pytest
 from block_variables import Group, Input, Output, Parameter, check
@@ -15,7 +15,7 @@ class Inner:
         0.25,
     )
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         check(self, "inner")
 
 
@@ -37,7 +37,7 @@ class Params:
     offset: Annotated[float, Parameter("from zero", unit="m", high=1.0)] = 0.0
     free: Annotated[float, Parameter("without a range", unit="m")] = 0.0
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         check(self)
 
 
@@ -61,9 +61,7 @@ class More(Params):
         (More, {"bits": 0}, "bits = 0: must be from 1 to 9"),
     ],
 )
-def test_a_value_out_of_its_range_is_one_line(
-    kind: type[Any], values: dict[str, Any], said: str
-) -> None:
+def test_a_value_out_of_its_range_is_one_line(kind, values, said):
     """Of what is declared in the class itself and in those it comes from."""
     with pytest.raises(ValueError, match=r".+") as caught:
         kind(**values)
@@ -72,7 +70,7 @@ def test_a_value_out_of_its_range_is_one_line(
 
 @pytest.mark.parametrize("bits", [1, 9])
 @pytest.mark.parametrize("offset", [-1e300, 1.0])
-def test_both_ends_of_a_range_belong_to_it(bits: int, offset: float) -> None:
+def test_both_ends_of_a_range_belong_to_it(bits, offset):
     assert Params(bits=bits, offset=offset, on=False).bits == bits
 
 
@@ -86,7 +84,7 @@ def test_both_ends_of_a_range_belong_to_it(bits: int, offset: float) -> None:
         lambda: Parameter("a gap", nominal=0.1),  # type: ignore[call-arg]
     ],
 )
-def test_all_but_the_meaning_goes_by_its_own_keyword(declared: Any) -> None:
+def test_all_but_the_meaning_goes_by_its_own_keyword(declared):
     """A number or a set in a row says nothing; a misspelt keyword would be lost."""
     with pytest.raises(TypeError, match="argument"):
         declared()

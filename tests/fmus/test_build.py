@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -26,22 +25,22 @@ FILES = sorted([f"{n}.fmu" for n in SHIPPED] + [n + end for n in TRANSLATED for 
 BINARY = f"binaries/{here().folder}/{{}}{here().suffix}"
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder):
     return {path.name: path.read_bytes() for path in folder.glob("[!.]*")}
 
 
-def times(folder: Path) -> dict[str, int]:
+def times(folder):
     return {path.name: path.stat().st_mtime_ns for path in folder.glob("[!.]*")}
 
 
 @pytest.fixture
-def out(fmus: Path, tmp_path: Path) -> Path:
+def out(fmus, tmp_path):
     """A folder with what was built."""
     return Path(shutil.copytree(fmus, tmp_path / "out"))
 
 
 @pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def own_cache(tmp_path, monkeypatch):
     """An empty one."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache/grasp-cosim"
@@ -50,7 +49,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 # ------------------------------------------------------------------ what is built
 
 
-def test_the_fmus_with_their_cross_check_files(fmus: Path, natives: Path) -> None:
+def test_the_fmus_with_their_cross_check_files(fmus, natives):
     assert sorted(contents(fmus)) == FILES
     assert sorted(contents(natives)) == sorted(
         [f"{n}.fmu" for n in TRANSLATED] + [n + end for n in TRANSLATED for end in ENDS]
@@ -60,7 +59,7 @@ def test_the_fmus_with_their_cross_check_files(fmus: Path, natives: Path) -> Non
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_what_is_in_an_fmu(fmus: Path, natives: Path, name: str) -> None:
+def test_what_is_in_an_fmu(fmus, natives, name):
     folders = ("resources/", "sources/", "documentation/licenses/")
     common = {
         "modelDescription.xml",
@@ -88,7 +87,7 @@ def test_what_is_in_an_fmu(fmus: Path, natives: Path, name: str) -> None:
 
 
 @pytest.mark.slow
-def test_another_process_gives_the_same_bytes(fmus: Path, own_cache: Path, tmp_path: Path) -> None:
+def test_another_process_gives_the_same_bytes(fmus, own_cache, tmp_path):
     """From another folder, with sets in another order, and several at once."""
     script = "from pathlib import Path; from grasp_fmus import build; build.build(Path('out'))"
     command = [sys.executable, "-c", script]
@@ -103,9 +102,7 @@ def test_another_process_gives_the_same_bytes(fmus: Path, own_cache: Path, tmp_p
 
 
 @needs_gcc
-def test_another_compiler_makes_another_binary_and_nothing_else(
-    natives: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_compiler_makes_another_binary_and_nothing_else(natives, tmp_path, monkeypatch):
     """The GUID is that of description and sources, whatever they are compiled with."""
     monkeypatch.setenv("CC", "gcc -fno-inline")
     (built,) = build_native(tmp_path, names=["ProximitySensor"])
@@ -117,7 +114,7 @@ def test_another_compiler_makes_another_binary_and_nothing_else(
 # ------------------------------------------------------------------ up to date
 
 
-def test_what_is_there_is_left_alone(out: Path) -> None:
+def test_what_is_there_is_left_alone(out):
     before = times(out)
     assert build(out) == [Built(out / f"{name}.fmu", "unchanged") for name in SHIPPED]
     assert times(out) == before
@@ -125,9 +122,7 @@ def test_what_is_there_is_left_alone(out: Path) -> None:
 
 @pytest.mark.parametrize("name", ["ProximitySensor.fmu", "GripperPlant_in.csv"])
 @pytest.mark.parametrize("damage", ["cut", "a bit", "gone"])
-def test_whatever_is_altered_is_mended_and_said(
-    fmus: Path, out: Path, name: str, damage: str
-) -> None:
+def test_whatever_is_altered_is_mended_and_said(fmus, out, name, damage):
     """Also with its size and its time kept; the others are not written, nothing is left beside."""
     file, data = out / name, bytearray((out / name).read_bytes())
     data[len(data) // 2] ^= 1
@@ -143,7 +138,7 @@ def test_whatever_is_altered_is_mended_and_said(
     assert {n for n, t in times(out).items() if before[n] != t} == {name}
 
 
-def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus: Path, tmp_path: Path) -> None:
+def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus, tmp_path):
     script = """if True:
         import sys
         from pathlib import Path
@@ -169,7 +164,7 @@ SOURCES = (
 )  # fmt: skip
 
 
-def test_every_source_is_in_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_source_is_in_the_key(tmp_path, monkeypatch):
     """Of copies of the packages, and of the binaries and the version of what is installed."""
     for package in (*builds.SOURCES, "pythonfmu"):
         original = package_folder(package)
@@ -186,11 +181,11 @@ def test_every_source_is_in_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert sources_key() == keys[-1]
 
 
-def made_once(folder: Path) -> None:
+def made_once(folder):
     (folder / "made.fmu").write_bytes(b"made")
 
 
-def test_of_what_is_kept_the_newest_stay(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_what_is_kept_the_newest_stay(own_cache, monkeypatch):
     monkeypatch.setattr(builds, "MOST_KEPT", 2)
     for k, part in enumerate("abca"):
         folder = builds._kept(made_once, part)
@@ -201,10 +196,8 @@ def test_of_what_is_kept_the_newest_stay(own_cache: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.usefixtures("own_cache")
-def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    ends: list[Callable[[], object]] = []
+def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process(monkeypatch):
+    ends = []
     monkeypatch.setattr(builds, "_until_the_end", {})
     monkeypatch.setattr(cache, "writable", lambda _: None)
     monkeypatch.setattr("atexit.register", ends.append)
@@ -216,9 +209,7 @@ def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process(
 
 
 @pytest.mark.usefixtures("own_cache")
-def test_a_build_that_fails_leaves_what_was_there(
-    fmus: Path, out: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_build_that_fails_leaves_what_was_there(fmus, out, monkeypatch):
     monkeypatch.setattr("grasp_fmus.page.icon", lambda name: (_ for _ in ()).throw(OSError("none")))
     with pytest.raises(OSError, match="none"):
         build(out)
@@ -228,12 +219,12 @@ def test_a_build_that_fails_leaves_what_was_there(
 # ------------------------------------------------------------------ which blocks
 
 
-def test_all_are_chosen_where_none_is_named() -> None:
+def test_all_are_chosen_where_none_is_named():
     assert builds.chosen_names() == TRANSLATED
 
 
 @pytest.mark.parametrize("name", ["gripperplant", ""])
-def test_a_name_that_is_none(name: str, tmp_path: Path) -> None:
+def test_a_name_that_is_none(name, tmp_path):
     said = rf"^{name}: no such block; must be of GraspController, "
     with pytest.raises(ValueError, match=said):
         build_native(tmp_path / "out", Plan(2, {}, {}, ""), ["ProximitySensor", name])
@@ -242,7 +233,7 @@ def test_a_name_that_is_none(name: str, tmp_path: Path) -> None:
 
 @needs_gcc
 @pytest.mark.parametrize("fmi", [2, slow(3)])
-def test_a_block_of_ones_own(fmi: int, tmp_path: Path) -> None:
+def test_a_block_of_ones_own(fmi, tmp_path):
     plan = planned(fmi=3 if fmi == 3 else 2)
     built = build_block(OWN["SpringPlant"], tmp_path, plan)
     assert built == Built(tmp_path / "SpringPlant.fmu", "new")

@@ -7,14 +7,13 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
 from pathlib import Path
 
 import c_compilers
 import pytest
 from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 from grasp_fmus.build import compiler_for, job
-from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, Target
+from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86
 from support.compilers import needs_zig
 from support.native_fmus import needs_gcc
 from support.processes import ends
@@ -29,32 +28,26 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="NO Linux")
 
 
 @pytest.fixture(autouse=True)
-def _own_cache(
-    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def _own_cache(request, tmp_path, monkeypatch):
     """An empty one, but for zig, which would make its libraries anew."""
     if "zig_" not in request.node.name:
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("CC", raising=False)
 
 
-def program(path: Path, text: str) -> Compiler:
+def program(path, text):
     path.write_text(f"#!/bin/sh\n{text}\n")
     path.chmod(0o755)
     return Compiler((str(path),))
 
 
-def made(
-    scratch: Path, sources: Mapping[str, bytes] = SOURCES, compiler: Compiler | None = None
-) -> Path:
+def made(scratch, sources=SOURCES, compiler=None):
     (library,) = compile_all([Job("Sum", sources, compiler or find_compiler())], scratch)
     return library
 
 
 @needs_gcc
-def test_what_is_compiled_is_kept_until_something_differs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_compiled_is_kept_until_something_differs(tmp_path, monkeypatch):
     log = tmp_path / "log"
     counting = program(tmp_path / "counting", f'echo >> {log}\nexec gcc "$@"')
     other = Compiler((*counting.command, "-O1"))
@@ -73,9 +66,7 @@ def test_what_is_compiled_is_kept_until_something_differs(
 
 
 @needs_gcc
-def test_a_cache_that_cannot_be_written_to_is_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cache_that_cannot_be_written_to_is_read(tmp_path, monkeypatch):
     before = made(tmp_path)
     monkeypatch.setattr(cache, "writable", lambda _: None)
     assert made(tmp_path) == before
@@ -85,13 +76,13 @@ def test_a_cache_that_cannot_be_written_to_is_read(
 
 
 @pytest.mark.parametrize("place", ["/dev/null", "/proc"], ids=["a file", "read-only"])
-def test_a_place_that_cannot_be_written_to(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_place_that_cannot_be_written_to(place, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", place)
     assert cache.writable("zig") is None
     assert cache.kept("zig") is None
 
 
-def test_a_folder_is_kept_as_a_file_is_and_the_first_stays(tmp_path: Path) -> None:
+def test_a_folder_is_kept_as_a_file_is_and_the_first_stays(tmp_path):
     """Two processes may make the same at once."""
     for text in ("one", "two"):
         (tmp_path / text).mkdir()
@@ -100,12 +91,12 @@ def test_a_folder_is_kept_as_a_file_is_and_the_first_stays(tmp_path: Path) -> No
     assert [path.name for path in (tmp_path / "cache/grasp-cosim/all").iterdir()] == ["key"]
 
 
-def test_no_two_lists_of_parts_have_one_key() -> None:
-    lists: list[list[str | bytes]] = [["ab", "c"], ["a", "bc"], ["abc"], ["abc", ""], [b"2\0ab"]]
+def test_no_two_lists_of_parts_have_one_key():
+    lists = [["ab", "c"], ["a", "bc"], ["abc"], ["abc", ""], [b"2\0ab"]]
     assert len({cache.key(parts) for parts in lists}) == len(lists)
 
 
-def test_a_relative_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_relative_folder_does_not_count(tmp_path, monkeypatch):
     """It would be another one in each folder, and what a stranger left there would be loaded."""
     monkeypatch.setenv("XDG_CACHE_HOME", "here")
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -115,13 +106,13 @@ def test_a_relative_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("given", ["cc 'half a quote", "   ", "no-such-compiler -m64"])
-def test_a_compiler_that_is_none_is_named(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_compiler_that_is_none_is_named(given, monkeypatch):
     monkeypatch.setenv("CC", given)
     with pytest.raises(ValueError, match=rf"^CC={given}: no such program; must be a C compiler"):
         find_compiler()
 
 
-def test_cc_comes_first_then_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cc_comes_first_then_what_there_is(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
     fix = f"{sys.executable} -m pip install ziglang"
@@ -152,9 +143,7 @@ ERROR = "M.c:3:1: error: expected ';'"
         (None, 0, "No such file or directory"),
     ],
 )
-def test_a_compiler_that_fails_is_heard_in_one_line(
-    said: str | None, code: int, line: str, tmp_path: Path
-) -> None:
+def test_a_compiler_that_fails_is_heard_in_one_line(said, code, line, tmp_path):
     compiler = program(tmp_path / "cc", f"printf '%s' \"{said}\" >&2\nexit {code}")
     if said is None:
         (tmp_path / "cc").write_text("#!/no/such/shell\n")
@@ -166,7 +155,7 @@ def test_a_compiler_that_fails_is_heard_in_one_line(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_no_compiler_outlives_us(number: signal.Signals, code: int, tmp_path: Path) -> None:
+def test_no_compiler_outlives_us(number, code, tmp_path):
     """Nor what it has started, nor its files; those that wait do not start."""
     log = tmp_path / "log"
     program(tmp_path / "cc", f"sleep 3600 & echo $! >> {log}; wait")
@@ -193,7 +182,7 @@ def test_no_compiler_outlives_us(number: signal.Signals, code: int, tmp_path: Pa
 @needs_zig
 @pytest.mark.platforms
 @pytest.mark.parametrize("target", [LINUX_X86, LINUX_ARM, MAC_X86, MAC_ARM])
-def test_zig_compiles_for_others(target: Target, tmp_path: Path) -> None:
+def test_zig_compiles_for_others(target, tmp_path):
     magic = b"\x7fELF" if target.suffix == ".so" else struct.pack("<I", 0xFEEDFACF)
     task = job("Sum", SOURCES, target, compiler_for(target, asked=True))
     assert compile_all([task], tmp_path)[0].read_bytes()[:4] == magic
@@ -203,9 +192,7 @@ def test_zig_compiles_for_others(target: Target, tmp_path: Path) -> None:
     ("system", "place"),
     [("linux", ".cache"), ("win32", "AppData/Local"), ("darwin", "Library/Caches")],
 )
-def test_what_is_kept_is_where_the_system_has_caches(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, system: str, place: str
-) -> None:
+def test_what_is_kept_is_where_the_system_has_caches(monkeypatch, tmp_path, system, place):
     monkeypatch.setattr("sys.platform", system)
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.delenv("XDG_CACHE_HOME")

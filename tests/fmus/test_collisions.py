@@ -3,13 +3,11 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from itertools import zip_longest
 from math import sin
 from pathlib import Path
 
 import pytest
-from conftest import Altered, Load
 from support.fmi2 import OK, Fmu, Instance
 from support.kinds import all_kinds
 
@@ -17,7 +15,7 @@ TESTS = Path(__file__).parents[1]
 ROOT = TESTS.parent
 H = 1e-3
 
-PARAMETERS: dict[str, list[dict[str, float]]] = {
+PARAMETERS = {
     "GraspControllerAdaptive": [
         {},
         {"contact_force.stiffness": 60.0, "reflectance.prior_deviation": 0.1},
@@ -32,7 +30,7 @@ PARAMETERS: dict[str, list[dict[str, float]]] = {
 }
 
 
-def driven(instance: Instance, steps: int) -> Iterator[list[float]]:
+def driven(instance, steps):
     """All outputs, step by step, under inputs that change; the plant gets into contact."""
     fmu = instance.fmu
     flags = [fmu.references[n] for n in fmu.names("output") if n in fmu.booleans]
@@ -52,7 +50,7 @@ def driven(instance: Instance, steps: int) -> Iterator[list[float]]:
 
 @all_kinds
 @pytest.mark.parametrize("name", PARAMETERS)
-def test_interleaved_instances_are_as_each_one_alone(load: Load, name: str) -> None:
+def test_interleaved_instances_are_as_each_one_alone(load, name):
     """Bit for bit, with other parameters and other numbers of steps."""
     steps = (300, 200, 250)
     alone = []
@@ -70,9 +68,7 @@ def test_interleaved_instances_are_as_each_one_alone(load: Load, name: str) -> N
 
 
 @all_kinds
-def test_two_builds_of_one_fmu_run_their_own_code(
-    load: Load, tmp_path: Path, altered: Altered
-) -> None:
+def test_two_builds_of_one_fmu_run_their_own_code(load, tmp_path, altered):
     """Alive at the same time and step by step in turn; whichever came first."""
     change = "p.gain * p.alpha", "2.0 * p.gain * p.alpha"
     other = altered("ProximitySensor", "proximity_sensor/optics.py", *change)
@@ -87,7 +83,7 @@ def test_two_builds_of_one_fmu_run_their_own_code(
             instance.call("FreeInstance")
 
 
-def test_two_builds_run_their_own_slave(fmus: Path, tmp_path: Path, altered: Altered) -> None:
+def test_two_builds_run_their_own_slave(fmus, tmp_path, altered):
     """The modules of the adapter, and those that they import, are of the same build."""
     change = "step size = ", "length of the step = "
     other = altered("GripperPlant", "grasp_fmus/slave.py", *change)
@@ -147,7 +143,7 @@ for name in MODULES:
 """
 
 
-def run(script: str, *arguments: object) -> str:
+def run(script, *arguments):
     """What a host prints; it must end with exit code 0."""
     roots = [ROOT / folder for folder in ("plant", "sensor", "controller", "fmus")]
     done = subprocess.run(
@@ -160,7 +156,7 @@ def run(script: str, *arguments: object) -> str:
 
 
 @pytest.mark.slow
-def test_a_host_does_not_change_what_an_fmu_computes(fmus: Path, tmp_path: Path) -> None:
+def test_a_host_does_not_change_what_an_fmu_computes(fmus, tmp_path):
     """That has garbled the same packages, or has other modules of their names."""
     nothing = 'assert not {m for m in sys.modules if m.startswith(("grasp", "gripper", "prox"))}'
     printed = [
@@ -215,9 +211,7 @@ for instance in instances.values():
 
 
 @pytest.mark.parametrize("first", ["ours", "theirs"])
-def test_a_stock_pythonfmu_fmu_lives_in_the_same_process(
-    fmus: Path, load: Load, tmp_path: Path, first: str
-) -> None:
+def test_a_stock_pythonfmu_fmu_lives_in_the_same_process(fmus, load, tmp_path, first):
     script = tmp_path / "Integrator.py"
     script.write_text(FOREIGN)
     run(BUILD_FOREIGN, script, tmp_path)

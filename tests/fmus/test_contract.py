@@ -3,12 +3,11 @@
 from dataclasses import dataclass, make_dataclass
 from enum import IntEnum
 from types import SimpleNamespace
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import pytest
 from block_variables import Input, Output, Parameter
 from grasp_fmus.contract import (
-    Field,
     build_params,
     declared,
     packer,
@@ -26,7 +25,7 @@ class Inner:
     bits: Annotated[int, Parameter("a whole number", low=1, high=9)] = 3
     rate: Annotated[Pair, Parameter("rates", unit="1/s", low=-2.0, high=3.0)] = (-0.5, 0.25)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         if self.rate[0] > 1.0:
             raise ValueError("rate too high")
 
@@ -64,7 +63,7 @@ class Outputs(NamedTuple):
     never: Annotated[bool, Output("from no input", depends_on=set())]
 
 
-def block(params: Any = Params, inputs: Any = Inputs, outputs: Any = Outputs) -> Any:
+def block(params=Params, inputs=Inputs, outputs=Outputs):
     return SimpleNamespace(Params=params, Inputs=inputs, Outputs=outputs)
 
 
@@ -73,7 +72,7 @@ BY_NAME = {".".join(f.path): f for f in FIELDS}
 NAMES = [name for f in FIELDS for name in f.names]
 
 
-def test_scalars_in_the_order_of_declaration() -> None:
+def test_scalars_in_the_order_of_declaration():
     assert NAMES == [
         "gap", "force[1]", "force[2]", "armed[1]", "armed[2]",
         "both[1]", "both[2]", "own[1]", "own[2]", "late", "never",
@@ -81,7 +80,7 @@ def test_scalars_in_the_order_of_declaration() -> None:
     ]  # fmt: skip
 
 
-def test_what_a_field_holds() -> None:
+def test_what_a_field_holds():
     rate = BY_NAME["inner.rate"]
     assert (rate.causality, rate.kind, rate.size) == ("parameter", float, 2)
     assert (rate.unit, rate.description, rate.limits) == ("1/s", "rates", (-2.0, 3.0))
@@ -95,7 +94,7 @@ def test_what_a_field_holds() -> None:
     assert [name for name, f in BY_NAME.items() if f.tunable] == ["offset"]
 
 
-def test_starts_are_the_defaults_and_outputs_have_none() -> None:
+def test_starts_are_the_defaults_and_outputs_have_none():
     assert [start for f in FIELDS for start in f.starts] == [
         0.3, 1.0, -1.0, False, True,
         None, None, None, None, None, None,
@@ -103,7 +102,7 @@ def test_starts_are_the_defaults_and_outputs_have_none() -> None:
     ]  # fmt: skip
 
 
-def test_nominal_values() -> None:
+def test_nominal_values():
     """Declared for inputs and outputs; for a parameter the size of its start, unless that is 0."""
     real = {name: f.nominal for name, f in BY_NAME.items() if f.kind is float}
     assert real == {
@@ -114,7 +113,7 @@ def test_nominal_values() -> None:
     assert {f.nominal for f in FIELDS if f.kind is not float} == {None}
 
 
-def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
+def feedthrough(fields, initially):
     """The inputs that reach each output without a step, by name, as its variable has them."""
     found = variables(fields)
     inputs = {v.name for v in found if v.causality == "input"}
@@ -129,7 +128,7 @@ def feedthrough(fields: list[Field], initially: bool) -> dict[str, list[str]]:
     }
 
 
-def test_feedthrough_while_stepping() -> None:
+def test_feedthrough_while_stepping():
     assert feedthrough(FIELDS, initially=False) == {
         "both[1]": ["force[1]", "force[2]"],
         "both[2]": ["force[1]", "force[2]"],
@@ -140,13 +139,13 @@ def test_feedthrough_while_stepping() -> None:
     }
 
 
-def test_feedthrough_in_initialisation() -> None:
+def test_feedthrough_in_initialisation():
     """That of the second set; where there is one only, the same as while stepping."""
     stepping = feedthrough(FIELDS, initially=False)
     assert feedthrough(FIELDS, initially=True) == {**stepping, "late": ["gap"]}
 
 
-def test_inputs_and_outputs_to_and_from_the_list_of_values() -> None:
+def test_inputs_and_outputs_to_and_from_the_list_of_values():
     values = [0.7, 1.5, 2.5, True, False, *range(50)]
     u = packer(Inputs, FIELDS)(values)
     assert u == Inputs(0.7, (1.5, 2.5), (True, False))
@@ -155,12 +154,12 @@ def test_inputs_and_outputs_to_and_from_the_list_of_values() -> None:
     assert unpacker(FIELDS)(y) == [1.0, 2.0, 3.0, 4.0, 5.0, True]
 
 
-def test_params_from_the_list_of_values() -> None:
+def test_params_from_the_list_of_values():
     values = [*range(11), 3.0, False, 7, 0.1, 0.2, 0.5]
     assert build_params(block(), FIELDS, values) == Params(3.0, Inner(False, 7, (0.1, 0.2)), 0.5)
 
 
-def test_what_the_block_refuses_is_passed_on() -> None:
+def test_what_the_block_refuses_is_passed_on():
     with pytest.raises(ValueError, match="rate too high"):
         build_params(block(), FIELDS, [*range(11), 3.0, False, 7, 1.5, 0.2, 0.5])
 
@@ -171,17 +170,17 @@ SWITCH = Input("a switch")
 REACHED = Output("a distance", unit="m", nominal=1.0, depends_on=set())
 
 
-def put_in(hint: Any) -> dict[str, Any]:
+def put_in(hint):
     """A block with one input, x."""
     return {"inputs": NamedTuple("OneInput", [("x", hint)])}
 
 
-def put_out(hint: Any) -> dict[str, Any]:
+def put_out(hint):
     """A block with one output, x."""
     return {"outputs": NamedTuple("OneOutput", [("x", hint)])}
 
 
-def set_to(hint: Any, value: Any) -> dict[str, Any]:
+def set_to(hint, value):
     """A block with one parameter, x."""
     return {"params": make_dataclass("OneParameter", [("x", hint, value)], frozen=True)}
 
@@ -230,7 +229,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("parts", "said"), WRONG)
-def test_what_is_declared_wrong_is_said(parts: dict[str, Any], said: str) -> None:
+def test_what_is_declared_wrong_is_said(parts, said):
     with pytest.raises(TypeError, match=f"^{said}"):
         declared(block(**parts))
 
@@ -242,13 +241,13 @@ class NoInputs(NamedTuple):
     """A source."""
 
 
-def test_a_block_may_have_no_inputs() -> None:
+def test_a_block_may_have_no_inputs():
     fields = declared(block(inputs=NoInputs, **put_out(Annotated[float, REACHED])))
     assert packer(NoInputs, fields)([None]) == NoInputs()
     assert feedthrough(fields, initially=True) == {"x": []}
 
 
-def test_an_int_enum_is_an_enumeration_and_the_block_gets_its_member() -> None:
+def test_an_int_enum_is_an_enumeration_and_the_block_gets_its_member():
     parts = set_to(Annotated[Colour, Parameter("a choice", tunable=True)], Colour.DARK_BLUE)
     fields = declared(block(**parts))
     *others, field = fields

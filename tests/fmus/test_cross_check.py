@@ -4,21 +4,19 @@ import re
 import shutil
 from dataclasses import make_dataclass
 from itertools import accumulate
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
 from block_variables import Input, Output
-from conftest import Folder
 from fmpy import read_model_description, simulate_fmu
 from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
 from fmpy.util import read_csv, read_ref_opt_file, validate_result
 from grasp_fmus.contract import declared, variables
 from grasp_fmus.cross_check import STEP_SIZE, cross_check_files
 from grasp_fmus.shipped import blocks
-from support.kinds import TRANSLATED, Kind, all_kinds
+from support.kinds import TRANSLATED, all_kinds
 from support.slow import slow
 
 BLOCKS = {name: block for name, block in blocks().items() if name in TRANSLATED}
@@ -29,13 +27,13 @@ LITERAL = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")
 @pytest.fixture(
     scope="module", params=[slow(n) if n[12:] in ("Compliant", "Movable") else n for n in BLOCKS]
 )
-def name(request: pytest.FixtureRequest) -> str:
+def name(request):
     """The FMUs, one after the other."""
     return str(request.param)
 
 
 @pytest.fixture(scope="module")
-def folder(name: str, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(name, fmus, tmp_path_factory):
     """The files of an FMU, beside it, in a folder as the rules want it."""
     folder = tmp_path_factory.mktemp("repo") / f"fmus/2.0/cs/linux64/grasp-cosim/1/{name}"
     folder.mkdir(parents=True)
@@ -44,25 +42,25 @@ def folder(name: str, fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> P
     return folder
 
 
-def simulated(fmu: Path, folder: Path, name: str, **arguments: Any) -> Any:
+def simulated(fmu, folder, name, **arguments):
     """The FMU, run by FMPy with the options and inputs in the folder."""
     options = read_ref_opt_file(folder / f"{name}_ref.opt")
     inputs, stop = read_csv(folder / f"{name}_in.csv"), options["StopTime"]
     return simulate_fmu(fmu, start_time=0.0, stop_time=stop, input=inputs, **arguments)
 
 
-def test_the_files_are_named_as_the_rules_want(name: str, fmus: Path) -> None:
+def test_the_files_are_named_as_the_rules_want(name, fmus):
     files = cross_check_files(name, BLOCKS[name])
     assert list(files) == [f"{name}_in.csv", f"{name}_ref.csv", f"{name}_ref.opt"]
     assert files == {file: (fmus / file).read_bytes() for file in files}
 
 
-def test_fmpy_finds_no_problem_in_the_submission(folder: Path) -> None:
+def test_fmpy_finds_no_problem_in_the_submission(folder):
     assert validate_test_fmu(str(folder)) == []
 
 
 @pytest.mark.parametrize(("suffix", "causality"), [("in", "input"), ("ref", "output")])
-def test_a_csv_file_follows_the_rules(folder: Path, name: str, suffix: str, causality: str) -> None:
+def test_a_csv_file_follows_the_rules(folder, name, suffix, causality):
     description = read_model_description(folder / f"{name}.fmu")
     found = [v for v in description.modelVariables if v.causality == causality]
     path = folder / f"{name}_{suffix}.csv"
@@ -76,7 +74,7 @@ def test_a_csv_file_follows_the_rules(folder: Path, name: str, suffix: str, caus
             assert v.type != "Boolean" or cell in ("0", "1")
 
 
-def test_the_rows_lie_on_the_communication_points(folder: Path, name: str) -> None:
+def test_the_rows_lie_on_the_communication_points(folder, name):
     """Whether a host multiplies, adds up or counts nanoseconds."""
     options = read_ref_opt_file(folder / f"{name}_ref.opt")
     times = read_csv(folder / f"{name}_in.csv")["time"]
@@ -88,9 +86,7 @@ def test_the_rows_lie_on_the_communication_points(folder: Path, name: str) -> No
 
 
 @all_kinds
-def test_the_fmu_gives_the_reference_to_the_last_bit(
-    folder: Path, folder_of: Folder, kind: Kind, name: str
-) -> None:
+def test_the_fmu_gives_the_reference_to_the_last_bit(folder, folder_of, kind, name):
     fmu = folder_of(kind) / f"{name}.fmu"
     result = simulated(fmu, folder, name, output_interval=STEP_SIZE)
     reference = read_csv(folder / f"{name}_ref.csv")
@@ -99,7 +95,7 @@ def test_the_fmu_gives_the_reference_to_the_last_bit(
         assert result[column].astype(float).tobytes() == reference[column].tobytes(), column
 
 
-def test_an_importer_with_a_step_of_its_own_passes(folder: Path, name: str) -> None:
+def test_an_importer_with_a_step_of_its_own_passes(folder, name):
     """The rules allow 0.1. An impact may lie between two samples, and so may a jump in the ratio of
     two intensities, of which the adaptive controller learns.
     """
@@ -109,7 +105,7 @@ def test_an_importer_with_a_step_of_its_own_passes(folder: Path, name: str) -> N
     assert outside < (0.08 if name.endswith("Adaptive") else 0.002)
 
 
-def test_inputs_differ_jump_and_stay_within_the_nominal_value(folder: Path, name: str) -> None:
+def test_inputs_differ_jump_and_stay_within_the_nominal_value(folder, name):
     inputs = [v for v in variables(declared(BLOCKS[name])) if v.causality == "input"]
     table = read_csv(folder / f"{name}_in.csv")
     for v in inputs:
@@ -135,7 +131,7 @@ class Outputs(NamedTuple):
     value: Annotated[float, Output("the value", unit="1", nominal=1.0, depends_on={"signal"})]
 
 
-def other(power: float) -> Any:
+def other(power):
     """A block with this power."""
     return SimpleNamespace(
         Params=make_dataclass("Params", ()), Inputs=Inputs, Outputs=Outputs,
@@ -144,13 +140,13 @@ def other(power: float) -> Any:
     )  # fmt: skip
 
 
-def test_a_switch_is_thrown_once() -> None:
+def test_a_switch_is_thrown_once():
     rows = cross_check_files("Other", other(1.0))["Other_in.csv"].decode().splitlines()
     assert rows[0] == '"time","on","signal"'
     assert [row.split(",")[1] for row in rows[1:]] == ["1"] * 384 + ["0"] * 385
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero")
-def test_a_reference_that_is_not_finite_is_refused() -> None:
+def test_a_reference_that_is_not_finite_is_refused():
     with pytest.raises(ValueError, match=r"^Other: value = .*inf.* at 0\.\d* s: must be finite$"):
         cross_check_files("Other", other(-1.0))

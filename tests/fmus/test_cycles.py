@@ -10,14 +10,11 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import Folder
 from support.fmi2 import OK, Fmu, Instance
-from support.kinds import Kind, all_kinds
+from support.kinds import all_kinds
 
 NAMES = ("GraspController", "GraspControllerAdaptive", "GripperPlant", "ProximitySensor")
 """The other plants are GripperPlant's adapter with arithmetic that keeps nothing."""
@@ -49,7 +46,7 @@ class _Malloc(ctypes.Structure):
     )  # fmt: skip
 
 
-def live(instance: Instance) -> None:
+def live(instance):
     """From instantiation or reset into step mode."""
     instance.initialise()
     first = instance.fmu.names("input")[0]
@@ -59,7 +56,7 @@ def live(instance: Instance) -> None:
         instance.outputs()
 
 
-def states(instance: Instance) -> None:
+def states(instance):
     """Save, serialise, restore."""
     state = instance.state()
     status, copy = instance.from_bytes(state.to_bytes())
@@ -68,7 +65,7 @@ def states(instance: Instance) -> None:
     copy.free()
 
 
-def refused(instance: Instance) -> None:
+def refused(instance):
     """Calls that are refused, each with its message."""
     assert instance.set_real([4711], [0.0]) == instance.fmu.refused
     assert instance.step(5.0, 1e-3) == instance.fmu.refused
@@ -77,15 +74,15 @@ def refused(instance: Instance) -> None:
     instance.log.clear()
 
 
-def reset(instance: Instance) -> None:
+def reset(instance):
     assert instance.call("Reset") == OK
     live(instance)
 
 
-ACTS: list[Callable[[Instance], None]] = [states, refused, reset, lambda _: None]
+ACTS = [states, refused, reset, lambda _: None]
 
 
-def cycle(fmu: Fmu, k: int) -> None:
+def cycle(fmu, k):
     """A life, of a kind that depends on k; a free without a terminate is allowed as well."""
     with Instance(fmu, f"instance {k % 10}") as instance:
         live(instance)
@@ -94,7 +91,7 @@ def cycle(fmu: Fmu, k: int) -> None:
             assert instance.call("Terminate") == OK
 
 
-def process(mallinfo: Callable[[], Any]) -> dict[str, Any]:
+def process(mallinfo):
     """What there is in this process."""
     gc.collect()
     malloc = mallinfo()
@@ -106,12 +103,12 @@ def process(mallinfo: Callable[[], Any]) -> dict[str, Any]:
     }
 
 
-def main(fmu: str, folder: str) -> None:
+def main(fmu, folder):
     """Prints what there was after BEFORE and after all cycles; two copies of the FMU take turns."""
     mallinfo = ctypes.CDLL(None).mallinfo2
     mallinfo.restype = _Malloc
     fmus = [Fmu(Path(fmu), Path(folder, name)) for name in "ab"]
-    at: list[str] = []
+    at = []
     for k in range(CYCLES):
         if k == BEFORE:
             at.append(json.dumps(process(mallinfo)))  # as one object, not to be counted itself
@@ -124,9 +121,7 @@ def main(fmu: str, folder: str) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux and glibc")
 @all_kinds
 @pytest.mark.parametrize("name", NAMES)
-def test_a_thousand_instances_leave_nothing_behind(
-    folder_of: Folder, kind: Kind, tmp_path: Path, name: str
-) -> None:
+def test_a_thousand_instances_leave_nothing_behind(folder_of, kind, tmp_path, name):
     done = subprocess.run(
         [sys.executable, __file__, folder_of(kind) / f"{name}.fmu", tmp_path],
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},

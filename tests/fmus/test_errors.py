@@ -4,11 +4,8 @@ import ctypes
 import sys
 from collections.abc import Callable
 from math import inf, nan
-from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import Altered, Load
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
@@ -18,27 +15,27 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 from support.fmi2 import FATAL, OK, Fmu, Instance
-from support.kinds import Kind, all_kinds, both_of_fmi_2, python_only
+from support.kinds import all_kinds, both_of_fmi_2, python_only
 
 pytestmark = all_kinds
 
 Act = Callable[[Instance], int]
 
 
-def plant(load: Load, **options: Any) -> Instance:
+def plant(load, **options):
     return Instance(load("GripperPlant"), "plant", **options)
 
 
-def real(name: str, value: float) -> Act:
+def real(name, value):
     return lambda instance: instance.set({name: value})
 
 
-def other(call: str, type_: Any) -> Act:
+def other(call, type_):
     """The last of the Reals as of another type."""
     return lambda i: i.call(call, (ctypes.c_uint * 1)(3), ctypes.c_size_t(1), (type_ * 1)())
 
 
-BEFORE: list[tuple[Act, str]] = [
+BEFORE = [
     (real("object_width", 99.0), "object_width = 99.0 m: must be from 0 to 10 m"),
     (real("finger_mass[2]", 0.0), "finger_mass[2] = 0.0 kg: must be from 0.001 to 1000 kg"),
     (real("object_width", nan), "object_width = nan m: must be from 0 to 10 m"),
@@ -56,7 +53,7 @@ BEFORE: list[tuple[Act, str]] = [
     (other("SetInteger", ctypes.c_int), "Integer"),
     (other("GetString", ctypes.c_char_p), "String"),
 ]
-STEPPING: list[tuple[Act, str]] = [
+STEPPING = [
     (lambda i: i.step(1e-3, 0.0), "step size = 0.0 s: must be a finite number above 0"),
     (lambda i: i.step(1e-3, -1e-3), "step size = -0.001 s: must be a finite number above 0"),
     (lambda i: i.step(1e-3, nan), "step size = nan s: must be a finite number above 0"),
@@ -69,13 +66,13 @@ STEPPING: list[tuple[Act, str]] = [
     (lambda i: i.enter(), "fmi2EnterInitializationMode in step mode: must be before init"),
     (lambda i: i.exit(), "fmi2ExitInitializationMode in step mode: must be in init"),
 ]
-TERMINATED: list[tuple[Act, str]] = [
+TERMINATED = [
     (real("force[1]", 1.0), "force[1]: set after fmi2Terminate: must be before"),
     (lambda i: i.step(1e-3, 1e-3), "fmi2DoStep after fmi2Terminate: must be in step mode"),
 ]
 
 
-def refused(instance: Instance, act: Act, time: str, reason: str) -> None:
+def refused(instance, act, time, reason):
     """The call is refused, said once and in full, and everything is as it was."""
     before = instance.state().to_bytes()
     assert act(instance) == instance.fmu.refused
@@ -89,7 +86,7 @@ def refused(instance: Instance, act: Act, time: str, reason: str) -> None:
     instance.log.clear()
 
 
-def test_refused_before_initialisation(load: Load) -> None:
+def test_refused_before_initialisation(load):
     with plant(load) as instance:
         for act, reason in BEFORE:
             refused(instance, act, "0", reason)
@@ -97,7 +94,7 @@ def test_refused_before_initialisation(load: Load) -> None:
         assert instance.step(0.0, 1e-3) == OK
 
 
-def test_refused_while_stepping_and_after_the_end(load: Load) -> None:
+def test_refused_while_stepping_and_after_the_end(load):
     with plant(load).initialise() as instance:
         assert instance.step(0.0, 1e-3) == OK
         for act, reason in STEPPING:
@@ -110,7 +107,7 @@ def test_refused_while_stepping_and_after_the_end(load: Load) -> None:
 
 
 @both_of_fmi_2
-def test_the_start_time_is_finite_and_set_before_initialisation(load: Load) -> None:
+def test_the_start_time_is_finite_and_set_before_initialisation(load):
     with plant(load) as instance:
         text = "start time = nan s: must be a finite number"
         refused(instance, lambda i: i.setup(nan), "0", text)
@@ -119,7 +116,7 @@ def test_the_start_time_is_finite_and_set_before_initialisation(load: Load) -> N
         refused(instance, lambda i: i.setup(), "0", text)
 
 
-def test_parameters_that_do_not_go_together(load: Load) -> None:
+def test_parameters_that_do_not_go_together(load):
     with plant(load) as instance:
         assert instance.set({"object_width": 0.5}) == OK
         text = "object spans -0.22 to 0.28 m, must fit between the fingertips"
@@ -128,14 +125,14 @@ def test_parameters_that_do_not_go_together(load: Load) -> None:
         assert (instance.enter(), instance.exit()) == (OK, OK)
 
 
-def test_a_refused_list_of_values_sets_none_of_them(load: Load) -> None:
+def test_a_refused_list_of_values_sets_none_of_them(load):
     with plant(load) as instance:
         instance.initialise(**{"force[1]": -1.0})
         assert instance.set({"force[1]": 5.0, "force[2]": nan}) == instance.fmu.refused
         assert instance.get("force[1]", "force[2]") == [-1.0, 0.0]
 
 
-def test_a_tunable_parameter_is_checked_while_stepping(load: Load) -> None:
+def test_a_tunable_parameter_is_checked_while_stepping(load):
     with Instance(load("ProximitySensor"), "eye") as instance:
         instance.initialise()
         assert instance.set({"reflectance": 11.0}) == instance.fmu.refused
@@ -143,7 +140,7 @@ def test_a_tunable_parameter_is_checked_while_stepping(load: Load) -> None:
         assert instance.set({"reflectance": 0.5}) == OK
 
 
-def test_a_step_with_no_finite_result_leaves_everything_as_it_was(load: Load) -> None:
+def test_a_step_with_no_finite_result_leaves_everything_as_it_was(load):
     """The inputs are taken by then, and the outputs follow them."""
     with plant(load) as instance:
         instance.initialise(**{"finger_mass[1]": 1e-3})
@@ -158,7 +155,7 @@ def test_a_step_with_no_finite_result_leaves_everything_as_it_was(load: Load) ->
         assert instance.step(0.0, 1e-3) == OK
 
 
-def test_large_values_whose_sum_is_not_finite_are_values(load: Load) -> None:
+def test_large_values_whose_sum_is_not_finite_are_values(load):
     with plant(load) as instance:
         instance.initialise()
         assert instance.set({"force[1]": 1.7e308, "force[2]": 1.7e308}) == OK
@@ -166,7 +163,7 @@ def test_large_values_whose_sum_is_not_finite_are_values(load: Load) -> None:
 
 
 @pytest.mark.parametrize("start", [0.0, -3.0, 1e6])
-def test_time_may_begin_anywhere_and_be_summed_up(load: Load, start: float) -> None:
+def test_time_may_begin_anywhere_and_be_summed_up(load, start):
     with plant(load) as instance:
         assert (instance.setup(start), instance.enter(), instance.exit()) == (OK, OK, OK)
         time = start
@@ -177,7 +174,7 @@ def test_time_may_begin_anywhere_and_be_summed_up(load: Load, start: float) -> N
 
 
 @pytest.mark.parametrize(("start", "off"), [(0.0, 1e-9), (-3.0, 1e-9), (1e6, 1e-6)])
-def test_how_far_the_clocks_may_be_apart(load: Load, start: float, off: float) -> None:
+def test_how_far_the_clocks_may_be_apart(load, start, off):
     """A nanosecond, or 1e-12 of the time where that is more."""
     with plant(load) as instance:
         assert (instance.setup(start), instance.enter(), instance.exit()) == (OK, OK, OK)
@@ -188,7 +185,7 @@ def test_how_far_the_clocks_may_be_apart(load: Load, start: float, off: float) -
 
 
 @pytest.mark.parametrize("name", ["", "50 %s", "x" * 60, "Größe µ"])
-def test_the_reason_is_logged_whatever_the_name(load: Load, name: str) -> None:
+def test_the_reason_is_logged_whatever_the_name(load, name):
     """The logger of FMI is a printf: a %s in a message would read memory that is not there."""
     with Instance(load("GripperPlant"), name) as instance:
         assert instance.set({"force[1]": nan}) == instance.fmu.refused
@@ -198,7 +195,7 @@ def test_the_reason_is_logged_whatever_the_name(load: Load, name: str) -> None:
         assert said.text == f"{shown}, t = 0 s: force[1] = nan N: must be a finite number"
 
 
-def test_a_host_that_does_not_log(load: Load) -> None:
+def test_a_host_that_does_not_log(load):
     with plant(load, logging=False) as instance:
         assert instance.set({"force[1]": nan}) == instance.fmu.refused
         instance.initialise()
@@ -210,7 +207,7 @@ def test_a_host_that_does_not_log(load: Load) -> None:
 LIGHT = "    l = 0.0 if u.gap < 0.0 else u.gap\n"
 
 
-def faulty(altered: Altered, folder: Path, statement: str) -> Instance:
+def faulty(altered, folder, statement):
     """A sensor whose block does something when it is close; it is far away."""
     source = "proximity_sensor/optics.py"
     trap = f"    if u.gap < 0.01:\n        {statement}\n{LIGHT}"
@@ -229,12 +226,10 @@ def faulty(altered: Altered, folder: Path, statement: str) -> Instance:
         ("raise KeyboardInterrupt", "KeyboardInterrupt"),
     ],
 )
-def test_a_bug_in_a_block_leaves_its_traceback(
-    altered: Altered, tmp_path: Path, statement: str, said: str
-) -> None:
+def test_a_bug_in_a_block_leaves_its_traceback(altered, tmp_path, statement, said):
     with faulty(altered, tmp_path, statement) as instance:
         assert instance.set({"gap": 0.005}) == OK
-        acts: list[Act] = [lambda i: i.step(0.0, 1e-3), lambda i: i.get_real([1])[0]]
+        acts = [lambda i: i.step(0.0, 1e-3), lambda i: i.get_real([1])[0]]
         for act in acts:
             instance.log.clear()
             assert act(instance) == FATAL
@@ -249,7 +244,7 @@ def test_a_bug_in_a_block_leaves_its_traceback(
 @pytest.mark.parametrize(
     "result", ["u.gap / 0.0", "(u.gap + 1e308) ** 2.0", "(1e308 + u.gap) * 10.0 * 0.0"]
 )
-def test_arithmetic_that_fails_is_refused(altered: Altered, tmp_path: Path, result: str) -> None:
+def test_arithmetic_that_fails_is_refused(altered, tmp_path, result):
     with faulty(altered, tmp_path, f"return Outputs({result})") as instance:
         assert instance.set({"gap": 0.005}) == OK
         assert instance.step(0.0, 1e-3) == instance.fmu.discarded
@@ -260,7 +255,7 @@ def test_arithmetic_that_fails_is_refused(altered: Altered, tmp_path: Path, resu
 
 
 @python_only
-def test_a_block_that_does_not_start_says_why(altered: Altered, tmp_path: Path) -> None:
+def test_a_block_that_does_not_start_says_why(altered, tmp_path):
     source, start = "proximity_sensor/channel.py", "    return State(0.0, "
     broken = f"    if u.gap > 0.0:\n        raise ImportError('no lamp')\n{start}"
     fmu = Fmu(altered("ProximitySensor", source, start, broken), tmp_path)
@@ -274,12 +269,10 @@ def test_a_block_that_does_not_start_says_why(altered: Altered, tmp_path: Path) 
 
 
 @both_of_fmi_2
-def test_the_reason_reaches_the_log_of_fmpy(
-    load: Load, kind: Kind, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_reason_reaches_the_log_of_fmpy(load, kind, monkeypatch):
     """Its logger is Python, and cannot run while an exception is set; Python would tell of that."""
-    told: list[Any] = []
-    said: list[str] = []
+    told = []
+    said = []
     monkeypatch.setattr(sys, "unraisablehook", told.append)
     fmu = load("GripperPlant")
     callbacks = fmi2CallbackFunctions()
@@ -304,7 +297,7 @@ def test_the_reason_reaches_the_log_of_fmpy(
     assert [text.endswith(reason) for text in said] == [True] * 3
 
 
-def test_sixty_refusals_and_a_reset_in_one_instance(load: Load) -> None:
+def test_sixty_refusals_and_a_reset_in_one_instance(load):
     """pythonfmu 0.7.0 alone gives up a reference to it with each."""
     with plant(load) as instance:
         for _ in range(60):

@@ -6,13 +6,12 @@ import zipfile
 from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 from grasp_fmus import page as made
 from grasp_fmus.build import build_model
-from grasp_fmus.contract import Field, declared
+from grasp_fmus.contract import declared
 from grasp_fmus.description import version
 from grasp_fmus.package import shipped_model
 from grasp_fmus.page import NATIVE, PROXY, PYTHON, icon, licences, needed, page
@@ -26,25 +25,25 @@ ICONS = sorted(file.stem for file in made.ICONS.glob("*.png"))
 KINDS = {"Python": PYTHON, "native": NATIVE, "proxy": PROXY}
 
 
-def card(block: Any) -> Path:
+def card(block):
     return Path(block.__file__).parents[1] / "README.md"
 
 
-def of(name: str) -> str:
+def of(name):
     """The page of one of our FMUs."""
     return page(name, "A summary", card(BLOCKS[name]).read_text("utf-8"), PYTHON)
 
 
-def parsed(html: str) -> ElementTree.Element:
+def parsed(html):
     """The page as XML: stricter than any reader of HTML."""
     return ElementTree.fromstring(html)
 
 
-def text(element: ElementTree.Element) -> str:
+def text(element):
     return " ".join("".join(element.itertext()).split())
 
 
-def rendered(markdown: str) -> str:
+def rendered(markdown):
     """What a card comes out as: what lies between the head of the page and its first section."""
     html = page("Name", "Summary", markdown, PYTHON)
     return (
@@ -55,7 +54,7 @@ def rendered(markdown: str) -> str:
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_the_page_is_well_formed_complete_and_stands_alone(name: str) -> None:
+def test_the_page_is_well_formed_complete_and_stands_alone(name):
     html = of(name)
     root = parsed(html)
     assert html.startswith("<!DOCTYPE html>\n")
@@ -71,7 +70,7 @@ def test_the_page_is_well_formed_complete_and_stands_alone(name: str) -> None:
         assert foreign not in html
 
 
-def shown(f: Field) -> str:
+def shown(f):
     return ".".join(f.path) + (f"[1..{f.size}]" if f.size else "")
 
 
@@ -83,14 +82,14 @@ def shown(f: Field) -> str:
         ("proxy", ["a peer in reach", "fmi3OK", "the state is that of the peer", "ws2_32"]),
     ],
 )
-def test_a_page_says_what_is_to_be_said_of_its_kind(kind: str, said: list[str]) -> None:
+def test_a_page_says_what_is_to_be_said_of_its_kind(kind, said):
     html = text(parsed(page("Name", "Summary", "", KINDS[kind], 3)))
     for words in said:
         assert words in html
     assert ("pythonfmu.txt" in html) == (kind == "Python")
 
 
-def test_packages_that_the_host_must_have_are_named() -> None:
+def test_packages_that_the_host_must_have_are_named():
     html = page("Name", "Summary", "", PYTHON, packages=needed(["one", "two"]))
     assert "That Python must have <code>one</code>, <code>two</code>." in html
     assert needed([]) == "No packages need to be installed."
@@ -114,17 +113,17 @@ def test_packages_that_the_host_must_have_are_named() -> None:
         ),
     ],
 )
-def test_what_a_card_comes_out_as(markdown: str, html: str) -> None:
+def test_what_a_card_comes_out_as(markdown, html):
     assert rendered(markdown) == html
 
 
-def test_a_cell_of_a_table_knows_its_head() -> None:
+def test_a_cell_of_a_table_knows_its_head():
     html = rendered("| a | b |\n|---|---|\n| 1 | 2 |\n| 3 | 4 |\n\n| c |\n|---|\n| 5 |\n")
     cells = [(e.get("data-head"), text(e)) for e in parsed(f"<p>{html}</p>").iter("td")]
     assert cells == [("a", "1"), ("b", "2"), ("a", "3"), ("b", "4"), ("c", "5")]
 
 
-def test_name_and_summary_are_text() -> None:
+def test_name_and_summary_are_text():
     html = parsed(page("A<b", "c & d.", "", PYTHON))
     assert [text(e) for e in html.iter("h1")] == ["A<b"]
     assert "c & d." in text(html)
@@ -133,7 +132,7 @@ def test_name_and_summary_are_text() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(360, 800), (1200, 800)])
 @pytest.mark.parametrize("block", ["GraspController", "GripperPlant", "ProximitySensor"])
-def test_nothing_sticks_out_of_the_page(block: str, size: tuple[int, int], tmp_path: Path) -> None:
+def test_nothing_sticks_out_of_the_page(block, size, tmp_path):
     """Of an equation that is too long for a phone the rest is reached within its own line."""
     ready = "<script>document.documentElement.dataset.ready = 1; const recording = {};</script>"
     act = """
@@ -145,7 +144,7 @@ def test_nothing_sticks_out_of_the_page(block: str, size: tuple[int, int], tmp_p
     assert in_browser(html, act, tmp_path, size=size) == [0, []]
 
 
-def test_licences_are_those_of_the_distributions() -> None:
+def test_licences_are_those_of_the_distributions():
     found = licences("grasp-cosim", "pythonfmu")
     assert [Path(file).name for file in found] == ["license.txt", "pythonfmu.txt"]
     assert found["documentation/licenses/license.txt"] == (ROOT / "LICENSE").read_bytes()
@@ -153,7 +152,7 @@ def test_licences_are_those_of_the_distributions() -> None:
 
 
 @pytest.mark.parametrize("name", ["no-such-distribution", "grasp-cosim"])
-def test_a_missing_licence_is_named(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_licence_is_named(name, monkeypatch):
     """The distribution's class may be that of a backport, which other packages bring along."""
     if name == "grasp-cosim":
         bare = SimpleNamespace(read_text=lambda _: None)
@@ -162,7 +161,7 @@ def test_a_missing_licence_is_named(name: str, monkeypatch: pytest.MonkeyPatch) 
         licences(name)
 
 
-def test_icons_are_small_pictures_with_a_transparent_background() -> None:
+def test_icons_are_small_pictures_with_a_transparent_background():
     assert {*BLOCKS, "Proxy"} == set(ICONS)
     for name in ICONS:
         png = icon(name) or b""
@@ -173,9 +172,7 @@ def test_icons_are_small_pictures_with_a_transparent_background() -> None:
     assert len({icon(name) for name in ICONS}) == len(ICONS)
 
 
-def test_the_fmu_holds_page_licences_and_icon(
-    fmus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_fmu_holds_page_licences_and_icon(fmus, tmp_path, monkeypatch):
     with zipfile.ZipFile(fmus / "GripperPlant.fmu") as archive:
         assert archive.read("documentation/index.html").startswith(b"<!DOCTYPE html>")
         for file, data in licences("grasp-cosim", "pythonfmu").items():

@@ -5,15 +5,12 @@ that FMI knows and never fatal; where a call was refused the log says why; and a
 fresh life of the same instance computes what it always does.
 """
 
-from typing import Any
-
 import pytest
-from conftest import Load
 from grasp_fmus.shipped import SHIPPED
 from hypothesis import HealthCheck, given
 from support.drawn_calls import SEQUENCES, Drawn
 from support.examples import examples
-from support.fmi2 import OK, Fmu, Instance
+from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
 from support.slow import slow
 
@@ -22,7 +19,7 @@ pytestmark = all_kinds
 FIRST, *OTHERS = SHIPPED
 
 
-def in_order(fmu: Fmu) -> list[float]:
+def in_order(fmu):
     with Instance(fmu).initialise() as instance:
         assert {instance.step(k * 1e-3, 1e-3) for k in range(5)} == {OK}
         return instance.outputs()
@@ -30,12 +27,12 @@ def in_order(fmu: Fmu) -> list[float]:
 
 @pytest.mark.hypothesis  # it finds those that are decorated, not what is inside of them
 @pytest.mark.parametrize("name", [FIRST, *map(slow, OTHERS)])
-def test_any_sequence_of_calls(load: Load, name: str) -> None:
+def test_any_sequence_of_calls(load, name):
     expected = in_order(load(name))
 
     @given(sequence=SEQUENCES)
     @examples(150, suppress_health_check=list(HealthCheck))
-    def run(sequence: list[tuple[int, tuple[Any, ...]]]) -> None:
+    def run(sequence):
         with Instance(load(name), "one") as one, Instance(load(name), "two") as two:
             drawn = (Drawn(one), Drawn(two))
             for which, call in sequence:

@@ -6,10 +6,8 @@ Each is a process of its own:  python tests/fmus/test_hard_times.py HOST FOLDER 
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
-from typing import Any
 
 import pytest
 from support.compiled import compile_c
@@ -19,7 +17,7 @@ from support.slow import slow
 ROUNDS = 10
 
 
-def without_an_import_path(fmus: list[Fmu]) -> None:
+def without_an_import_path(fmus):
     """The host may do as it likes with sys.path."""
     with Instance(fmus[0]) as instance:
         instance.initialise()
@@ -31,17 +29,17 @@ def without_an_import_path(fmus: list[Fmu]) -> None:
         assert instance.step(0.0, 1e-3) == OK
 
 
-def in_threads(fmus: list[Fmu]) -> None:
+def in_threads(fmus):
     """Instances of different FMUs made at the same time."""
 
-    def live(fmu: Fmu) -> None:
+    def live(fmu):
         for _ in range(ROUNDS):
             with Instance(fmu) as instance:
                 instance.initialise()
                 assert instance.step(0.0, 1e-3) == OK
                 finished.append(fmu.name)
 
-    finished: list[str] = []
+    finished = []
     before = sys.path.copy()
     threads = [Thread(target=live, args=(fmu,)) for fmu in fmus]
     for thread in threads:
@@ -52,16 +50,16 @@ def in_threads(fmus: list[Fmu]) -> None:
     assert sys.path == before
 
 
-HOSTS: dict[str, Any] = {host.__name__: host for host in (without_an_import_path, in_threads)}
+HOSTS = {host.__name__: host for host in (without_an_import_path, in_threads)}
 
 
 @pytest.mark.parametrize("host", [slow(h) if h == "in_threads" else h for h in HOSTS])
-def test_the_host_lives(fmus: Path, tmp_path: Path, host: str) -> None:
+def test_the_host_lives(fmus, tmp_path, host):
     """With every other FMU, one of each room; the threads with all."""
     hosted(host, tmp_path, sorted(fmus.glob("*.fmu"))[:: 1 if host == "in_threads" else 2])
 
 
-def test_binaries_let_go_of_python_before_the_process_ends(tmp_path: Path) -> None:
+def test_binaries_let_go_of_python_before_the_process_ends(tmp_path):
     """pythonfmu 0.7.0 alone does that twice then, the second time in memory that was freed."""
     source, library = tmp_path / "let_go.c", tmp_path / "let_go.so"
     source.write_text(
@@ -77,11 +75,11 @@ def test_binaries_let_go_of_python_before_the_process_ends(tmp_path: Path) -> No
     assert (done.returncode, done.stdout, done.stderr) == (0, "let go\n", "")
 
 
-def test_threads_live_with_native_fmus_too(natives: Path, tmp_path: Path) -> None:
+def test_threads_live_with_native_fmus_too(natives, tmp_path):
     hosted("in_threads", tmp_path, sorted(natives.glob("*.fmu")))
 
 
-def hosted(host: str, folder: Path, fmus: Sequence[Path]) -> None:
+def hosted(host, folder, fmus):
     """It ends in peace."""
     done = subprocess.run(
         [sys.executable, __file__, host, folder, *fmus],

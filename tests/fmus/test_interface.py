@@ -1,13 +1,10 @@
 """The FMUs have the variables that other tools rely on."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from conftest import Folder
-from grasp_cosim.interface.interface import Variable
 from grasp_cosim.interface.read import read_interface
-from support.kinds import Kind, all_kinds
+from support.kinds import all_kinds
 
 PLANT = """
 force[1]                      input      Real     N      0.0
@@ -143,14 +140,14 @@ EXTRA = ("baumgarte_", "impact_reduction.intensity_floor", "kelvin_voigt.", "hun
 """How those begin that are not agreed."""
 
 
-def described(v: Variable) -> tuple[str, ...]:
+def described(v):
     row = (v.name, v.causality, v.kind, v.unit or "-")
     return row if v.start is None else (*row, v.start)
 
 
 @all_kinds
 @pytest.mark.parametrize(("name", "table"), FMUS.items())
-def test_variables_are_those_agreed(folder_of: Folder, kind: Kind, name: str, table: str) -> None:
+def test_variables_are_those_agreed(folder_of, kind, name, table):
     agreed = {tuple(line.split()) for line in table.splitlines() if line}
     found = read_interface(folder_of(kind) / f"{name}.fmu").variables
     ours = {described(v) for v in found if v.causality != "independent"}
@@ -158,7 +155,7 @@ def test_variables_are_those_agreed(folder_of: Folder, kind: Kind, name: str, ta
     assert all(row[0].startswith(EXTRA) for row in ours - agreed)
 
 
-def test_the_adaptive_controller_takes_the_place_of_the_published_one(fmus: Path) -> None:
+def test_the_adaptive_controller_takes_the_place_of_the_published_one(fmus):
     """Every variable of that, declared alike and in the same order; what it adds is its own."""
     published, adaptive = (
         read_interface(fmus / f"{name}.fmu")

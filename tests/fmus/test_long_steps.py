@@ -5,7 +5,6 @@ from math import inf
 from types import SimpleNamespace
 
 import pytest
-from conftest import Load
 from grasp_fmus.contract import longest_step
 from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
@@ -24,7 +23,7 @@ TERMINATED = 3
 
 
 @pytest.mark.parametrize("name", LONGEST)
-def test_a_step_that_is_too_long_is_discarded(load: Load, name: str) -> None:
+def test_a_step_that_is_too_long_is_discarded(load, name):
     """The instance stays as it is, and takes the step that the log says it would take."""
     longest = LONGEST[name]
     with Instance(load(name)).initialise() as instance:
@@ -41,12 +40,12 @@ def test_a_step_that_is_too_long_is_discarded(load: Load, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["GraspController", "GraspControllerAdaptive"])
-def test_a_block_without_sub_steps_takes_any_step(load: Load, name: str) -> None:
+def test_a_block_without_sub_steps_takes_any_step(load, name):
     with Instance(load(name)).initialise() as instance:
         assert instance.step(0.0, 1e300) == OK
 
 
-STIFF: dict[str, dict[str, float]] = {
+STIFF = {
     "GripperPlant": {"baumgarte_alpha": 1e5},
     "GripperPlantCompliant": {"kelvin_voigt.damping": 1e5},
     "GripperPlantMovable": {"kelvin_voigt.damping": 1e5},
@@ -54,7 +53,7 @@ STIFF: dict[str, dict[str, float]] = {
 
 
 @pytest.mark.parametrize("name", STIFF)
-def test_a_step_with_too_many_sub_steps_is_discarded(load: Load, name: str) -> None:
+def test_a_step_with_too_many_sub_steps_is_discarded(load, name):
     """They would be over 20,000; the instance takes a shorter one."""
     closed = {"initial_position[1]": 0.0651, "initial_position[2]": -0.0051}
     with Instance(load(name)).initialise(**closed, **STIFF[name]) as instance:
@@ -66,11 +65,11 @@ def test_a_step_with_too_many_sub_steps_is_discarded(load: Load, name: str) -> N
 
 
 @pytest.mark.parametrize(("declared", "longest"), [({}, inf), ({"LONGEST_STEP": 2}, 2.0)])
-def test_the_longest_step_of_a_block(declared: dict[str, object], longest: float) -> None:
+def test_the_longest_step_of_a_block(declared, longest):
     assert longest_step(SimpleNamespace(**declared)) == longest
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), "10", True, None])
-def test_a_longest_step_is_a_positive_number(value: object) -> None:
+def test_a_longest_step_is_a_positive_number(value):
     with pytest.raises(TypeError, match=r"^LONGEST_STEP = .*: must be a positive number, in s$"):
         longest_step(SimpleNamespace(LONGEST_STEP=value))

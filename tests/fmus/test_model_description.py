@@ -6,16 +6,14 @@ again: nothing is taken from the code that writes the file.
 
 import random
 import re
-from collections.abc import Iterator
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
-from xml.etree.ElementTree import Element, fromstring
+from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+from xml.etree.ElementTree import fromstring
 
 import fmpy
 import pytest
-from conftest import Load
 from fmpy.validation import validate_fmu
 from grasp_fmus.contract import declared, variables
 from grasp_fmus.description import Description, build_description, model_description
@@ -27,30 +25,30 @@ from support.kinds import TRANSLATED, all_kinds
 
 SCHEMA = Path(fmpy.__file__).parent / "schema"
 Kind = Literal["python", "2", "3"]
-KINDS: tuple[Kind, ...] = ("python", "2", "3")
+KINDS = ("python", "2", "3")
 
 every = pytest.mark.parametrize("name", TRANSLATED)
 each = pytest.mark.parametrize("kind", KINDS)
 
 
 @cache
-def described(name: str) -> Description:
+def described(name):
     return Description(name, "What it is", variables(declared(blocks()[name])))
 
 
 @cache
-def written(name: str, kind: Kind) -> bytes:
+def written(name, kind):
     d = described(name)
     if kind == "python":
         return model_description(d, "G")
     return model_description(d, "G", 2 if kind == "2" else 3, native=True)
 
 
-def root_of(name: str, kind: Kind) -> Element:
+def root_of(name, kind):
     return fromstring(written(name, kind))
 
 
-def found(root: Element) -> dict[str, dict[str, str]]:
+def found(root):
     """The attributes of the variables, those of their types included; without the time."""
     named = {"Float64": "Real", "Int32": "Integer"}
     rows = [
@@ -65,7 +63,7 @@ def found(root: Element) -> dict[str, dict[str, str]]:
 # What the blocks declare, read once more
 
 SHOWN = {"m": "mm", "m/s": "mm/s", "V": "mV"}
-TYPES: dict[type[Any], str] = {float: "Real", bool: "Boolean", int: "Integer"}
+TYPES = {float: "Real", bool: "Boolean", int: "Integer"}
 PLACE = ["initial_position[1]", "initial_position[2]", "object_width", "initial_object_position"]
 WEIGHTS = [f"weight[{k}]" for k in (1, 2, 3)]
 AROUND = [
@@ -92,9 +90,9 @@ FIXED = {
 """Start values, geometry, and what the state was made with; the cards say why of each."""
 
 
-def declarations(name: str) -> list[dict[str, str]]:
+def declarations(name):
     """The attributes that the variables of a block must have, in their order."""
-    block: Any = blocks()[name]
+    block = blocks()[name]
     rows = [
         *_rows(block.Inputs, "input", block.Inputs()),
         *_rows(block.Outputs, "output", None),
@@ -109,7 +107,7 @@ def declarations(name: str) -> list[dict[str, str]]:
     return rows
 
 
-def _rows(cls: Any, causality: str, values: Any, prefix: str = "") -> Iterator[dict[str, str]]:
+def _rows(cls, causality, values, prefix=""):
     for name, hint in get_type_hints(cls, include_extras=True).items():
         value = getattr(values, name, None)
         if get_origin(hint) is not Annotated:
@@ -125,7 +123,7 @@ def _rows(cls: Any, causality: str, values: Any, prefix: str = "") -> Iterator[d
             yield _row(f"{prefix}{name}", causality, kind, says, value, value)
 
 
-def _row(name: str, causality: str, kind: Any, says: Any, start: Any, size: Any) -> dict[str, str]:
+def _row(name, causality, kind, says, start, size):
     row = {"name": name, "causality": causality, "type": TYPES.get(kind, "Enumeration")}
     row["description"] = says.description
     row["variability"] = "continuous" if kind is float else "discrete"
@@ -149,7 +147,7 @@ def _row(name: str, causality: str, kind: Any, says: Any, start: Any, size: Any)
 
 @every
 @each
-def test_variables_are_what_the_block_declares(name: str, kind: Kind) -> None:
+def test_variables_are_what_the_block_declares(name, kind):
     """In order, with references, starts, ranges, nominal values and units; no others."""
     expected = declarations(name)
     assert [*found(root_of(name, kind)).values()] == expected
@@ -160,7 +158,7 @@ def test_variables_are_what_the_block_declares(name: str, kind: Kind) -> None:
 
 
 @every
-def test_names_are_such_that_no_host_trips_over_them(name: str) -> None:
+def test_names_are_such_that_no_host_trips_over_them(name):
     """Simulink takes 63 characters, less what it puts before them; ROS makes _ of all else."""
     rows = found(root_of(name, "2"))
     assert max(map(len, rows)) <= 55
@@ -175,7 +173,7 @@ def test_names_are_such_that_no_host_trips_over_them(name: str) -> None:
 
 @every
 @each
-def test_valid_against_the_schema_of_the_standard(name: str, kind: Kind) -> None:
+def test_valid_against_the_schema_of_the_standard(name, kind):
     fmi = "fmi3" if kind == "3" else "fmi2"
     schema = etree.XMLSchema(file=str(SCHEMA / fmi / f"{fmi}ModelDescription.xsd"))
     document = etree.fromstring(written(name, kind))
@@ -185,12 +183,12 @@ def test_valid_against_the_schema_of_the_standard(name: str, kind: Kind) -> None
 
 
 @every
-def test_fmpy_finds_no_problem(fmus: Path, name: str) -> None:
+def test_fmpy_finds_no_problem(fmus, name):
     assert validate_fmu(str(fmus / f"{name}.fmu")) == []
 
 
 @each
-def test_head(kind: Kind) -> None:
+def test_head(kind):
     root = root_of("ProximitySensor", kind)
     head = {key: root.get(key) for key in ("modelName", "variableNamingConvention", "license")}
     assert head == {"modelName": "ProximitySensor", "variableNamingConvention": "structured",
@@ -219,7 +217,7 @@ def test_head(kind: Kind) -> None:
 
 
 @pytest.mark.parametrize("networked", [False, True])
-def test_how_it_is_built(networked: bool) -> None:
+def test_how_it_is_built(networked):
     """One file in one set, which is the first for hosts that read no other."""
     text = build_description("Mass", networked)
     etree.XMLSchema(file=str(SCHEMA / "fmi3/fmi3BuildDescription.xsd")).assertValid(
@@ -238,7 +236,7 @@ def test_how_it_is_built(networked: bool) -> None:
 
 
 @each
-def test_surfaces_are_chosen_by_name(kind: Kind) -> None:
+def test_surfaces_are_chosen_by_name(kind):
     root = root_of("ProximitySensor", kind)
     (choice,) = root.findall("TypeDefinitions/*")
     assert choice.get("name") == found(root)["surface"]["declaredType"]
@@ -246,7 +244,7 @@ def test_surfaces_are_chosen_by_name(kind: Kind) -> None:
     assert items == {"custom": 0, "white": 1, "blue": 2, "red": 3, "brown": 4, "black": 5}
 
 
-def test_the_time_of_fmi_3_has_a_name_of_its_own() -> None:
+def test_the_time_of_fmi_3_has_a_name_of_its_own():
     taken = [Variable(name, float, "parameter", start=0.0, variability="fixed")
              for name in ("time", "time_")]  # fmt: skip
     root = fromstring(model_description(Description("Mass", "", taken), "G", 3, native=True))
@@ -257,15 +255,15 @@ def test_the_time_of_fmi_3_has_a_name_of_its_own() -> None:
 
 # Units
 
-ATOMS: dict[str, dict[str, int]] = {
+ATOMS = {
     "1": {}, "m": {"m": 1}, "s": {"s": 1}, "kg": {"kg": 1}, "N": {"kg": 1, "m": 1, "s": -2},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1}, "Hz": {"s": -1}, "rad": {"rad": 1},
 }  # fmt: skip
 
 
-def exponents(unit: str) -> dict[str, int]:
+def exponents(unit):
     """Of the SI base units in a unit such as N.s/m."""
-    total: dict[str, int] = {}
+    total = {}
     above, _, below = unit.partition("/")
     for factors, sign in ((above, 1), (below, -1)):
         for atom in filter(None, factors.split(".")):
@@ -276,7 +274,7 @@ def exponents(unit: str) -> dict[str, int]:
 
 @every
 @each
-def test_units(name: str, kind: Kind) -> None:
+def test_units(name, kind):
     """Each is defined once and used; people read millimetres."""
     root = root_of(name, kind)
     defined = [unit.attrib["name"] for unit in root.iter("Unit")]
@@ -296,7 +294,7 @@ def test_units(name: str, kind: Kind) -> None:
 # What depends on what
 
 
-def dependencies(root: Element, section: str) -> dict[str, list[str]]:
+def dependencies(root, section):
     """What is declared for each output, in the order of the file."""
     names = [*found(root)]
     fmi_3 = root.get("fmiVersion") == "3.0"
@@ -311,7 +309,7 @@ def dependencies(root: Element, section: str) -> dict[str, list[str]]:
 
 @every
 @each
-def test_every_output_is_there_in_both_sections(name: str, kind: Kind) -> None:
+def test_every_output_is_there_in_both_sections(name, kind):
     """At the start it depends on all parameters, and on nothing but inputs later."""
     root = root_of(name, kind)
     rows = found(root)
@@ -336,7 +334,7 @@ LAYERS = [
     for b in (False, True)
 ]
 ELECTRONICS = [f"{stage}.enabled" for stage in ("ambient", "noise", "adc", "filter")]
-SWITCHES: dict[str, list[dict[str, bool]]] = {
+SWITCHES = {
     "GraspController": LAYERS,
     "GraspControllerAdaptive": LAYERS,
     "GripperPlant": [{}],
@@ -353,19 +351,19 @@ SWITCHES: dict[str, list[dict[str, bool]]] = {
 }
 
 
-def responses(instance: Instance) -> dict[str, set[str]]:
+def responses(instance):
     """Which inputs change which outputs between two steps; the inputs are left as they were."""
     fmu = instance.fmu
     names = [n for n in fmu.names("output") if n not in fmu.booleans]
     flags = [n for n in fmu.names("output") if n in fmu.booleans]
 
-    def outputs() -> list[float]:
+    def outputs():
         status, values = instance.get_boolean([fmu.references[n] for n in flags])
         assert status == OK
         return instance.get(*names) + values
 
     before = outputs()
-    seen: dict[str, set[str]] = {n: set() for n in fmu.names("output")}
+    seen = {n: set() for n in fmu.names("output")}
     for source in fmu.names("input"):
         (start,) = instance.get(source)
         for delta in DELTAS:
@@ -380,15 +378,13 @@ def responses(instance: Instance) -> dict[str, set[str]]:
 
 @all_kinds
 @every
-def test_the_fmu_depends_on_the_inputs_that_it_declares_and_on_no_others(
-    load: Load, name: str
-) -> None:
+def test_the_fmu_depends_on_the_inputs_that_it_declares_and_on_no_others(load, name):
     """In initialisation mode, and between two steps."""
     fmu = load(name)
     inputs = fmu.names("input")
-    seen: dict[str, dict[str, set[str]]] = {"Output": {}, "InitialUnknown": {}}
+    seen = {"Output": {}, "InitialUnknown": {}}
 
-    def note(section: str, instance: Instance) -> None:
+    def note(section, instance):
         for output, sources in responses(instance).items():
             seen[section].setdefault(output, set()).update(sources)
 

@@ -13,20 +13,20 @@ from recording.rows import full_disk
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root makes devices")
 
 
-def write(path: Path, text: str) -> None:
+def write(path, text):
     with in_one_piece(path) as part:
         part.write_text(text)
 
 
-def read_from(pipe: Path) -> tuple[Thread, list[bytes]]:
+def read_from(pipe):
     os.mkfifo(pipe)
-    found: list[bytes] = []
+    found = []
     reader = Thread(target=lambda: found.append(pipe.read_bytes()), daemon=True)
     reader.start()
     return reader, found
 
 
-def test_a_full_disk_names_the_target(tmp_path: Path) -> None:
+def test_a_full_disk_names_the_target(tmp_path):
     path = tmp_path / "wanted.txt"
     with full_disk(10), pytest.raises(OSError, match="too large") as caught:
         write(path, "x" * 1000)
@@ -35,32 +35,32 @@ def test_a_full_disk_names_the_target(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [None, "part", "path"])
-def test_an_error_that_names_the_temporary_file(tmp_path: Path, name: str | None) -> None:
+def test_an_error_that_names_the_temporary_file(tmp_path, name):
     path = tmp_path / "wanted.txt"
     with pytest.raises(OSError, match="No space") as caught, in_one_piece(path) as part:
         raise _no_space({None: None, "part": str(part), "path": part}[name])
     assert caught.value.filename == str(path)
 
 
-def _no_space(name: object) -> OSError:
+def _no_space(name):
     error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     error.filename = name
     return error
 
 
-def test_another_file_keeps_its_name(tmp_path: Path) -> None:
+def test_another_file_keeps_its_name(tmp_path):
     with pytest.raises(FileNotFoundError) as caught, in_one_piece(tmp_path / "wanted.txt"):
         (tmp_path / "other.txt").read_text()
     assert caught.value.filename == str(tmp_path / "other.txt")
 
 
-def test_a_folder_is_refused(tmp_path: Path) -> None:
+def test_a_folder_is_refused(tmp_path):
     with pytest.raises(IsADirectoryError, match="must be the name of a file"):
         write(tmp_path, "")
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_a_link_stays_and_what_it_names_is_replaced(tmp_path: Path, there: bool) -> None:
+def test_a_link_stays_and_what_it_names_is_replaced(tmp_path, there):
     link, file = tmp_path / "link", tmp_path / "folder" / "file"
     link.symlink_to(Path("folder") / "file")
     if there:
@@ -73,7 +73,7 @@ def test_a_link_stays_and_what_it_names_is_replaced(tmp_path: Path, there: bool)
     assert [p.name for p in file.parent.iterdir()] == ["file"]
 
 
-def test_whoever_reads_a_pipe_gets_what_is_written(tmp_path: Path) -> None:
+def test_whoever_reads_a_pipe_gets_what_is_written(tmp_path):
     reader, found = read_from(tmp_path / "pipe")
     (tmp_path / "link").symlink_to("pipe")
     write(tmp_path / "link", "text")
@@ -83,7 +83,7 @@ def test_whoever_reads_a_pipe_gets_what_is_written(tmp_path: Path) -> None:
 
 
 @needs_root
-def test_a_device_stays_one(tmp_path: Path) -> None:
+def test_a_device_stays_one(tmp_path):
     null = tmp_path / "null"
     os.mknod(null, stat.S_IFCHR | 0o666, os.makedev(1, 3))
     write(null, "text")
@@ -91,7 +91,7 @@ def test_a_device_stays_one(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [null]
 
 
-def test_what_is_written_into_stdout_comes_after_what_was_there(tmp_path: Path) -> None:
+def test_what_is_written_into_stdout_comes_after_what_was_there(tmp_path):
     out = tmp_path / "out"
     with out.open("w") as file:
         file.write("before ")
@@ -100,7 +100,7 @@ def test_what_is_written_into_stdout_comes_after_what_was_there(tmp_path: Path) 
     assert out.read_text() == "before after"
 
 
-def test_files_folders_and_what_is_not_there_are_no_streams(tmp_path: Path) -> None:
+def test_files_folders_and_what_is_not_there_are_no_streams(tmp_path):
     (tmp_path / "file").touch()
     for path in (tmp_path, tmp_path / "file", tmp_path / "none", Path("/dev")):
         assert not is_stream(path)

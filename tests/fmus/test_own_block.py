@@ -3,10 +3,8 @@
 import json
 import sys
 from math import exp
-from pathlib import Path
 
 import pytest
-from conftest import Run
 from grasp_fmus.build import build_block
 from grasp_fmus.package import Built
 from support.fmi2 import OK, Fmu, Instance, read_members
@@ -58,13 +56,13 @@ def outputs(p, x, u):
 '''
 
 
-def write(folder: Path, text: str, name: str = "first_order_lag.py") -> Path:
+def write(folder, text, name="first_order_lag.py"):
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
 
 
-def answer(path: Path, folder: Path) -> float:
+def answer(path, folder):
     """Its output after 0.3 s of one step."""
     with Instance(Fmu(path, folder)) as instance:
         instance.initialise()
@@ -72,14 +70,14 @@ def answer(path: Path, folder: Path) -> float:
         return instance.get("y")[0]
 
 
-def test_a_file_becomes_an_fmu(tmp_path: Path) -> None:
+def test_a_file_becomes_an_fmu(tmp_path):
     built = build_block(write(tmp_path, LAG), tmp_path / "out")
     assert built == Built(tmp_path / "out/FirstOrderLag.fmu", "new")
     assert answer(built.path, tmp_path / "a") == pytest.approx(1.0 - exp(-0.6), abs=1e-15)
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["FirstOrderLag.fmu"]
 
 
-def test_a_change_is_built_and_both_run_in_one_process(tmp_path: Path) -> None:
+def test_a_change_is_built_and_both_run_in_one_process(tmp_path):
     file = write(tmp_path, LAG)
     before = build_block(file, tmp_path / "1")
     assert build_block(file, tmp_path / "1").status == "unchanged"
@@ -92,7 +90,7 @@ def test_a_change_is_built_and_both_run_in_one_process(tmp_path: Path) -> None:
     assert "<code>time_constant</code>" in page
 
 
-def test_packages_of_our_blocks_come_along(tmp_path: Path) -> None:
+def test_packages_of_our_blocks_come_along(tmp_path):
     text = LAG.replace("from math", "from gripper_plant import substeps\nfrom math")
     text = text.replace("State(0.0)", "State(float(substeps.count(30.0, 1.0)))")
     built = build_block(write(tmp_path, text), tmp_path)
@@ -145,9 +143,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("before", "after", "said"), WRONG)
-def test_what_is_wrong_is_one_line(
-    command: Run, tmp_path: Path, before: str, after: str, said: str
-) -> None:
+def test_what_is_wrong_is_one_line(command, tmp_path, before, after, said):
     assert LAG.count(before) == 1
     file = write(tmp_path, LAG.replace(before, after))
     code, out, err = command("build", file, "--out", "out")
@@ -166,14 +162,14 @@ def test_what_is_wrong_is_one_line(
         ("GRIPPERplant.py", "GripperPlant.fmu is one of the FMUs that come with this package"),
     ],
 )
-def test_a_name_that_does_not_do(command: Run, tmp_path: Path, name: str, said: str) -> None:
+def test_a_name_that_does_not_do(command, tmp_path, name, said):
     file = write(tmp_path, LAG, name)
     code, _, err = command("build", file)
     assert code == 2
     assert err.startswith(f"grasp-cosim: build: {file}: {said}")
 
 
-def test_what_the_file_prints_is_not_among_the_results(command: Run, tmp_path: Path) -> None:
+def test_what_the_file_prints_is_not_among_the_results(command, tmp_path):
     text = LAG.replace("from math", "print('imported')\nfrom math")
     text = text.replace("    return State(0.0)", "    print('started')\n    return State(0.0)")
     code, out, err = command("build", write(tmp_path, text), "--json")
@@ -181,7 +177,7 @@ def test_what_the_file_prints_is_not_among_the_results(command: Run, tmp_path: P
     assert err == "imported\nstarted\n"
 
 
-def test_a_folder_in_the_place_of_the_fmu(command: Run, tmp_path: Path) -> None:
+def test_a_folder_in_the_place_of_the_fmu(command, tmp_path):
     (tmp_path / "out/FirstOrderLag.fmu").mkdir(parents=True)
     code, out, err = command("build", write(tmp_path, LAG), "--out", "out")
     assert (code, out) == (2, "")

@@ -22,7 +22,7 @@ for module in list(sys.modules.values()):
 """
 
 
-def check_packed(fmu: Path, folder: Path) -> None:
+def check_packed(fmu, folder):
     """A bare Python that imports the script imports every module in the FMU, and finds them all."""
     with ZipFile(fmu) as archive:
         archive.extractall(folder)
@@ -35,9 +35,7 @@ def check_packed(fmu: Path, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_the_modules_of_an_fmu_are_those_that_its_script_imports(
-    fmus: Path, tmp_path: Path, name: str
-) -> None:
+def test_the_modules_of_an_fmu_are_those_that_its_script_imports(fmus, tmp_path, name):
     """Each under a name that ends in the hash of the content, which is the GUID."""
     check_packed(fmus / f"{name}.fmu", tmp_path)
     content = (tmp_path / "resources/slavemodule.txt").read_text().removeprefix(f"{name}_")
@@ -46,7 +44,7 @@ def test_the_modules_of_an_fmu_are_those_that_its_script_imports(
     assert {module.rpartition("_")[2] for module in packed} == {content, "slavemodule"}
 
 
-def test_the_modules_of_a_block_of_ones_own_are_those_that_it_imports(tmp_path: Path) -> None:
+def test_the_modules_of_a_block_of_ones_own_are_those_that_it_imports(tmp_path):
     check_packed(build_block(SPRING, tmp_path).path, tmp_path / "unpacked")
 
 
@@ -64,9 +62,7 @@ FILES = {
 }
 
 
-def test_imports_are_followed_in_whatever_form_they_come(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_imports_are_followed_in_whatever_form_they_come(tmp_path, monkeypatch):
     second = {"__init__.py": "", "leaf.py": "", "unused.py": ""}
     for package, files in (("package", FILES), ("second_package", second)):
         for name, text in files.items():
@@ -85,11 +81,11 @@ def test_imports_are_followed_in_whatever_form_they_come(
     assert packed["package_of_the_test/b.py"] == FILES["b.py"].encode()
 
 
-def test_a_package_that_is_not_installed_is_no_surprise_of_the_host(tmp_path: Path) -> None:
+def test_a_package_that_is_not_installed_is_no_surprise_of_the_host(tmp_path):
     with pytest.raises(ImportError, match="no_such_package: no such package; must be installed"):
         with_imports({"Script.py": b"from no_such_package import block\n"})
 
 
-def test_an_import_is_none_in_the_middle_of_a_text() -> None:
+def test_an_import_is_none_in_the_middle_of_a_text():
     text = 'from a import b\nfrom c.d import (\n  e\n)\n"""\nfrom the start, import is\n"""\n'
     assert IMPORT.findall(text) == ["a", "c"]

@@ -5,10 +5,7 @@ import math
 import os
 import resource
 import struct
-from collections.abc import Callable
-from pathlib import Path
 from random import Random
-from typing import Any
 
 import pytest
 from grasp_fmus.link.message import (
@@ -35,7 +32,6 @@ from support.ports import kept_port
 from support.scripted_peer import (
     SIGNATURE,
     VARIABLES,
-    Act,
     Clock,
     ScriptedPeer,
     answer,
@@ -62,7 +58,7 @@ FOR_EVER = Clock(tick=40_000_000)
 # Initialisation
 
 
-def test_values_go_to_the_peer_and_come_back() -> None:
+def test_values_go_to_the_peer_and_come_back():
     with connected() as (host, peer):
         assert host.outputs() == START
         assert peer.kinds() == [HELLO, INITIALISE]
@@ -71,7 +67,7 @@ def test_values_go_to_the_peer_and_come_back() -> None:
         assert (host.state(), host.counts()) == (1, {})
 
 
-def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_does() -> None:
+def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_does():
     with ScriptedPeer() as peer, hosted(peer.port, peer.clock) as host:
         host.setup(2.5)
         assert host.outputs() == ZEROS
@@ -94,12 +90,12 @@ def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_doe
         assert peer.kinds() == [HELLO, INITIALISE, INITIALISE, INITIALISE]
 
 
-def nothing_yet(peer: ScriptedPeer, m: Message) -> None:
+def nothing_yet(peer, m):
     peer.clock.now += 60_000_000
     peer.send(peer.pack(m, WELCOME, cookie=0))  # wakes, and is none
 
 
-def test_hello_and_initialise_are_repeated_as_they_are() -> None:
+def test_hello_and_initialise_are_repeated_as_they_are():
     with ScriptedPeer() as peer, hosted(peer.port, peer.clock) as host:
         peer.told(HELLO, nothing_yet, busy)  # a busy peer is waited for
         peer.told(INITIALISE, busy)
@@ -109,7 +105,7 @@ def test_hello_and_initialise_are_repeated_as_they_are() -> None:
         assert host.outputs() == START
 
 
-def test_a_session_that_another_was_before_is_begun_anew() -> None:
+def test_a_session_that_another_was_before_is_begun_anew():
     with ScriptedPeer() as peer, hosted(peer.port, peer.clock) as host:
         peer.told(INITIALISE, forget)
         host.initialise()
@@ -129,7 +125,7 @@ def test_a_session_that_another_was_before_is_begun_anew() -> None:
         (refuse(FAILED, b"hot"), "the peer failed: hot"),
     ],
 )  # fmt: skip
-def test_a_peer_that_refuses_is_named_with_its_reason(act: Act, reason: str) -> None:
+def test_a_peer_that_refuses_is_named_with_its_reason(act, reason):
     with ScriptedPeer() as peer, hosted(peer.port, peer.clock, connect_timeout=0.2) as host:
         peer.told(HELLO, *[act] * 4)
         line = host.refused(host.enter)
@@ -138,8 +134,8 @@ def test_a_peer_that_refuses_is_named_with_its_reason(act: Act, reason: str) -> 
 
 
 @pytest.mark.parametrize("answer", [(WELCOME, 1), (REFUSE, 1), (OUTPUTS, 1)])
-def test_of_another_version_nothing_else_is_understood(answer: tuple[int, int]) -> None:
-    def speak_so(peer: ScriptedPeer, m: Message) -> None:
+def test_of_another_version_nothing_else_is_understood(answer):
+    def speak_so(peer, m):
         peer.send(peer.pack(m, answer[0], b"", OTHER_INTERFACE, version=answer[1], cookie=5))
         peer.send(peer.pack(m, REFUSE, b"", OTHER_VERSION))  # of this version, which is none
         peer.clock.now += 10**12
@@ -150,7 +146,7 @@ def test_of_another_version_nothing_else_is_understood(answer: tuple[int, int]) 
         assert "no answer from" in host.refused(host.enter)
 
 
-def test_nobody_there_and_the_host_tries_again() -> None:
+def test_nobody_there_and_the_host_tries_again():
     with ScriptedPeer() as peer, hosted(1, Clock(tick=40_000_000), connect_timeout=0.1) as host:
         assert host.refused(host.enter) == (
             "proxy, t = 0 s: no answer from 127.0.0.1:1 within 0.1 s: "
@@ -163,7 +159,7 @@ def test_nobody_there_and_the_host_tries_again() -> None:
         assert host.outputs() == START
 
 
-def test_a_peer_that_refuses_the_start_values_may_get_others() -> None:
+def test_a_peer_that_refuses_the_start_values_may_get_others():
     with ScriptedPeer() as peer, hosted(peer.port, peer.clock) as host:
         peer.told(INITIALISE, fail)
         host.enter()
@@ -174,7 +170,7 @@ def test_a_peer_that_refuses_the_start_values_may_get_others() -> None:
         assert peer.kinds() == [HELLO, INITIALISE, HELLO, INITIALISE]  # that session is over
 
 
-def test_settings_may_change_in_initialisation_mode() -> None:
+def test_settings_may_change_in_initialisation_mode():
     with (
         ScriptedPeer() as first,
         ScriptedPeer(first.clock) as second,
@@ -199,7 +195,7 @@ def test_settings_may_change_in_initialisation_mode() -> None:
         ({"host": "no such host"}, "no such host:9: no connection: "),
     ],
 )  # fmt: skip
-def test_settings_that_are_none(setting: dict[str, Any], reason: str) -> None:
+def test_settings_that_are_none(setting, reason):
     with hosted(9, **setting) as host:
         assert host.refused(host.enter).startswith(f"proxy, t = 0 s: {reason}")
 
@@ -213,7 +209,7 @@ def test_settings_that_are_none(setting: dict[str, Any], reason: str) -> None:
         ("proxy.key_file", "k" * 1024, "proxy.key_file: too long: must have 0 to 1023 bytes"),
     ],
 )
-def test_values_that_are_refused(name: str, value: Any, reason: str) -> None:
+def test_values_that_are_refused(name, value, reason):
     with hosted(9) as host:
         before = host.get(name)
         line = host.refused(lambda: host.set(**{name: value}))
@@ -221,7 +217,7 @@ def test_values_that_are_refused(name: str, value: Any, reason: str) -> None:
         assert host.get(name) == before
 
 
-def test_a_host_with_more_files_open_than_can_be_watched() -> None:
+def test_a_host_with_more_files_open_than_can_be_watched():
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if hard != resource.RLIM_INFINITY and hard < 1200:
         pytest.skip(f"NO {hard} files: must be 1200")
@@ -249,7 +245,7 @@ def test_a_host_with_more_files_open_than_can_be_watched() -> None:
         (b"\x000123456789abcdef\n", 0o640, "others have access to this key: must be chmod 600"),
     ],
 )  # fmt: skip
-def test_a_shared_key(tmp_path: Path, text: bytes, mode: int, said: str) -> None:
+def test_a_shared_key(tmp_path, text, mode, said):
     key = tmp_path / "key"
     key.write_bytes(text)
     key.chmod(mode)
@@ -263,7 +259,7 @@ def test_a_shared_key(tmp_path: Path, text: bytes, mode: int, said: str) -> None
         assert host.log() == ([f"proxy, t = 0 s: {key}: {said}"] if said else [])
 
 
-def test_a_key_must_be_long_enough_and_the_same(tmp_path: Path) -> None:
+def test_a_key_must_be_long_enough_and_the_same(tmp_path):
     key = tmp_path / "key"
     key.write_bytes(b"0123456789abcde")
     with kept_port() as port, hosted(port, FOR_EVER, key_file=str(key)) as host:
@@ -279,7 +275,7 @@ def test_a_key_must_be_long_enough_and_the_same(tmp_path: Path) -> None:
 # Steps
 
 
-def test_a_step_carries_the_hosts_numbers_to_the_bit() -> None:
+def test_a_step_carries_the_hosts_numbers_to_the_bit():
     random = Random(1)
     with connected() as (host, peer):
         time = 0.0
@@ -301,7 +297,7 @@ def test_a_step_carries_the_hosts_numbers_to_the_bit() -> None:
         assert host.counts() == {}
 
 
-def test_outputs_follow_a_step_and_tunable_parameters_may_change() -> None:
+def test_outputs_follow_a_step_and_tunable_parameters_may_change():
     with connected() as (host, _):
         for name in ("mass", "proxy.timeout"):
             line = host.refused(lambda name=name: host.set(**{name: 1.0}))
@@ -312,8 +308,8 @@ def test_outputs_follow_a_step_and_tunable_parameters_may_change() -> None:
         assert host.get("doubled") == 40.0
 
 
-def test_round_trip_and_age() -> None:
-    def after_a_while(peer: ScriptedPeer, m: Message) -> None:
+def test_round_trip_and_age():
+    def after_a_while(peer, m):
         peer.clock.now += 3_000_000
         answer(peer, m)
 
@@ -330,7 +326,7 @@ def test_round_trip_and_age() -> None:
 # Misses
 
 
-def test_misses_that_are_tolerated_hold_the_outputs() -> None:
+def test_misses_that_are_tolerated_hold_the_outputs():
     with connected() as (host, peer):
         peer.told(STEP, answer, miss, miss, miss, answer)
         for force, doubled, state, missed in (
@@ -346,7 +342,7 @@ def test_misses_that_are_tolerated_hold_the_outputs() -> None:
         assert [m.sequence for m in peer.got if m.kind == STEP] == [2, 3, 4, 5, 6]
 
 
-def lost(host: Host, peer: ScriptedPeer) -> None:
+def lost(host, peer):
     """Step until the peer is lost."""
     peer.told(STEP, *[miss] * 4)
     host.set(force=50.0)
@@ -364,7 +360,7 @@ def lost(host: Host, peer: ScriptedPeer) -> None:
         ({"on_loss": "hold", "failsafe.doubled": -1.0}, START),
     ],
 )
-def test_a_lost_peer(settings: dict[str, Any], outputs: list[Any]) -> None:
+def test_a_lost_peer(settings, outputs):
     """Nothing is sent but the end any more, and nothing is taken."""
     with connected(**settings) as (host, peer):
         lost(host, peer)
@@ -381,7 +377,7 @@ def test_a_lost_peer(settings: dict[str, Any], outputs: list[Any]) -> None:
     assert peer.kinds() == [*before, END]
 
 
-def test_the_host_may_be_stopped() -> None:
+def test_the_host_may_be_stopped():
     with connected(on_loss="stop", misses_tolerated=1) as (host, peer):
         peer.told(STEP, answer, miss, miss)
         host.step()
@@ -403,7 +399,7 @@ def test_the_host_may_be_stopped() -> None:
         (forget, 1, "2 missed in a row: the peer does not know this session;"),
     ],
 )
-def test_when_a_peer_is_lost(act: Act, tolerated: int, reason: str) -> None:
+def test_when_a_peer_is_lost(act, tolerated, reason):
     with connected(misses_tolerated=tolerated) as (host, peer):
         peer.told(STEP, act, act)
         host.step()
@@ -417,7 +413,7 @@ def test_when_a_peer_is_lost(act: Act, tolerated: int, reason: str) -> None:
 # What comes late, twice, or from elsewhere
 
 
-def test_a_late_answer_is_the_newest_there_is_unless_a_newer_one_was_before() -> None:
+def test_a_late_answer_is_the_newest_there_is_unless_a_newer_one_was_before():
     with connected() as (host, peer):
         peer.told(STEP, keep, send_kept_and_miss, answer, keep, answer, send_kept_and_miss, answer)
         for force, doubled in (
@@ -430,7 +426,7 @@ def test_a_late_answer_is_the_newest_there_is_unless_a_newer_one_was_before() ->
         assert host.counts() == {"missed": 4, "late": 2, "out_of_order": 1, "duplicated": 1}
 
 
-def junk() -> list[bytes]:
+def junk():
     """Datagrams that are none of this session."""
     message = Message(OUTPUTS, 0, SIGNATURE.hash, 5, 5, 1, 0.0, 0.0, 0, b"")
     fields = (b"GRSP", VERSION, *message[:-2], 0, 0)
@@ -439,10 +435,10 @@ def junk() -> list[bytes]:
     return [b"", b"x", bytes(80), whole, older, whole[:-1], whole * 800]
 
 
-def test_what_is_none_of_the_session_is_counted_and_changes_nothing() -> None:
+def test_what_is_none_of_the_session_is_counted_and_changes_nothing():
     many = [*junk(), *[b"x"] * 80]
 
-    def odd(peer: ScriptedPeer, m: Message) -> None:
+    def odd(peer, m):
         peer.send(peer.pack(m, REFUSE, b"", 99))
         datagrams(many)(peer, m)
 
@@ -464,8 +460,8 @@ def test_what_is_none_of_the_session_is_counted_and_changes_nothing() -> None:
     [(0, struct.pack("<d", math.nan)), (0, struct.pack("<d", -math.inf)),
      (1, struct.pack("<q", 2**31)), (2, struct.pack("<Q", 2))],
 )  # fmt: skip
-def test_values_that_are_none_are_a_miss(place: int, value: bytes) -> None:
-    def damaged(peer: ScriptedPeer, m: Message) -> None:
+def test_values_that_are_none_are_a_miss(place, value):
+    def damaged(peer, m):
         body = bytearray(Codec(SIGNATURE.answer).pack(1.0, 2, True))
         body[8 * place : 8 * place + 8] = value
         peer.send(peer.pack(m, OUTPUTS, bytes(body)))
@@ -478,13 +474,13 @@ def test_values_that_are_none_are_a_miss(place: int, value: bytes) -> None:
         assert host.counts() == {"missed": 1, "consecutive_missed": 1, "rejected": 1}
 
 
-def test_a_flood_does_not_put_off_the_deadline() -> None:
+def test_a_flood_does_not_put_off_the_deadline():
     """However much comes, with each look at the clock a step is nearer to its end."""
     clock = Clock()
     with connected(clock, timeout=1e-3) as (host, peer):
         over = False
 
-        def flood(peer: ScriptedPeer, m: Message) -> None:
+        def flood(peer, m):
             while not over:
                 peer.send(bytes(80))
 
@@ -502,14 +498,14 @@ def test_a_flood_does_not_put_off_the_deadline() -> None:
         clock.tick = 0
 
 
-def down(datagram: bytes) -> None:
+def down(datagram):
     """A cable was pulled."""
     raise OSError(errno.ENETUNREACH, "Network is unreachable")
 
 
 @pytest.mark.parametrize("at", [HELLO, INITIALISE, STEP])
-def test_a_network_that_is_down_is_a_peer_that_is_silent(at: int) -> None:
-    calls: dict[int, Callable[[Host], Any]] = {
+def test_a_network_that_is_down_is_a_peer_that_is_silent(at):
+    calls = {
         HELLO: Host.enter, INITIALISE: Host.outputs, STEP: Host.step,
     }  # fmt: skip
     how = {"connect_timeout": 0.1, "timeout": 0.1, "misses_tolerated": 0, "on_loss": "stop"}
@@ -528,13 +524,11 @@ def test_a_network_that_is_down_is_a_peer_that_is_silent(at: int) -> None:
 @pytest.mark.parametrize(
     ("reports", "state", "timeout", "tick"), [(1, 1, 2.0, 50_000_000), (2, 3, 0.001, 400_000)]
 )
-def test_a_send_that_only_reported_an_earlier_datagram_is_made_again(
-    reports: int, state: int, timeout: float, tick: int
-) -> None:
+def test_a_send_that_only_reported_an_earlier_datagram_is_made_again(reports, state, timeout, tick):
     """Once, as a report is of one datagram; the peer gets it once."""
-    sent: list[int] = []
+    sent = []
 
-    def reporting(datagram: bytes) -> None:
+    def reporting(datagram):
         sent.append(datagram[6])
         if len(sent) <= reports:
             raise OSError(errno.ECONNREFUSED, "Connection refused")
@@ -553,11 +547,11 @@ def test_a_send_that_only_reported_an_earlier_datagram_is_made_again(
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_state_counts_and_outputs_are_what_the_answers_make_them(seed: int) -> None:
+def test_state_counts_and_outputs_are_what_the_answers_make_them(seed):
     """Against a model of a few lines."""
     random = Random(seed)
     tolerated, resume = random.randrange(4), random.random() < 0.5
-    failsafe: dict[str, Any] = {"failsafe.doubled": -1.0}
+    failsafe = {"failsafe.doubled": -1.0}
     acts = [answer, answer, miss, miss, keep, send_kept_and_answer, fail]
     with connected(misses_tolerated=tolerated, resume=resume, **failsafe) as (host, peer):
         is_lost, in_a_row, missed, shown = False, 0, 0, 3.0
@@ -586,7 +580,7 @@ def test_state_counts_and_outputs_are_what_the_answers_make_them(seed: int) -> N
 # Coming back
 
 
-def test_a_lost_peer_may_come_back_but_not_by_a_late_answer() -> None:
+def test_a_lost_peer_may_come_back_but_not_by_a_late_answer():
     with connected(resume=True) as (host, peer):
         lost(host, peer)
         peer.told(STEP, keep, send_kept_and_miss, answer)
@@ -614,9 +608,7 @@ def test_a_lost_peer_may_come_back_but_not_by_a_late_answer() -> None:
     ],
     ids=["at once", "slowly", "with another between", "after one more failure"],
 )  # fmt: skip
-def test_a_peer_that_was_started_anew_is_greeted_anew(
-    steps: list[Act], hellos: list[Act], initialisations: list[Act], kinds: list[list[int]]
-) -> None:
+def test_a_peer_that_was_started_anew_is_greeted_anew(steps, hellos, initialisations, kinds):
     with connected(resume=True, misses_tolerated=0) as (host, peer):
         peer.told(STEP, *steps)
         peer.told(HELLO, *hellos)
@@ -638,7 +630,7 @@ def test_a_peer_that_was_started_anew_is_greeted_anew(
 # The end
 
 
-def test_the_end_is_said_once_and_values_stay() -> None:
+def test_the_end_is_said_once_and_values_stay():
     with connected() as (host, peer):
         host.step()
         host.terminate()
@@ -648,7 +640,7 @@ def test_the_end_is_said_once_and_values_stay() -> None:
     assert peer.kinds() == [HELLO, INITIALISE, STEP, END]
 
 
-def test_before_a_session_there_is_nothing_to_end() -> None:
+def test_before_a_session_there_is_nothing_to_end():
     with ScriptedPeer() as peer:
         peer.told(HELLO, *[lambda p, m: None] * 5)
         with hosted(peer.port, FOR_EVER, connect_timeout=0.1) as host:
@@ -656,13 +648,13 @@ def test_before_a_session_there_is_nothing_to_end() -> None:
     assert set(peer.kinds()) == {HELLO}
 
 
-def test_there_are_no_states() -> None:
+def test_there_are_no_states():
     with hosted(9) as host:
         line = host.refused(host.must, "SetFMUstate", None)
         assert line.endswith(": is not supported by this FMU")
 
 
-def test_an_original_without_outputs() -> None:
+def test_an_original_without_outputs():
     inputs = [v for v in VARIABLES if v.causality == "input"]
     wire = shared_signature(inputs)
     with (

@@ -6,9 +6,7 @@ import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
 
 import numpy as np
 import pytest
@@ -49,13 +47,13 @@ OWN_OUTPUTS = dict.fromkeys(
 
 
 @pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+def run(tmp_path, monkeypatch, capsys):
     """The command in an empty folder: exit code, standard output, standard error."""
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
 
-    def command(*arguments: str | Path) -> tuple[int, str, str]:
+    def command(*arguments: str | Path):
         code = cli.main(["proxy", *map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err
@@ -64,10 +62,10 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 
 
 @pytest.fixture(params=["2", platforms("3")])
-def proxy(run: Run, request: pytest.FixtureRequest) -> Proxy:
+def proxy(run, request):
     """Builds the proxy of an FMU."""
 
-    def build(original: Path, *options: str) -> Path:
+    def build(original, *options):
         code, _, err = run(original, "-o", "TheProxy.fmu", "--fmi", request.param, *options)
         assert code == 0, err
         return Path("TheProxy.fmu").absolute()
@@ -75,12 +73,12 @@ def proxy(run: Run, request: pytest.FixtureRequest) -> Proxy:
     return build
 
 
-def read(fmu: Path) -> Element:
+def read(fmu):
     with zipfile.ZipFile(fmu) as archive:
         return ElementTree.fromstring(archive.read("modelDescription.xml"))
 
 
-def rewritten(fmu: Path, change: Callable[[Element], None]) -> Path:
+def rewritten(fmu, change):
     """The FMU with another description."""
     root = read(fmu)
     change(root)
@@ -99,7 +97,7 @@ KINDS = {"Float64": "Real", "Float32": "Real", "Enumeration": "Integer"}
 KINDS |= {f"{u}Int{bits}": "Integer" for u in ("", "U") for bits in (8, 16, 32)}
 
 
-def variables(fmu: Path) -> dict[str, dict[str, Any]]:
+def variables(fmu):
     """Inputs, parameters and outputs by name, read from FMI 2 or 3."""
     found = {}
     for element in read(fmu).iterfind("ModelVariables/*"):
@@ -108,10 +106,8 @@ def variables(fmu: Path) -> dict[str, dict[str, Any]]:
             continue
         start = typed.get("start", next((e.get("value") for e in element.iter("Start")), None))
         kind = KINDS.get(typed.tag, typed.tag)
-        convert: Any = {"Real": float, "Integer": int}.get(kind, str)
-        numbers: dict[str, Any] = {
-            k: convert(typed.attrib[k]) for k in ("min", "max") if k in typed.attrib
-        }
+        convert = {"Real": float, "Integer": int}.get(kind, str)
+        numbers = {k: convert(typed.attrib[k]) for k in ("min", "max") if k in typed.attrib}
         found[element.attrib["name"]] = {
             "kind": kind,
             "causality": element.get("causality"),
@@ -126,7 +122,7 @@ def variables(fmu: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
-def check(original: Path, proxy: Path) -> None:
+def check(original, proxy):
     """Everything of the original is in the proxy, and what it has beside, and it is valid."""
     theirs, ours = variables(original), variables(proxy)
     theirs = {name: v for name, v in theirs.items() if v["kind"] != "String"}
@@ -147,10 +143,10 @@ def check(original: Path, proxy: Path) -> None:
     check_structure(proxy)
 
 
-def check_units(original: Path, proxy: Path) -> None:
+def check_units(original, proxy):
     """Units that the proxy uses are defined as the original does."""
 
-    def bases(fmu: Path) -> dict[str, dict[str, float] | None]:
+    def bases(fmu):
         return {
             unit.attrib["name"]: None if base is None else {k: float(x) for k, x in base.items()}
             for unit in read(fmu).iter("Unit")
@@ -164,7 +160,7 @@ def check_units(original: Path, proxy: Path) -> None:
         assert base == theirs.get(name, {"s": 1.0}), name
 
 
-def unknowns(fmu: Path, section: str) -> dict[str, set[str] | None]:
+def unknowns(fmu, section):
     """What is declared of outputs, or at the start, in FMI 2 or 3; None: nothing."""
     root = read(fmu)
     names = [v.attrib["name"] for v in root.iterfind("ModelVariables/*")]
@@ -177,7 +173,7 @@ def unknowns(fmu: Path, section: str) -> dict[str, set[str] | None]:
     return {name: d if d is None else {names[int(i)] for i in d.split()} for name, d in listed}
 
 
-def check_structure(proxy: Path) -> None:
+def check_structure(proxy):
     """Outputs follow nothing while stepping, and nothing of the proxy's own at the start."""
     outputs = [n for n, v in variables(proxy).items() if v["causality"] == "output"]
     for section in ("Output", "InitialUnknown"):
@@ -190,13 +186,13 @@ def check_structure(proxy: Path) -> None:
             assert not [name for name in known if name.startswith("proxy.")]
 
 
-def initial(fmu: Path) -> dict[str, set[str]]:
+def initial(fmu):
     """What is declared of outputs at the start."""
     return {n: known for n, known in unknowns(fmu, "InitialUnknown").items() if known is not None}
 
 
 @pytest.mark.parametrize("name", [slow(n) if n != "ProximitySensor" else n for n in BLOCKS])
-def test_the_proxy_of_one_of_ours(fmus: Path, proxy: Proxy, name: str) -> None:
+def test_the_proxy_of_one_of_ours(fmus, proxy, name):
     original = fmus / f"{name}.fmu"
     made = proxy(original)
     check(original, made)
@@ -209,10 +205,10 @@ def test_the_proxy_of_one_of_ours(fmus: Path, proxy: Proxy, name: str) -> None:
     assert {k: float(v) for k, v in ours.items()} == {k: float(v) for k, v in theirs.items()}
 
 
-def test_the_proxy_of_an_fmu_with_every_type_of_fmi_2(tmp_path: Path, proxy: Proxy) -> None:
+def test_the_proxy_of_an_fmu_with_every_type_of_fmi_2(tmp_path, proxy):
     units = {"u_Real": "degC", "y_Real": "degF", "x": "mm", "now": "bare"}
 
-    def describe(root: Element) -> None:
+    def describe(root):
         for v in root.iter("ScalarVariable"):
             v.set("description", f"a <{v.get('name')}> & more")
             typed = v[0]
@@ -250,8 +246,8 @@ def test_the_proxy_of_an_fmu_with_every_type_of_fmi_2(tmp_path: Path, proxy: Pro
     assert read(made).find("DefaultExperiment") is None
 
 
-def test_dependencies_that_are_not_declared_are_all(tmp_path: Path, proxy: Proxy) -> None:
-    def undeclare(root: Element) -> None:
+def test_dependencies_that_are_not_declared_are_all(tmp_path, proxy):
+    def undeclare(root):
         for unknown in root.iter("Unknown"):
             unknown.attrib.pop("dependencies")
 
@@ -263,7 +259,7 @@ def test_dependencies_that_are_not_declared_are_all(tmp_path: Path, proxy: Proxy
     assert all(declared[n] == everything for n, v in found.items() if v["causality"] == "output")
 
 
-def test_arrays_are_exchanged_by_element(tmp_path: Path, run: Run) -> None:
+def test_arrays_are_exchanged_by_element(tmp_path, run):
     """In lockstep with the same values as without the link, to the bit."""
     original = state_space(tmp_path, complete=True)
     values = {
@@ -289,7 +285,7 @@ def test_arrays_are_exchanged_by_element(tmp_path: Path, run: Run) -> None:
         np.testing.assert_array_equal(direct, there)
 
 
-def test_texts_and_structural_parameters_are_left_out(tmp_path: Path, run: Run) -> None:
+def test_texts_and_structural_parameters_are_left_out(tmp_path, run):
     original = state_space(
         tmp_path,
         more='<String name="label" valueReference="50" '
@@ -315,10 +311,8 @@ def test_texts_and_structural_parameters_are_left_out(tmp_path: Path, run: Run) 
         ("y_clock", "output y_clock is of type Clock"),
     ],
 )
-def test_an_input_or_output_that_cannot_be_exchanged_is_named(
-    tmp_path: Path, run: Run, name: str, reason: str
-) -> None:
-    def only(root: Element) -> None:
+def test_an_input_or_output_that_cannot_be_exchanged_is_named(tmp_path, run, name, reason):
+    def only(root):
         model, structure = root.find("ModelVariables"), root.find("ModelStructure")
         assert model is not None
         assert structure is not None
@@ -333,11 +327,11 @@ def test_an_input_or_output_that_cannot_be_exchanged_is_named(
     assert not Path("TheProxy.fmu").exists()
 
 
-def test_start_values_that_no_datagram_holds(tmp_path: Path, run: Run) -> None:
+def test_start_values_that_no_datagram_holds(tmp_path, run):
     """A parameter keeps the value it has in the original; an input cannot."""
 
-    def endless(name: str) -> Callable[[Element], None]:
-        def change(root: Element) -> None:
+    def endless(name):
+        def change(root):
             for v in root.iter("ScalarVariable"):
                 if v.get("name") == name:
                     v[0].set("start", "INF")
@@ -355,7 +349,7 @@ def test_start_values_that_no_datagram_holds(tmp_path: Path, run: Run) -> None:
     assert "input u_Real is INF at the start" in err
 
 
-def test_a_proxy_of_a_proxy_has_no_names_left(fmus: Path, proxy: Proxy, run: Run) -> None:
+def test_a_proxy_of_a_proxy_has_no_names_left(fmus, proxy, run):
     code, _, err = run(proxy(fmus / "ProximitySensor.fmu"), "-o", "Second.fmu")
     assert code == 2
     assert "TheProxy.fmu: proxy.port: proxy. begins the names of a proxy's own" in err
@@ -364,7 +358,7 @@ def test_a_proxy_of_a_proxy_has_no_names_left(fmus: Path, proxy: Proxy, run: Run
 # What is in it
 
 
-def test_its_own_start_values_and_capabilities(fmus: Path, proxy: Proxy) -> None:
+def test_its_own_start_values_and_capabilities(fmus, proxy):
     made = variables(proxy(fmus / "ProximitySensor.fmu"))
     for name, (_, start) in OWN_PARAMETERS.items():
         assert made[name]["start"] == start
@@ -379,7 +373,7 @@ def test_its_own_start_values_and_capabilities(fmus: Path, proxy: Proxy) -> None
     assert found.get("needsexecutiontool", "false") == "false"
 
 
-def test_the_files_in_it(fmus: Path, run: Run) -> None:
+def test_the_files_in_it(fmus, run):
     assert run(fmus / "GripperPlant.fmu", "-o", "P.fmu")[0] == 0
     with zipfile.ZipFile("P.fmu") as archive:
         names = archive.namelist()
@@ -394,7 +388,7 @@ def test_the_files_in_it(fmus: Path, run: Run) -> None:
     assert "pthread" not in sources
 
 
-def test_an_unchanged_proxy_is_left_alone(fmus: Path, run: Run) -> None:
+def test_an_unchanged_proxy_is_left_alone(fmus, run):
     arguments = (fmus / "ProximitySensor.fmu", "-o", "sub/Eye.fmu")
     assert run(*arguments)[:2] == (0, "sub/Eye.fmu: new\n")
     before = Path("sub/Eye.fmu").stat().st_mtime_ns
@@ -407,7 +401,7 @@ def test_an_unchanged_proxy_is_left_alone(fmus: Path, run: Run) -> None:
     assert [p.name for p in Path("sub").iterdir()] == ["Eye.fmu"]
 
 
-def test_the_peers_side_as_a_c_header(fmus: Path, run: Run) -> None:
+def test_the_peers_side_as_a_c_header(fmus, run):
     """What it does: test_bench_header.py."""
     original = fmus / "GripperPlant.fmu"
     signature, _ = link_signature(read_interface(original))
@@ -450,7 +444,7 @@ SENSOR = "ProximitySensor.fmu"
         ([SENSOR, "--c-header", "p.h", "--fmi", "3"], "--fmi needs -o FILE.fmu"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_one_line(fmus: Path, run: Run, arguments: list[str], reason: str) -> None:
+def test_a_mistake_is_one_line(fmus, run, arguments, reason):
     shutil.copy(fmus / SENSOR, SENSOR)
     before = Path(SENSOR).read_bytes()
     code, out, err = run(*arguments)
@@ -460,9 +454,7 @@ def test_a_mistake_is_one_line(fmus: Path, run: Run, arguments: list[str], reaso
     assert Path(SENSOR).read_bytes() == before
 
 
-def test_without_a_compiler_what_brings_one_is_named(
-    fmus: Path, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_compiler_what_brings_one_is_named(fmus, run, monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setitem(sys.modules, "ziglang", None)

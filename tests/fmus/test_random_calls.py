@@ -7,15 +7,12 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import Folder
 from grasp_cosim.hil.served import Service
 from support import campaign
-from support.kinds import Kind, all_kinds
+from support.kinds import all_kinds
 from support.proxies import build_proxy, serving
 
 CALLER = Path(__file__).with_name("random_calls.py")
@@ -27,9 +24,7 @@ GROWTH = 4e6
 """Bytes by which the process may grow over the second half of ten seeds or more."""
 
 
-def called(
-    folder: Path, seeds: range, calls: int, fmus: Sequence[Path], statuses: str
-) -> dict[str, int]:
+def called(folder, seeds, calls, fmus, statuses):
     """The calls by name and status; nothing else than these statuses may come of them."""
     folder.mkdir()
     done = subprocess.run(
@@ -39,7 +34,7 @@ def called(
     )  # fmt: skip
     last = folder / "last"
     assert done.returncode == 0, f"{last.read_text()}\n{done.stderr}"
-    report: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    report = json.loads(done.stdout.splitlines()[-1])
     assert report["longest"][0] < LONGEST, report["longest"]
     assert {name.rpartition(" ")[2] for name in report["calls"]} <= {"", *statuses}
     assert min(report["calls"][f"{name} 0"] for name in ("DoStep", "SetReal")) > 0
@@ -60,9 +55,7 @@ SIZES = pytest.mark.parametrize(
 
 @all_kinds
 @SIZES
-def test_the_fmus_live(
-    folder_of: Folder, kind: Kind, tmp_path: Path, seeds: range, calls: int
-) -> None:
+def test_the_fmus_live(folder_of, kind, tmp_path, seeds, calls):
     """pythonfmu answers fmi2Fatal for what a slave refuses; a native one has no such."""
     refused = "4" if kind == "python" else "3"
     made = sorted(folder_of(kind).glob("*.fmu"))
@@ -74,7 +67,7 @@ def test_the_fmus_live(
 
 @pytest.mark.slow
 @SIZES
-def test_proxies_live(fmus: Path, tmp_path: Path, seeds: range, calls: int) -> None:
+def test_proxies_live(fmus, tmp_path, seeds, calls):
     """With a peer, and one without."""
     fmu = fmus / "GripperPlant.fmu"
     with serving(fmu, Service(lockstep=True)) as server:

@@ -1,7 +1,6 @@
 """The sensor's electronics through the FMU: states, steps, seeds, refusals."""
 
 import pytest
-from conftest import Load
 from grasp_fmus.contract import declared
 from proximity_sensor import channel
 from support.driven import drive
@@ -14,20 +13,20 @@ STAGES = ("pattern", "ambient", "noise", "adc", "filter", "median")
 H = 1e-4
 
 
-def sensor(load: Load, **values: float) -> Instance:
+def sensor(load, **values):
     """With every stage on; a double underscore in a name stands for the point."""
     on = {f"{stage}.enabled": True for stage in STAGES}
     given = {name.replace("__", "."): value for name, value in values.items()}
     return Instance(load("ProximitySensor")).initialise(**on, **given)
 
 
-def test_off_by_default() -> None:
+def test_off_by_default():
     switches = [f for f in declared(channel) if f.path[-1] == "enabled"]
     assert [(f.path[0], f.start) for f in switches] == [(stage, False) for stage in STAGES]
 
 
 @pytest.mark.parametrize("size", [1e-4, 1.7e-4, 1 / 3e4])
-def test_a_state_in_the_middle_of_a_sampling_period(load: Load, size: float) -> None:
+def test_a_state_in_the_middle_of_a_sampling_period(load, size):
     """In the instance, and through bytes in another, in which every stage is off."""
     with sensor(load, noise__seed=3, ambient__drift=0.1) as one:
         drive(one, 0, 101, size)
@@ -44,7 +43,7 @@ def test_a_state_in_the_middle_of_a_sampling_period(load: Load, size: float) -> 
         state.free()
 
 
-def test_the_step_changes_neither_noise_nor_filter(load: Load) -> None:
+def test_the_step_changes_neither_noise_nor_filter(load):
     seen = []
     for every in (1, 2, 10):
         with sensor(load) as instance:
@@ -57,7 +56,7 @@ def test_the_step_changes_neither_noise_nor_filter(load: Load) -> None:
     assert seen[0] == seen[1] == seen[2]
 
 
-def test_equal_seeds_equal_noise(load: Load) -> None:
+def test_equal_seeds_equal_noise(load):
     runs = []
     for seed in (1, 1, 2):
         with sensor(load, noise__seed=seed) as instance:
@@ -75,9 +74,7 @@ def test_equal_seeds_equal_noise(load: Load) -> None:
         ("adc.bits", 33, True, "adc.bits = 33: must be from 1 to 32"),
     ],
 )
-def test_what_does_not_fit_is_refused(
-    load: Load, name: str, value: float, at_once: bool, text: str
-) -> None:
+def test_what_does_not_fit_is_refused(load, name, value, at_once, text):
     with Instance(load("ProximitySensor")) as instance:
         refused = instance.fmu.refused
         assert instance.assign({"filter.enabled": True}) == OK

@@ -4,7 +4,7 @@ import math
 from xml.etree.ElementTree import fromstring
 
 import pytest
-from grasp_fmus.description import Description, Version, model_description
+from grasp_fmus.description import Description, model_description
 from grasp_fmus.variable import Variable
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +14,7 @@ TEN = {"": 0, "m": -3, "u": -6, "n": -9, "k": 3, "M": 6, "G": 9, "c": -2, "h": 2
 SYMBOLS = {"m": {"m": 1}, "s": {"s": 1}, "N": {"kg": 1, "m": 1, "s": -2}, "K": {"K": 1}}
 
 
-def exponents(**powers: int) -> tuple[int, ...]:
+def exponents(**powers: int):
     return tuple(powers.get(name, 0) for name in BASE)
 
 
@@ -55,7 +55,7 @@ def exponents(**powers: int) -> tuple[int, ...]:
         ("\u2126", 1.0, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
     ],
 )
-def test_known_names(name: str, factor: float, offset: float, powers: dict[str, int]) -> None:
+def test_known_names(name, factor, offset, powers):
     found = known_unit(name)
     assert found is not None
     assert (found.name, found.exponents) == (name, exponents(**powers))
@@ -67,7 +67,7 @@ OTHERS = "Nm kgm N/m.s m/s/s m. .m /s () 10m 12 1e3 PS at zork mkg kdeg m- -- d9
 
 
 @pytest.mark.parametrize("name", [*OTHERS.split(), "", " m", "m s"])
-def test_other_names_are_not(name: str) -> None:
+def test_other_names_are_not(name):
     assert known_unit(name) is None
 
 
@@ -78,9 +78,7 @@ def test_other_names_are_not(name: str) -> None:
     st.sampled_from(list(SYMBOLS)),
     st.integers(1, 3),
 )
-def test_prefixes_are_powers_of_ten_to_the_bit(
-    above: str, one: str, below: str, other: str, power: int
-) -> None:
+def test_prefixes_are_powers_of_ten_to_the_bit(above, one, below, other, power):
     found = known_unit(f"{above}{one}/{below}{other}{power}")
     expected = [SYMBOLS[one].get(b, 0) - power * SYMBOLS[other].get(b, 0) for b in BASE]
     assert found is not None
@@ -89,13 +87,13 @@ def test_prefixes_are_powers_of_ten_to_the_bit(
 
 
 @given(st.text(alphabet="mskNKPagh1-2%./()*^°µ²⁻ ", max_size=8))
-def test_no_text_is_more_than_no_unit(name: str) -> None:
+def test_no_text_is_more_than_no_unit(name):
     found = known_unit(name)
     assert found is None or (math.isfinite(found.factor) and found.factor > 0.0)
 
 
 @pytest.mark.parametrize("name", ["Pa", "rad/s", "N.m", "W", "kN", "V.m^n", "N/m^n", "1", "%"])
-def test_a_unit_is_not_refused(name: str) -> None:
+def test_a_unit_is_not_refused(name):
     assert refusal(name) == ""
 
 
@@ -115,12 +113,12 @@ def test_a_unit_is_not_refused(name: str) -> None:
         ("kiloohm", "kOhm"),
     ],
 )
-def test_what_is_meant_is_asked(name: str, meant: str) -> None:
+def test_what_is_meant_is_asked(name, meant):
     assert refusal(name) == f"unit {name!r} is not known; did you mean {meant}?"
 
 
 @pytest.mark.parametrize("name", ["zork", "m/s/s", "V.n^m", "m s^n"])
-def test_where_nothing_is_near_the_form_is_said(name: str) -> None:
+def test_where_nothing_is_near_the_form_is_said(name):
     assert refusal(name) == f"unit {name!r} is not known; must be one like N, kg, m/s2, N.s/m"
 
 
@@ -135,7 +133,7 @@ def test_where_nothing_is_near_the_form_is_said(name: str) -> None:
     ],
 )
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_description_defines_them(fmi: Version, name: str, base: dict[str, str] | None) -> None:
+def test_a_description_defines_them(fmi, name, base):
     variable = Variable("x", float, "input", name, 0.0)
     root = fromstring(model_description(Description("X", "", [variable]), "g", fmi))
     (unit,) = (unit for unit in root.iter("Unit") if unit.get("name") == name)

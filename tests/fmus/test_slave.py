@@ -1,16 +1,12 @@
 """An FMU as a host sees it: plain FMPy, values before and after a set."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
-from conftest import Folder, Load
 from fmpy import simulate_fmu
 from grasp_fmus.contract import declared, unpacker
 from grasp_fmus.shipped import blocks
 from support.fmi2 import OK, Instance
-from support.kinds import Kind, all_kinds
+from support.kinds import all_kinds
 from support.packages import skip_without_pythonfmu
 
 pytestmark = all_kinds
@@ -19,21 +15,21 @@ BLOCKS = blocks()
 
 
 @pytest.fixture(scope="module")
-def of(folder_of: Folder, kind: Kind) -> Path:
+def of(folder_of, kind):
     """The folder with the FMUs of the kind that the test is run on."""
     return folder_of(kind)
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_runs_in_plain_fmpy(of: Path, name: str) -> None:
+def test_runs_in_plain_fmpy(of, name):
     skip_without_pythonfmu()
-    result: Any = simulate_fmu(of / f"{name}.fmu", stop_time=0.01, validate=True)
+    result = simulate_fmu(of / f"{name}.fmu", stop_time=0.01, validate=True)
     assert len(result) > 10
     assert all(np.isfinite(result[column]).all() for column in result.dtype.names)
 
 
-def test_a_free_finger_in_plain_fmpy_is_a_parabola(of: Path) -> None:
-    result: Any = simulate_fmu(
+def test_a_free_finger_in_plain_fmpy_is_a_parabola(of):
+    result = simulate_fmu(
         of / "GripperPlant.fmu",
         stop_time=0.1,
         step_size=1e-3,
@@ -45,7 +41,7 @@ def test_a_free_finger_in_plain_fmpy_is_a_parabola(of: Path) -> None:
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_start_values_are_those_of_the_block(load: Load, name: str) -> None:
+def test_start_values_are_those_of_the_block(load, name):
     block = BLOCKS[name]
     with Instance(load(name)) as instance:
         assert (instance.setup(), instance.enter()) == (OK, OK)
@@ -55,7 +51,7 @@ def test_start_values_are_those_of_the_block(load: Load, name: str) -> None:
         assert instance.outputs() == [value for value in values if not isinstance(value, bool)]
 
 
-def test_outputs_agree_with_inputs_in_initialisation_mode(load: Load) -> None:
+def test_outputs_agree_with_inputs_in_initialisation_mode(load):
     with Instance(load("ProximitySensor")) as instance:
         assert (instance.setup(), instance.enter()) == (OK, OK)
         for gap, reflectance in ((0.02, 1.0), (0.01, 0.5)):
@@ -64,7 +60,7 @@ def test_outputs_agree_with_inputs_in_initialisation_mode(load: Load) -> None:
             assert instance.get("intensity") == [pytest.approx(expected, rel=1e-14)]
 
 
-def test_outputs_follow_a_tunable_parameter_at_run_time(load: Load) -> None:
+def test_outputs_follow_a_tunable_parameter_at_run_time(load):
     with Instance(load("ProximitySensor")).initialise() as instance:
         assert instance.step(0.0, 1e-3) == OK
         (before,) = instance.get("intensity")
@@ -74,7 +70,7 @@ def test_outputs_follow_a_tunable_parameter_at_run_time(load: Load) -> None:
         assert instance.get("intensity") == [0.25 * before]
 
 
-def test_values_in_any_order_and_none(load: Load) -> None:
+def test_values_in_any_order_and_none(load):
     with Instance(load("GraspController")) as instance:
         assert (instance.setup(), instance.enter()) == (OK, OK)
         names = ["intensity[2]", "position[1]", "intensity[1]"]

@@ -3,12 +3,11 @@
 import struct
 
 import pytest
-from conftest import Load
 from hypothesis import given
 from hypothesis import strategies as st
 from support.driven import H, drive
 from support.examples import examples
-from support.fmi2 import OK, Fmu, Instance
+from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
 
 pytestmark = all_kinds
@@ -25,13 +24,13 @@ NAMES = tuple(PARAMETERS)
 PLANTS = NAMES[:3]
 
 
-def ready(fmu: Fmu) -> Instance:
+def ready(fmu):
     """An instance in step mode, with parameters that are not those it starts with."""
     return Instance(fmu).initialise(**PARAMETERS[fmu.name])
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_step_save_step_restore_step(load: Load, name: str) -> None:
+def test_step_save_step_restore_step(load, name):
     """In the instance, with the outputs of that moment, and in another, even a new one."""
     with ready(load(name)) as one, Instance(load(name), "two") as two:
         drive(one, 0, 150)
@@ -48,7 +47,7 @@ def test_step_save_step_restore_step(load: Load, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_state_goes_through_bytes(load: Load, name: str) -> None:
+def test_a_state_goes_through_bytes(load, name):
     with ready(load(name)) as one, Instance(load(name), "two") as two:
         drive(one, 0, 100)
         state = one.state()
@@ -62,7 +61,7 @@ def test_a_state_goes_through_bytes(load: Load, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_phase_is_part_of_the_state(load: Load, name: str) -> None:
+def test_the_phase_is_part_of_the_state(load, name):
     with Instance(load(name)) as instance:
         fresh = instance.state()
         instance.initialise()
@@ -79,7 +78,7 @@ def test_the_phase_is_part_of_the_state(load: Load, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_bytes_that_are_no_state_are_refused(load: Load, name: str) -> None:
+def test_bytes_that_are_no_state_are_refused(load, name):
     """Of another size, of another FMU; the instance goes on."""
     with ready(load(name)) as instance:
         drive(instance, 0, 20)
@@ -99,7 +98,7 @@ def test_bytes_that_are_no_state_are_refused(load: Load, name: str) -> None:
 
 @pytest.mark.parametrize("number", [1e300, float("inf"), float("nan"), -7.0, 0.5, 9.0])
 @pytest.mark.parametrize("place", ["phase", "surface"])
-def test_bytes_with_a_number_that_none_may_have(load: Load, number: float, place: str) -> None:
+def test_bytes_with_a_number_that_none_may_have(load, number, place):
     """The surface is an enumeration, of a value that no host could read again."""
     with Instance(load("ProximitySensor")).initialise() as instance:
         data = bytearray(instance.state().to_bytes())
@@ -110,7 +109,7 @@ def test_bytes_with_a_number_that_none_may_have(load: Load, number: float, place
         assert instance.from_bytes(bytes(data))[0] == fmu.refused
 
 
-def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
+def test_a_state_of_another_fmu_is_refused(load):
     with ready(load("GripperPlant")) as plant, ready(load("ProximitySensor")) as sensor:
         state = plant.state()
         assert sensor.restore(state) == sensor.fmu.refused
@@ -128,9 +127,7 @@ def test_a_state_of_another_fmu_is_refused(load: Load) -> None:
     size=st.sampled_from([1e-4, 1e-3, 7e-3]),
 )
 @examples(25)
-def test_any_moment_can_be_restored(
-    load: Load, name: str, forces: list[float], steps: int, size: float
-) -> None:
+def test_any_moment_can_be_restored(load, name, forces, steps, size):
     """In flight, in contact, leaving: from a drawn moment on, twice the same bits."""
     with Instance(load(name)).initialise() as instance:
         assert instance.set({"force[1]": forces[0], "force[2]": forces[1]}) == OK
@@ -152,7 +149,7 @@ def test_any_moment_can_be_restored(
         state.free()
 
 
-def test_what_may_be_set_follows_from_the_phase_restored(load: Load) -> None:
+def test_what_may_be_set_follows_from_the_phase_restored(load):
     """The parameters are part of the state, too."""
     with Instance(load("GripperPlant")) as stepping, Instance(load("GripperPlant")) as fresh:
         state = stepping.initialise(**{"finger_mass[1]": 0.7}).state()

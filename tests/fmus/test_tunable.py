@@ -1,17 +1,14 @@
 """Parameters that change between two steps: from there, the FMU is the block with the new ones."""
 
-from collections.abc import Callable
 from math import isfinite
-from typing import Any
 
 import pytest
-from conftest import Load
-from grasp_fmus.contract import Field, build_params, declared, longest_step, packer, unpacker
+from grasp_fmus.contract import build_params, declared, longest_step, packer, unpacker
 from grasp_fmus.shipped import blocks
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from support.examples import examples
-from support.fmi2 import OK, Fmu, Instance
+from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
 from support.slow import slow
 
@@ -29,7 +26,7 @@ HELD = {
     **{f"force[{k}]": -1.0 - 0.1 * k for k in (1, 2, 3)},
 }
 NEAR = {"position[1]": 0.09, "velocity[1]": -0.1, "intensity[1]": 0.1}
-STARTS: dict[str, dict[str, float]] = {
+STARTS = {
     "GripperPlant": CLOSED,
     "GripperPlantCompliant": CLOSED,
     "GripperPlantMovable": CLOSED,
@@ -51,7 +48,7 @@ H = 2e-3
 class Twin:
     """The block itself, called as its FMU is."""
 
-    def __init__(self, block: Any, start: dict[str, float]) -> None:
+    def __init__(self, block, start):
         self.block, self.fields = block, declared(block)
         names = [(n, f) for f in self.fields for n in f.names]
         starts = [s for f in self.fields for s in f.starts]
@@ -60,21 +57,21 @@ class Twin:
         self.state = block.initial_state(self.params, self.inputs)
 
     @property
-    def params(self) -> Any:
+    def params(self):
         return build_params(self.block, self.fields, list(self.values.values()))
 
     @property
-    def inputs(self) -> Any:
+    def inputs(self):
         return packer(self.block.Inputs, self.fields)(list(self.values.values()))
 
-    def outputs(self) -> list[Any]:
+    def outputs(self):
         """Those of now; ValueError where the parameters do not go together."""
         y = self.unpack(self.block.outputs(self.params, self.state, self.inputs))
         if not all(map(isfinite, y)):
             raise ArithmeticError
         return y
 
-    def step(self, h: float) -> None:
+    def step(self, h):
         """ArithmeticError where it cannot, ValueError where the parameters do not go together."""
         p, before = self.params, self.state
         if h > longest_step(self.block):
@@ -87,7 +84,7 @@ class Twin:
             raise
 
 
-def expected(fmu: Fmu, call: Callable[[], Any]) -> tuple[int, Any, str]:
+def expected(fmu, call):
     """The status that the FMU has, the result, and the end of the reason where it is refused."""
     try:
         return OK, call(), ""
@@ -97,10 +94,10 @@ def expected(fmu: Fmu, call: Callable[[], Any]) -> tuple[int, Any, str]:
         return fmu.refused, None, str(error)
 
 
-def outputs(instance: Instance) -> tuple[int, list[Any]]:
+def outputs(instance):
     """All of them, in the order of declaration."""
     fmu = instance.fmu
-    found: dict[str, Any] = {}
+    found = {}
     for get, names in (
         (instance.get_real, [n for n in fmu.names("output") if n not in fmu.booleans]),
         (instance.get_boolean, [n for n in fmu.names("output") if n in fmu.booleans]),
@@ -112,7 +109,7 @@ def outputs(instance: Instance) -> tuple[int, list[Any]]:
     return OK, [found[n] for n in fmu.names("output")]
 
 
-def values(f: Field) -> st.SearchStrategy[float]:
+def values(f):
     """In the range of a parameter, mostly of the order of its start value."""
     low, high = f.limits or (-1e3, 1e3)
     if f.kind is bool:
@@ -128,7 +125,7 @@ def values(f: Field) -> st.SearchStrategy[float]:
     return near | drawn.map(lambda x: min(max(float(f"{x:.6f}"), low), high))
 
 
-def changes(block: Any) -> st.SearchStrategy[list[tuple[dict[str, float], int]]]:
+def changes(block):
     """Values of some tunable parameters, and how many steps follow; several times."""
     tunable = [(n, f) for f in declared(block) if f.tunable for n in f.names]
     one = st.sampled_from(tunable).flatmap(lambda t: values(t[1]).map(lambda v: (t[0], v)))
@@ -136,7 +133,7 @@ def changes(block: Any) -> st.SearchStrategy[list[tuple[dict[str, float], int]]]
     return st.lists(st.tuples(some, st.integers(0, 3)), min_size=1, max_size=6)
 
 
-def agree(instance: Instance, twin: Twin, status: int, call: Callable[[], object]) -> None:
+def agree(instance, twin, status, call):
     """A call ended as the block's does, for the same reason; and the outputs are the block's."""
     asked, _, reason = expected(instance.fmu, call)
     assert status == asked, instance.log
@@ -156,13 +153,13 @@ def agree(instance: Instance, twin: Twin, status: int, call: Callable[[], object
 
 @pytest.mark.hypothesis
 @pytest.mark.parametrize("name", [slow(n) if n == "HandPlantMovable" else n for n in BLOCKS])
-def test_a_change_is_that_of_the_block(load: Load, name: str) -> None:
+def test_a_change_is_that_of_the_block(load, name):
     """Whatever changes, between whichever steps."""
     fmu, block, start = load(name), BLOCKS[name], STARTS[name]
 
     @given(drawn=changes(block))
     @examples(25, suppress_health_check=list(HealthCheck))
-    def run(drawn: list[tuple[dict[str, float], int]]) -> None:
+    def run(drawn):
         twin, time = Twin(block, start), 0.0
         with Instance(fmu).initialise(**start) as instance:
             for change, steps in [({}, 2), *drawn]:
@@ -177,7 +174,7 @@ def test_a_change_is_that_of_the_block(load: Load, name: str) -> None:
     run()
 
 
-def test_what_does_not_go_together_is_refused_when_it_is_needed(load: Load) -> None:
+def test_what_does_not_go_together_is_refused_when_it_is_needed(load):
     """So that a host may set them in two calls; nothing has happened, and a set mends it."""
     with Instance(load("ProximitySensor"), "eye").initialise() as instance:
         assert instance.step(0.0, H) == OK
@@ -204,7 +201,7 @@ def test_what_does_not_go_together_is_refused_when_it_is_needed(load: Load) -> N
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_one_that_is_fixed_is_refused(load: Load, name: str) -> None:
+def test_one_that_is_fixed_is_refused(load, name):
     fmu = load(name)
     with Instance(fmu, "one").initialise() as instance:
         for n in fmu.names("parameter"):

@@ -3,16 +3,13 @@
 Values, what is refused and why, and the bytes of states; whatever is called, with whatever.
 """
 
-from typing import Any
-
 import pytest
-from conftest import LoadAs
 from hypothesis import HealthCheck, given
 from support.drawn_calls import SEQUENCES, Drawn
 from support.driven import drive
 from support.examples import examples
 from support.fmi2 import OK, Instance
-from support.kinds import NAMES, Kind
+from support.kinds import NAMES
 from support.twins import Twins
 
 pytestmark = pytest.mark.kinds("native", "native FMI 3")
@@ -20,10 +17,10 @@ pytestmark = pytest.mark.kinds("native", "native FMI 3")
 
 @pytest.mark.hypothesis
 @pytest.mark.parametrize("name", NAMES)
-def test_any_sequence_of_calls(load_as: LoadAs, kind: Kind, name: str) -> None:
+def test_any_sequence_of_calls(load_as, kind, name):
     @given(sequence=SEQUENCES)
     @examples(100, suppress_health_check=list(HealthCheck))
-    def run(sequence: list[tuple[int, tuple[Any, ...]]]) -> None:
+    def run(sequence):
         with Twins(load_as(name, "python"), load_as(name, kind)) as twins:
             drawn = Drawn(twins)
             for _, call in sequence:
@@ -42,14 +39,12 @@ def test_any_sequence_of_calls(load_as: LoadAs, kind: Kind, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_run_that_is_saved_in_one_goes_on_in_the_other(
-    load_as: LoadAs, kind: Kind, name: str
-) -> None:
+def test_a_run_that_is_saved_in_one_goes_on_in_the_other(load_as, kind, name):
     """To and fro; with the bytes alone, in an instance that has had another life."""
     python, native = load_as(name, "python"), load_as(name, kind)
     with Instance(python).initialise() as alone:
         expected = drive(alone, 0, 400)
-    seen: list[float] = []
+    seen = []
     saved = b""
     for k, fmu in enumerate((python, native, python, native)):
         with Instance(fmu, "another").initialise() as instance:

@@ -6,17 +6,15 @@ The FMUs are native ones, with the bits of Python's and a run in milliseconds.
 from dataclasses import replace
 from functools import cache
 from math import ceil
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_controller import holding, reflectance_ratio
-from grasp_cosim.recording.result import Result
 from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
-from support.adaptive import Pair, adaptive_grasp, last, run, values_of
+from support.adaptive import adaptive_grasp, last, run, values_of
 from support.approach import pairs
-from support.continuous import Grasp, Solution, solve
+from support.continuous import Grasp, solve
 from support.continuous_learning import Adaptive
 from support.examples import examples
 from support.slow import slow
@@ -41,29 +39,29 @@ OFF_CENTRE = Grasp(reflectance=(0.3, 1.2), x_m=0.05, adaptive=Adaptive())
 
 
 @cache
-def _reference(g: Grasp, stop: float = STOP, to_the_end: bool = False) -> Solution:
+def _reference(g, stop=STOP, to_the_end=False):
     return solve(g, stop, to_the_end=to_the_end)
 
 
-def _run(natives: Path, g: Grasp, step: float, stop: float) -> Result:
+def _run(natives, g, step, stop):
     values = values_of(g.reflectance, g.x_m, g.W, g.m, g.K_i)
     return run(adaptive_grasp(natives), values, step, stop)
 
 
-def _times(solution: Solution) -> Pair:
+def _times(solution):
     t_1, t_2 = solution.contact_time
     assert t_1 is not None
     assert t_2 is not None
     return t_1, t_2
 
 
-def _contacts(natives: Path, g: Grasp, step: float) -> Result:
+def _contacts(natives, g, step):
     """A run until a little after the later contact of the reference."""
     stop = max(_times(_reference(g))) + 0.02
     return _run(natives, g, step, ceil(stop / step) * step)
 
 
-def _learnt(result: Result) -> Pair:
+def _learnt(result):
     """beta and its standard deviation at the end."""
     ratio, deviation = (
         float(result[f"controller.reflectance_ratio{name}"][-1])
@@ -72,7 +70,7 @@ def _learnt(result: Result) -> Pair:
     return float(np.log(ratio)), deviation / ratio
 
 
-def test_the_defaults_of_the_block_are_the_numbers_of_the_reference() -> None:
+def test_the_defaults_of_the_block_are_the_numbers_of_the_reference():
     p, h = reflectance_ratio.Params(), holding.Params()
     assert Adaptive() == Adaptive(
         p.diffusion_exponent,
@@ -91,7 +89,7 @@ def test_the_defaults_of_the_block_are_the_numbers_of_the_reference() -> None:
     ("g", "times", "beta"),
     [(BLACK_ON_WHITE, (1.885, 1.895), -0.5627), slow(OFF_CENTRE, (1.793, 1.822), -1.387)],
 )
-def test_the_reference_gives_the_known_grasps(g: Grasp, times: Pair, beta: float) -> None:
+def test_the_reference_gives_the_known_grasps(g, times, beta):
     """Pins the reference itself: an error made in the blocks as well would not show elsewhere."""
     assert _times(_reference(g)) == pytest.approx(times, abs=1e-3)
     assert _reference(g).beta[0] == pytest.approx(beta, abs=1e-3)
@@ -109,7 +107,7 @@ def test_the_reference_gives_the_known_grasps(g: Grasp, times: Pair, beta: float
         slow(replace(BLACK_ON_WHITE, m=(0.25, 1.0))),
     ],
 )
-def test_contact_times_and_what_is_learnt(natives: Path, g: Grasp) -> None:
+def test_contact_times_and_what_is_learnt(natives, g):
     result, solution = _contacts(natives, g, STEP), _reference(g)
     assert result.metrics["time_to_contact"] == pytest.approx(_times(solution), abs=TOLERANCE)
     assert _learnt(result) == pytest.approx(solution.beta, abs=2e-4)
@@ -117,7 +115,7 @@ def test_contact_times_and_what_is_learnt(natives: Path, g: Grasp) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("g", [BLACK_ON_WHITE, OFF_CENTRE])
-def test_contact_times_err_in_proportion_to_the_step(natives: Path, g: Grasp) -> None:
+def test_contact_times_err_in_proportion_to_the_step(natives, g):
     steps = [2e-4, 4e-4, 8e-4, 1.6e-3]
     times = np.array([_contacts(natives, g, h).metrics["time_to_contact"] for h in steps])
     for finger in (times - _times(_reference(g))).T:
@@ -127,7 +125,7 @@ def test_contact_times_err_in_proportion_to_the_step(natives: Path, g: Grasp) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("g", [BLACK_ON_WHITE, OFF_CENTRE])
-def test_contact_times_tend_to_the_reference(natives: Path, g: Grasp) -> None:
+def test_contact_times_tend_to_the_reference(natives, g):
     """Without the part that falls with the step nothing is left: the equations are the same."""
     fine, coarse = (
         np.array(_contacts(natives, g, h).metrics["time_to_contact"]) for h in (STEP, 2.0 * STEP)
@@ -137,7 +135,7 @@ def test_contact_times_tend_to_the_reference(natives: Path, g: Grasp) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("g", [BLACK_ON_WHITE, OFF_CENTRE])
-def test_the_force_builds_up_as_in_the_reference(natives: Path, g: Grasp) -> None:
+def test_the_force_builds_up_as_in_the_reference(natives, g):
     expected = _reference(g, BUILD_UP, True)
     result = _run(natives, g, STEP, BUILD_UP)
     assert last(result, "plant.contact_force") == pytest.approx(expected.contact_force, abs=1e-3)
@@ -146,7 +144,7 @@ def test_the_force_builds_up_as_in_the_reference(natives: Path, g: Grasp) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("g", [BLACK_ON_WHITE, OFF_CENTRE])
-def test_both_settle_with_the_stiffness_over_half_the_width(natives: Path, g: Grasp) -> None:
+def test_both_settle_with_the_stiffness_over_half_the_width(natives, g):
     """What is left of f_s once the fingers hold is (P_0/P)^2 of what it would be."""
     settled = 0.5 * g.K_i * g.W
     forces = (settled, -settled)
@@ -172,7 +170,7 @@ GRASPS = st.builds(
     20, phases=[Phase.generate]
 )  # to shrink a failure tells no more than the numbers of a grasp do
 @given(g=GRASPS)
-def test_contact_times_of_any_grasp(natives: Path, g: Grasp) -> None:
+def test_contact_times_of_any_grasp(natives, g):
     speeds = _reference(g).closing_speed
     assume(all(speed is not None and speed >= SLOWEST for speed in speeds))
     times = _contacts(natives, g, STEP).metrics["time_to_contact"]

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim.interface.interface import Value
-from grasp_cosim.recording.result import Result
 from hypothesis import Phase, given
 from hypothesis import strategies as st
-from support.adaptive import Pair, adaptive_grasp, last, run, values_of
+from support.adaptive import adaptive_grasp, last, run, values_of
 from support.approach import pairs
 from support.examples import examples
 
@@ -35,16 +33,14 @@ MASSES = pairs(0.25, 1.0)
 a_few = examples(3, phases=[Phase.generate])  # to shrink a failure tells no more
 
 
-def apart(result: Result) -> float:
+def apart(result):
     t_1, t_2 = result.metrics["time_to_contact"]
     return float(t_1 - t_2)
 
 
 @a_few
 @given(REFLECTANCES, PLACES, WIDTHS, MASSES)
-def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(
-    natives: Path, alpha: Pair, x_m: float, width: float, mass: Pair
-) -> None:
+def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(natives, alpha, x_m, width, mass):
     grasp = adaptive_grasp(natives)
     a = run(grasp, values_of(alpha, x_m, width, mass), STEP, 2.6)
     b = run(grasp, values_of(alpha[::-1], -x_m, width, mass[::-1]), STEP, 2.6)
@@ -61,13 +57,11 @@ def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(
 @pytest.mark.parametrize(("noise", "within"), [(1e-12, 2e-5), (5e-4, 5e-3)])
 @a_few
 @given(REFLECTANCES, PLACES, st.floats(0.25, 4.0))
-def test_scaling_both_reflectances_changes_nothing(
-    natives: Path, noise: float, within: float, alpha: Pair, x_m: float, factor: float
-) -> None:
+def test_scaling_both_reflectances_changes_nothing(natives, noise, within, alpha, x_m, factor):
     """But for rounding, to which the first millimetre is open; and for noise, if it is reckoned
     with: the darker, the later a line is believed.
     """
-    sigma: dict[str, Value] = {"controller.reflectance.intensity_noise": noise}
+    sigma = {"controller.reflectance.intensity_noise": noise}
     dark = (factor * alpha[0], factor * alpha[1])
     a, b = (
         run(adaptive_grasp(natives), {**values_of(each, x_m), **sigma}, STEP, 2.6)
@@ -81,9 +75,7 @@ def test_scaling_both_reflectances_changes_nothing(
 
 @a_few
 @given(REFLECTANCES, PLACES, WIDTHS, MASSES, st.floats(60.0, 200.0))
-def test_the_forces_settle_at_half_the_width(
-    natives: Path, alpha: Pair, x_m: float, width: float, mass: Pair, stiffness: float
-) -> None:
+def test_the_forces_settle_at_half_the_width(natives, alpha, x_m, width, mass, stiffness):
     """Whatever has been learnt: of f_s is left, at rest, at most K_s·tanh(1)·P_0^2/(P_0^2 + P^2).
 
     It moves the target by that over K_a2 = 36 N/m, and layer 1 makes a force of it.
@@ -100,7 +92,7 @@ def test_the_forces_settle_at_half_the_width(
 
 
 @pytest.mark.parametrize("alpha", [(0.1, 1.0), (1.0, 0.1)])
-def test_the_hold_alone_settles_the_forces(natives: Path, alpha: Pair) -> None:
+def test_the_hold_alone_settles_the_forces(natives, alpha):
     """Though nothing is learnt, and f_s would do for lifting a finger off: K_a2·W/2 = 1.26 N."""
     assert 3.0 * tanh((1.0 - 0.1) / (1.0 + 0.1)) > 1.26
     values = {**values_of(alpha), "controller.reflectance.prior_deviation": 0.0}
@@ -110,9 +102,7 @@ def test_the_hold_alone_settles_the_forces(natives: Path, alpha: Pair) -> None:
 
 @a_few
 @given(REFLECTANCES, PLACES, WIDTHS, MASSES)
-def test_there_is_no_force_before_contact(
-    natives: Path, alpha: Pair, x_m: float, width: float, mass: Pair
-) -> None:
+def test_there_is_no_force_before_contact(natives, alpha, x_m, width, mass):
     """Nor a hold, but for the first moments, in which the fingers pull and do not move yet."""
     result = run(adaptive_grasp(natives), values_of(alpha, x_m, width, mass), STEP, 2.6)
     times = result.metrics["time_to_contact"]
@@ -129,7 +119,7 @@ def test_there_is_no_force_before_contact(
 
 
 @pytest.mark.parametrize("alpha", [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
-def test_a_blind_sensor(natives: Path, alpha: Pair) -> None:
+def test_a_blind_sensor(natives, alpha):
     """0 V tells nothing: what is learnt stays 1, and nothing is not a number."""
     result = run(adaptive_grasp(natives), values_of(alpha), STEP, 3.0)
     assert set(result["controller.reflectance_ratio"]) == {1.0}
@@ -139,9 +129,9 @@ def test_a_blind_sensor(natives: Path, alpha: Pair) -> None:
 
 @pytest.mark.parametrize("volts", [0.2, 0.5])
 @pytest.mark.parametrize("alpha", [(0.57, 1.0), (1.0, 0.57)])
-def test_a_sensor_that_saturates(natives: Path, alpha: Pair, volts: float) -> None:
+def test_a_sensor_that_saturates(natives, alpha, volts):
     """What has been learnt until then stays learnt, and the forces settle equal."""
-    values: dict[str, Value] = values_of(alpha)
+    values = values_of(alpha)
     for j in FINGER:
         values[f"sensor_{j}.adc.enabled"] = True
         values[f"sensor_{j}.adc.range[2]"] = volts
@@ -153,7 +143,7 @@ def test_a_sensor_that_saturates(natives: Path, alpha: Pair, volts: float) -> No
 
 @pytest.mark.parametrize("gap", [1e-3, 3e-3])
 @pytest.mark.parametrize("alpha", [(0.57, 1.0), (1.0, 0.57), (1.0, 1.0)])
-def test_a_start_within_millimetres_of_a_face(natives: Path, alpha: Pair, gap: float) -> None:
+def test_a_start_within_millimetres_of_a_face(natives, alpha, gap):
     """A finger that arrives before it has learnt anything still holds as firmly as the other."""
     result = run(adaptive_grasp(natives), values_of(alpha, 0.075 - gap), 2e-3, 9.0)
     assert None not in result.metrics["time_to_contact"]
@@ -162,7 +152,7 @@ def test_a_start_within_millimetres_of_a_face(natives: Path, alpha: Pair, gap: f
     assert np.all(np.abs(np.log(result["controller.reflectance_ratio"])) <= 2.5)
 
 
-def test_the_card_says_what_is_learnt_of_black_and_white(natives: Path) -> None:
+def test_the_card_says_what_is_learnt_of_black_and_white(natives):
     result = run(adaptive_grasp(natives), values_of((0.57, 1.0)), STEP, 2.0)
     first = int(min(result.metrics["time_to_contact"]) / STEP)
     learnt = result["controller.reflectance_ratio"][first]

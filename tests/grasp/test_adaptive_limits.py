@@ -6,16 +6,14 @@ names besides. Other seeds draw other grasps.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import System, sweep
+from grasp_cosim import sweep
 from grasp_cosim.grasp.controllers import with_controller
 from grasp_cosim.grasp.presets import with_preset
 from grasp_cosim.sweeps.rows import grid
-from grasp_cosim.sweeps.table import Table
 from scipy.stats import qmc
 from support import campaign
 
@@ -78,7 +76,7 @@ STUDIES = {
 }
 
 
-def rows(study: Study, runs: int) -> list[dict[str, Any]]:
+def rows(study, runs):
     """The grasps of a study: one in each of `runs` equal slices of everything that varies."""
     varied = {**{(name,): span for name, span in FACES.items()}, **study.more}
     low, high = np.array(list(varied.values())).T
@@ -94,7 +92,7 @@ def rows(study: Study, runs: int) -> list[dict[str, Any]]:
     return found
 
 
-def system_of(study: Study, grasp: System, fmus: Path, law: str = "adaptive") -> System:
+def system_of(study, grasp, fmus, law="adaptive"):
     system = with_controller(grasp, law)
     if "object_shift" in study.limits:
         system = system.swap("plant", fmus / "GripperPlantMovable.fmu")
@@ -103,7 +101,7 @@ def system_of(study: Study, grasp: System, fmus: Path, law: str = "adaptive") ->
     return system.with_values(study.settings).with_experiment(step=study.step, stop=6.0)
 
 
-def columns(table: Table, metric: str) -> np.ndarray:
+def columns(table, metric):
     """All values of a metric, of each finger; a run without one has none that is finite."""
     return np.array([table[c] for c in table.metrics if c.partition("[")[0] == metric])
 
@@ -111,7 +109,7 @@ def columns(table: Table, metric: str) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", STUDIES)
-def test_a_study_keeps_its_limits(name: str, grasp: System, fmus: Path) -> None:
+def test_a_study_keeps_its_limits(name, grasp, fmus):
     study = STUDIES[name]
     table = sweep(system_of(study, grasp, fmus), rows(study, campaign.part(200)))
     assert not table.errors
@@ -124,7 +122,7 @@ def test_a_study_keeps_its_limits(name: str, grasp: System, fmus: Path) -> None:
 
 
 @pytest.mark.slow
-def test_with_equal_faces_it_does_as_the_published_law(grasp: System, fmus: Path) -> None:
+def test_with_equal_faces_it_does_as_the_published_law(grasp, fmus):
     positions = [0.01 * k for k in range(-5, 6, 2)]
     faces = [0.3, 0.57, 0.86, 1.0, 1.2]
     varied = grid({"sensor_1.reflectance": faces, "plant.initial_object_position": positions})

@@ -1,6 +1,5 @@
 """The sampled closed loop against an independent solution of the equations in continuous time."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -15,8 +14,8 @@ from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
 from proximity_sensor import optics
 from support.approach import pairs
-from support.continuous import Grasp, Solution, solve
-from support.direct import Sensors, closed_loop
+from support.continuous import Grasp, solve
+from support.direct import closed_loop
 from support.examples import examples
 from support.slow import slow
 
@@ -45,7 +44,7 @@ SLOWEST = 3e-3
 """m/s; the ranges below keep nearly every approach faster."""
 
 
-def _blocks(g: Grasp) -> tuple[rigid.Params, Sensors, series.Params]:
+def _blocks(g):
     """The parameters of the blocks for a grasp of the reference."""
     sensor_1, sensor_2 = (optics.Params(r, g.K, g.n, g.l_0) for r in g.reflectance)
     return (
@@ -60,27 +59,27 @@ def _blocks(g: Grasp) -> tuple[rigid.Params, Sensors, series.Params]:
 
 
 @cache
-def _reference(g: Grasp) -> Solution:
+def _reference(g):
     return solve(g, STOP)
 
 
-def _reference_times(g: Grasp) -> Array:
+def _reference_times(g):
     return np.array(_reference(g).contact_time, np.float64)
 
 
 @cache
-def _contact_times(g: Grasp, step: float) -> Array:
+def _contact_times(g, step):
     columns = closed_loop(*_blocks(g), step, round(STOP / step), until_contact=True)
     signals = Signals(columns["time"], columns)
     contacts = [first_contact(signals, j) for j in FINGERS]
     return np.array([np.nan if c is None else c[0] for c in contacts])
 
 
-def _forces(signals: Mapping[str, Array]) -> list[float]:
+def _forces(signals):
     return [float(signals[f"plant.contact_force[{j}]"][-1]) for j in FINGERS]
 
 
-def test_the_defaults_of_the_blocks_are_the_published_numbers() -> None:
+def test_the_defaults_of_the_blocks_are_the_published_numbers():
     assert _blocks(Grasp()) == (
         rigid.Params(),
         (optics.Params(), optics.Params()),
@@ -96,9 +95,7 @@ def test_the_defaults_of_the_blocks_are_the_published_numbers() -> None:
         (2, (1.887, 1.897), (0.0059, 0.0060)),
     ],
 )
-def test_the_reference_gives_the_known_grasps(
-    case: int, times: tuple[float, float], speeds: tuple[float, float]
-) -> None:
+def test_the_reference_gives_the_known_grasps(case, times, speeds):
     """Pins the reference itself: an error made in the blocks as well would not show elsewhere."""
     solution = _reference(Grasp(case=case, x_m=OFF_CENTRE))
     assert solution.contact_time == pytest.approx(times, abs=5e-4)
@@ -106,7 +103,7 @@ def test_the_reference_gives_the_known_grasps(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_reference_settles_with_the_stiffness_over_half_the_width(case: int) -> None:
+def test_the_reference_settles_with_the_stiffness_over_half_the_width(case):
     g = Grasp(case=case, x_m=OFF_CENTRE)
     solution = solve(g, 5.0, to_the_end=True)
     settled = 0.5 * g.K_i * g.W
@@ -116,13 +113,13 @@ def test_the_reference_settles_with_the_stiffness_over_half_the_width(case: int)
 
 @pytest.mark.parametrize("x_m", [0.0, OFF_CENTRE, 0.05])
 @pytest.mark.parametrize("case", SLOW_CASES)
-def test_contact_times(case: int, x_m: float) -> None:
+def test_contact_times(case, x_m):
     g = Grasp(case=case, x_m=x_m)
     assert _contact_times(g, STEP) == pytest.approx(_reference_times(g), abs=TOLERANCE)
 
 
 @pytest.mark.parametrize("case", SLOW_CASES)
-def test_contact_times_err_in_proportion_to_the_step(case: int) -> None:
+def test_contact_times_err_in_proportion_to_the_step(case):
     """Sample and hold is of first order, whatever the order of the steps within the blocks."""
     g = Grasp(case=case, x_m=OFF_CENTRE)
     steps = [2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3]
@@ -133,7 +130,7 @@ def test_contact_times_err_in_proportion_to_the_step(case: int) -> None:
 
 
 @pytest.mark.parametrize("case", SLOW_CASES)
-def test_contact_times_tend_to_the_reference(case: int) -> None:
+def test_contact_times_tend_to_the_reference(case):
     """Without the part that falls with the step nothing is left: the equations are the same.
 
     What the extrapolation leaves is of second order in the step, here below 0.1 us.
@@ -144,7 +141,7 @@ def test_contact_times_tend_to_the_reference(case: int) -> None:
 
 
 @pytest.mark.parametrize("case", SLOW_CASES)
-def test_the_force_builds_up_as_in_the_reference(case: int) -> None:
+def test_the_force_builds_up_as_in_the_reference(case):
     g = Grasp(case=case, x_m=OFF_CENTRE)
     expected = solve(g, BUILD_UP[case], to_the_end=True)
     signals = closed_loop(*_blocks(g), STEP, round(BUILD_UP[case] / STEP))
@@ -153,7 +150,7 @@ def test_the_force_builds_up_as_in_the_reference(case: int) -> None:
 
 
 @pytest.mark.parametrize("case", [1, slow(2)])
-def test_the_contact_is_nearly_rigid(case: int) -> None:
+def test_the_contact_is_nearly_rigid(case):
     """Ten times the stabilisation rates, a hundred times the stiffness: no other grasp.
 
     In Case 2 the fingers touch 10 ms apart, too soon for the one to feel how the other landed;
@@ -191,7 +188,7 @@ GRASPS = st.builds(
     8, phases=[Phase.generate]
 )  # to shrink a failure takes minutes and tells no more than the numbers of a grasp do
 @given(drawn=GRASPS)
-def test_contact_times_of_any_grasp(case: int, drawn: Grasp) -> None:
+def test_contact_times_of_any_grasp(case, drawn):
     """An error in time is one in position over the speed of approach: without a bound on the speed
     there is none on the time. Grasps that crawl to the surface, or miss it, are left out.
 

@@ -5,22 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grasp_controller import contact_force, impact_reduction, series, simultaneous_contact
-from grasp_cosim import System, simulate
-from grasp_cosim.interface.interface import Value
+from grasp_cosim import simulate
 from gripper_plant import rigid
 from proximity_sensor import optics
 from support.cases import CASES
 from support.direct import closed_loop
 
 
-def assert_same_bits(
-    system: System,
-    plant: rigid.Params,
-    sensors: tuple[optics.Params, optics.Params],
-    controller: series.Params,
-    step: float,
-    steps: int,
-) -> None:
+def assert_same_bits(system, plant, sensors, controller, step, steps):
     ours = simulate(system, step=step, stop=step * steps)
     direct = closed_loop(plant, sensors, controller, step, steps)
     outputs = [name for name in ours if "exchange_energy" not in name]
@@ -35,14 +27,14 @@ def assert_same_bits(
     assert different == []
 
 
-def controller(case: int) -> series.Params:
+def controller(case):
     return series.Params(
         simultaneous_contact.Params(enabled=case == 2), impact_reduction.Params(enabled=case >= 1)
     )
 
 
 @pytest.mark.parametrize(("case", "step"), [(0, 1e-4), (1, 1e-3), (2, 1e-3), (2, 3.2e-3)])
-def test_the_grasp(grasp: System, case: int, step: float) -> None:
+def test_the_grasp(grasp, case, step):
     steps = round((0.5 if case == 0 else 2.56) / step)
     sensor = optics.Params()
     system = grasp.with_values(CASES[case])
@@ -50,15 +42,15 @@ def test_the_grasp(grasp: System, case: int, step: float) -> None:
 
 
 @pytest.mark.slow
-def test_the_published_step(grasp: System) -> None:
+def test_the_published_step(grasp):
     """10 kHz, from free flight into contact."""
     sensor = optics.Params()
     assert_same_bits(grasp, rigid.Params(), (sensor, sensor), controller(2), 1e-4, 20_000)
 
 
 @pytest.mark.slow
-def test_other_parameters(grasp: System) -> None:
-    values: dict[str, Value] = {
+def test_other_parameters(grasp):
+    values = {
         "plant.finger_mass[1]": 0.41,
         "plant.finger_mass[2]": 0.63,
         "plant.initial_position[1]": 0.093,

@@ -23,7 +23,7 @@ print(len({c.fmu.parent for system in made for c in system.components}))
 
 
 @pytest.fixture
-def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def empty(tmp_path, monkeypatch):
     """An empty current folder, and an empty cache beside it."""
     skip_without_pythonfmu()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
@@ -34,7 +34,7 @@ def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.slow
-def test_the_first_build_may_be_asked_for_by_many_threads_and_processes(empty: Path) -> None:
+def test_the_first_build_may_be_asked_for_by_many_threads_and_processes(empty):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", EIGHT_THREADS]
     processes = [
@@ -47,8 +47,8 @@ def test_the_first_build_may_be_asked_for_by_many_threads_and_processes(empty: P
 
 
 def test_where_nothing_can_be_kept_one_line_says_so_and_threads_share_it(
-    empty: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+    empty, monkeypatch, caplog
+):
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
     monkeypatch.setattr(builds, "_until_the_end", {})
     of_the_grasp = {name: shipped for name, shipped in SHIPPED.items() if not shipped.size}

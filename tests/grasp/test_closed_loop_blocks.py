@@ -5,7 +5,6 @@ from functools import cache
 from math import tanh
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_controller import contact_force as layer_1
 from grasp_controller import impact_reduction as layer_2
@@ -40,11 +39,11 @@ class Grasp:
     case: int = 2
     stiffness: float = 98.0
 
-    def sensors(self) -> tuple[optics.Params, optics.Params]:
+    def sensors(self):
         alpha_1, alpha_2 = self.reflectance
         return optics.Params(reflectance=alpha_1), optics.Params(reflectance=alpha_2)
 
-    def run(self, stop: float) -> list[Sample]:
+    def run(self, stop):
         """Plant, sensors, controller, and again: a sample per communication point."""
         controller, sensors = self.controller(), self.sensors()
         x = rigid.initial_state(self.gripper, rigid.Inputs())
@@ -61,7 +60,7 @@ class Grasp:
             samples.append(Sample(y, u.intensity, series.outputs(controller, z, u)))
         return samples
 
-    def controller(self) -> series.Params:
+    def controller(self):
         return series.Params(
             layer_3.Params(enabled=self.case == 2),
             layer_2.Params(enabled=self.case > 0),
@@ -69,23 +68,23 @@ class Grasp:
         )
 
 
-def seen(sensors: tuple[optics.Params, optics.Params], gap: Pair) -> Pair:
+def seen(sensors, gap):
     p_1, p_2 = sensors
     l_1, l_2 = gap
     xi_1 = optics.outputs(p_1, optics.Inputs(l_1)).intensity
     return xi_1, optics.outputs(p_2, optics.Inputs(l_2)).intensity
 
 
-def around(x_m: float, width: float = 0.07) -> rigid.Params:
+def around(x_m, width=0.07):
     return rigid.Params(initial_object_position=x_m, object_width=width)
 
 
-def swapped(pair: Pair) -> Pair:
+def swapped(pair):
     first, second = pair
     return -second, -first
 
 
-def contact_times(samples: list[Sample]) -> list[float | None]:
+def contact_times(samples):
     return [
         next((n * H for n, sample in enumerate(samples) if sample.gripper.contact[j]), None)
         for j in (0, 1)
@@ -98,9 +97,7 @@ def contact_times(samples: list[Sample]) -> list[float | None]:
 @pytest.mark.slow
 @examples(6)
 @given(st.floats(-0.07, 0.07), st.sampled_from([0, 1, 2]), st.floats(0.5, 1.0), st.floats(0.5, 1.0))
-def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(
-    x_m: float, case: int, alpha_1: float, alpha_2: float
-) -> None:
+def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(x_m, case, alpha_1, alpha_2):
     samples = Grasp(around(x_m), (alpha_1, alpha_2), case).run(2.5)
     images = Grasp(around(-x_m), (alpha_2, alpha_1), case).run(2.5)
     for a, b in zip(samples, images, strict=True):
@@ -113,7 +110,7 @@ def test_the_mirrored_grasp_is_exactly_the_mirrored_grasp(
 
 
 @pytest.mark.parametrize("case", [0, 1, 2])
-def test_both_fingers_of_a_centred_grasp_do_the_same(case: int) -> None:
+def test_both_fingers_of_a_centred_grasp_do_the_same(case):
     """And they touch, so that the symmetry holds in contact as well."""
     samples = Grasp(around(0.0), case=case).run(2.5)
     assert all(s.gripper.position[0] == -s.gripper.position[1] for s in samples)
@@ -137,9 +134,7 @@ def test_both_fingers_of_a_centred_grasp_do_the_same(case: int) -> None:
         (1, 0.03, 0.07, 50.0),
     ],
 )
-def test_the_grasp_settles_at_the_force_of_half_the_width(
-    case: int, x_m: float, width: float, stiffness: float
-) -> None:
+def test_the_grasp_settles_at_the_force_of_half_the_width(case, x_m, width, stiffness):
     """K_i·W/2 on each finger, borne by the object, and the target at its centre."""
     last = Grasp(around(x_m, width), case=case, stiffness=stiffness).run(9.0)[-1]
     force = 0.5 * stiffness * width
@@ -150,7 +145,7 @@ def test_the_grasp_settles_at_the_force_of_half_the_width(
     assert last.controller.target_position == pytest.approx(x_m, abs=1e-9)
 
 
-def test_unequal_reflectances_leave_the_target_off_the_centre() -> None:
+def test_unequal_reflectances_leave_the_target_off_the_centre():
     """At rest f_s of the two reflectances, borne by K_a2: Eq. (10) with both gaps zero."""
     last = Grasp(reflectance=(0.86, 1.0)).run(9.0)[-1]
     off = 3.0 * tanh((0.86 - 1.0) / (0.86 + 1.0)) / 36.0
@@ -162,14 +157,14 @@ def test_unequal_reflectances_leave_the_target_off_the_centre() -> None:
 
 
 @cache
-def grey(case: int) -> list[Sample]:
+def grey(case):
     """The grasp of an object of reflectance 0.9."""
     return Grasp(case=case, reflectance=(0.9, 0.9)).run(2.5)
 
 
 @pytest.mark.parametrize("case", [0, 1, 2])
 @pytest.mark.parametrize("factor", [0.25, 0.5, 8.0])
-def test_twice_the_reflectance_changes_no_force_at_all(case: int, factor: float) -> None:
+def test_twice_the_reflectance_changes_no_force_at_all(case, factor):
     scaled = Grasp(case=case, reflectance=(0.9 * factor, 0.9 * factor)).run(2.5)
     for a, b in zip(grey(case), scaled, strict=True):
         assert b.controller == a.controller
@@ -177,12 +172,12 @@ def test_twice_the_reflectance_changes_no_force_at_all(case: int, factor: float)
         assert b.intensity == (factor * a.intensity[0], factor * a.intensity[1])
 
 
-def forces_of(samples: list[Sample]) -> npt.NDArray[np.float64]:
+def forces_of(samples):
     return np.array([(*s.controller.force, *s.gripper.contact_force) for s in samples])
 
 
 @pytest.mark.parametrize("factor", [slow(0.57), 0.93, 3.0])
-def test_any_reflectance_changes_no_force(factor: float) -> None:
+def test_any_reflectance_changes_no_force(factor):
     """But for roundings, relative to the largest force."""
     scaled = Grasp(reflectance=(factor, factor)).run(2.5)
     plain, forces = forces_of(grey(2)), forces_of(scaled)
@@ -192,7 +187,7 @@ def test_any_reflectance_changes_no_force(factor: float) -> None:
 # ------------------------------------------------------------------------------- the cases
 
 
-def test_each_layer_does_what_it_is_for() -> None:
+def test_each_layer_does_what_it_is_for():
     """Layer 3 brings the fingers to the object together, layer 2 brings them slowly."""
     differences, speeds = [], []
     for case in (0, 1, 2):

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Run
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.master import master
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.toml import read_toml
@@ -20,7 +18,7 @@ AWAY = r"^controller\.force\[1\] ran away: -1e\+06 N at t = 0\.413\d s, ten time
 HINT = "; look at factor = -1 of controller.force[1] -> plant.force[1], or try a shorter step"
 
 
-def turned(grasp: System) -> System:
+def turned(grasp):
     """The grasp with the force on finger 1 the wrong way round."""
     target = Port("plant", "force[1]")
     return replace(
@@ -31,7 +29,7 @@ def turned(grasp: System) -> System:
     )
 
 
-def as_file(folder: Path, fmus: Path, more: str = "") -> Path:
+def as_file(folder, fmus, more=""):
     """That as a system file, with more in [experiment]."""
     from grasp_cosim.grasp.presets import SYSTEM
 
@@ -48,9 +46,7 @@ def as_file(folder: Path, fmus: Path, more: str = "") -> Path:
 @pytest.mark.parametrize(
     ("engine", "every"), [("compiled", 1), slow("python", 1), slow("python", 100)]
 )
-def test_it_is_kept_up_to_there_the_same_bits_in_both_engines(
-    grasp: System, engine: Engine, every: int
-) -> None:
+def test_it_is_kept_up_to_there_the_same_bits_in_both_engines(grasp, engine, every):
     with pytest.raises(SimulationError, match=AWAY) as caught:
         simulate(turned(grasp), every=every, engine=engine, stop=0.6)
     result = caught.value.result
@@ -66,7 +62,7 @@ def test_it_is_kept_up_to_there_the_same_bits_in_both_engines(
     assert line.endswith(HINT + "; the run went on")
 
 
-def test_how_the_rows_come_does_not_matter(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_how_the_rows_come_does_not_matter(grasp, monkeypatch):
     texts = set()
     for enough in (1, 32, 5000):
         monkeypatch.setattr(master, "ENOUGH", enough)
@@ -77,7 +73,7 @@ def test_how_the_rows_come_does_not_matter(grasp: System, monkeypatch: pytest.Mo
 
 
 @pytest.mark.slow
-def test_the_command_keeps_the_recording_and_is_3(command: Run, fmus: Path, tmp_path: Path) -> None:
+def test_the_command_keeps_the_recording_and_is_3(command, fmus, tmp_path):
     path = as_file(tmp_path, fmus)
     code, out, err = command("run", path, "--out", "out")
     assert (code, out) == (3, "")
@@ -91,7 +87,7 @@ def test_the_command_keeps_the_recording_and_is_3(command: Run, fmus: Path, tmp_
     assert max(map(len, out.splitlines())) < 80
 
 
-def test_a_system_file_lets_it_go_on_and_so_does_its_archive(fmus: Path, tmp_path: Path) -> None:
+def test_a_system_file_lets_it_go_on_and_so_does_its_archive(fmus, tmp_path):
     system = read_toml(as_file(tmp_path, fmus, 'diverging = "continue"'))
     assert simulate(system, stop=0.5, step=1e-3).settings["diverging"] == "continue"
     write_ssp(system, tmp_path / "turned.ssp")
@@ -99,14 +95,14 @@ def test_a_system_file_lets_it_go_on_and_so_does_its_archive(fmus: Path, tmp_pat
 
 
 @pytest.mark.slow
-def test_a_qualification_says_which_run(grasp: System, fmus: Path) -> None:
+def test_a_qualification_says_which_run(grasp, fmus):
     wrong = turned(grasp).with_experiment(step=1e-3, stop=0.64)
     with pytest.raises(SimulationError, match=AWAY[:30]):
         qualify(wrong, "sensor_1", fmus / "ProximitySensor.fmu", isolation="none")
 
 
 @pytest.mark.slow
-def test_a_sweep_has_it_as_failed_runs(command: Run, fmus: Path, tmp_path: Path) -> None:
+def test_a_sweep_has_it_as_failed_runs(command, fmus, tmp_path):
     as_file(tmp_path, fmus)
     vary, short = "plant.finger_mass[1]=0.5,100", ("--step", "1e-3", "--stop", "0.5")
     code, out, _ = command(
@@ -122,16 +118,14 @@ def test_a_sweep_has_it_as_failed_runs(command: Run, fmus: Path, tmp_path: Path)
 @pytest.mark.parametrize("case", [0, 1, 2])
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize("plant", ["", "Compliant", "Movable"])
-def test_no_grasp_of_ours_does(
-    command: Run, fmus: Path, case: int, scheme: str, plant: str
-) -> None:
+def test_no_grasp_of_ours_does(command, fmus, case, scheme, plant):
     swap = f"plant={fmus / f'GripperPlant{plant}.fmu'}"
     options = ("--case", str(case), "--scheme", scheme, "--swap", swap, "--step", "1e-3")
     code, _, err = command("run", *options, "--stop", "2")
     assert (code, "ran away" in err) == (0, False)
 
 
-def test_a_loop_that_only_overshoots_does_not(grasp: System) -> None:
+def test_a_loop_that_only_overshoots_does_not(grasp):
     """Hardly any damping in the contact force layer: 300 N instead of 3.4 N, and it settles."""
     result = simulate(grasp.with_values({"controller.contact_force.damping": 1e-3}), step=1e-3)
     assert result.complete

@@ -2,24 +2,22 @@
 
 import struct
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim.grasp import pictures
-from grasp_cosim.recording.result import Result
 from report.runs import TOUCH, component, grasp_run
 from support.slow import slow
 
 
-def width(path: Path) -> int:
+def width(path):
     """Of a PNG, in pixels."""
     head = path.read_bytes()[:24]
     assert head.startswith(b"\x89PNG")
     return int(struct.unpack(">I", head[16:20])[0])
 
 
-def touching_from(run: Result, moments: dict[int, float]) -> Result:
+def touching_from(run, moments):
     """The run with contacts that begin at these times only."""
     contacts = {f"plant.contact[{j}]": run.time >= moments.get(j, np.inf) - 1e-9 for j in (1, 2)}
     return replace(run, signals={**run.signals, **contacts})
@@ -35,11 +33,7 @@ def touching_from(run: Result, moments: dict[int, float]) -> Result:
         slow({2: 0.0}, [[2]]),
     ],
 )
-def test_close_ups_of_the_contacts(
-    moments: dict[int, float],
-    close_ups: list[list[int]],
-    tmp_path: Path,
-) -> None:
+def test_close_ups_of_the_contacts(moments, close_ups, tmp_path):
     run = touching_from(grasp_run(), moments)
     axes = pictures.draw_grasp(run, tmp_path / "grasp.png").axes
     assert len(axes) == 3 * (1 + len(close_ups))
@@ -54,7 +48,7 @@ def test_close_ups_of_the_contacts(
     assert width(tmp_path / "grasp.png") == int(130 * (7.2 + 2.9 * len(close_ups)))
 
 
-def test_the_picture_says_what_it_shows() -> None:
+def test_the_picture_says_what_it_shows():
     run = touching_from(grasp_run(), {})
     parts = {**run.settings["components"], "controller": component("My$Law$.fmu")}
     changed = {"plant.object_width": 0.06, "controller.impact_reduction.enabled": False}
@@ -67,12 +61,12 @@ def test_the_picture_says_what_it_shows() -> None:
     assert said(own.titled("$Mine$"))[0] == "$Mine$"
 
 
-def said(run: Result) -> list[str]:
+def said(run):
     """What the picture of a run says above its panels, lines joined."""
     return [text.get_text().replace("\n", " ") for text in pictures.draw_grasp(run).texts]
 
 
-def test_fingers_differ_in_grey_and_there_is_one_legend() -> None:
+def test_fingers_differ_in_grey_and_there_is_one_legend():
     figure = pictures.draw_grasp(grasp_run())
     for axes in figure.axes:
         assert axes.get_legend() is None
@@ -84,7 +78,7 @@ def test_fingers_differ_in_grey_and_there_is_one_legend() -> None:
     assert names == ["finger 1", "finger 2", "target", "centre of the object"]
 
 
-def test_a_peak_above_the_axes_is_written_there() -> None:
+def test_a_peak_above_the_axes_is_written_there():
     run = grasp_run()
     name = "plant.contact_force[2]"
     hard = replace(run, signals={**run.signals, name: 40.0 * run.signals[name]})
@@ -92,7 +86,7 @@ def test_a_peak_above_the_axes_is_written_there() -> None:
     assert texts == ["peaks: 3 and 136 N"]
 
 
-def test_a_close_up_shows_the_samples_around_the_contact() -> None:
+def test_a_close_up_shows_the_samples_around_the_contact():
     run = grasp_run()
     gap, force, speed = pictures.draw_grasp(run).axes[1::3]
     time, shown = gap.lines[0].get_data()

@@ -31,14 +31,12 @@ Path = Callable[[int], float]
 """A number at each sample."""
 
 
-def light(alpha: float, gap: float) -> float:
+def light(alpha, gap):
     """xi in V, of the sensor's block."""
     return optics.outputs(optics.Params(reflectance=alpha), optics.Inputs(gap)).intensity
 
 
-def samples(
-    gap: tuple[Path, Path], alpha: tuple[Path, Path], way: tuple[Path, Path], count: int
-) -> list[Inputs]:
+def samples(gap, alpha, way, count):
     """What the controller gets: positions and speeds by way, light by gap and reflectance."""
     seen = []
     for k in range(count):
@@ -49,7 +47,7 @@ def samples(
     return seen
 
 
-def assert_same_to_any_law(a: list[Inputs], b: list[Inputs]) -> None:
+def assert_same_to_any_law(a, b):
     """The samples are the same, and so is what both of our laws make of them."""
     assert len(a) == len(b)
     for one, other in zip(a, b, strict=True):
@@ -66,11 +64,11 @@ def assert_same_to_any_law(a: list[Inputs], b: list[Inputs]) -> None:
         assert series.outputs(p, z_, other).force == pytest.approx(forces, abs=1e-6)
 
 
-def still(x: float) -> Path:
+def still(x):
     return lambda _: x
 
 
-def even(start: float, speed: float) -> Path:
+def even(start, speed):
     """start + speed·t."""
     return lambda k: start + speed * k * H
 
@@ -80,13 +78,13 @@ def even(start: float, speed: float) -> Path:
 
 @examples(20)
 @given(st.floats(0.3, 3.0), st.floats(0.02, 0.05))
-def test_at_rest_a_brighter_face_further_away_looks_the_same(c: float, distance: float) -> None:
+def test_at_rest_a_brighter_face_further_away_looks_the_same(c, distance):
     """(alpha·c, lambda·c^(1/n)), lambda = l + l_0, is the same light for every c."""
     far = distance * c ** (1.0 / N)
     assert light(c, far - L_0) == pytest.approx(light(1.0, distance - L_0), rel=ROUNDING)
 
 
-def test_at_rest_no_law_knows_which_finger_is_nearer() -> None:
+def test_at_rest_no_law_knows_which_finger_is_nearer():
     """White on both sides, or black and nearer on the right: a second of the plant's samples."""
     black = 0.57
     width = 0.07
@@ -116,7 +114,7 @@ def test_at_rest_no_law_knows_which_finger_is_nearer() -> None:
 
 
 @pytest.mark.parametrize("w", [0.005, -0.005])
-def test_at_even_speed_a_face_that_comes_nearer_is_a_face_of_another_brightness(w: float) -> None:
+def test_at_even_speed_a_face_that_comes_nearer_is_a_face_of_another_brightness(w):
     """Closing at v, towards a face that moves by w: lambda is (v + w)/v times that of one at rest.
 
     So is alpha^(1/n), for the same light. The gaps are not the same, nor is the moment of contact.
@@ -127,10 +125,10 @@ def test_at_even_speed_a_face_that_comes_nearer_is_a_face_of_another_brightness(
     distance = even(way, -v)
     count = 250
 
-    def scaled(k: int) -> float:
+    def scaled(k):
         return c * distance(k) - L_0
 
-    def plain(k: int) -> float:
+    def plain(k):
         return distance(k) - L_0
 
     other = still(c**N)
@@ -141,7 +139,7 @@ def test_at_even_speed_a_face_that_comes_nearer_is_a_face_of_another_brightness(
     assert abs(scaled(count) - plain(count)) > 1e-3
 
 
-def test_another_speed_of_the_finger_tells_them_apart() -> None:
+def test_another_speed_of_the_finger_tells_them_apart():
     """It is impossible at the one speed v only: quicker by dv, the light is another."""
     v, w, way = 0.02, 0.005, 0.06
     face = ((v + w) / v) ** N
@@ -152,18 +150,18 @@ def test_another_speed_of_the_finger_tells_them_apart() -> None:
 
 
 @pytest.mark.parametrize("nearer", [2e-3, 5e-3])
-def test_a_pattern_along_the_approach_explains_any_light(nearer: float) -> None:
+def test_a_pattern_along_the_approach_explains_any_light(nearer):
     """A white face, and a painted one that is nearer: its reflectance goes with the gap."""
     closing = (even(0.1, -0.02), even(-0.1, 0.02))
     count = 200
 
-    def gap(k: int) -> float:
+    def gap(k):
         return 0.055 - 0.02 * k * H
 
-    def painted(k: int) -> float:
+    def painted(k):
         return float(((gap(k) - nearer + L_0) / (gap(k) + L_0)) ** N)
 
-    def near(k: int) -> float:
+    def near(k):
         return gap(k) - nearer
 
     a = samples((gap, gap), (still(1.0), still(1.0)), closing, count)
@@ -175,7 +173,7 @@ def test_a_pattern_along_the_approach_explains_any_light(nearer: float) -> None:
 # ------------------------------------------------------------------ time to contact alone
 
 
-def rates(seen: list[Inputs]) -> list[tuple[float, float]]:
+def rates(seen):
     """xi'/xi of both fingers, all that a law of the time to contact has."""
     return [
         (
@@ -187,17 +185,17 @@ def rates(seen: list[Inputs]) -> list[tuple[float, float]]:
 
 
 @pytest.mark.parametrize("c", [0.6, 1.5])
-def test_equal_times_to_contact_do_not_make_equal_gaps(c: float) -> None:
+def test_equal_times_to_contact_do_not_make_equal_gaps(c):
     """One finger c times as far away and c times as fast: all rates are the same, on both sides.
 
     When the one arrives at lambda = l_0, the other has the gap (c - 1)·l_0 to go, or has hit.
     """
     v, way, count = 0.02, 0.06, 250
 
-    def plain(k: int) -> float:
+    def plain(k):
         return way - v * k * H - L_0
 
-    def further(k: int) -> float:
+    def further(k):
         return c * (way - v * k * H) - L_0
 
     white = (still(1.0), still(1.0))
@@ -211,7 +209,7 @@ def test_equal_times_to_contact_do_not_make_equal_gaps(c: float) -> None:
     assert left == pytest.approx((c - 1.0) * L_0, abs=1e-12)
 
 
-def test_with_the_way_it_can_be_told() -> None:
+def test_with_the_way_it_can_be_told():
     """The adaptive law, which has the encoders as well, finds equal faces in both."""
     v, way, count = 0.02, 0.06, 250
     further = (lambda k: way - v * k * H - L_0, lambda k: 1.5 * (way - v * k * H) - L_0)

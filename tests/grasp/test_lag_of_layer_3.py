@@ -5,15 +5,11 @@ obeys Eqs. (1), (3), (6) and (7), all linear, with f_s = -K_s·n·z and a mean f
 z = (d_1 - d_2)/(d_1 + d_2). At one d its slowest root says how fast the rest dies out.
 """
 
-from pathlib import Path
-
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_cosim import System
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.recording.result import Result
-from support.adaptive import Pair, adaptive_grasp, run, values_of
+from support.adaptive import adaptive_grasp, run, values_of
 
 N, L_0 = 1.1506, 0.005
 
@@ -21,7 +17,7 @@ CENTRES = (0.03, 0.05)
 """m; the published position, and the furthest."""
 
 
-def slowest(d: float) -> float:
+def slowest(d):
     """How fast the middle of the fingers comes to that of the object, 1/s, at the distance d in m.
 
     With X for the middle, V for that of the virtual objects and T for the target:
@@ -35,35 +31,34 @@ def slowest(d: float) -> float:
     return float(min(-roots.real))
 
 
-def distances(result: Result) -> npt.NDArray[np.float64]:
+def distances(result):
     return np.array([result[f"plant.gap[{j}]"] + L_0 for j in (1, 2)])
 
 
-def rest(result: Result) -> npt.NDArray[np.float64]:
+def rest(result):
     """z over time."""
     d_1, d_2 = distances(result)
-    z: npt.NDArray[np.float64] = (d_1 - d_2) / (d_1 + d_2)
-    return z
+    return (d_1 - d_2) / (d_1 + d_2)
 
 
-def grasps(natives: Path, x_m: float, alpha: Pair = (1.0, 1.0)) -> tuple[Result, Result]:
+def grasps(natives, x_m, alpha=(1.0, 1.0)):
     """The published one and the adaptive one."""
     values = values_of(alpha, x_m)
     published = System.load(SYSTEM, natives)
     return run(published, values, 1e-3, 2.5), run(adaptive_grasp(natives), values, 1e-3, 2.5)
 
 
-def apart(result: Result) -> float:
+def apart(result):
     return float(result.metrics["time_difference"])
 
 
 @pytest.mark.parametrize("x_m", CENTRES)
-def test_with_equal_faces_it_is_that_of_the_published_law(natives: Path, x_m: float) -> None:
+def test_with_equal_faces_it_is_that_of_the_published_law(natives, x_m):
     published, adaptive = grasps(natives, x_m)
     assert apart(adaptive) == pytest.approx(apart(published), abs=2e-3)
 
 
-def test_most_of_what_unequal_faces_leave_is_this_lag(natives: Path) -> None:
+def test_most_of_what_unequal_faces_leave_is_this_lag(natives):
     _, equal = grasps(natives, 0.05)
     _, unequal = grasps(natives, 0.05, (0.3, 1.2))
     assert apart(equal) == pytest.approx(0.025, abs=2e-3)
@@ -72,7 +67,7 @@ def test_most_of_what_unequal_faces_leave_is_this_lag(natives: Path) -> None:
 
 @pytest.mark.parametrize("x_m", CENTRES)
 @pytest.mark.parametrize("before", [0.6, 0.3, 0.1])
-def test_it_dies_out_with_the_slowest_root(natives: Path, x_m: float, before: float) -> None:
+def test_it_dies_out_with_the_slowest_root(natives, x_m, before):
     """At moments in s before the contact; some 2.4 1/s at every distance."""
     published, adaptive = grasps(natives, x_m)
     for result, rel in ((published, 0.04), (adaptive, 0.06)):
@@ -83,7 +78,7 @@ def test_it_dies_out_with_the_slowest_root(natives: Path, x_m: float, before: fl
 
 
 @pytest.mark.parametrize("x_m", CENTRES)
-def test_the_contacts_are_apart_by_the_rest_over_the_speed(natives: Path, x_m: float) -> None:
+def test_the_contacts_are_apart_by_the_rest_over_the_speed(natives, x_m):
     """At the first contact the other finger has still 2·z·d to go."""
     for result in grasps(natives, x_m):
         t_1, t_2 = result.metrics["time_to_contact"]

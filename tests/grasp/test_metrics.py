@@ -1,8 +1,7 @@
 """The metrics of a grasp against solutions in closed form, and where there is nothing to tell."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import cos, exp, log, pi, sin, sqrt
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,23 +33,17 @@ OF_OBJECT = {
 """Metrics of the object by the output of the plant that each is taken from."""
 
 
-def grasp_metrics(time: Array, signals: Mapping[str, npt.NDArray[Any]]) -> Mapping[str, Any]:
+def grasp_metrics(time, signals):
     """The values of the metrics of a grasp, by name."""
     return measure(Signals(time, signals), METRICS).values
 
 
-def recorded(
-    time: Array,
-    finger: Motion,
-    velocity: Motion,
-    surface: Motion,
-    force: Motion,
-) -> dict[str, npt.NDArray[Any]]:
+def recorded(time, finger, velocity, surface, force):
     """Two fingers, one the mirror image of the other; motions are in the opening direction."""
     x, v, s, f = (
         np.array([motion(t) for t in time]) for motion in (finger, velocity, surface, force)
     )
-    signals: dict[str, npt.NDArray[Any]] = {
+    signals = {
         "plant.object_position": np.zeros(len(time)),
         "controller.target_position": np.zeros(len(time)),
     }
@@ -65,14 +58,12 @@ def recorded(
     return signals
 
 
-def every(step: float, end: float) -> Array:
+def every(step, end):
     """Points in time."""
     return step * np.arange(round(end / step) + 1, dtype=np.float64)
 
 
-def pressed(
-    force: Motion, end: float, step: float = 1e-3, touch: float = 0.1004
-) -> Mapping[str, Any]:
+def pressed(force, end, step=1e-3, touch=0.1004):
     """The metrics where fingers of 0.1 m/s touch, and a force of the time since then begins."""
     time = every(step, end)
     return grasp_metrics(
@@ -87,14 +78,14 @@ def pressed(
     )
 
 
-def impact(step: float) -> tuple[Array, dict[str, npt.NDArray[Any]]]:
+def impact(step):
     """A mass that flies on to a Kelvin-Voigt surface and has not left it after the window."""
     touch, w, decay = (START - SURFACE) / SPEED, *oscillation()
 
-    def depth(t: float) -> float:
+    def depth(t):
         return SPEED / w * exp(-decay * t) * sin(w * t)
 
-    def rate(t: float) -> float:
+    def rate(t):
         return SPEED * exp(-decay * t) * (cos(w * t) - decay / w * sin(w * t))
 
     time = every(step, 0.09)
@@ -107,13 +98,13 @@ def impact(step: float) -> tuple[Array, dict[str, npt.NDArray[Any]]]:
     )
 
 
-def oscillation() -> tuple[float, float]:
+def oscillation():
     """Frequency in rad/s and decay in 1/s of the mass on the surface."""
     decay = 0.5 * DAMPING / MASS
     return sqrt(STIFFNESS / MASS - decay * decay), decay
 
 
-def test_the_impulse_of_an_impact_is_the_momentum_that_it_takes() -> None:
+def test_the_impulse_of_an_impact_is_the_momentum_that_it_takes():
     w, decay = oscillation()
     t = IMPACT_WINDOW
     left = SPEED * exp(-decay * t) * (cos(w * t) - decay / w * sin(w * t))
@@ -123,7 +114,7 @@ def test_the_impulse_of_an_impact_is_the_momentum_that_it_takes() -> None:
     assert metrics["time_to_contact"] == pytest.approx([(START - SURFACE) / SPEED] * 2, abs=1e-9)
 
 
-def test_the_impulse_errs_in_proportion_to_the_square_of_the_step() -> None:
+def test_the_impulse_errs_in_proportion_to_the_square_of_the_step():
     """Though the force begins with a jump between two samples."""
     w, decay = oscillation()
     t = IMPACT_WINDOW
@@ -135,11 +126,11 @@ def test_the_impulse_errs_in_proportion_to_the_square_of_the_step() -> None:
 
 
 @pytest.mark.parametrize("zeta", [0.1, 0.3, 0.5, 0.7, 0.9])
-def test_a_step_response_of_second_order(zeta: float) -> None:
+def test_a_step_response_of_second_order(zeta):
     w_0, steady = 40.0, 3.0
     w = w_0 * sqrt(1.0 - zeta * zeta)
 
-    def off(t: float) -> float:
+    def off(t):
         return exp(-zeta * w_0 * t) * (cos(w * t) + zeta * w_0 / w * sin(w * t))
 
     metrics = pressed(lambda t: steady * (1.0 - off(t)), end=9.0)
@@ -152,14 +143,14 @@ def test_a_step_response_of_second_order(zeta: float) -> None:
     assert metrics["steady_contact_force"] == pytest.approx([steady] * 2, rel=1e-9)
 
 
-def test_a_step_response_of_first_order_does_not_overshoot() -> None:
+def test_a_step_response_of_first_order_does_not_overshoot():
     tau = 0.2
     metrics = pressed(lambda t: 2.0 * (1.0 - exp(-t / tau)), end=8.0)
     assert metrics["settling_time"] == pytest.approx([tau * log(1.0 / SETTLED)] * 2, abs=1e-5)
     assert metrics["force_overshoot"] == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
-def test_a_force_that_is_there_at_once_has_settled_at_once() -> None:
+def test_a_force_that_is_there_at_once_has_settled_at_once():
     metrics = pressed(lambda _: 2.0, end=1.0)
     assert metrics["settling_time"] == [0.0, 0.0]
     assert metrics["impact_impulse"] == pytest.approx([2.0 * IMPACT_WINDOW] * 2, rel=1e-12)
@@ -174,27 +165,27 @@ def test_a_force_that_is_there_at_once_has_settled_at_once() -> None:
     ],
     ids=["still rising", "a step in the last 0.1 s", "an oscillation"],
 )
-def test_a_force_that_does_not_stay_has_not_settled(force: Motion) -> None:
+def test_a_force_that_does_not_stay_has_not_settled(force):
     metrics = pressed(force, end=0.7)
     assert metrics["settling_time"] == [None, None]
     assert metrics["force_overshoot"][0] > 0.0
 
 
-def test_a_finger_that_has_let_go_has_no_steady_force_to_exceed() -> None:
+def test_a_finger_that_has_let_go_has_no_steady_force_to_exceed():
     metrics = pressed(lambda t: 2.0 if t < 0.3 else 0.0, end=1.0)
     assert metrics["steady_contact_force"] == [0.0, 0.0]
     assert metrics["force_overshoot"] == metrics["settling_time"] == [None, None]
     assert metrics["impact_impulse"] == pytest.approx([2.0 * IMPACT_WINDOW] * 2, rel=1e-12)
 
 
-def test_a_finger_that_lets_go_in_the_end_has_no_steady_force_to_exceed() -> None:
+def test_a_finger_that_lets_go_in_the_end_has_no_steady_force_to_exceed():
     """The mean of the last 0.1 s is still one: 2 N for half of it."""
     metrics = pressed(lambda t: 2.0 if t < 0.85 else 0.0, end=1.0)
     assert metrics["steady_contact_force"] == pytest.approx([1.0] * 2, rel=0.03)
     assert metrics["force_overshoot"] == metrics["settling_time"] == [None, None]
 
 
-def test_a_finger_that_never_touches() -> None:
+def test_a_finger_that_never_touches():
     metrics = pressed(lambda _: 2.0, end=0.05)
     for name in (
         "time_to_contact", "impact_velocity", "impact_impulse", "force_overshoot", "settling_time",
@@ -204,7 +195,7 @@ def test_a_finger_that_never_touches() -> None:
     assert metrics["peak_contact_force"] == metrics["steady_contact_force"] == [0.0, 0.0]
 
 
-def test_unequal_forces_differ_by_their_steady_parts() -> None:
+def test_unequal_forces_differ_by_their_steady_parts():
     time, signals = impact(1e-3)
     at_rest = np.where(time < 0.02, 9.0, 2.0)
     held = {"plant.contact_force[1]": -at_rest, "plant.contact_force[2]": 0.0 * time + 2.5}
@@ -214,7 +205,7 @@ def test_unequal_forces_differ_by_their_steady_parts() -> None:
     assert metrics["force_difference"] == pytest.approx(0.5, rel=1e-12)
 
 
-def test_the_object_drifts_by_what_it_goes_in_the_end() -> None:
+def test_the_object_drifts_by_what_it_goes_in_the_end():
     time = every(1e-3, 0.5)
     _, signals = impact(1e-3)
     longer = {name: np.resize(s, len(time)) for name, s in signals.items()}
@@ -224,7 +215,7 @@ def test_the_object_drifts_by_what_it_goes_in_the_end() -> None:
     assert grasp_metrics(time[:90], short)["object_drift"] is None
 
 
-def test_only_where_a_finger_never_touches_is_there_a_gap_that_remains() -> None:
+def test_only_where_a_finger_never_touches_is_there_a_gap_that_remains():
     """Finger 1 comes as near as 2 mm and leaves; finger 2 touches."""
     time, signals = impact(1e-3)
     near = np.linspace(0.01, 0.002, len(time) // 2)
@@ -238,13 +229,13 @@ def test_only_where_a_finger_never_touches_is_there_a_gap_that_remains() -> None
     assert not OF_FREE_FINGERS & set(grasp_metrics(time, signals))
 
 
-def test_an_impact_that_is_not_recorded_to_its_end_has_no_impulse() -> None:
+def test_an_impact_that_is_not_recorded_to_its_end_has_no_impulse():
     assert pressed(lambda _: 2.0, end=0.119)["impact_impulse"] == [None, None]
     assert pressed(lambda _: 2.0, end=0.122)["impact_impulse"] != [None, None]
 
 
 @pytest.mark.parametrize(("step", "there"), [(0.019, True), (0.021, False), (0.1, False)])
-def test_an_impact_between_two_samples_has_no_impulse(step: float, there: bool) -> None:
+def test_an_impact_between_two_samples_has_no_impulse(step, there):
     """The window begins 1 us before a sample: two within it, or that one."""
     metrics = pressed(lambda _: 2.0, end=50 * step, step=step, touch=10 * step - 1e-6)
     assert metrics["impact_impulse"] == (
@@ -258,9 +249,7 @@ def test_an_impact_between_two_samples_has_no_impulse(step: float, there: bool) 
     [(0.05, 0.0), (0.05, 0.03), (0.05, -0.02), (0.0, -0.02), (-0.01, -0.02)],
     ids=["fixed", "it flees", "it comes", "it meets a finger at rest", "it catches up"],
 )
-def test_the_speed_of_an_impact_is_relative_to_the_surface(
-    closing: float, fleeing: float, step: float
-) -> None:
+def test_the_speed_of_an_impact_is_relative_to_the_surface(closing, fleeing, step):
     """Both at an even speed, so the moment and the speed are exact."""
     time = every(step, 2.0)
     signals = recorded(
@@ -276,7 +265,7 @@ def test_the_speed_of_an_impact_is_relative_to_the_surface(
     assert metrics["time_to_contact"] == pytest.approx([expected] * 2, abs=1e-9)
 
 
-def test_the_speed_of_an_impact_on_a_surface_that_speeds_up() -> None:
+def test_the_speed_of_an_impact_on_a_surface_that_speeds_up():
     """The surface's speed is that in the middle of the last free interval, half a step before."""
     step, a = 1e-3, 0.4
     time = every(step, 1.0)
@@ -293,7 +282,7 @@ def test_the_speed_of_an_impact_on_a_surface_that_speeds_up() -> None:
     assert metrics["time_to_contact"] == pytest.approx([touch] * 2, abs=step)
 
 
-def test_a_plant_that_holds_its_outputs_has_the_same_speed_of_impact() -> None:
+def test_a_plant_that_holds_its_outputs_has_the_same_speed_of_impact():
     """One with ten times the step of the experiment."""
     time = every(1e-4, 0.3)
     own = np.repeat(time[::10], 10)[: len(time)]
@@ -311,7 +300,7 @@ def test_a_plant_that_holds_its_outputs_has_the_same_speed_of_impact() -> None:
 
 
 @pytest.mark.parametrize("held", [1, 10])
-def test_a_surface_that_has_come_to_rest_has_no_speed(held: int) -> None:
+def test_a_surface_that_has_come_to_rest_has_no_speed(held):
     """It comes, rests for 0.4 s with the finger ahead of it, and is then touched in one step.
 
     Whether each step of the plant is recorded, or each ten times.
@@ -333,7 +322,7 @@ def test_a_surface_that_has_come_to_rest_has_no_speed(held: int) -> None:
 
 
 @pytest.mark.parametrize("held", [1, 10])
-def test_a_surface_that_a_finger_keeps_up_with_has_its_speed(held: int) -> None:
+def test_a_surface_that_a_finger_keeps_up_with_has_its_speed(held):
     """A constant gap for 0.4 s, behind a surface that has fled faster until then."""
     time = every(1e-4, 0.7)
     own = np.repeat(time[::held], held)[: len(time)]
@@ -351,7 +340,7 @@ def test_a_surface_that_a_finger_keeps_up_with_has_its_speed(held: int) -> None:
         assert found.speed == pytest.approx(0.15 - 0.05, rel=1e-6)
 
 
-def test_the_steps_of_the_plant_are_seen_at_any_of_its_outputs() -> None:
+def test_the_steps_of_the_plant_are_seen_at_any_of_its_outputs():
     """Finger 1 and its surface rest from the start but for one jump; finger 2 moves throughout."""
     time = every(1e-3, 0.5)
     signals = recorded(
@@ -367,7 +356,7 @@ def test_the_steps_of_the_plant_are_seen_at_any_of_its_outputs() -> None:
     assert found.speed == pytest.approx(0.004 / 1e-3, rel=1e-9)
 
 
-def test_fingers_that_touch_from_the_start() -> None:
+def test_fingers_that_touch_from_the_start():
     time = every(1e-3, 0.5)
     signals = recorded(time, lambda _: SURFACE, lambda _: 0.0, lambda _: SURFACE, lambda _: 1.5)
     metrics = grasp_metrics(time, signals)
@@ -377,7 +366,7 @@ def test_fingers_that_touch_from_the_start() -> None:
     assert metrics["settling_time"] == [0.0, 0.0]
 
 
-def test_the_object_has_the_metrics_that_the_plant_has_outputs_for() -> None:
+def test_the_object_has_the_metrics_that_the_plant_has_outputs_for():
     time, signals = impact(1e-3)
     assert not set(OF_OBJECT) & set(grasp_metrics(time, signals))
     tilt, never, once = (np.zeros(len(time)), *np.zeros((2, len(time)), bool))
@@ -392,7 +381,7 @@ def test_the_object_has_the_metrics_that_the_plant_has_outputs_for() -> None:
     assert grasp_metrics(time, signals | {"plant.damaged": never})["damaged"] is False
 
 
-def test_every_metric_has_a_unit_and_a_label() -> None:
+def test_every_metric_has_a_unit_and_a_label():
     time, signals = impact(1e-3)
     signals |= {f"plant.{output}": np.zeros(len(time)) for output in OF_OBJECT.values()}
     there = [m.name for m in METRICS if m.name not in OF_FREE_FINGERS]

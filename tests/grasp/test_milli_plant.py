@@ -1,22 +1,18 @@
 """A plant of another vendor in mm, mm/s and mN has the metrics of the one in SI."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from conftest import MadeOnce, Run
-from grasp_cosim import Result, System, load_run, simulate
+from grasp_cosim import System, load_run, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.grasp.identification.identification import chosen
 from grasp_cosim.grasp.identification.log import identify_from_log
 from grasp_cosim.grasp.presets import SYSTEM, start_in_si, with_case, with_si_values
 from grasp_cosim.grasp.published.grasps import settled_force
 from grasp_cosim.grasp.scene import grasp_scene
-from grasp_cosim.metrics.metric import Signals, metric
+from grasp_cosim.metrics.metric import metric
 from grasp_cosim.recording.load import load_log
 from grasp_cosim.recording.result import UNITS
 from support.milli import milli_plant
@@ -44,15 +40,15 @@ SCALED = {"position": 1e-3, "velocity": 1e-3, "gap": 1e-3, "force": 1e3}
 
 
 @metric("closest", unit="m")
-def closest(run: Signals) -> float:
+def closest(run):
     return float(run["plant.gap[1]"].min())
 
 
 @pytest.fixture(scope="module")
-def plants(made_once: MadeOnce) -> Path:
+def plants(made_once):
     """The plant with its units defined, named only, and without any: KIND/MilliPlant.fmu."""
 
-    def fill(folder: Path) -> None:
+    def fill(folder):
         milli_plant(folder / "defined", "defined")
         milli_plant(folder / "named", "named")
         milli_plant(folder / "none", "none")
@@ -60,7 +56,7 @@ def plants(made_once: MadeOnce) -> Path:
     return made_once("milli_plants", fill)
 
 
-def written(path: Path, fmus: Path, plant: Path, more: str = "", factors: bool = False) -> Path:
+def written(path, fmus, plant, more="", factors=False):
     """The built-in system with a plant in mm."""
     text = SYSTEM.read_text("utf-8").replace(*VALUES)
     text = text.replace('fmu = "GripperPlant.fmu"', f'fmu = "{plant}"\n{more}')
@@ -81,22 +77,22 @@ def written(path: Path, fmus: Path, plant: Path, more: str = "", factors: bool =
 
 
 @pytest.fixture(scope="module")
-def original(grasp: System) -> Result:
+def original(grasp):
     return simulate(grasp, metrics=[closest], step=STEP, stop=STOP)
 
 
 @pytest.fixture(scope="module")
-def defined(fmus: Path, plants: Path, tmp_path_factory: pytest.TempPathFactory) -> System:
+def defined(fmus, plants, tmp_path_factory):
     folder = tmp_path_factory.mktemp("defined")
     return System.load(written(folder / "mm.toml", fmus, plants / "defined/MilliPlant.fmu"))
 
 
 @pytest.fixture(scope="module")
-def result(defined: System) -> Result:
+def result(defined):
     return simulate(defined, metrics=[closest], step=STEP, stop=STOP)
 
 
-def check(found: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
+def check(found, expected):
     """All metrics agree to rounding."""
     for name, value in expected.items():
         if name not in UNITS:
@@ -104,20 +100,20 @@ def check(found: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
     assert found.keys() == expected.keys()
 
 
-def test_metrics_are_those_in_si(result: Result, original: Result) -> None:
+def test_metrics_are_those_in_si(result, original):
     assert result.metrics["time_to_contact"][0] is not None
     check(result.metrics, original.metrics)
     assert result.metric_units == original.metric_units
     assert not any("taken to be" in line for line in result.log)
 
 
-def test_signals_and_their_units_stay_as_recorded(result: Result, original: Result) -> None:
+def test_signals_and_their_units_stay_as_recorded(result, original):
     assert result.units["plant.gap[1]"] == "mm"
     np.testing.assert_allclose(result["plant.gap[1]"], 1e3 * original["plant.gap[1]"], atol=1e-9)
     assert result.by_role["plant.gap[1]"] == pytest.approx(original["plant.gap[1]"], abs=1e-12)
 
 
-def test_the_energy_of_the_exchange_is_in_joule(result: Result, original: Result) -> None:
+def test_the_energy_of_the_exchange_is_in_joule(result, original):
     for j in (1, 2):
         name = f"plant.exchange_energy[{j}]"
         assert result.units[name] == "J"
@@ -129,14 +125,8 @@ def test_the_energy_of_the_exchange_is_in_joule(result: Result, original: Result
     [("named", False, False), ("none", True, False), ("none", True, True)],
 )
 def test_a_plant_whose_units_are_names_or_named_in_the_file(
-    fmus: Path,
-    plants: Path,
-    tmp_path: Path,
-    original: Result,
-    kind: str,
-    named: bool,
-    factors: bool,
-) -> None:
+    fmus, plants, tmp_path, original, kind, named, factors
+):
     more = f"units = {{ {ENTRY} }}" if named else ""
     plant = plants / kind / "MilliPlant.fmu"
     system = System.load(written(tmp_path / "mm.toml", fmus, plant, more, factors))
@@ -147,9 +137,7 @@ def test_a_plant_whose_units_are_names_or_named_in_the_file(
         np.testing.assert_allclose(found[name], original[name], rtol=1e-9, atol=1e-15)
 
 
-def test_a_run_read_back_has_the_same_metrics(
-    result: Result, original: Result, tmp_path: Path
-) -> None:
+def test_a_run_read_back_has_the_same_metrics(result, original, tmp_path):
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")
     check(load_run(tmp_path).metrics, original.metrics)
@@ -159,7 +147,7 @@ def test_a_run_read_back_has_the_same_metrics(
     check(load_run(tmp_path).metrics, original.metrics)
 
 
-def test_the_scene_gets_what_it_draws_in_si(result: Result, original: Result) -> None:
+def test_the_scene_gets_what_it_draws_in_si(result, original):
     ours, theirs = grasp_scene(original), grasp_scene(result)
     assert ours is not None
     assert theirs is not None
@@ -177,9 +165,7 @@ def test_the_scene_gets_what_it_draws_in_si(result: Result, original: Result) ->
 
 
 @pytest.mark.slow
-def test_the_plant_may_take_the_place_of_the_original(
-    grasp: System, plants: Path, original: Result
-) -> None:
+def test_the_plant_may_take_the_place_of_the_original(grasp, plants, original):
     fast = grasp.with_experiment(STEP, STOP)
     plant = plants / "defined/MilliPlant.fmu"
     check(simulate(fast.swap("plant", plant), metrics=[closest]).metrics, original.metrics)
@@ -194,16 +180,14 @@ def test_the_plant_may_take_the_place_of_the_original(
 
 
 @pytest.mark.slow
-def test_the_original_may_take_the_place_of_the_plant(
-    defined: System, fmus: Path, original: Result
-) -> None:
+def test_the_original_may_take_the_place_of_the_plant(defined, fmus, original):
     fast = defined.with_experiment(STEP, STOP)
     swapped = fast.swap("plant", fmus / "GripperPlant.fmu")
     check(simulate(swapped, metrics=[closest]).metrics, original.metrics)
     assert qualify(fast, "plant", fmus / "GripperPlant.fmu", isolation="none").qualified
 
 
-def test_parameters_are_converted_to_si_and_from_it(defined: System, grasp: System) -> None:
+def test_parameters_are_converted_to_si_and_from_it(defined, grasp):
     assert start_in_si(defined, "plant.object_width") == pytest.approx(0.07, rel=1e-15)
     assert settled_force(defined) == pytest.approx(settled_force(grasp), rel=1e-15)
     moved = with_si_values(defined, {"plant.initial_object_position": 0.02}, "test:")
@@ -211,7 +195,7 @@ def test_parameters_are_converted_to_si_and_from_it(defined: System, grasp: Syst
     assert with_case(defined, 1).start("plant.object_width") == 70.0
 
 
-def test_a_parameter_without_a_unit_is_in_si(defined: System) -> None:
+def test_a_parameter_without_a_unit_is_in_si(defined):
     plant = defined.component("plant", "")
     bare = replace(plant, fmu=plant.fmu.parents[1] / "none/MilliPlant.fmu")
     others = [c for c in defined.components if c.name != "plant"]
@@ -219,9 +203,7 @@ def test_a_parameter_without_a_unit_is_in_si(defined: System) -> None:
 
 
 @pytest.mark.slow
-def test_friction_from_a_log_in_mm(
-    result: Result, original: Result, grasp: System, tmp_path: Path
-) -> None:
+def test_friction_from_a_log_in_mm(result, original, grasp, tmp_path):
     fits = []
     for name, run in (("si", original), ("mm", result)):
         run.to_csv(tmp_path / name / "signals.csv")
@@ -233,9 +215,7 @@ def test_friction_from_a_log_in_mm(
 
 
 @pytest.mark.slow
-def test_a_sweep_has_the_metrics_in_si(
-    command: Run, fmus: Path, plants: Path, tmp_path: Path, original: Result
-) -> None:
+def test_a_sweep_has_the_metrics_in_si(command, fmus, plants, tmp_path, original):
     written(tmp_path / "mm.toml", fmus, plants / "defined/MilliPlant.fmu")
     """And takes its values in SI, though the plant has them in mm."""
     vary = ("--vary", "plant.initial_object_position=0.03", "--step", "1e-3")
@@ -253,9 +233,7 @@ def test_a_sweep_has_the_metrics_in_si(
         ("sweep", "--vary", "experiment.stop=0.01", "--workers", "1"),
     ],
 )
-def test_a_plant_without_units_for_one_that_has_them_is_said(
-    command: Run, plants: Path, arguments: tuple[str, ...]
-) -> None:
+def test_a_plant_without_units_for_one_that_has_them_is_said(command, plants, arguments):
     plant = plants / "none/MilliPlant.fmu"
     swap = ("--quiet", "--set", f"components.plant.fmu={plant}")
     values = [f"plant.{name}=0.07" for name in ("object_width",)]

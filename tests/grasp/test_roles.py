@@ -2,15 +2,12 @@
 
 import csv
 import json
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Run
-from grasp_cosim import InputError, Result, System, load_run, simulate
+from grasp_cosim import InputError, System, load_run, simulate
 from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS
 from grasp_cosim.grasp.presets import (
     CASES,
@@ -31,7 +28,7 @@ LOST = (
 NAMES = {"plant": "gripper", "sensor_1": "right", "sensor_2": "left", "controller": "brain"}
 
 
-def written(fmus: Path, folder: Path, names: Mapping[str, str], roles: bool, presets: bool) -> Path:
+def written(fmus, folder, names, roles, presets):
     """The built-in system file with other names of its components, in folder."""
     text, _, rest = SYSTEM.read_text("utf-8").partition("# Values under a name")
     text += rest.partition("\n")[2] if presets else ""
@@ -46,7 +43,7 @@ def written(fmus: Path, folder: Path, names: Mapping[str, str], roles: bool, pre
     return path
 
 
-def renamed(signals: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
+def renamed(signals, names):
     found = {}
     for name, column in signals.items():
         component, _, variable = name.partition(".")
@@ -54,18 +51,18 @@ def renamed(signals: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, A
     return found
 
 
-def of_the_grasp(metrics: Mapping[str, Any]) -> dict[str, Any]:
+def of_the_grasp(metrics):
     return {k: v for k, v in metrics.items() if k not in UNITS}
 
 
 @pytest.fixture(scope="module")
-def original(grasp: System) -> Result:
+def original(grasp):
     """Case 0, until both fingers have touched."""
     return simulate(with_case(grasp, 0), step=1e-3, stop=0.5)
 
 
 @pytest.fixture
-def gripper(fmus: Path, tmp_path: Path) -> System:
+def gripper(fmus, tmp_path):
     """The grasp with its plant called gripper, and nobody who says so."""
     return System.load(written(fmus, tmp_path, {"plant": "gripper"}, roles=False, presets=False))
 
@@ -73,7 +70,7 @@ def gripper(fmus: Path, tmp_path: Path) -> System:
 # ------------------------------------------------------------------------- metrics
 
 
-def test_without_a_plant_there_are_no_metrics_and_it_says_why(gripper: System) -> None:
+def test_without_a_plant_there_are_no_metrics_and_it_says_why(gripper):
     result = simulate(gripper, step=1e-3, stop=0.01)
     assert result.measured.missing == LOST
     assert dict(result.measured.values) == {}
@@ -81,9 +78,7 @@ def test_without_a_plant_there_are_no_metrics_and_it_says_why(gripper: System) -
     assert result.view.stem == "signals"
 
 
-def test_with_roles_they_are_the_same_to_the_bit(
-    original: Result, fmus: Path, tmp_path: Path
-) -> None:
+def test_with_roles_they_are_the_same_to_the_bit(original, fmus, tmp_path):
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=False))
     result = simulate(with_case(system, 0), step=1e-3, stop=0.5)
     assert list(result) == list(renamed(original, NAMES))
@@ -95,7 +90,7 @@ def test_with_roles_they_are_the_same_to_the_bit(
 
 
 @pytest.mark.slow
-def test_a_run_read_back_is_the_result_it_was(original: Result, fmus: Path, tmp_path: Path) -> None:
+def test_a_run_read_back_is_the_result_it_was(original, fmus, tmp_path):
     (tmp_path / "out").mkdir()
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=False))
     run = simulate(with_case(system, 0), step=1e-3, stop=0.5)
@@ -113,7 +108,7 @@ def test_a_run_read_back_is_the_result_it_was(original: Result, fmus: Path, tmp_
     assert (tmp_path / "back.png").read_bytes() == (tmp_path / "result.png").read_bytes()
 
 
-def test_what_a_run_lacks_is_read_back_too(gripper: System, tmp_path: Path) -> None:
+def test_what_a_run_lacks_is_read_back_too(gripper, tmp_path):
     result = simulate(gripper, step=1e-3, stop=0.01)
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")
@@ -130,9 +125,7 @@ def test_what_a_run_lacks_is_read_back_too(gripper: System, tmp_path: Path) -> N
         unique=True,
     )
 )
-def test_metrics_do_not_depend_on_the_names_of_components(
-    original: Result, chosen: list[str]
-) -> None:
+def test_metrics_do_not_depend_on_the_names_of_components(original, chosen):
     """Not even where the controller is called plant, and the plant controller."""
     names = dict(zip(("plant", "controller"), chosen, strict=True))
     signals = {name: original[name] for name in OBJECT_NEEDS}
@@ -149,9 +142,7 @@ def test_metrics_do_not_depend_on_the_names_of_components(
 
 
 @pytest.mark.parametrize("presets", [True, False], ids=["own presets", "built-in presets"])
-def test_cases_and_bench_find_components_by_their_roles(
-    grasp: System, fmus: Path, tmp_path: Path, presets: bool
-) -> None:
+def test_cases_and_bench_find_components_by_their_roles(grasp, fmus, tmp_path, presets):
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=presets))
     assert bool(system.presets) == presets
     pairs = [(with_case(system, n), with_case(grasp, n)) for n in CASES]
@@ -163,9 +154,7 @@ def test_cases_and_bench_find_components_by_their_roles(
         assert ours.roles == NAMES
 
 
-def test_a_preset_of_the_file_comes_before_the_built_in_one(
-    grasp: System, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_preset_of_the_file_comes_before_the_built_in_one(grasp, fmus, tmp_path):
     own = replace(grasp, presets={"case_0": {"plant.object_width": 0.06}, "mine": {}})
     assert with_case(own, 0).start("plant.object_width") == 0.06
     assert with_case(own, 0).component("controller", "").values == {}
@@ -175,7 +164,7 @@ def test_a_preset_of_the_file_comes_before_the_built_in_one(
     assert set(built_in_presets()) == {"bench", *(f"case_{n}" for n in CASES)}
 
 
-def test_without_roles_a_case_says_what_it_does_not_find(fmus: Path, tmp_path: Path) -> None:
+def test_without_roles_a_case_says_what_it_does_not_find(fmus, tmp_path):
     names = {"controller": "brain"}
     system = System.load(written(fmus, tmp_path, names, roles=False, presets=False))
     with pytest.raises(InputError) as caught:
@@ -189,15 +178,13 @@ def test_without_roles_a_case_says_what_it_does_not_find(fmus: Path, tmp_path: P
 # ------------------------------------------------------------------------- commands
 
 
-def enabled(out: str, layer: str) -> Any:
+def enabled(out, layer):
     run = json.loads(Path(out, "run.json").read_text())
     return run["components"]["brain"]["values"].get(f"{layer}.enabled")
 
 
 @pytest.mark.parametrize("presets", [True, False], ids=["own presets", "built-in presets"])
-def test_run_takes_presets_of_a_system_with_roles(
-    command: Run, fmus: Path, tmp_path: Path, presets: bool
-) -> None:
+def test_run_takes_presets_of_a_system_with_roles(command, fmus, tmp_path, presets):
     path = written(fmus, tmp_path, NAMES, roles=True, presets=presets)
     short = ("run", path, "--step", "1e-3", "--stop", "0.01")
     for options, expected in (
@@ -217,7 +204,7 @@ def test_run_takes_presets_of_a_system_with_roles(
     assert "no preset 'case_9'; did you mean " in err
 
 
-def test_run_says_why_there_are_no_metrics(command: Run, fmus: Path, tmp_path: Path) -> None:
+def test_run_says_why_there_are_no_metrics(command, fmus, tmp_path):
     path = written(fmus, tmp_path, {"plant": "gripper"}, roles=False, presets=False)
     short = ("run", path, "--step", "1e-3", "--stop", "0.01")
     code, out, _ = command(*short)
@@ -256,15 +243,13 @@ def heat(run):
 
 
 @pytest.fixture
-def own(tmp_path: Path) -> Path:
+def own(tmp_path):
     path = tmp_path / "own.py"
     path.write_text(OWN, "utf-8")
     return path
 
 
-def test_a_user_s_metrics_are_wherever_those_of_the_grasp_are(
-    command: Run, own: Path, tmp_path: Path
-) -> None:
+def test_a_user_s_metrics_are_wherever_those_of_the_grasp_are(command, own, tmp_path):
     short = ("run", "--case", "0", "--step", "1e-3", "--stop", "0.05", "--metrics", own)
     code, out, _ = command(*short, "--out", "out")
     assert code == 0
@@ -292,7 +277,7 @@ def test_a_user_s_metrics_are_wherever_those_of_the_grasp_are(
 
 
 @pytest.mark.slow
-def test_a_user_s_metrics_are_columns_of_a_sweep(command: Run, own: Path, tmp_path: Path) -> None:
+def test_a_user_s_metrics_are_columns_of_a_sweep(command, own, tmp_path):
     vary = ("--case", "0", "--vary", "plant.finger_mass[1]=0.5,2")
     short = ("--step", "1e-3", "--stop", "0.05", "--metrics", own)
     code, out, _ = command("sweep", *vary, *short, "--workers", "1", "--json")
@@ -309,9 +294,7 @@ def test_a_user_s_metrics_are_columns_of_a_sweep(command: Run, own: Path, tmp_pa
 
 
 @pytest.mark.slow
-def test_a_user_s_metrics_have_bands_in_a_qualification(
-    command: Run, own: Path, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_user_s_metrics_have_bands_in_a_qualification(command, own, fmus, tmp_path):
     short = (
         "qualify", fmus / "GripperPlant.fmu", "--as", "plant", "--step", "1e-3", "--stop", "0.05",
         "--set", "components.plant.isolation=none", "--metrics", own,
@@ -351,9 +334,7 @@ def test_a_user_s_metrics_have_bands_in_a_qualification(
         ),
     ],
 )
-def test_a_metric_that_fails_loses_nothing_of_the_run(
-    command: Run, own: Path, more: tuple[str, ...], code: int, ends: list[str]
-) -> None:
+def test_a_metric_that_fails_loses_nothing_of_the_run(command, own, more, code, ends):
     """Nor does it hide why a run failed."""
     own.write_text(OWN.replace("return reach(run)[0] < 1e-3", "return run.reach"))
     short = ("run", "--step", "1e-3", "--stop", "0.01", "--metrics", own, "--out", "out", *more)
@@ -388,7 +369,7 @@ def test_a_metric_that_fails_loses_nothing_of_the_run(
         ),
     ],
 )
-def test_a_user_s_mistake_is_one_line(command: Run, own: Path, text: str, message: str) -> None:
+def test_a_user_s_mistake_is_one_line(command, own, text, message):
     own.write_text(text)
     silent = "--json", "--quiet"  # else a line may say that native FMUs ran
     code, out, err = command("run", "--step", "1e-3", "--stop", "0.01", "--metrics", own, *silent)

@@ -5,18 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 from grasp_cosim.grasp.scene import grasp_scene
-from grasp_cosim.recording.result import Result
 from grasp_cosim.report.page import page_html
 from report.runs import grasp_run, ring_run
 from report.test_page import Elements
 
 
-def page_of(result: Result) -> str:
+def page_of(result):
     """The page as the command report makes it."""
     return page_html(result, scene=grasp_scene(result))
 
 
-def test_only_a_grasp_has_the_scene() -> None:
+def test_only_a_grasp_has_the_scene():
     assert grasp_scene(ring_run(["a", "b"])) is None
     page = Elements(page_of(grasp_run()))
     assert {"scene", "fingers", "readings"} <= set(page.ids())
@@ -25,7 +24,7 @@ def test_only_a_grasp_has_the_scene() -> None:
     assert grasp_run().view.scene(grasp_run()) == grasp_scene(grasp_run())
 
 
-def test_signals_go_by_roles() -> None:
+def test_signals_go_by_roles():
     """Also of a gripper that another component plays."""
     run = grasp_run()
     other = {name.replace("plant.", "hand."): values for name, values in run.signals.items()}
@@ -40,7 +39,7 @@ def test_signals_go_by_roles() -> None:
     ]
 
 
-def test_signals_of_a_finger_have_its_colour() -> None:
+def test_signals_of_a_finger_have_its_colour():
     scene = grasp_scene(grasp_run())
     assert scene is not None
     assert scene.colors["plant.gap[1]"] == scene.colors["sensor_1.intensity"] == "--finger1"
@@ -48,7 +47,7 @@ def test_signals_of_a_finger_have_its_colour() -> None:
     assert "controller.target_position" not in scene.colors
 
 
-def test_first_contacts_are_marked_and_have_buttons() -> None:
+def test_first_contacts_are_marked_and_have_buttons():
     scene = grasp_scene(grasp_run())
     assert scene is not None
     assert [color for _, color in scene.marks] == ["--finger1", "--finger2"]
@@ -58,7 +57,7 @@ def test_first_contacts_are_marked_and_have_buttons() -> None:
     np.testing.assert_allclose(spans["Both contacts"], (1.0 - 0.005, 1.2 + 0.03), atol=1e-9)
 
 
-def test_metrics_of_the_object_are_in_degrees_and_words() -> None:
+def test_metrics_of_the_object_are_in_degrees_and_words():
     run = grasp_run()
     more = {"tilt": 0.5, "toppled": False, "squeeze": 0.006, "damaged": True}
     signals = {f"plant.{name}": np.full(run.time.shape, value) for name, value in more.items()}
@@ -71,7 +70,7 @@ def test_metrics_of_the_object_are_in_degrees_and_words() -> None:
         assert expected in text
 
 
-def test_contacts_begin_where_the_metrics_say_and_again_after_each_release() -> None:
+def test_contacts_begin_where_the_metrics_say_and_again_after_each_release():
     run = grasp_run()
     contact = run.signals["plant.contact[1]"].copy()
     contact[1500:1600] = False
@@ -82,8 +81,8 @@ def test_contacts_begin_where_the_metrics_say_and_again_after_each_release() -> 
     np.testing.assert_allclose([t for _, t in found], [1.0, 1.2, 1.6], atol=1e-9)
 
 
-def test_the_actuator_force_comes_from_the_connections() -> None:
-    def actuators(factor: float | None, unit: str | None) -> object:
+def test_the_actuator_force_comes_from_the_connections():
+    def actuators(factor, unit):
         run = grasp_run()
         connections = [
             {**w, "factor": factor} if w["to"] == "plant.force[1]" else w

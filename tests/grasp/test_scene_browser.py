@@ -1,7 +1,5 @@
 """The page of a grasp in a headless Chromium: traces in its colours, fingers that move, playing."""
 
-from pathlib import Path
-
 import pytest
 from grasp.test_scene import page_of
 from report.javascript import in_browser
@@ -41,13 +39,11 @@ BLUE, RED, DARK_BLUE = "31,95,168", "192,57,43", "107,165,231"
 
 
 @pytest.fixture(scope="module")
-def html() -> str:
+def html():
     return page_of(grasp_run())
 
 
-def test_the_traces_of_a_grasp_are_drawn_in_the_colours_of_the_fingers(
-    html: str, tmp_path: Path
-) -> None:
+def test_the_traces_of_a_grasp_are_drawn_in_the_colours_of_the_fingers(html, tmp_path):
     panels = in_browser(html, CANVASES + "return panels();", tmp_path)
     titles = ["gap in mm", "contact force in N", "velocity in mm/s", "target position in mm"]
     assert [p["title"] for p in panels] == titles
@@ -58,7 +54,7 @@ def test_the_traces_of_a_grasp_are_drawn_in_the_colours_of_the_fingers(
     assert (gap["low"], gap["high"]) == pytest.approx((0.0, 0.11 + CENTRE - WIDTH / 2), abs=1e-6)
 
 
-def test_a_zoom_can_be_linked(html: str, tmp_path: Path) -> None:
+def test_a_zoom_can_be_linked(html, tmp_path):
     """The panels then fit what is in view, between the neighbours of its first and last row."""
     panels = in_browser(
         html, CANVASES + "return panels();", tmp_path, "t=0.9,1.1&show=plant.gap%5B1%5D"
@@ -72,13 +68,13 @@ def test_a_zoom_can_be_linked(html: str, tmp_path: Path) -> None:
     assert RED not in gap["colors"]
 
 
-def test_dark_colours(html: str, tmp_path: Path) -> None:
+def test_dark_colours(html, tmp_path):
     panels = in_browser(html, CANVASES + "return panels();", tmp_path, dark=True)
     assert panels[0]["colors"][DARK_BLUE] > 100
     assert BLUE not in panels[0]["colors"]
 
 
-def test_the_animation_shows_fingers_and_object_where_they_are(html: str, tmp_path: Path) -> None:
+def test_the_animation_shows_fingers_and_object_where_they_are(html, tmp_path):
     times = [0.3, 1.1, 1.9]
     for t, scene in zip(times, in_browser(html, SCENES % times, tmp_path), strict=True):
         pixel = 1.5 / scene["scale"]
@@ -91,14 +87,14 @@ def test_the_animation_shows_fingers_and_object_where_they_are(html: str, tmp_pa
         assert unit == "mm"
 
 
-def test_a_new_contact_glows(html: str, tmp_path: Path) -> None:
+def test_a_new_contact_glows(html, tmp_path):
     """For a quarter of a second of real time, which slowed down 50 times is 5 ms."""
     times = [TOUCH[1] - 1e-3, TOUCH[1] + 2.5e-3, TOUCH[1] + 5.5e-3]
     scenes = in_browser(html, SCENES % times, tmp_path)
     assert [s["glow"] for s in scenes] == ["0.000,0.000", "0.500,0.000", "0.000,0.000"]
 
 
-def test_playing_slows_down_around_a_contact_and_ends_at_the_end(html: str, tmp_path: Path) -> None:
+def test_playing_slows_down_around_a_contact_and_ends_at_the_end(html, tmp_path):
     act = """
       const play = document.getElementById("play"), speeds = new Set(), times = [];
       play.click();
@@ -118,7 +114,7 @@ def test_playing_slows_down_around_a_contact_and_ends_at_the_end(html: str, tmp_
     assert text == "Play"
 
 
-def test_signals_are_chosen_and_grouped(html: str, tmp_path: Path) -> None:
+def test_signals_are_chosen_and_grouped(html, tmp_path):
     act = """
       const click = (text) => document.querySelector(`#signals input[${text}]`).click();
       const titles = () => [...document.querySelectorAll("#plots h3")].map((h) => h.textContent);

@@ -14,13 +14,13 @@ M_2, K_2, D_2, K_S = 1.0, 36.0, 12.0, 3.0
 GAIN, L_0, EXPONENT = 0.0024, 5e-3, 1.1506
 
 
-def contacts(angles: tuple[float, ...], centre: tuple[float, float], alpha: float) -> list[float]:
+def contacts(angles, centre, alpha):
     """When each finger touches a prism of 35 mm: from then on it stays there."""
     a, n, count = np.radians(angles), np.array(balance_weights(angles)), len(angles)
     faces = 0.035 + np.cos(a) * centre[0] + np.sin(a) * centre[1]
     times = np.full(count, np.inf)
 
-    def rates(_: float, x: np.ndarray) -> np.ndarray:
+    def rates(_, x):
         s, v, z, z_dot, s_v, s_v_dot = x.reshape(6, count)
         free = ~np.isfinite(times)
         reach = np.maximum(s - faces, 0.0) + L_0
@@ -42,7 +42,7 @@ def contacts(angles: tuple[float, ...], centre: tuple[float, float], alpha: floa
     x, t = np.concatenate([s_0, still, s_0 - n @ s_0 / count, still, s_0, still]), 0.0
     while not np.isfinite(times).all():
 
-        def next_gap(_: float, x: np.ndarray) -> float:
+        def next_gap(_, x):
             return float((x[:count] - faces)[~np.isfinite(times)].min())
 
         next_gap.terminal = True
@@ -64,9 +64,7 @@ def contacts(angles: tuple[float, ...], centre: tuple[float, float], alpha: floa
         ((20.0, 100.0, 200.0, 290.0), (-0.005, 0.002), 1.2),
     ],
 )
-def test_each_finger_touches_within_a_millisecond(
-    angles: tuple[float, ...], centre: tuple[float, float], alpha: float
-) -> None:
+def test_each_finger_touches_within_a_millisecond(angles, centre, alpha):
     system = hand_system(angles=angles, native=False).with_experiment(step=5e-4, stop=2.5)
     values = {f"sensor_{k}.reflectance": alpha for k in range(1, len(angles) + 1)}
     values |= {f"plant.initial_object_position[{i + 1}]": centre[i] for i in (0, 1)}

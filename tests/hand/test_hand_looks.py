@@ -1,14 +1,12 @@
 """The picture and the page of a hand: every finger where it is, around an object of its shape."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim import hand_system, simulate
 from grasp_cosim.hand.metrics import directions, is_disc
 from grasp_cosim.hand.pictures import _prism, draw_hand
-from grasp_cosim.recording.result import Result
 from grasp_cosim.report.page import page_html
 from report.javascript import in_browser
 
@@ -36,31 +34,31 @@ return { fingers: [colored(31, 95, 168), colored(192, 57, 43), colored(46, 139, 
 
 
 @pytest.fixture(scope="module")
-def hand() -> Result:
+def hand():
     return simulate(hand_system(native=False), stop=2.2)
 
 
-def test_the_page_shows_the_hand(hand: Result) -> None:
+def test_the_page_shows_the_hand(hand):
     html = page_html(hand, scene=hand.view.scene(hand))
     for said in ("<h2>Hand</h2>", "class Hand extends Grasp", "All contacts", "seen from above"):
         assert said in html
 
 
-def test_a_disc_is_told_from_a_prism() -> None:
+def test_a_disc_is_told_from_a_prism():
     system = hand_system(angles=(10, 130, 250), native=False).with_values({"plant.shape": "disc"})
     run = simulate(system, stop=0.01)
     assert is_disc(run.by_role)
     assert directions(run.by_role) == pytest.approx([math.radians(a) for a in (10, 130, 250)])
 
 
-def test_the_faces_of_a_prism_make_its_outline() -> None:
+def test_the_faces_of_a_prism_make_its_outline():
     """A regular triangle: its corners are twice as far out as its faces."""
     e = np.exp(1j * np.radians([0.0, 120.0, 240.0]))
     corners = _prism(0.035 * e, e, 0.1)
     assert sorted(np.round(abs(corners), 12)) == pytest.approx([0.07] * 3)
 
 
-def test_it_is_drawn(hand: Result, tmp_path: Path) -> None:
+def test_it_is_drawn(hand, tmp_path):
     pytest.importorskip("matplotlib")
     figure = draw_hand(hand, tmp_path / "hand.png")
     assert (tmp_path / "hand.png").read_bytes().startswith(b"\x89PNG")
@@ -70,7 +68,7 @@ def test_it_is_drawn(hand: Result, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_fingers_and_object_are_where_they_are(hand: Result, tmp_path: Path) -> None:
+def test_fingers_and_object_are_where_they_are(hand, tmp_path):
     html = page_html(hand, scene=hand.view.scene(hand))
     found = in_browser(html, SCENE % "1.0", tmp_path)
     row = int(np.searchsorted(hand.time, 1.0))

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Run
 from grasp_cosim import InputError, System, grasp_system, hand_system, load_run, simulate
 from grasp_cosim.hand.system import directions_of, fmus_of
 from support.both_engines import needs_compiler
@@ -15,14 +14,14 @@ from support.slow import slow
 COLOURS = {"sensor_1.reflectance": 0.3, "sensor_2.reflectance": 1.2, "sensor_3.reflectance": 0.6}
 
 
-def placed(system: System, x: float, y: float, **more: float) -> System:
+def placed(system, x, y, **more):
     where = {"plant.initial_object_position[1]": x, "plant.initial_object_position[2]": y}
     return system.with_values({**where, **more})
 
 
 @pytest.mark.parametrize("law", ["published", "adaptive"])
 @pytest.mark.parametrize(("right", "x"), [slow(1.0, 0.03), (0.57, 0.0)])
-def test_two_fingers_do_what_the_grasp_does(law: str, right: float, x: float) -> None:
+def test_two_fingers_do_what_the_grasp_does(law, right, x):
     both = [
         grasp_system(law, native=False).with_values({"plant.initial_object_position": x}),
         placed(hand_system(2, controller=law, native=False), x, 0.0),
@@ -38,9 +37,7 @@ def test_two_fingers_do_what_the_grasp_does(law: str, right: float, x: float) ->
 
 
 @pytest.mark.parametrize("angles", [None, (0.0, 90.0, 225.0)])
-def test_three_fingers_touch_together_and_press_by_their_weights(
-    angles: tuple[float, ...] | None,
-) -> None:
+def test_three_fingers_touch_together_and_press_by_their_weights(angles):
     system = hand_system(angles=angles, controller="adaptive", native=False)
     metrics = simulate(placed(system, 0.006, -0.008, **COLOURS)).metrics
     assert metrics["time_difference"] <= 0.02
@@ -48,14 +45,14 @@ def test_three_fingers_touch_together_and_press_by_their_weights(
     assert max(metrics["force_difference"], metrics["net_force"]) <= 0.01
 
 
-def test_the_published_law_tells_no_colour_from_a_gap() -> None:
+def test_the_published_law_tells_no_colour_from_a_gap():
     metrics = simulate(placed(hand_system(native=False), 0.0, 0.0, **COLOURS)).metrics
     assert metrics["time_difference"] is None
     assert metrics["net_force"] > 1.0
 
 
 @pytest.mark.slow
-def test_a_free_prism_turns_back_to_what_the_floor_holds() -> None:
+def test_a_free_prism_turns_back_to_what_the_floor_holds():
     """mu·m·g·r_t/(sum of f_k·h_k), within a tenth."""
     system = hand_system(controller="adaptive", native=False)
     system = system.swap("plant", fmus_of(3) / "HandPlantMovable.fmu")
@@ -70,9 +67,7 @@ def test_a_free_prism_turns_back_to_what_the_floor_holds() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("off", "thrown"), [(0.9e-3, False), (1.1e-3, True)])
-def test_a_disc_between_points_is_held_by_the_floor_up_to_a_millimetre(
-    off: float, thrown: bool
-) -> None:
+def test_a_disc_between_points_is_held_by_the_floor_up_to_a_millimetre(off, thrown):
     """|c| = mu·m·g/((N/2)·K_i), 1.0 mm."""
     system = hand_system(controller="adaptive", native=False)
     system = system.swap("plant", fmus_of(3) / "HandPlantMovable.fmu")
@@ -81,7 +76,7 @@ def test_a_disc_between_points_is_held_by_the_floor_up_to_a_millimetre(
     assert shift > 0.01 if thrown else shift < 1e-4
 
 
-def test_weights_that_do_not_balance_are_refused() -> None:
+def test_weights_that_do_not_balance_are_refused():
     system = hand_system(native=False).with_values({"plant.angle[2]": 1.9})
     with pytest.raises(InputError, match=r"controller.weight = 1, 1, 1: leaves 0.19") as refused:
         simulate(system, stop=0.01)
@@ -98,14 +93,12 @@ def test_weights_that_do_not_balance_are_refused() -> None:
         (None, (0.0, 2.09, 4.19), "degrees: there is no finger for 355.81 degrees"),
     ],
 )
-def test_what_is_no_hand_is_said(
-    fingers: int | None, angles: tuple[float, ...] | None, said: str
-) -> None:
+def test_what_is_no_hand_is_said(fingers, angles, said):
     with pytest.raises(InputError, match=said):
         directions_of(fingers, angles)
 
 
-def test_a_finger_that_hardly_takes_part_is_warned_of() -> None:
+def test_a_finger_that_hardly_takes_part_is_warned_of():
     with pytest.warns(UserWarning, match="finger 2 at 170 degrees has a weight of 0.137"):
         hand_system(angles=(0.0, 170.0, 181.0), native=False)
     with warnings.catch_warnings():
@@ -113,9 +106,7 @@ def test_a_finger_that_hardly_takes_part_is_warned_of() -> None:
         hand_system(native=False)
 
 
-def test_the_command_writes_a_hand_that_runs(
-    command: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_command_writes_a_hand_that_runs(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert command("init", "hand.toml", "--angles", "20,100,200,290")[0] == 0
     code, out, err = command("run", "hand.toml", "--out", "thin", "--every", "100", "-q")
@@ -134,7 +125,7 @@ def test_the_command_writes_a_hand_that_runs(
 @pytest.mark.slow
 @pytest.mark.parametrize("fingers", [2, 3, 4, 5])
 @pytest.mark.parametrize("plant", ["HandPlant", "HandPlantMovable"])
-def test_native_fmus_give_the_bits_of_the_python_ones(fingers: int, plant: str) -> None:
+def test_native_fmus_give_the_bits_of_the_python_ones(fingers, plant):
     system = hand_system(fingers, controller="adaptive", native=False).with_presets("bench")
     number = "" if fingers == 3 else str(fingers)
     system = system.swap("plant", fmus_of(fingers) / f"{plant}{number}.fmu")

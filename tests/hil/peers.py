@@ -16,10 +16,10 @@ from grasp_cosim.hil.server import Server
 from grasp_cosim.interface.read import read_interface
 
 
-def main(fmu: str) -> None:
+def main(fmu):
     interface = read_interface(Path(fmu))
     served = ServedFmu(interface, Service(lockstep=True))
-    children: list[int] = []
+    children = []
     for line in sys.stdin:
         if line.startswith("end "):
             child = int(line[4:])

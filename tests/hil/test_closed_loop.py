@@ -1,19 +1,15 @@
 """The grasp with a part of it behind a proxy: the same values, to the bit, in lockstep."""
 
-from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from grasp_cosim import System, simulate
+from grasp_cosim import simulate
 from grasp_cosim.hil.served import Service
-from grasp_cosim.master.engine import Engine
 from support.proxies import ANY_PORT, build_proxy, serving
 from support.slow import slow
 
-ENGINE: Engine = "python"
+ENGINE = "python"
 """The peers are threads of this process. The compiled loop keeps Python's lock to itself, where
 another FMU is a Python one, and a native proxy in it then waits for a peer that cannot run."""
 
@@ -22,14 +18,12 @@ STEP, STOP = 4e-3, 2.0
 
 
 @pytest.fixture(scope="module")
-def stepped(grasp: System) -> System:
+def stepped(grasp):
     return grasp.with_experiment(step=STEP, stop=STOP)
 
 
 @contextmanager
-def on_the_bench(
-    system: System, folder: Path, names: tuple[str, ...], how: Service
-) -> Iterator[System]:
+def on_the_bench(system, folder, names, how):
     """The system with these components as proxies, each with a peer in lockstep of its own."""
     with ExitStack() as stack:
         for name in names:
@@ -47,9 +41,7 @@ def on_the_bench(
     [slow(("plant", "sensor_1", "sensor_2", "controller")), ("controller",)],
     ids=["all", "controller"],
 )
-def test_a_part_on_the_bench_changes_no_bit(
-    stepped: System, tmp_path: Path, names: tuple[str, ...], scheme: str
-) -> None:
+def test_a_part_on_the_bench_changes_no_bit(stepped, tmp_path, names, scheme):
     values = {"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.93}
     system = stepped.with_experiment(scheme=scheme).with_values(values)
     direct = simulate(system)
@@ -66,7 +58,7 @@ def test_a_part_on_the_bench_changes_no_bit(
 
 
 @pytest.mark.slow
-def test_native_and_python_mixed(stepped: System, natives: Path, tmp_path: Path) -> None:
+def test_native_and_python_mixed(stepped, natives, tmp_path):
     """Proxies of native and of Python FMUs, with peers that serve the other."""
     system, direct = stepped, simulate(stepped)
     for name in ("plant", "sensor_2"):
@@ -81,7 +73,7 @@ def test_native_and_python_mixed(stepped: System, natives: Path, tmp_path: Path)
         np.testing.assert_array_equal(values, again[signal], signal)
 
 
-def test_events_reach_the_bench(grasp: System, tmp_path: Path) -> None:
+def test_events_reach_the_bench(grasp, tmp_path):
     """A tunable parameter of a sensor on the bench, set on the way."""
     system = grasp.with_experiment(step=1e-3, stop=0.02)
     with on_the_bench(system, tmp_path, ("sensor_1",), Service(lockstep=True)) as benched:
@@ -90,7 +82,7 @@ def test_events_reach_the_bench(grasp: System, tmp_path: Path) -> None:
     assert here[11] < 0.6 * here[10]
 
 
-def darkened(system: System) -> npt.NDArray[np.float64]:
+def darkened(system):
     """The intensity of a sensor before whose tenth step its side gets darker."""
     with simulate.session(system, engine=ENGINE) as session:
         session.step(10)
@@ -100,7 +92,7 @@ def darkened(system: System) -> npt.NDArray[np.float64]:
 
 
 @pytest.mark.slow
-def test_two_runs_one_after_the_other_use_the_same_bench(grasp: System, tmp_path: Path) -> None:
+def test_two_runs_one_after_the_other_use_the_same_bench(grasp, tmp_path):
     system = grasp.with_experiment(step=1e-3, stop=0.05)
     with on_the_bench(system, tmp_path, ("plant",), Service(lockstep=True)) as benched:
         first, second = (simulate(benched, engine=ENGINE)["plant.position[1]"] for _ in range(2))

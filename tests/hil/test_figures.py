@@ -1,15 +1,12 @@
 """What is said of the proxies of a run, from made-up diagnostics."""
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 from grasp_cosim.hil.figures import proxy_figures, proxy_lines
 
-TIME: npt.NDArray[np.float64] = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+TIME = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 
 
-def diagnostics(**values: list[float]) -> dict[str, npt.NDArray[Any]]:
+def diagnostics(**values: list[float]):
     quiet = dict.fromkeys(
         ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected", "age"),
         [0.0] * 6,
@@ -20,18 +17,18 @@ def diagnostics(**values: list[float]) -> dict[str, npt.NDArray[Any]]:
     return {"arm.angle": np.zeros(6), **signals}
 
 
-def test_a_run_without_proxies_has_nothing_to_say() -> None:
+def test_a_run_without_proxies_has_nothing_to_say():
     assert proxy_figures(TIME, {"arm.angle": TIME}) == {}
     assert proxy_lines(TIME, {"arm.angle": TIME}, 0.1) == []
 
 
-def test_of_a_quiet_one_a_line() -> None:
+def test_of_a_quiet_one_a_line():
     assert proxy_lines(
         TIME, diagnostics(round_trip_time=[0.0, 0.001, 0.001, 0.009, 0.001, 0.001]), 0.1
     ) == ["arm: 0 of 5 steps missed (0 in a row), 0 answers late; round trip 1 ms, at worst 9 ms"]
 
 
-def test_a_loss_and_a_return_are_named() -> None:
+def test_a_loss_and_a_return_are_named():
     signals = diagnostics(
         state=[1, 2, 3, 3, 1, 3], missed=[0, 1, 2, 3, 3, 4], consecutive_missed=[0, 1, 2, 3, 0, 1],
         sessions=[1, 1, 1, 1, 2, 2], age=[0.0, 0.1, 0.2, 0.3, 0.0, -2.5],
@@ -51,19 +48,19 @@ def test_a_loss_and_a_return_are_named() -> None:
     ]
 
 
-def test_many_losses_are_not_all_listed() -> None:
-    time: npt.NDArray[np.float64] = np.linspace(0.0, 3.9, 40)
+def test_many_losses_are_not_all_listed():
+    time = np.linspace(0.0, 3.9, 40)
     signals = {
         name: np.resize(column, 40) for name, column in diagnostics(state=[1, 3] * 3).items()
     }
     assert sum("lost at" in line for line in proxy_lines(time, signals, 0.1)) == 5
 
 
-def test_steps_are_counted_though_not_each_is_recorded() -> None:
+def test_steps_are_counted_though_not_each_is_recorded():
     (line,) = proxy_lines(TIME, diagnostics(), 0.01)
     assert line.startswith("arm: 0 of 50 steps missed")
 
 
-def test_without_a_row_there_is_nothing_to_say() -> None:
+def test_without_a_row_there_is_nothing_to_say():
     nothing = {name: column[:0] for name, column in diagnostics().items()}
     assert proxy_lines(TIME[:0], nothing, 0.1) == []

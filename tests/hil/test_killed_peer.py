@@ -8,16 +8,13 @@ import random
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim import SimulationError, simulate
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.interface.interface import Value
-from grasp_cosim.recording.result import Result
 from support.campaign import seeds
 from support.proxies import build_proxy
 
@@ -41,7 +38,7 @@ HELD = ("proxy.hold.target_position", "proxy.hold.virtual_position[1]")
 class Peers:
     """Starts and kills processes that serve an FMU."""
 
-    def __init__(self, fmu: Path) -> None:
+    def __init__(self, fmu):
         program = Path(__file__).with_name("peers.py")
         self._process = subprocess.Popen(
             [sys.executable, str(program), str(fmu)],
@@ -51,18 +48,18 @@ class Peers:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         )
 
-    def start(self) -> tuple[int, int]:
+    def start(self):
         """Process id and port of a new one."""
         child, port = self._say("start").split()
         return int(child), int(port)
 
-    def kill(self, child: int) -> None:
+    def kill(self, child):
         assert self._say(f"end {child}") == f"{child} ended\n"
 
-    def close(self) -> None:
+    def close(self):
         self._process.communicate(timeout=60)
 
-    def _say(self, line: str) -> str:
+    def _say(self, line):
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None
         assert stdout is not None
@@ -72,20 +69,20 @@ class Peers:
 
 
 @pytest.fixture(scope="module")
-def peers(fmus: Path) -> Iterator[Peers]:
+def peers(fmus):
     found = Peers(fmus / "GraspController.fmu")
     yield found
     found.close()
 
 
 @pytest.fixture(scope="module")
-def proxied(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> System:
+def proxied(grasp, tmp_path_factory):
     """The controller on the bench, alone: it moves its fingers although nothing follows them."""
     controller = grasp.component("controller", "test")
     proxy = build_proxy(
         controller.fmu, tmp_path_factory.mktemp("bench") / "controller_bench.fmu", 5501,
     )  # fmt: skip
-    values: dict[str, Value] = {
+    values = {
         "position[1]": 0.11,
         "position[2]": -0.11,
         "velocity[1]": -0.05,
@@ -101,14 +98,14 @@ def proxied(grasp: System, tmp_path_factory: pytest.TempPathFactory) -> System:
     return replace(grasp.with_experiment(step=1e-3, stop=1e3), components=(part,), connections=())
 
 
-def run_until_killed(system: System, peers: Peers, seed: int) -> Result | None:
+def run_until_killed(system, peers, seed):
     """A run whose peer is killed at a moment; None where that was before the first step."""
     chance = random.Random(seed)
     child, port = peers.start()
     policy = ("failsafe", "hold", "stop")[seed % 3]
     # One in twenty while it is loaded and initialised, the others in the run
     early = seed % 20 == 0
-    values: dict[str, Value] = {
+    values = {
         "controller.proxy.port": port,
         "controller.proxy.on_loss": policy,
         "controller.proxy.connect_timeout": PATIENCE if early else 60.0,
@@ -134,15 +131,14 @@ def run_until_killed(system: System, peers: Peers, seed: int) -> Result | None:
         lost = f"127.0.0.1:{port} is lost, {TOLERATED + 1} missed in a row"
         if lost not in str(error) or policy != "stop":
             raise
-        kept: Result | None = error.result
-        return kept
+        return error.result
     finally:
         if killer.ident is None:  # a busy machine has lost it before
             killer.start()
         killer.join()
 
 
-def check(result: Result) -> None:
+def check(result):
     """Whenever it was killed, what was recorded is what the parameters promise."""
     policy = result.settings["components"]["controller"]["values"]["proxy.on_loss"]
     state, row = result["controller.proxy.state"], result["controller.proxy.consecutive_missed"]
@@ -175,7 +171,7 @@ def check(result: Result) -> None:
 @pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("first", MOMENTS[::PORTION])
-def test_the_peer_killed_at_any_moment(proxied: System, peers: Peers, first: int) -> None:
+def test_the_peer_killed_at_any_moment(proxied, peers, first):
     found = dict.fromkeys(("not begun", "ended", "lost"), 0)
     for seed in range(first, first + PORTION):
         result = run_until_killed(proxied, peers, seed)

@@ -1,26 +1,18 @@
 """The grasp over a network that loses, delays, repeats and swaps; the peer lost, and back again."""
 
-from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import System, simulate
-from grasp_cosim.hil.network import DIRECTIONS, Conditions, Direction, Network, Outage
-from grasp_cosim.hil.relay import Relay
+from grasp_cosim import simulate
+from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.served import Service
-from grasp_cosim.hil.server import Server
-from grasp_cosim.hil.traffic import Entry
-from grasp_cosim.interface.interface import Value
-from grasp_cosim.master.engine import Engine
-from grasp_cosim.recording.result import Result
 from support.ports import kept_port
 from support.proxies import ANY_PORT, build_proxy, relaying, serving, wait_until
 from support.slow import slow
 
-ENGINE: Engine = "python"
+ENGINE = "python"
 """The peers are threads of this process: test_closed_loop.py."""
 
 STEP = 0.01
@@ -34,9 +26,9 @@ CLEAN = 12
 BAD = Conditions(jitter=0.002, loss=0.05, duplicate=0.02)
 
 
-def network(conditions: Conditions, *outages: Outage) -> Network:
+def network(conditions, *outages):
     """With a seed at which the session begins and ends without a loss."""
-    both: dict[Direction, Conditions] = dict.fromkeys(DIRECTIONS, conditions)
+    both = dict.fromkeys(DIRECTIONS, conditions)
     for seed in count(1):
         found = Network(both, outages, seed=seed)
         clean = (*range(1, CLEAN), *range(STEPS - 5, STEPS + SPARE + CLEAN))
@@ -46,9 +38,7 @@ def network(conditions: Conditions, *outages: Outage) -> Network:
 
 
 @contextmanager
-def behind_a_relay(
-    system: System, name: str, folder: Path, bad: Network, log: list[Entry]
-) -> Iterator[tuple[System, Server, Relay]]:
+def behind_a_relay(system, name, folder, bad, log):
     """The system with a component on the bench, which steps on request, behind a relay."""
     fmu = system.component(name, "test").fmu
     with (
@@ -61,11 +51,11 @@ def behind_a_relay(
 
 
 @pytest.fixture(scope="module")
-def slow_grasp(grasp: System) -> System:
+def slow_grasp(grasp):
     return grasp.with_experiment(step=STEP, stop=STEP * (STEPS + SPARE))
 
 
-def simulated(system: System, name: str) -> Result:
+def simulated(system, name):
     """Up to a step whose answer is in time: all answers that arrive have come by then."""
     with simulate.session(system, engine=ENGINE) as session:
         session.step(STEPS)
@@ -74,17 +64,17 @@ def simulated(system: System, name: str) -> Result:
         return session.result()
 
 
-def dropped(log: list[Entry], direction: Direction) -> int:
+def dropped(log, direction):
     return sum(e.direction == direction and e.delay is None for e in log)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["plant", "controller"])
 def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accounted_for(
-    slow_grasp: System, tmp_path: Path, name: str
-) -> None:
-    log: list[Entry] = []
-    values: dict[str, Value] = {
+    slow_grasp, tmp_path, name
+):
+    log = []
+    values = {
         f"{name}.proxy.timeout": 0.1,
         f"{name}.proxy.misses_tolerated": 1000,
     }
@@ -96,7 +86,7 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
     steps = len(result.time) - 1
     assert counters["request"].received - 1 - steps < CLEAN  # HELLO and INITIALISE, and END
 
-    def copies(direction: Direction) -> int:
+    def copies(direction):
         return sum(e.direction == direction and e.copy == 1 for e in log)
 
     requests_lost, replies_lost = (dropped(log, direction) for direction in DIRECTIONS)
@@ -115,16 +105,16 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
     assert result["plant.contact_force[2]"][-1] == pytest.approx(-3.43, rel=0.1)
 
 
-def last(result: Result, name: str) -> int:
+def last(result, name):
     return int(result[name][-1])
 
 
 @pytest.mark.slow
-def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp: System, tmp_path: Path) -> None:
+def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp, tmp_path):
     """Twenty requests get nowhere; the peer makes up for them with what comes after."""
-    log: list[Entry] = []
+    log = []
     gone = Network(outages=(Outage(100, 120),))
-    values: dict[str, Value] = {
+    values = {
         "plant.proxy.timeout": 0.1,
         "plant.proxy.on_loss": "hold",
         "plant.proxy.resume": True,
@@ -148,10 +138,10 @@ def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp: System, tmp_path
 
 
 @pytest.mark.parametrize("resume", [slow(True), False])
-def test_the_peer_started_anew(slow_grasp: System, tmp_path: Path, resume: bool) -> None:
+def test_the_peer_started_anew(slow_grasp, tmp_path, resume):
     """It knows no session; a proxy that may resume begins another one, from the start values."""
     fmu = slow_grasp.component("plant", "test").fmu
-    values: dict[str, Value] = {
+    values = {
         "plant.proxy.timeout": 0.05,
         "plant.proxy.misses_tolerated": 2,
         "plant.proxy.on_loss": "failsafe",

@@ -5,20 +5,17 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from csv import DictReader
 from dataclasses import asdict
 from functools import partial
-from pathlib import Path
 
 import pytest
 from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.hil.address import Address
 from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.relay import MOST_CLIENTS, Relay
-from grasp_cosim.hil.traffic import Counters, Entry
+from grasp_cosim.hil.traffic import Counters
 from support.echo_peer import EchoPeer, client
 from support.ports import kept_port
 from support.proxies import relaying, wait_until
@@ -26,14 +23,14 @@ from support.proxies import relaying, wait_until
 NASTY = Conditions(jitter=0.002, loss=0.2, duplicate=0.2, reorder=0.2, reorder_by=0.005)
 
 
-def both(conditions: Conditions, seed: int = 0, *outages: Outage) -> Network:
+def both(conditions, seed=0, *outages):
     """The same in both directions."""
     return Network(dict.fromkeys(DIRECTIONS, conditions), outages, seed)
 
 
-def converse(relay: Relay, count: int, at_once: int = 20) -> list[bytes]:
+def converse(relay, count, at_once=20):
     """Send so many numbered requests, a few at a time; return the replies, in their order."""
-    replies: list[bytes] = []
+    replies = []
     with client() as mine:
         for first in range(0, count, at_once):
             upto = min(first + at_once, count)
@@ -45,29 +42,29 @@ def converse(relay: Relay, count: int, at_once: int = 20) -> list[bytes]:
     return replies
 
 
-def settled(relay: Relay, requests: int) -> bool:
+def settled(relay, requests):
     """Whether so many requests and all the replies to them have gone through, or been dropped."""
     request, reply = relay.counters.values()
     arrived = request.received == requests and reply.received == request.delivered
     return arrived and request.held == reply.held == 0
 
 
-def delivered(relay: Relay, requests: int) -> bool:
+def delivered(relay, requests):
     """Whether so many requests have gone through."""
     return relay.counters["request"].delivered == requests
 
 
-def test_an_undisturbed_network_passes_all_in_order() -> None:
+def test_an_undisturbed_network_passes_all_in_order():
     with EchoPeer() as peer, relaying(peer.address) as relay:
         assert converse(relay, 100) == [b"%d" % n for n in range(1, 101)]
         fine = Counters(received=100, delivered=100)
         assert relay.counters == {"request": fine, "reply": fine}
 
 
-def test_what_gets_through_and_the_counters_are_those_of_the_fates() -> None:
+def test_what_gets_through_and_the_counters_are_those_of_the_fates():
     """Whatever the timing: requests by their content, replies by how many there were."""
     net = both(NASTY, 11)
-    log: list[Entry] = []
+    log = []
     with EchoPeer() as peer, relaying(peer.address, net, log=log.append) as relay:
         replies = converse(relay, 300)
     request, reply = relay.counters.values()
@@ -92,7 +89,7 @@ def test_what_gets_through_and_the_counters_are_those_of_the_fates() -> None:
     assert request.reordered > 0
 
 
-def test_any_content_goes_through_unchanged() -> None:
+def test_any_content_goes_through_unchanged():
     contents = [b"", b"\0", bytes(range(256)) * 200, b"GRSP" + bytes(76)]
     with EchoPeer() as peer, relaying(peer.address) as relay, client() as mine:
         for data in contents:
@@ -100,7 +97,7 @@ def test_any_content_goes_through_unchanged() -> None:
             assert mine.recvfrom(65_535) == (data, relay.address)
 
 
-def test_a_peer_that_is_away_and_comes_back() -> None:
+def test_a_peer_that_is_away_and_comes_back():
     """What nobody takes is lost on the way; the first datagram after the return gets through."""
     with kept_port() as port, relaying(("127.0.0.1", port)) as relay, client() as mine:
         with EchoPeer(port):
@@ -116,13 +113,13 @@ def test_a_peer_that_is_away_and_comes_back() -> None:
     assert relay.counters["reply"] == Counters(received=2, delivered=2)
 
 
-def test_an_outage_in_the_middle() -> None:
+def test_an_outage_in_the_middle():
     with EchoPeer() as peer, relaying(peer.address, both(Conditions(), 0, Outage(4, 8))) as relay:
         assert converse(relay, 10, at_once=1) == [b"1", b"2", b"3", b"8", b"9", b"10"]
     assert relay.counters["request"] == Counters(received=10, delivered=6, outage=4)
 
 
-def test_clients_get_their_own_replies_and_the_peer_can_tell_them_apart() -> None:
+def test_clients_get_their_own_replies_and_the_peer_can_tell_them_apart():
     with EchoPeer() as peer, relaying(peer.address) as relay, client() as one, client() as other:
         for _ in range(3):
             one.sendto(b"one", relay.address)
@@ -134,20 +131,20 @@ def test_clients_get_their_own_replies_and_the_peer_can_tell_them_apart() -> Non
     assert len({port for port, _ in peer.received}) == 2
 
 
-def test_a_further_client_takes_the_place_of_the_one_silent_for_longest() -> None:
+def test_a_further_client_takes_the_place_of_the_one_silent_for_longest():
     with EchoPeer() as peer, relaying(peer.address) as relay, ExitStack() as stack:
         mine = [stack.enter_context(client()) for _ in range(MOST_CLIENTS + 1)]
         for number in [*range(MOST_CLIENTS), 0, MOST_CLIENTS, 0, 1]:
             mine[number].sendto(b"%d" % number, relay.address)
             assert mine[number].recv(100) == b"%d" % number
-    ports: dict[bytes, list[int]] = {}
+    ports = {}
     for port, data in peer.received:
         ports.setdefault(data, []).append(port)
     assert len(set(ports[b"0"])) == 1  # heard again before the further one came
     assert len(set(ports[b"1"])) == 2  # that took its place; it is a new client now
 
 
-def test_a_request_of_a_forgotten_client_is_counted_as_unsent() -> None:
+def test_a_request_of_a_forgotten_client_is_counted_as_unsent():
     """All are held for 1 s of a clock that stands still; the first client has to go."""
     now = 0
     net = both(Conditions(delay=1.0))
@@ -165,14 +162,14 @@ def test_a_request_of_a_forgotten_client_is_counted_as_unsent() -> None:
 
 
 @pytest.mark.parametrize("more", [0, 1])
-def test_a_client_that_gives_way_in_the_turn_in_which_it_gets_a_reply(more: int) -> None:
+def test_a_client_that_gives_way_in_the_turn_in_which_it_gets_a_reply(more):
     """For many sockets: their numbers decide which is looked at first."""
     with client() as peer, ExitStack() as stack:
         for _ in range(more):
             stack.enter_context(client())
         relay = stack.enter_context(Relay(peer.getsockname()))
         mine = [stack.enter_context(client()) for _ in range(2 * MOST_CLIENTS)]
-        senders: list[Address] = []
+        senders = []
         for number, one in enumerate(mine):
             if number >= MOST_CLIENTS:
                 peer.sendto(b"reply", senders[number - MOST_CLIENTS])
@@ -183,7 +180,7 @@ def test_a_client_that_gives_way_in_the_turn_in_which_it_gets_a_reply(more: int)
             assert one.recv(100) == b"reply"
 
 
-def test_requests_that_are_sent_one_after_the_other_to_nobody_are_all_sent() -> None:
+def test_requests_that_are_sent_one_after_the_other_to_nobody_are_all_sent():
     """What the network says of the first must not keep the second from being sent."""
     now = 0
     with client() as peer, client() as mine:
@@ -198,7 +195,7 @@ def test_requests_that_are_sent_one_after_the_other_to_nobody_are_all_sent() -> 
         assert relay.counters["request"] == Counters(received=3, delivered=3)
 
 
-def test_room_is_bounded() -> None:
+def test_room_is_bounded():
     net = Network(dict.fromkeys(DIRECTIONS, Conditions(delay=60.0)), capacity=3)
     with EchoPeer() as peer, relaying(peer.address, net) as relay, client() as mine:
         for _ in range(8):
@@ -207,7 +204,7 @@ def test_room_is_bounded() -> None:
         assert relay.counters["request"] == Counters(received=8, overflow=5, held=3)
 
 
-def test_what_is_under_way_at_the_end_stays_so() -> None:
+def test_what_is_under_way_at_the_end_stays_so():
     """A duration of 3 s, on a clock that goes on by 1 s whenever it is asked."""
     ticks = iter(range(0, 100 * 10**9, 10**9))
     with EchoPeer() as peer, client() as mine:
@@ -219,7 +216,7 @@ def test_what_is_under_way_at_the_end_stays_so() -> None:
     assert not peer.received
 
 
-def test_stopped_before_it_runs_and_more_than_once() -> None:
+def test_stopped_before_it_runs_and_more_than_once():
     with EchoPeer() as peer, Relay(peer.address) as relay:
         for _ in range(1000):  # more than the waking socket holds
             relay.stop()
@@ -227,15 +224,15 @@ def test_stopped_before_it_runs_and_more_than_once() -> None:
         assert relay.counters["request"] == Counters()
 
 
-def test_an_idle_relay_is_woken_to_end() -> None:
+def test_an_idle_relay_is_woken_to_end():
     with EchoPeer() as peer, relaying(peer.address) as relay:
         pass
     with Relay(peer.address, port=relay.address[1]) as again:  # which is free again
         assert again.address[1] == relay.address[1]
 
 
-def test_what_the_log_raises_ends_it_and_is_raised() -> None:
-    def full(entry: Entry) -> None:
+def test_what_the_log_raises_ends_it_and_is_raised():
+    def full(entry):
         raise OSError(28, "No space left on device")
 
     with EchoPeer() as peer, client() as mine, Relay(peer.address, log=full) as relay:
@@ -244,8 +241,8 @@ def test_what_the_log_raises_ends_it_and_is_raised() -> None:
             relay.run()
 
 
-def test_what_ends_a_relay_in_a_thread_is_raised_at_the_end() -> None:
-    def full(entry: Entry) -> None:
+def test_what_ends_a_relay_in_a_thread_is_raised_at_the_end():
+    def full(entry):
         raise OSError(28, "No space left on device")
 
     with EchoPeer() as peer, client() as mine, ExitStack() as stack:
@@ -256,7 +253,7 @@ def test_what_ends_a_relay_in_a_thread_is_raised_at_the_end() -> None:
             stack.close()
 
 
-def test_it_does_not_relay_to_itself() -> None:
+def test_it_does_not_relay_to_itself():
     with client() as mine:
         port = mine.getsockname()[1]
     for host in ("127.0.0.1", "0.0.0.0"):
@@ -264,7 +261,7 @@ def test_it_does_not_relay_to_itself() -> None:
             Relay(("127.0.0.1", port), host=host, port=port)
 
 
-def test_a_port_that_is_taken() -> None:
+def test_a_port_that_is_taken():
     with EchoPeer() as peer, pytest.raises(InputError) as error:
         Relay(peer.address, port=peer.address[1])
     assert str(error.value) == (
@@ -274,18 +271,18 @@ def test_a_port_that_is_taken() -> None:
 
 
 @pytest.fixture
-def ended(monkeypatch: pytest.MonkeyPatch) -> None:
+def ended(monkeypatch):
     """A relay is interrupted as soon as it runs."""
     monkeypatch.setattr(Relay, "run", lambda _: signal.raise_signal(signal.SIGINT))
 
 
-def command(*arguments: str) -> int:
+def command(*arguments: str):
     """Run grasp-cosim relay in this process."""
     return cli.main(["relay", *arguments])
 
 
 @pytest.mark.usefixtures("ended")
-def test_the_command_relays_until_it_is_interrupted(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_relays_until_it_is_interrupted(capsys):
     assert command("0", "127.0.0.1:5501") == 0
     out, err = capsys.readouterr()
     assert re.fullmatch(r"relaying 127\.0\.0\.1:[1-9][0-9]* -> 127\.0\.0\.1:5501\n", err)
@@ -296,7 +293,7 @@ def test_the_command_relays_until_it_is_interrupted(capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.usefixtures("ended")
-def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_listening_beyond_this_machine_is_said(capsys):
     assert command("0.0.0.0:0", "5501") == 0
     note, listening = capsys.readouterr().err.splitlines()
     where = listening.split()[1]
@@ -325,9 +322,7 @@ def test_listening_beyond_this_machine_is_said(capsys: pytest.CaptureFixture[str
         ),
     ],
 )
-def test_wrong_input_is_one_line(
-    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_input_is_one_line(arguments, said, capsys):
     assert command("0", "5501", *arguments) == 2
     assert capsys.readouterr() == ("", f"grasp-cosim: {said}\n")
 
@@ -343,9 +338,7 @@ def test_wrong_input_is_one_line(
         ("0", "256.0.0.1:1", "256.0.0.1:1: no such host; must be an IPv4 address or a name that"),
     ],
 )
-def test_a_wrong_address_is_one_line(
-    listen: str, to: str, said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_address_is_one_line(listen, to, said, capsys):
     assert command(listen, to) == 2
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
@@ -356,27 +349,25 @@ def test_a_wrong_address_is_one_line(
     "arguments",
     [[], ["0"], ["0", "1", "--seed", "-1"]],
 )
-def test_what_click_refuses_is_one_line(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_click_refuses_is_one_line(arguments, capsys):
     assert command(*arguments) == 2
     out, err = capsys.readouterr()
     assert not out
     assert len(err.splitlines()) == 1
 
 
-def test_a_log_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_that_cannot_be_written(tmp_path, capsys):
     path = tmp_path / "missing" / "log.csv"
     assert command("0", "5501", "--log", str(path)) == 2
     assert capsys.readouterr().err == f"grasp-cosim: {path}: No such file or directory\n"
 
 
 @pytest.fixture
-def started(tmp_path: Path) -> Iterator[Callable[..., tuple[subprocess.Popen[str], Address]]]:
+def started(tmp_path):
     """Starts the command as a process; returns it and where it listens. Ends what is left."""
     with ExitStack() as stack:
 
-        def start(*arguments: str) -> tuple[subprocess.Popen[str], Address]:
+        def start(*arguments: str):
             process = stack.enter_context(
                 subprocess.Popen(
                     [sys.executable, "-m", "grasp_cosim", "relay", *arguments],
@@ -394,9 +385,7 @@ def started(tmp_path: Path) -> Iterator[Callable[..., tuple[subprocess.Popen[str
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_it_with_counters_and_log(
-    started: Callable[..., tuple[subprocess.Popen[str], Address]], tmp_path: Path
-) -> None:
+def test_ctrl_c_ends_it_with_counters_and_log(started, tmp_path):
     """As a process of its own: the log is that of the fates, the counters are those of the log."""
     path = tmp_path / "log.csv"
     chances = "--loss 0.3 --delay 0:0.002 --duplicate 0.3 --reorder 0.2 --seed 7"
@@ -440,9 +429,7 @@ def test_ctrl_c_ends_it_with_counters_and_log(
         assert counts["held"] == 0
 
 
-def test_sigterm_before_the_duration_is_over(
-    started: Callable[..., tuple[subprocess.Popen[str], Address]],
-) -> None:
+def test_sigterm_before_the_duration_is_over(started):
     process, _ = started("0", "5501", "--json")
     process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=60)

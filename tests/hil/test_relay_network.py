@@ -2,15 +2,13 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.hil.network import DIRECTIONS, Conditions, Direction, Network, Outage
-from grasp_cosim.hil.traffic import Counters, Entry, Traffic
+from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
+from grasp_cosim.hil.traffic import Counters, Traffic
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
@@ -35,23 +33,21 @@ arrivals = st.lists(st.tuples(st.sampled_from(DIRECTIONS), st.integers(0, 30 * M
 """Direction, and ns since the arrival before."""
 
 
-def network(seed: int = 0, **request: float) -> Network:
+def network(seed=0, **request):
     """One that disturbs requests only."""
     return Network({"request": Conditions(**request), "reply": Conditions()}, seed=seed)
 
 
-def relayed(
-    net: Network, arriving: Iterable[tuple[Direction, int]]
-) -> tuple[list[tuple[int, Direction, int]], list[Entry], dict[Direction, Counters]]:
+def relayed(net, arriving):
     """What was delivered (when, direction, number), the log, and the counters at the end.
 
     What is due is delivered before each arrival, and at the end, at the time when it is due.
     """
-    log: list[Entry] = []
+    log = []
     traffic = Traffic[None](net, log.append)
-    delivered: list[tuple[int, Direction, int]] = []
+    delivered = []
 
-    def deliver(until: float) -> None:
+    def deliver(until):
         while (due := traffic.next_due()) is not None and due <= until:
             held = traffic.take(due)
             assert held is not None
@@ -60,7 +56,7 @@ def relayed(
             traffic.settle(held, sent=True)
 
     now = 0
-    counts: Counter[Direction] = Counter()
+    counts = Counter()
     for direction, gap in arriving:
         deliver(now + gap)
         now += gap
@@ -71,30 +67,28 @@ def relayed(
     return delivered, log, traffic.snapshot()
 
 
-def check_sums(counters: Iterable[Counters]) -> None:
+def check_sums(counters):
     """Every datagram and every copy is in exactly one place."""
     for c in counters:
         assert c.dropped == c.lost + c.outage + c.overflow + c.unsent
         assert c.received + c.duplicated == c.delivered + c.dropped + c.held
 
 
-def one_by_one(count: int, gap: int = MS) -> Sequence[tuple[Direction, int]]:
+def one_by_one(count, gap=MS):
     """So many requests, gap ns apart."""
     return [("request", gap)] * count
 
 
 @QUICK
 @given(networks, st.integers(1, 2**40), st.sampled_from(DIRECTIONS))
-def test_a_fate_is_a_function_of_seed_direction_and_number(
-    net: Network, number: int, direction: Direction
-) -> None:
+def test_a_fate_is_a_function_of_seed_direction_and_number(net, number, direction):
     for other in (number + 1, 1, number):
         net.fate(direction, other)
     again = Network(dict(net.conditions), net.outages, net.seed, 7)
     assert again.fate(direction, number) == net.fate(direction, number)
 
 
-def test_fates_stay_what_they_were() -> None:
+def test_fates_stay_what_they_were():
     """A seed in a report of today means the same next year."""
     net = network(1, delay=0.001, jitter=0.002, loss=0.3, duplicate=0.3, reorder=0.3)
     assert [[p.delay_ns for p in net.fate("request", n)] for n in range(1, 9)] == FATES
@@ -102,9 +96,7 @@ def test_fates_stay_what_they_were() -> None:
 
 @QUICK
 @given(networks, arrivals)
-def test_what_arrives_in_between_and_when_changes_no_fate(
-    net: Network, arriving: Sequence[tuple[Direction, int]]
-) -> None:
+def test_what_arrives_in_between_and_when_changes_no_fate(net, arriving):
     """The log of requests alone, all at once, is that of requests among replies at any times."""
     roomy = replace(net, capacity=1000)
     requests = [d for d, _ in arriving].count("request")
@@ -114,13 +106,11 @@ def test_what_arrives_in_between_and_when_changes_no_fate(
 
 @QUICK
 @given(networks, arrivals)
-def test_deliveries_are_those_of_the_fates_in_the_order_of_due_times(
-    net: Network, arriving: Sequence[tuple[Direction, int]]
-) -> None:
+def test_deliveries_are_those_of_the_fates_in_the_order_of_due_times(net, arriving):
     roomy = replace(net, capacity=1000)
     delivered, _, counters = relayed(roomy, arriving)
     now, expected = 0, []
-    counts: Counter[Direction] = Counter()
+    counts = Counter()
     for direction, gap in arriving:
         now += gap
         counts[direction] += 1
@@ -139,7 +129,7 @@ def test_deliveries_are_those_of_the_fates_in_the_order_of_due_times(
         )  # fmt: skip
 
 
-def test_of_those_due_at_once_the_first_to_arrive_is_the_first_delivered() -> None:
+def test_of_those_due_at_once_the_first_to_arrive_is_the_first_delivered():
     net = network(delay=0.001, duplicate=1.0)
     numbers = [n for _, _, n in relayed(net, one_by_one(5, 0))[0]]
     assert numbers == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
@@ -147,9 +137,7 @@ def test_of_those_due_at_once_the_first_to_arrive_is_the_first_delivered() -> No
 
 @QUICK
 @given(networks, arrivals)
-def test_never_more_under_way_than_there_is_room_for(
-    net: Network, arriving: Sequence[tuple[Direction, int]]
-) -> None:
+def test_never_more_under_way_than_there_is_room_for(net, arriving):
     """The sums hold after every arrival, too; the log says what there was no room for."""
     delivered, log, counters = relayed(net, arriving)
     check_sums(counters.values())
@@ -158,7 +146,7 @@ def test_never_more_under_way_than_there_is_room_for(
     assert fates["passed"] + fates["held back"] == len(delivered)
 
 
-def test_the_room_is_for_both_directions_together() -> None:
+def test_the_room_is_for_both_directions_together():
     net = Network(dict.fromkeys(DIRECTIONS, Conditions(delay=1.0, duplicate=1.0)), capacity=5)
     traffic = Traffic[None](net)
     for _ in range(3):
@@ -171,7 +159,7 @@ def test_the_room_is_for_both_directions_together() -> None:
     assert traffic.next_due() == 10**9
 
 
-def test_what_this_machine_refuses_to_send_is_counted() -> None:
+def test_what_this_machine_refuses_to_send_is_counted():
     traffic = Traffic[str](network())
     traffic.receive("request", b"x", "somewhere", 5)
     held = traffic.take(5)
@@ -183,7 +171,7 @@ def test_what_this_machine_refuses_to_send_is_counted() -> None:
 
 @pytest.mark.parametrize("probability", [0.01, 0.2, 0.9])
 @pytest.mark.parametrize("direction", DIRECTIONS)
-def test_frequencies_are_those_asked_for(probability: float, direction: Direction) -> None:
+def test_frequencies_are_those_asked_for(probability, direction):
     """Losses, copies and datagrams held back, each within what a binomial count allows."""
     p = probability
     asked = Conditions(loss=p, duplicate=p, reorder=p)
@@ -201,7 +189,7 @@ def test_frequencies_are_those_asked_for(probability: float, direction: Directio
     assert stats.binomtest(int(runs), MANY - 1, 2 * p * (1 - p)).pvalue > 1e-3
 
 
-def test_delays_are_uniform_and_those_of_a_copy_independent() -> None:
+def test_delays_are_uniform_and_those_of_a_copy_independent():
     net = network(5, delay=0.010, jitter=0.005, duplicate=1.0)
     delays = np.array([[p.delay_ns for p in net.fate("request", n)] for n in range(1, MANY + 1)])
     for column in delays.T:
@@ -209,7 +197,7 @@ def test_delays_are_uniform_and_those_of_a_copy_independent() -> None:
     assert stats.pearsonr(*delays.T).pvalue > 1e-3
 
 
-def test_certainty_and_impossibility() -> None:
+def test_certainty_and_impossibility():
     numbers = range(1, 1001)
     assert not any(network(loss=1.0).fate("request", n) for n in numbers)
     assert all(network().fate("request", n) == ((0, False),) for n in numbers)
@@ -219,21 +207,21 @@ def test_certainty_and_impossibility() -> None:
     )
 
 
-def test_seeds_and_directions_differ() -> None:
-    def lost(seed: int, direction: Direction) -> list[int]:
+def test_seeds_and_directions_differ():
+    def lost(seed, direction):
         net = Network(dict.fromkeys(DIRECTIONS, Conditions(loss=0.5)), seed=seed)
         return [n for n in range(1, 200) if not net.fate(direction, n)]
 
     assert len({tuple(lost(s, d)) for s in range(10) for d in DIRECTIONS}) == 20
 
 
-def test_a_higher_loss_leaves_the_delays_of_the_others() -> None:
+def test_a_higher_loss_leaves_the_delays_of_the_others():
     few, more = (network(9, jitter=0.1, duplicate=0.3, loss=p) for p in (0.1, 0.5))
     for n in range(1, 500):
         assert more.fate("request", n) in ((), few.fate("request", n))
 
 
-def test_held_back_is_overtaken() -> None:
+def test_held_back_is_overtaken():
     """20 ms by default: at 1 ms apart each is overtaken by those of the next 20 ms."""
     net = network(2, reorder=0.1)
     delivered, log, counters = relayed(net, one_by_one(300))
@@ -248,10 +236,10 @@ def test_held_back_is_overtaken() -> None:
     ]
 
 
-def test_an_outage_by_numbers_of_requests() -> None:
+def test_an_outage_by_numbers_of_requests():
     """Replies, too, from the arrival of request 3 until that of request 5."""
     net = Network(outages=(Outage(3, 5), Outage(7, 8)))
-    both: list[tuple[Direction, int]] = [("request", 0), ("reply", 0)]
+    both = [("request", 0), ("reply", 0)]
     delivered, log, counters = relayed(net, both * 8)
     assert [n for _, d, n in delivered if d == "request"] == [1, 2, 5, 6, 8]
     assert [n for _, d, n in delivered if d == "reply"] == [1, 2, 5, 6, 8]
@@ -261,19 +249,19 @@ def test_an_outage_by_numbers_of_requests() -> None:
     assert {e.delay for e in out} == {None}
 
 
-def test_an_outage_in_seconds_begins_at_the_first_datagram() -> None:
+def test_an_outage_in_seconds_begins_at_the_first_datagram():
     net = Network(outages=(Outage(0.002, 0.004, "s"),))
     delivered, _, counters = relayed(net, one_by_one(6))
     assert [n for _, _, n in delivered] == [1, 2, 5, 6]
     assert counters["request"].outage == 2
 
 
-def test_what_was_under_way_before_an_outage_arrives() -> None:
+def test_what_was_under_way_before_an_outage_arrives():
     net = replace(network(delay=0.0025), outages=(Outage(2, 6),))
     assert [n for _, _, n in relayed(net, one_by_one(6))[0]] == [1, 6]
 
 
-def test_an_outage_takes_no_fate_away_from_those_after_it() -> None:
+def test_an_outage_takes_no_fate_away_from_those_after_it():
     net = network(4, jitter=0.001, loss=0.2)
     fine = relayed(net, one_by_one(100))[1]
     out = relayed(replace(net, outages=(Outage(20, 40),)), one_by_one(100))[1]
@@ -291,7 +279,7 @@ def test_an_outage_takes_no_fate_away_from_those_after_it() -> None:
         ({"reorder_by": math.nan}, "reorder_by = nan s: must be from 0 to 1e+06 s"),
     ],
 )
-def test_wrong_conditions(wrong: dict[str, float], said: str) -> None:
+def test_wrong_conditions(wrong, said):
     with pytest.raises(InputError) as error:
         Conditions(**wrong)
     assert str(error.value) == said
@@ -308,7 +296,7 @@ def test_wrong_conditions(wrong: dict[str, float], said: str) -> None:
         ((math.nan, 1, "s"), "nan until 1 s: must begin at 0 or later, and end after that"),
     ],
 )
-def test_wrong_outages(arguments: tuple[Any, ...], said: str) -> None:
+def test_wrong_outages(arguments, said):
     with pytest.raises(InputError) as error:
         Outage(*arguments)
     assert str(error.value) == f"outage from {said}"
@@ -322,7 +310,7 @@ def test_wrong_outages(arguments: tuple[Any, ...], said: str) -> None:
         ({"capacity": 0}, "capacity = 0: must be a whole number, at least 1"),
     ],
 )
-def test_wrong_networks(wrong: dict[str, Any], said: str) -> None:
+def test_wrong_networks(wrong, said):
     with pytest.raises(InputError) as error:
         Network(**wrong)
     assert str(error.value) == said

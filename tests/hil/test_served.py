@@ -3,7 +3,7 @@
 import math
 import re
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -14,7 +14,6 @@ from grasp_cosim.fmi.make_instance import load_here
 from grasp_cosim.hil.driven import DrivenFmu
 from grasp_cosim.hil.protocol import exchanged, link_signature
 from grasp_cosim.hil.served import BACKLOG, ServedFmu, Service
-from grasp_cosim.interface.interface import Value
 from grasp_cosim.interface.read import read_interface
 from grasp_fmus.link.message import STEP as STEP_REQUEST
 from grasp_fmus.link.peer import TOO_LONG
@@ -28,14 +27,14 @@ STEP = 1e-3
 class Clocked:
     """A served FMU, a proxy of it and their clock."""
 
-    def __init__(self, fmu: Path, serving: Service) -> None:
+    def __init__(self, fmu, serving):
         self.now = 10_000 * MS
-        self.said: list[str] = []
+        self.said = []
         self.served = ServedFmu(read_interface(fmu), serving, self.said.append)
         signature, _ = link_signature(exchanged(fmu))
         self.proxy = HandProxy(signature, lambda d: self.served.answer(d, "test", self.now))
 
-    def wait(self, milliseconds: float) -> None:
+    def wait(self, milliseconds):
         """Let time pass; it looks whenever it wants to."""
         end = self.now + round(milliseconds * MS)
         while (due := self.served.due()) is not None and due <= end:
@@ -48,11 +47,11 @@ MakeClocked = Callable[[Path, Service], Clocked]
 
 
 @pytest.fixture
-def clocked() -> Iterator[MakeClocked]:
+def clocked():
     """Serves FMUs with a clock; closes them."""
     with ExitStack() as stack:
 
-        def make(fmu: Path, serving: Service) -> Clocked:
+        def make(fmu, serving):
             it = Clocked(fmu, serving)
             stack.callback(it.served.close)
             return it
@@ -60,7 +59,7 @@ def clocked() -> Iterator[MakeClocked]:
         yield make
 
 
-def starts(fmu: Path, **values: Value) -> list[Value]:
+def starts(fmu, **values):
     """A request's values: the start values, but for those given by name."""
     interface = read_interface(fmu)
     signature, _ = link_signature(interface)
@@ -71,7 +70,7 @@ def starts(fmu: Path, **values: Value) -> list[Value]:
     ]
 
 
-def directly(fmu: Path, gaps: list[float], reflectance: float) -> list[Value]:
+def directly(fmu, gaps, reflectance):
     """The intensities of a sensor stepped in this process."""
     interface = read_interface(fmu)
     gap, intensity = interface.by_name["gap"], interface.by_name["intensity"]
@@ -90,9 +89,7 @@ def directly(fmu: Path, gaps: list[float], reflectance: float) -> list[Value]:
     return found
 
 
-def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(
-    fmus: Path, clocked: MakeClocked
-) -> None:
+def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     gaps = [0.1 / 3 ** (k / 7) for k in range(40)]
     it = clocked(fmu, Service(lockstep=True))
@@ -108,7 +105,7 @@ def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(
     ]
 
 
-def test_of_a_server_that_was_started_anew_it_is_said(fmus: Path, clocked: MakeClocked) -> None:
+def test_of_a_server_that_was_started_anew_it_is_said(fmus, clocked):
     fmu, other = fmus / "ProximitySensor.fmu", fmus / "GripperPlant.fmu"
     it, anew = (clocked(fmu, Service(lockstep=True)) for _ in range(2))
     it.proxy.begin(1, starts(fmu))
@@ -120,7 +117,7 @@ def test_of_a_server_that_was_started_anew_it_is_said(fmus: Path, clocked: MakeC
     assert anew.said[1].startswith("a datagram from test of another interface was refused: its")
 
 
-def test_in_initialisation_mode_outputs_follow_the_inputs(fmus: Path, clocked: MakeClocked) -> None:
+def test_in_initialisation_mode_outputs_follow_the_inputs(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
@@ -130,9 +127,7 @@ def test_in_initialisation_mode_outputs_follow_the_inputs(fmus: Path, clocked: M
         assert intensity == pytest.approx(expected, rel=1e-12)
 
 
-def test_lost_requests_are_made_up_for_with_the_newest_values(
-    fmus: Path, clocked: MakeClocked
-) -> None:
+def test_lost_requests_are_made_up_for_with_the_newest_values(fmus, clocked):
     fmu = fmus / "GripperPlant.fmu"
     push, rest = {"force[1]": 1.0, "force[2]": 0.0}, {"force[1]": 0.0, "force[2]": 0.0}
     two, one = (clocked(fmu, Service(lockstep=True)) for _ in range(2))
@@ -143,13 +138,11 @@ def test_lost_requests_are_made_up_for_with_the_newest_values(
     assert one.proxy.step(2 * STEP, STEP, starts(fmu, **push)) == whole
 
 
-def test_lost_requests_are_not_made_up_for_when_the_end_has_come(
-    fmus: Path, clocked: MakeClocked
-) -> None:
+def test_lost_requests_are_not_made_up_for_when_the_end_has_come(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it, asked = clocked(fmu, Service(lockstep=True)), []
 
-    def over() -> bool:
+    def over():
         asked.append(1)
         return len(asked) > 10
 
@@ -160,9 +153,7 @@ def test_lost_requests_are_not_made_up_for_when_the_end_has_come(
     assert len(asked) == 11
 
 
-def test_a_step_in_parts_is_given_up_when_the_end_has_come(
-    natives: Path, clocked: MakeClocked
-) -> None:
+def test_a_step_in_parts_is_given_up_when_the_end_has_come(natives, clocked):
     fmu = natives / "GripperPlantMovable.fmu"
     it = clocked(fmu, Service(lockstep=True))
     push = starts(fmu, **{"force[1]": -3.0, "force[2]": 3.0})
@@ -175,9 +166,7 @@ def test_a_step_in_parts_is_given_up_when_the_end_has_come(
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
-def test_a_step_that_is_too_long_ends_its_session_alone(
-    fmus: Path, clocked: MakeClocked, lockstep: bool
-) -> None:
+def test_a_step_that_is_too_long_ends_its_session_alone(fmus, clocked, lockstep):
     fmu = fmus / "GripperPlant.fmu"
     it = clocked(fmu, Service(lockstep=lockstep))
     it.proxy.begin(1, starts(fmu))
@@ -190,9 +179,7 @@ def test_a_step_that_is_too_long_ends_its_session_alone(
 
 
 @pytest.mark.parametrize("time", [-1.0, 1e9, 1e300])
-def test_a_step_from_nowhere_fails_and_the_next_session_is_served(
-    fmus: Path, time: float, clocked: MakeClocked
-) -> None:
+def test_a_step_from_nowhere_fails_and_the_next_session_is_served(fmus, time, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
@@ -204,9 +191,7 @@ def test_a_step_from_nowhere_fails_and_the_next_session_is_served(
 
 
 @pytest.mark.parametrize("step", [5e-324, 4e-10, 1e10, 1e300])
-def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(
-    fmus: Path, step: float, clocked: MakeClocked
-) -> None:
+def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(fmus, step, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service())
     it.proxy.begin(1, starts(fmu))
@@ -217,9 +202,7 @@ def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(
     assert it.proxy.step(0.0, STEP, starts(fmu))
 
 
-def test_sessions_of_an_fmu_without_inputs_and_parameters_count(
-    fmus: Path, tmp_path: Path, clocked: MakeClocked
-) -> None:
+def test_sessions_of_an_fmu_without_inputs_and_parameters_count(fmus, tmp_path, clocked):
     sensor, fmu = fmus / "ProximitySensor.fmu", tmp_path / "Source.fmu"
     with zipfile.ZipFile(sensor) as old, zipfile.ZipFile(fmu, "w") as new:
         for name in old.namelist():
@@ -234,14 +217,14 @@ def test_sessions_of_an_fmu_without_inputs_and_parameters_count(
     assert it.served.counters()["sessions"] == 1
 
 
-def test_a_parameter_that_the_fmu_refuses_is_said(fmus: Path, clocked: MakeClocked) -> None:
+def test_a_parameter_that_the_fmu_refuses_is_said(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service())
     with pytest.raises(RefusedError, match=r"offset_distance = -1\.0 m: must be from"):
         it.proxy.begin(1, starts(fmu, offset_distance=-1.0))
 
 
-def test_a_tunable_parameter_changes_on_the_way(fmus: Path, clocked: MakeClocked) -> None:
+def test_a_tunable_parameter_changes_on_the_way(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
@@ -250,7 +233,7 @@ def test_a_tunable_parameter_changes_on_the_way(fmus: Path, clocked: MakeClocked
     assert float(dark) == pytest.approx(0.5 * float(bright))
 
 
-def test_a_session_starts_at_its_own_time(fmus: Path, clocked: MakeClocked) -> None:
+def test_a_session_starts_at_its_own_time(fmus, clocked):
     fmu = fmus / "GripperPlant.fmu"
     it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu), time=2.5)
@@ -258,9 +241,7 @@ def test_a_session_starts_at_its_own_time(fmus: Path, clocked: MakeClocked) -> N
     assert it.proxy.outputs_time == 2.5 + STEP
 
 
-def test_by_its_own_clock_the_model_moves_between_requests(
-    fmus: Path, clocked: MakeClocked
-) -> None:
+def test_by_its_own_clock_the_model_moves_between_requests(fmus, clocked):
     fmu = fmus / "GripperPlant.fmu"
     push = starts(fmu, **{"force[1]": -1.0})
     it = clocked(fmu, Service())
@@ -276,7 +257,7 @@ def test_by_its_own_clock_the_model_moves_between_requests(
     assert moved == pytest.approx(-0.5 * 1.0 / 0.5 * 0.02**2, rel=1e-9)
 
 
-def test_its_own_step_may_be_shorter(fmus: Path, clocked: MakeClocked) -> None:
+def test_its_own_step_may_be_shorter(fmus, clocked):
     fmu = fmus / "GripperPlant.fmu"
     it = clocked(fmu, Service(step_ns=MS // 4))
     it.proxy.begin(1, starts(fmu))
@@ -285,9 +266,7 @@ def test_its_own_step_may_be_shorter(fmus: Path, clocked: MakeClocked) -> None:
     assert it.served.counters()["own_steps"] == 20
 
 
-def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(
-    fmus: Path, clocked: MakeClocked
-) -> None:
+def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(fmus, clocked):
     fmu = fmus / "GripperPlant.fmu"
     push = starts(fmu, **{"force[1]": -1.0})
     it = clocked(fmu, Service(watchdog_ns=50 * MS, failsafe={"force[1]": 0.25}))
@@ -305,9 +284,7 @@ def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(
     assert float(it.proxy.step(0.11, STEP, push)[2]) < float(velocity)
 
 
-def test_a_clock_that_was_away_for_long_does_not_make_the_model_race(
-    fmus: Path, clocked: MakeClocked
-) -> None:
+def test_a_clock_that_was_away_for_long_does_not_make_the_model_race(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service(watchdog_ns=10**15))
     it.proxy.begin(1, starts(fmu))
@@ -321,9 +298,7 @@ def test_a_clock_that_was_away_for_long_does_not_make_the_model_race(
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
-def test_a_failure_of_the_fmu_is_said_to_the_proxy(
-    tmp_path: Path, lockstep: bool, clocked: MakeClocked
-) -> None:
+def test_a_failure_of_the_fmu_is_said_to_the_proxy(tmp_path, lockstep, clocked):
     fmu = native_fmus.build(tmp_path, "Native", "2.0")
     it = clocked(fmu, Service(lockstep=lockstep))
     values = starts(fmu, error_at=0.0025)
@@ -337,9 +312,9 @@ def test_a_failure_of_the_fmu_is_said_to_the_proxy(
     assert it.served.due() is None
 
 
-def test_every_type_there_and_back(tmp_path: Path, clocked: MakeClocked) -> None:
+def test_every_type_there_and_back(tmp_path, clocked):
     fmu = native_fmus.build(tmp_path, "Native", "2.0")
-    values: dict[str, Value] = {
+    values = {
         "u_Real": 0.1,
         "u_Integer": -7,
         "u_Boolean": True,
@@ -356,15 +331,13 @@ def test_every_type_there_and_back(tmp_path: Path, clocked: MakeClocked) -> None
             assert (outputs[f"y{name[1:]}"], type(outputs[f"y{name[1:]}"])) == (value, type(value))
 
 
-def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path: Path) -> None:
+def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path):
     fmu = native_fmus.build(tmp_path, "Native", "3.0")
     with pytest.raises(InputError, match=r"input u_UInt32 is of type UInt32, which a proxy cannot"):
         link_signature(exchanged(fmu))
 
 
-def test_an_output_that_is_not_finite_is_a_failure(
-    tmp_path: Path, clocked: MakeClocked, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_output_that_is_not_finite_is_a_failure(tmp_path, clocked, monkeypatch):
     fmu = native_fmus.build(tmp_path, "Native", "2.0")
     it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
@@ -374,7 +347,7 @@ def test_an_output_that_is_not_finite_is_a_failure(
         it.proxy.step(0.0, STEP, starts(fmu))
 
 
-def test_what_is_dropped_is_said_once(fmus: Path, clocked: MakeClocked) -> None:
+def test_what_is_dropped_is_said_once(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service(key=b"a key of 16 byte"))
     for _ in range(3):
@@ -382,9 +355,7 @@ def test_what_is_dropped_is_said_once(fmus: Path, clocked: MakeClocked) -> None:
     assert it.said == ["a datagram from somebody without the right key was dropped"]
 
 
-def test_a_server_that_is_closed_says_where_its_session_ended(
-    fmus: Path, clocked: MakeClocked
-) -> None:
+def test_a_server_that_is_closed_says_where_its_session_ended(fmus, clocked):
     fmu = fmus / "ProximitySensor.fmu"
     it = clocked(fmu, Service(lockstep=True))
     it.proxy.begin(1, starts(fmu))
@@ -393,7 +364,7 @@ def test_a_server_that_is_closed_says_where_its_session_ended(
     assert it.said[-1] == "the session is over at t = 0.001 s: the server is closed"
 
 
-def test_wrong_failsafe_values_are_refused(fmus: Path) -> None:
+def test_wrong_failsafe_values_are_refused(fmus):
     plant = read_interface(fmus / "GripperPlant.fmu")
     with pytest.raises(
         InputError, match=r"failsafe force: no such input .* did you mean force\[1\]"
@@ -403,6 +374,6 @@ def test_wrong_failsafe_values_are_refused(fmus: Path) -> None:
         ServedFmu(plant, Service(failsafe={"force[1]": "x"}))
 
 
-def test_a_key_that_is_too_short_is_refused(fmus: Path) -> None:
+def test_a_key_that_is_too_short_is_refused(fmus):
     with pytest.raises(InputError, match="key of 3 bytes: must have 16 or more"):
         ServedFmu(read_interface(fmus / "GripperPlant.fmu"), Service(key=b"abc"))

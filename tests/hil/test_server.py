@@ -9,9 +9,7 @@ import socket
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 from grasp_cosim import cli
@@ -28,13 +26,13 @@ KEY = b"a key of 16 byte"
 
 
 @contextmanager
-def proxied(fmu: Path, server: Server, key: bytes | None = None) -> Iterator[HandProxy]:
+def proxied(fmu, server, key=None):
     signature, _ = link_signature(read_interface(fmu))
     with UdpAsk(server.address) as ask:
         yield HandProxy(signature, ask, key)
 
 
-def requests(fmu: Path) -> list[float | int | bool | str]:
+def requests(fmu):
     interface = read_interface(fmu)
     signature, _ = link_signature(interface)
     return [
@@ -43,7 +41,7 @@ def requests(fmu: Path) -> list[float | int | bool | str]:
     ]
 
 
-def test_a_session_over_udp(fmus: Path) -> None:
+def test_a_session_over_udp(fmus):
     fmu = fmus / "GripperPlant.fmu"
     values = requests(fmu)
     with (
@@ -59,7 +57,7 @@ def test_a_session_over_udp(fmus: Path) -> None:
     assert server.fmu.counters()["steps"] == 50
 
 
-def test_by_its_own_clock_it_goes_on_without_requests(fmus: Path) -> None:
+def test_by_its_own_clock_it_goes_on_without_requests(fmus):
     fmu = fmus / "GripperPlant.fmu"
     values = requests(fmu)
     with serving(fmu, Service()) as server, proxied(fmu, server) as proxy:
@@ -70,14 +68,14 @@ def test_by_its_own_clock_it_goes_on_without_requests(fmus: Path) -> None:
         assert proxy.outputs_time >= 0.02
 
 
-def test_the_port_is_one_that_is_free(fmus: Path) -> None:
+def test_the_port_is_one_that_is_free(fmus):
     interface = read_interface(fmus / "ProximitySensor.fmu")
     refused = pytest.raises(InputError, match="cannot listen there: Address already in use")
     with Server(ServedFmu(interface)) as server, refused:
         Server(ServedFmu(interface), server.address)
 
 
-def garbage(seed: int, legal: bytes) -> Iterator[bytes]:
+def garbage(seed, legal):
     """Datagrams that are none: noise of every size, and legal ones with bytes changed."""
     chance = random.Random(seed)
     while True:
@@ -93,7 +91,7 @@ def garbage(seed: int, legal: bytes) -> Iterator[bytes]:
 @pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("key", [None, KEY])
-def test_many_malformed_datagrams(fmus: Path, key: bytes | None) -> None:
+def test_many_malformed_datagrams(fmus, key):
     """Half a million in all: no crash, no growth, every legal request served."""
     steps, each = campaign.part(5000), 100
     fmu = fmus / "GripperPlant.fmu"
@@ -126,7 +124,7 @@ def test_many_malformed_datagrams(fmus: Path, key: bytes | None) -> None:
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
+def test_the_command_serves_until_it_is_interrupted(fmus):
     command = [sys.executable, "-m", "grasp_cosim", "serve", str(fmus / "ProximitySensor.fmu")]
     process = subprocess.Popen(
         [*command, "--port", "0", "--lockstep", "--json"],
@@ -164,13 +162,7 @@ def test_the_command_serves_until_it_is_interrupted(fmus: Path) -> None:
         (["--host", ""], ":5501: no such host; must be an IPv4 address or a name that has one"),
     ],
 )
-def test_wrong_input_is_one_line(
-    fmus: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
-    message: str,
-) -> None:
+def test_wrong_input_is_one_line(fmus, tmp_path, capsys, arguments, message):
     (tmp_path / "short").write_text("short", encoding="utf-8")
     given = [a.format(short=tmp_path / "short") for a in arguments]
     assert cli.main(["serve", str(fmus / "ProximitySensor.fmu"), *given]) == 2
@@ -180,9 +172,7 @@ def test_wrong_input_is_one_line(
     assert message in captured.err
 
 
-def test_an_fmu_that_does_not_load_is_not_offered(
-    fmus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_fmu_that_does_not_load_is_not_offered(fmus, tmp_path, capsys):
     empty = tmp_path / "empty.fmu"
     with zipfile.ZipFile(fmus / "GripperPlant.fmu") as good, zipfile.ZipFile(empty, "w") as file:
         file.writestr("modelDescription.xml", good.read("modelDescription.xml"))
@@ -194,15 +184,13 @@ def test_an_fmu_that_does_not_load_is_not_offered(
 
 
 @pytest.fixture
-def ended(monkeypatch: pytest.MonkeyPatch) -> None:
+def ended(monkeypatch):
     """A server is interrupted as soon as it serves."""
     monkeypatch.setattr(Server, "serve", lambda *_: signal.raise_signal(signal.SIGINT))
 
 
 @pytest.mark.usefixtures("ended")
-def test_an_interrupted_service_says_what_is_left(
-    fmus: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_interrupted_service_says_what_is_left(fmus, capsys):
     fmu = str(fmus / "ProximitySensor.fmu")
     assert cli.main(["serve", fmu, "--port", "0"]) == 0
     assert capsys.readouterr().out == "nothing came\n"
@@ -221,14 +209,7 @@ def test_an_interrupted_service_says_what_is_left(
         ("0.0.0.0", True, ""),
     ],
 )
-def test_it_says_who_may_take_part(
-    fmus: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    host: str,
-    key: bool,
-    who: str,
-) -> None:
+def test_it_says_who_may_take_part(fmus, tmp_path, capsys, host, key, who):
     (tmp_path / "key").write_bytes(KEY)
     given = ["--host", host, *(["--key-file", str(tmp_path / "key")] if key else [])]
     command = ["serve", str(fmus / "ProximitySensor.fmu"), "--port", "0"]

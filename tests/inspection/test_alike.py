@@ -1,11 +1,10 @@
 """Which variables of a foreign plant are meant by those of ours."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from grasp_cosim.inspection.alike import Match, candidates, matches
+from grasp_cosim.inspection.alike import candidates, matches
 from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.interface.read import read_interface
 from hypothesis import given
@@ -13,29 +12,29 @@ from hypothesis import strategies as st
 
 
 @pytest.fixture(scope="module")
-def plant(fmus: Path) -> Interface:
+def plant(fmus):
     return read_interface(fmus / "GripperPlant.fmu")
 
 
-def output(name: str, unit: str | None = None, kind: str = "Real", text: str = "") -> Variable:
+def output(name, unit=None, kind="Real", text=""):
     return Variable(
         name, kind, "output", 0, unit, None, None, None, description=text  # type: ignore[arg-type]
     )  # fmt: skip
 
 
-def settable(name: str, causality: str, unit: str | None = None) -> Variable:
+def settable(name, causality, unit=None):
     return Variable(name, "Real", causality, 0, unit, "0", None, None)
 
 
-def foreign(*variables: Variable) -> Interface:
+def foreign(*variables: Variable):
     return Interface(Path("vendor.fmu"), "", "vendor", variables)
 
 
-def found(plant: Interface, *variables: Variable) -> dict[str, Match]:
+def found(plant, *variables):
     return matches(plant, plant.by_name, foreign(*variables))
 
 
-def names(plant: Interface, *variables: Variable, certain: bool | None = None) -> dict[str, str]:
+def names(plant, *variables, certain=None):
     return {
         name: match.variable.name
         for name, match in found(plant, *variables).items()
@@ -58,11 +57,9 @@ SURE = [
 
 @pytest.mark.parametrize("pair", SURE)
 @pytest.mark.parametrize("turned", [False, True])
-def test_names_of_the_gaps_that_need_no_check(
-    plant: Interface, pair: tuple[str, str], turned: bool
-) -> None:
+def test_names_of_the_gaps_that_need_no_check(plant, pair, turned):
     """In any order of declaration, beside positions in the same unit."""
-    gaps: Sequence[Variable] = [output(name, "mm") for name in pair]
+    gaps = [output(name, "mm") for name in pair]
     others = [output(f"fingertip_x_{side}", "mm") for side in ("right", "left")]
     chosen = names(plant, *(gaps[::-1] if turned else gaps), *others, certain=True)
     assert chosen == {
@@ -84,12 +81,12 @@ def test_names_of_the_gaps_that_need_no_check(
         (("surfaceDistance1", "surfaceDistance2"), "by its description"),
     ],
 )
-def test_names_that_are_to_be_checked(plant: Interface, pair: tuple[str, str], doubt: str) -> None:
+def test_names_that_are_to_be_checked(plant, pair, doubt):
     chosen = found(plant, *(output(name, "mm") for name in pair))
     assert [(m.variable.name, m.doubt) for m in chosen.values()] == [(n, doubt) for n in pair]
 
 
-def test_a_description_is_to_be_checked(plant: Interface) -> None:
+def test_a_description_is_to_be_checked(plant):
     texts = ("gap right", "gap left", "position of the object", "something")
     chosen = found(plant, *(output(f"y{i}", text=text) for i, text in enumerate(texts)))
     assert {n: m.variable.name for n, m in chosen.items()} == {
@@ -98,7 +95,7 @@ def test_a_description_is_to_be_checked(plant: Interface) -> None:
     assert {m.doubt for m in chosen.values()} == {"by its description"}
 
 
-def test_the_only_ones_of_a_unit_are_to_be_checked(plant: Interface) -> None:
+def test_the_only_ones_of_a_unit_are_to_be_checked(plant):
     chosen = found(plant, output("alpha", "mm/s"), output("beta", "mm/s"), output("n1", "mm/s"))
     assert chosen == {}
     pair = [output(f"rate{j}", "mm/s") for j in (1, 2)]
@@ -107,7 +104,7 @@ def test_the_only_ones_of_a_unit_are_to_be_checked(plant: Interface) -> None:
     assert {m.doubt for m in speed.values()} == {"the only one of its unit and type"}
 
 
-def test_unit_type_and_causality_decide(plant: Interface) -> None:
+def test_unit_type_and_causality_decide(plant):
     """One name, two quantities; and none for what is of another quantity or direction."""
     assert names(plant, output("gap1", "N"), output("gap2", "N")) == {}
     assert names(plant, output("gap1", "m", "Boolean"), output("gap2", "m", "Boolean")) == {}
@@ -122,7 +119,7 @@ def test_unit_type_and_causality_decide(plant: Interface) -> None:
     }  # fmt: skip
 
 
-def test_of_two_that_are_as_much_alike_none_is_taken(plant: Interface) -> None:
+def test_of_two_that_are_as_much_alike_none_is_taken(plant):
     two = [output(f"{word}{j}", "m") for word in ("clearance", "distance") for j in (1, 2)]
     assert names(plant, *two) == {}
     assert [v.name for v in candidates(plant, "gap[1]", foreign(*two), ["distance1"])] == [
@@ -132,14 +129,14 @@ def test_of_two_that_are_as_much_alike_none_is_taken(plant: Interface) -> None:
     assert names(plant, *two, *exact)["gap[1]"] == "gap1"
 
 
-def test_an_integer_may_be_a_flag_that_is_recorded(plant: Interface) -> None:
+def test_an_integer_may_be_a_flag_that_is_recorded(plant):
     flags = output("Kontakt", kind="Integer"), output("Zustand", kind="Boolean")
     theirs = foreign(*flags, output("l"))
     assert candidates(plant, "contact[1]", theirs, []) == [*flags]
     assert [v.name for v in candidates(plant, "gap[1]", theirs, [])] == ["l"]
 
 
-def test_parameters(plant: Interface) -> None:
+def test_parameters(plant):
     width, start = settable("partWidth", "parameter", "mm"), settable("W", "parameter", "m")
     assert names(plant, width, certain=True) == {"object_width": "partWidth"}
     assert names(plant, start) == {"object_width": "W"}
@@ -162,9 +159,7 @@ STYLES = {
     st.fixed_dictionaries({word: st.sampled_from(sorted(STYLES)) for word in WORDS}),
     st.booleans(),
 )
-def test_any_style_in_any_order_with_and_without_units(
-    plant: Interface, order: list[tuple[str, int]], styles: dict[str, str], units: bool
-) -> None:
+def test_any_style_in_any_order_with_and_without_units(plant, order, styles, units):
     ours = {f"{word}[{j}]": plant.by_name[f"{word}[{j}]"] for word, j in order}
     theirs = {
         name: replace(v, name=STYLES[styles[word]](word, j), unit=v.unit if units else None)
@@ -174,11 +169,11 @@ def test_any_style_in_any_order_with_and_without_units(
     assert chosen == {name: v.name for name, v in theirs.items()}
 
 
-def test_no_force_is_proposed_for_a_position(plant: Interface) -> None:
+def test_no_force_is_proposed_for_a_position(plant):
     theirs = foreign(*(output(name) for name in ("F_1", "F_2", "contactForce", "way", "x_1")))
     assert [v.name for v in candidates(plant, "position[1]", theirs, [])] == ["way", "x_1"]
     assert not {"position[1]", "position[2]"} & matches(plant, plant.by_name, theirs).keys()
 
 
-def test_three_fingers_are_not_those_of_two(plant: Interface) -> None:
+def test_three_fingers_are_not_those_of_two(plant):
     assert names(plant, *(output(f"position{j}", "m") for j in (1, 2, 3))) == {}

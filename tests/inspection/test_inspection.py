@@ -111,10 +111,10 @@ FMI_3 = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 @pytest.fixture
-def archive(tmp_path: Path) -> Archive:
+def archive(tmp_path):
     """Writes an FMU of a modelDescription.xml and further, empty files."""
 
-    def write(xml: str, *files: str) -> Path:
+    def write(xml, *files):
         path = tmp_path / "some.fmu"
         encoding = "latin-1" if "ISO-8859-1" in xml else "utf-8"
         with zipfile.ZipFile(path, "w") as file:
@@ -127,16 +127,16 @@ def archive(tmp_path: Path) -> Archive:
 
 
 @pytest.fixture
-def valve(archive: Archive) -> Report:
+def valve(archive):
     """The report on the FMI 2.0 FMU."""
     return inspect_fmu(archive(FMI_2))
 
 
-def column(report: Report, key: str) -> dict[str, Any]:
+def column(report, key):
     return {v["name"]: v[key] for v in report["variables"]}
 
 
-def table(text: str) -> dict[str, dict[str, str]]:
+def table(text):
     """The table in the text, cut at where its column titles stand: row, column, cell."""
     titles, *rows = text.split("\n\n")[1].splitlines()
     edges = [titles.index(name) for name in COLUMNS]
@@ -149,12 +149,12 @@ def table(text: str) -> dict[str, dict[str, str]]:
     return found
 
 
-def head(text: str) -> dict[str, str]:
+def head(text):
     lines = text.split("\n\n")[0].splitlines()
     return {line[:20].strip(): line[20:] for line in lines}
 
 
-def test_our_controller(fmus: Path) -> None:
+def test_our_controller(fmus):
     path = fmus / "GraspController.fmu"
     report = inspect_fmu(path)
     assert report["fmu"] == str(path)
@@ -186,7 +186,7 @@ def test_our_controller(fmus: Path) -> None:
         "GraspControllerAdaptive",
     ],
 )
-def test_our_fmus_are_shown_as_fmpy_reads_them(fmus: Path, name: str) -> None:
+def test_our_fmus_are_shown_as_fmpy_reads_them(fmus, name):
     report = inspect_fmu(fmus / f"{name}.fmu")
     model = fmpy.read_model_description(fmus / f"{name}.fmu")
     assert report["guid"] == model.guid
@@ -201,13 +201,13 @@ def test_our_fmus_are_shown_as_fmpy_reads_them(fmus: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("xml", [FMI_1, FMI_2, FMI_3])
-def test_json_and_text_hold_the_same_variables(archive: Archive, xml: str) -> None:
+def test_json_and_text_hold_the_same_variables(archive, xml):
     report = inspect_fmu(archive(xml))
     assert json.loads(json.dumps(report, allow_nan=False)) == report
     assert list(table(as_text(report))) == [v["name"] for v in report["variables"]]
 
 
-def test_the_keys_of_the_report(valve: Report) -> None:
+def test_the_keys_of_the_report(valve):
     assert list(valve) == [
         "fmu", "model_name", "fmi_version", "kinds", "generation_tool", "guid",
         "default_experiment", "platforms", "this_machine", "sources", "python", "capabilities",
@@ -219,7 +219,7 @@ def test_the_keys_of_the_report(valve: Report) -> None:
     }  # fmt: skip
 
 
-def test_values_have_their_types(valve: Report) -> None:
+def test_values_have_their_types(valve):
     assert column(valve, "start") == {
         "p_in": 101325.0, "p_out": "-inf", "flow": None, "state": None, "noise": None,
         "lost": None, "mode": 2, "table": "a.csv", "stages": 3, "fast": True, "slow": False,
@@ -229,7 +229,7 @@ def test_values_have_their_types(valve: Report) -> None:
     assert isinstance(column(valve, "start")["mode"], int)
 
 
-def test_the_declared_type_fills_in(valve: Report) -> None:
+def test_the_declared_type_fills_in(valve):
     p_in, p_out, *_ = valve["variables"]
     keys = ("unit", "display_unit", "min", "max", "nominal")
     assert [p_in[key] for key in keys] == ["Pa", "bar", 0.0, 1e7, 1e5]
@@ -239,7 +239,7 @@ def test_the_declared_type_fills_in(valve: Report) -> None:
     assert (mode["items"], p_in["items"]) == ({"open": 1, "shut": 2}, None)
 
 
-def test_dependencies_not_declared_are_not_none_at_all(valve: Report) -> None:
+def test_dependencies_not_declared_are_not_none_at_all(valve):
     assert column(valve, "dependencies") == {
         "flow": ["p_in", "p_out"], "state": [], "noise": None, "lost": None, "p_in": None,
         "p_out": None, "mode": None, "table": None, "stages": None, "fast": None, "slow": None,
@@ -251,7 +251,7 @@ def test_dependencies_not_declared_are_not_none_at_all(valve: Report) -> None:
     ]  # fmt: skip
 
 
-def test_every_column(valve: Report) -> None:
+def test_every_column(valve):
     rows = table(as_text(valve))
     assert rows["p_in"] == {
         "name": "p_in", "causality": "input", "variability": "continuous", "type": "Real",
@@ -270,7 +270,7 @@ def test_every_column(valve: Report) -> None:
     assert starts == ["true", "false", "a.csv", "nan", ""]
 
 
-def test_every_line_of_the_head(archive: Archive) -> None:
+def test_every_line_of_the_head(archive):
     path = archive(
         FMI_2, "binaries/win64/valve.dll", "binaries/linux64/valve.so", "binaries/win32/lib/x.dll",
         "binaries\\aarch64-darwin\\valve.dylib", "binaries/linux32/readme.txt", "sources/all.c",
@@ -291,7 +291,7 @@ def test_every_line_of_the_head(archive: Archive) -> None:
     }
 
 
-def test_what_is_absent_is_said(archive: Archive) -> None:
+def test_what_is_absent_is_said(archive):
     report = inspect_fmu(archive(FMI_3.replace("true", "false").replace("0.5", "")))
     assert (
         head(as_text(report)).items()
@@ -313,7 +313,7 @@ def test_what_is_absent_is_said(archive: Archive) -> None:
     assert report["python"] is False
 
 
-def test_fmi_1(archive: Archive) -> None:
+def test_fmi_1(archive):
     report = inspect_fmu(archive(FMI_1))
     assert (report["fmi_version"], report["kinds"]) == ("1.0", ["co-simulation"])
     assert report["capabilities"].items() >= {
@@ -331,13 +331,13 @@ def test_fmi_1(archive: Archive) -> None:
     assert rows["ratio"]["causality"] == "parameter"
 
 
-def test_fmi_1_model_exchange(archive: Archive) -> None:
+def test_fmi_1_model_exchange(archive):
     xml = FMI_1[: FMI_1.index("<Implementation>")] + "</fmiModelDescription>"
     report = inspect_fmu(archive(xml))
     assert (report["kinds"], report["capabilities"]) == (["model exchange"], {})
 
 
-def test_fmi_3(archive: Archive) -> None:
+def test_fmi_3(archive):
     report = inspect_fmu(archive(FMI_3))
     assert report["kinds"] == ["co-simulation", "scheduled execution"]
     assert report["guid"] == "{3}"
@@ -362,7 +362,7 @@ def test_fmi_3(archive: Archive) -> None:
     assert rows["cloud"]["description"] == "the same"
 
 
-def test_long_arrays_do_not_widen_the_table(archive: Archive) -> None:
+def test_long_arrays_do_not_widen_the_table(archive):
     xml = FMI_3.replace('"1 2 3 4 5 6"', f'"{"1 " * 999}"')
     report = inspect_fmu(archive(xml))
     assert len(column(report, "start")["points"]) == 999
@@ -370,7 +370,7 @@ def test_long_arrays_do_not_widen_the_table(archive: Archive) -> None:
     assert start == "1, 1, 1, 1, 1, 1, 1, 1, ... (991 more)"
 
 
-def test_no_capability_of_the_standard_is_left_out() -> None:
+def test_no_capability_of_the_standard_is_left_out():
     """Against the schemas of FMI, which come with FMPy."""
     schemas = Path(fmpy.__file__).parent / "schema"
     for version, name in (
@@ -393,14 +393,14 @@ def test_no_capability_of_the_standard_is_left_out() -> None:
         assert flags == {a for a in attributes if a.startswith(prefixes)}
 
 
-def test_columns_are_aligned_two_spaces_apart(valve: Report) -> None:
+def test_columns_are_aligned_two_spaces_apart(valve):
     lines = as_text(valve).split("\n\n")[1].splitlines()
     assert lines[0].startswith("name    causality  variability  type         unit  start")
     assert lines[1].startswith("p_in    input      continuous   Real         Pa    101325")
     assert all(line == line.rstrip() for line in lines)
 
 
-def test_the_description_is_cut_to_the_terminal(valve: Report) -> None:
+def test_the_description_is_cut_to_the_terminal(valve):
     valve["variables"][0]["description"] = "d" * 200
     valve["variables"][7]["start"] = "path/" * 20
     uncut = table(as_text(valve))
@@ -414,7 +414,7 @@ def test_the_description_is_cut_to_the_terminal(valve: Report) -> None:
     assert rows["p_in"] | {"description": ""} == uncut["p_in"] | {"description": ""}
 
 
-def test_a_narrow_terminal_costs_no_other_column(valve: Report) -> None:
+def test_a_narrow_terminal_costs_no_other_column(valve):
     valve["variables"][0]["description"] = "d" * 200
     rows = table(as_text(valve, 40))
     assert rows["p_in"]["description"] == "d" * 10 + "…"
@@ -422,7 +422,7 @@ def test_a_narrow_terminal_costs_no_other_column(valve: Report) -> None:
     assert set(rows["flow"]) == set(COLUMNS)
 
 
-def test_no_variables(archive: Archive) -> None:
+def test_no_variables(archive):
     cut = FMI_3[: FMI_3.index("<UInt64")] + "</ModelVariables></fmiModelDescription>"
     assert table(as_text(inspect_fmu(archive(cut)))) == {}
 
@@ -443,7 +443,7 @@ SLOPPY = {
 
 
 @pytest.mark.parametrize("mistake", SLOPPY)
-def test_a_sloppy_fmu_is_shown_all_the_same(archive: Archive, valve: Report, mistake: str) -> None:
+def test_a_sloppy_fmu_is_shown_all_the_same(archive, valve, mistake):
     """FMPy refuses each of these even where it need not validate."""
     assert FMI_2.count(SLOPPY[mistake][0]) == 1
     path = archive(FMI_2.replace(*SLOPPY[mistake]))
@@ -460,7 +460,7 @@ def test_a_sloppy_fmu_is_shown_all_the_same(archive: Archive, valve: Report, mis
     assert report == valve
 
 
-def test_fmi_3_types_that_fmpy_does_not_know(archive: Archive) -> None:
+def test_fmi_3_types_that_fmpy_does_not_know(archive):
     types = (
         '<TypeDefinitions><ClockType name="T" intervalVariability="triggered"/>'
         '<BinaryType name="B" maxSize="9"/><Float32Type name="G" unit="dB" min="-9"/>'
@@ -475,7 +475,7 @@ def test_fmi_3_types_that_fmpy_does_not_know(archive: Archive) -> None:
 
 
 @pytest.mark.parametrize("text", ["1" * 400, "1" * 5000, "", "one"])
-def test_a_start_that_is_no_number_is_shown_as_it_is(archive: Archive, text: str) -> None:
+def test_a_start_that_is_no_number_is_shown_as_it_is(archive, text):
     report = inspect_fmu(archive(FMI_2.replace('min="1" start="3"', f'min="1" start="{text}"')))
     assert column(report, "start")["stages"] == text
 
@@ -497,13 +497,13 @@ def test_a_start_that_is_no_number_is_shown_as_it_is(archive: Archive, text: str
         ),
     ],
 )
-def test_a_garbled_description_is_one_line(archive: Archive, xml: str, message: str) -> None:
+def test_a_garbled_description_is_one_line(archive, xml, message):
     with pytest.raises(InputError, match=message) as caught:
         inspect_fmu(archive(xml))
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_a_file_that_is_no_fmu_is_one_line(tmp_path: Path) -> None:
+def test_a_file_that_is_no_fmu_is_one_line(tmp_path):
     text, empty = tmp_path / "text.fmu", tmp_path / "empty.fmu"
     text.write_text("hello")
     with zipfile.ZipFile(empty, "w") as file:

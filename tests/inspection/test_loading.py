@@ -14,11 +14,10 @@ from shlex import quote
 
 import fmpy
 import pytest
-from conftest import UnpackIn
 from fmpy.fmi2 import FMU2Slave
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection import loading
-from grasp_cosim.inspection.loading import Finding, Unpacked, Verdict, unpack
+from grasp_cosim.inspection.loading import Finding, Unpacked, unpack
 from support import native_fmus
 from support.models import build_model
 from support.slow import slow
@@ -60,7 +59,7 @@ gcc = pytest.mark.skipif(not shutil.which("gcc"), reason="needs gcc")
 
 
 @pytest.fixture(scope="module")
-def stock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def stock(tmp_path_factory):
     """An FMU as pythonfmu makes it; in a process of its own, as pythonfmu imports the script."""
     folder = tmp_path_factory.mktemp("stock")
     (folder / "Stock.py").write_text(SCRIPT)
@@ -69,7 +68,7 @@ def stock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "Stock.fmu"
 
 
-def altered(fmu: Path, target: Path, changes: Changes) -> Path:
+def altered(fmu, target, changes):
     """A copy of an FMU in which the given files are replaced, added, or left out (None)."""
     with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(target, "w") as copy:
         files = {name: source.read(name) for name in source.namelist()}
@@ -80,10 +79,10 @@ def altered(fmu: Path, target: Path, changes: Changes) -> Path:
 
 
 @pytest.fixture
-def opened(stock: Path, tmp_path: Path) -> Opened:
+def opened(stock, tmp_path):
     """The stock FMU with changes, unpacked for a single check."""
 
-    def open_(changes: Changes | None = None) -> Unpacked:
+    def open_(changes=None):
         folder = Path(tempfile.mkdtemp(dir=tmp_path))
         fmu = unpack(altered(stock, tmp_path / "altered.fmu", changes or {}), folder)
         return dataclasses.replace(fmu, linked=loading._linked(fmu.binary))
@@ -91,17 +90,17 @@ def opened(stock: Path, tmp_path: Path) -> Opened:
     return open_
 
 
-def linked(fmu: Path, folder: Path) -> Unpacked:
+def linked(fmu, folder):
     found = unpack(fmu, folder)
     return dataclasses.replace(found, linked=loading._linked(found.binary))
 
 
-def status(verdict: Verdict | None) -> str:
+def status(verdict):
     assert verdict is not None
     return verdict[0]
 
 
-def patched(fmu: Path, offset: int, value: int) -> bytes:
+def patched(fmu, offset, value):
     """The binary of an FMU with one byte of its ELF header replaced."""
     with zipfile.ZipFile(fmu) as archive:
         data = bytearray(archive.read(LINUX64))
@@ -109,18 +108,18 @@ def patched(fmu: Path, offset: int, value: int) -> bytes:
     return bytes(data)
 
 
-def examine(fmu: Path) -> list[Finding]:
+def examine(fmu):
     return loading.examine(fmu, load=True)
 
 
-def test_of_the_file_alone_nothing_is_run(fmus: Path, monkeypatch) -> None:
+def test_of_the_file_alone_nothing_is_run(fmus, monkeypatch):
     monkeypatch.setattr(loading, "_run", None)
     findings = loading.examine(fmus / "GripperPlant.fmu")
     assert [f.check for f in findings] == ["fmu", "binary", "script", "modules"]
     assert {f.status for f in findings} == {"ok"}
 
 
-def test_our_fmu_loads_here(fmus: Path) -> None:
+def test_our_fmu_loads_here(fmus):
     findings = examine(fmus / "GripperPlant.fmu")
     found = {f.check: f.status for f in findings}
     assert list(found) == MACHINE_CHECKS + FMU_CHECKS
@@ -132,7 +131,7 @@ def test_our_fmu_loads_here(fmus: Path) -> None:
     assert "grasp-cosim build --native" in fix
 
 
-def test_a_stock_fmu_loads_here(stock: Path) -> None:
+def test_a_stock_fmu_loads_here(stock):
     found = {f.check: f for f in examine(stock)}
     assert {f.status for f in found.values() if f.check in FMU_CHECKS} == {"ok", "warning"}
     assert found["trial"].status == "ok"
@@ -140,7 +139,7 @@ def test_a_stock_fmu_loads_here(stock: Path) -> None:
     assert "grasp-cosim" not in (found["host"].fix or "")
 
 
-def test_text_is_one_line_each_with_the_fix_below() -> None:
+def test_text_is_one_line_each_with_the_fix_below():
     findings = [Finding("a", "ok", "fine", None), Finding("b c", "problem", "broken", "mend it")]
     assert loading.as_text(findings, tried=True).splitlines() == [
         "loads on this machine: no",
@@ -150,7 +149,7 @@ def test_text_is_one_line_each_with_the_fix_below() -> None:
     ]
 
 
-def test_json_has_four_keys() -> None:
+def test_json_has_four_keys():
     finding = Finding("a", "warning", "odd", "mend it")
     expected = {"check": "a", "status": "warning", "text": "odd", "fix": "mend it"}
     assert json.loads(json.dumps([dataclasses.asdict(finding)])) == [expected]
@@ -165,12 +164,12 @@ def test_json_has_four_keys() -> None:
         ((3, 11, 7), 2**31 - 1, "problem"),
     ],
 )
-def test_python_is_new_and_64_bit(version: tuple[int, ...], largest: int, expected: str) -> None:
+def test_python_is_new_and_64_bit(version, largest, expected):
     assert status(loading.interpreter(version, largest)) == expected
 
 
 @pytest.mark.parametrize("name", ["a#b", "a+b", "a%b", "é", "a,b", "a:b", "(a)"])
-def test_a_temporary_folder_that_crashes_python_fmus(name: str) -> None:
+def test_a_temporary_folder_that_crashes_python_fmus(name):
     verdict, text, fix = loading.temporary_folder(Path("/tmp", name), False, True)
     assert (verdict, fix) == ("problem", "export TMPDIR=/tmp")
     assert f"/tmp/{name}" in text
@@ -178,16 +177,16 @@ def test_a_temporary_folder_that_crashes_python_fmus(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["a b", "a_b", "a-b.c~1"])
-def test_a_temporary_folder_that_does_not(name: str) -> None:
+def test_a_temporary_folder_that_does_not(name):
     assert status(loading.temporary_folder(Path("/tmp", name), False, True)) == "ok"
 
 
 @pytest.mark.parametrize("python", [False, True])
-def test_a_temporary_folder_from_which_nothing_loads(python: bool) -> None:
+def test_a_temporary_folder_from_which_nothing_loads(python):
     assert status(loading.temporary_folder(Path("/tmp"), True, python)) == "problem"
 
 
-def test_libpython_is_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_libpython_is_found(monkeypatch, tmp_path):
     listed = f"\t{loading.LIBPYTHON} (libc6,x86-64) => /lib/{loading.LIBPYTHON}\n\tlibz.so => /z\n"
     monkeypatch.setattr(sys, "base_prefix", str(tmp_path))
     monkeypatch.setattr(loading, "_run", lambda *_: (0, listed))
@@ -199,14 +198,14 @@ def test_libpython_is_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     assert loading.find_libpython() == str(tmp_path / "lib" / loading.LIBPYTHON)
 
 
-def test_no_libpython_is_a_warning_with_a_fix() -> None:
+def test_no_libpython_is_a_warning_with_a_fix():
     assert status(loading.libpython("/lib/libpython.so")) == "ok"
     verdict, _, fix = loading.libpython(None)
     assert verdict == "warning"
     assert f"libpython{loading.VERSION}" in (fix or "")
 
 
-def test_python3_on_the_path(tmp_path: Path) -> None:
+def test_python3_on_the_path(tmp_path):
     assert status(loading.python_on_path(sys.executable)) == "ok"
     other = tmp_path / "python3"
     other.write_text("#!/bin/sh\necho 3.1.4\n")
@@ -230,12 +229,12 @@ def test_python3_on_the_path(tmp_path: Path) -> None:
         ({"PYTHONPATH": "/usr/lib/python3.1/site-packages"}, "unset PYTHONPATH"),
     ],
 )
-def test_the_environment_of_python(environ: dict[str, str], fix: str | None) -> None:
+def test_the_environment_of_python(environ, fix):
     verdict = loading.environment(environ)
     assert (verdict[0], verdict[2]) == ("warning" if fix else "ok", fix)
 
 
-def test_the_environment_of_another_python(tmp_path: Path) -> None:
+def test_the_environment_of_another_python(tmp_path):
     folder = tmp_path / "python3.1"
     folder.mkdir()
     assert status(loading.environment({"PYTHONPATH": str(folder)})) == "warning"
@@ -251,9 +250,7 @@ def test_the_environment_of_another_python(tmp_path: Path) -> None:
         ("text", "not a readable FMU: File is not a zip file"),
     ],
 )
-def test_no_fmu_is_wrong_input(
-    content: dict[str, str] | str | None, message: str, tmp_path: Path
-) -> None:
+def test_no_fmu_is_wrong_input(content, message, tmp_path):
     fmu = tmp_path / "x.fmu"
     if isinstance(content, str):
         fmu.write_text(content)
@@ -268,7 +265,7 @@ def test_no_fmu_is_wrong_input(
     assert len(str(error.value).splitlines()) == 1
 
 
-def test_a_folder_is_no_fmu(tmp_path: Path) -> None:
+def test_a_folder_is_no_fmu(tmp_path):
     with pytest.raises(InputError, match="is a folder; must be an FMU"):
         examine(tmp_path)
 
@@ -281,7 +278,7 @@ def test_a_folder_is_no_fmu(tmp_path: Path) -> None:
         ("1.0", ""),
     ],
 )
-def test_an_fmu_of_another_kind_is_not_loaded(version: str, kinds: str, tmp_path: Path) -> None:
+def test_an_fmu_of_another_kind_is_not_loaded(version, kinds, tmp_path):
     with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
         text = DESCRIPTION.format(version=version, kinds=kinds)
         if version == "3.0":
@@ -300,7 +297,7 @@ def test_an_fmu_of_another_kind_is_not_loaded(version: str, kinds: str, tmp_path
 @gcc
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_one_for_model_exchange_runs_here_by_a_solver(version: str, tmp_path: Path) -> None:
+def test_one_for_model_exchange_runs_here_by_a_solver(version, tmp_path):
     fmu = build_model("bouncing_ball", tmp_path, version, ("ModelExchange",))
     found = {f.check: f for f in examine(fmu)}
     checks = ("fmu", "binary", "libraries", "trial")
@@ -308,7 +305,7 @@ def test_one_for_model_exchange_runs_here_by_a_solver(version: str, tmp_path: Pa
     assert "run here by a solver, elsewhere ask the vendor" in found["fmu"].text
 
 
-def test_both_kinds_are_a_cosimulation(tmp_path: Path) -> None:
+def test_both_kinds_are_a_cosimulation(tmp_path):
     kinds = '<ModelExchange modelIdentifier="M"/><CoSimulation modelIdentifier="C"/>'
     with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
         text = DESCRIPTION.format(version="2.0", kinds=kinds)
@@ -318,7 +315,7 @@ def test_both_kinds_are_a_cosimulation(tmp_path: Path) -> None:
     assert fmu.binary.stem == "C"
 
 
-def test_a_description_that_fmpy_refuses(opened: Opened) -> None:
+def test_a_description_that_fmpy_refuses(opened):
     fmu = opened()
     file = fmu.folder / "modelDescription.xml"
     file.write_text(file.read_text().replace('causality="output"', 'causality="parameter"'))
@@ -330,7 +327,7 @@ def test_a_description_that_fmpy_refuses(opened: Opened) -> None:
     assert loaded[0] == "warning"  # this master reads it, and others may not
 
 
-def test_no_binary_for_this_system(stock: Path, tmp_path: Path) -> None:
+def test_no_binary_for_this_system(stock, tmp_path):
     fmu = altered(stock, tmp_path / "windows.fmu", {LINUX64: None})
     found = {f.check: f for f in examine(fmu)}
     assert found["binary"].status == "problem"
@@ -355,9 +352,7 @@ SOURCES = "<b><SourceFileSet><SourceFile name='N.c'/></SourceFileSet></b>"
         ({"N.c": "", "buildDescription.xml": "<b"}, "problem", "buildDescription.xml: unclosed"),
     ],
 )
-def test_sources_can_be_compiled(
-    files: dict[str, str], expected: str | None, text: str, opened: Opened
-) -> None:
+def test_sources_can_be_compiled(files, expected, text, opened):
     verdict = loading.sources(opened({f"sources/{n}": t.encode() for n, t in files.items()}))
     assert (verdict and verdict[0]) == expected
     assert text in (verdict[1] if verdict else "")
@@ -365,7 +360,7 @@ def test_sources_can_be_compiled(
 
 @gcc
 @pytest.mark.parametrize("version", [slow("2.0"), "3.0"])
-def test_a_native_fmu_of_either_version_is_tried(version: str, tmp_path: Path) -> None:
+def test_a_native_fmu_of_either_version_is_tried(version, tmp_path):
     found = {
         f.check: f for f in examine(native_fmus.build(tmp_path, version=version, complete=True))
     }
@@ -375,7 +370,7 @@ def test_a_native_fmu_of_either_version_is_tried(version: str, tmp_path: Path) -
     assert f"there is: {ours}; this machine: {ours}" in found["binary"].text
 
 
-def test_no_binary_but_sources(opened: Opened) -> None:
+def test_no_binary_but_sources(opened):
     fmu = opened({LINUX64: None, "sources/all.c": b""})
     assert "LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU" in (loading.binary(fmu)[2] or "")
 
@@ -389,9 +384,7 @@ def test_no_binary_but_sources(opened: Opened) -> None:
         (0, 0, "is no ELF file; must be"),
     ],
 )
-def test_a_binary_for_another_processor(
-    offset: int, value: int, text: str, stock: Path, opened: Opened
-) -> None:
+def test_a_binary_for_another_processor(offset, value, text, stock, opened):
     fmu = opened({LINUX64: patched(stock, offset, value)})
     verdict = loading.binary(fmu)
     assert verdict[0] == "problem"
@@ -412,14 +405,7 @@ BOUND = "\tlibpython{} => {}\n" + LOADER
         (f"{LOADER}undefined symbol: _Py_NoneStruct\t(x.so)\n", "warning", "LD_PRELOAD='{}/{}'"),
     ],
 )
-def test_libpython_in_other_hosts(
-    linked: str,
-    expected: str,
-    fix: str,
-    opened: Opened,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_libpython_in_other_hosts(linked, expected, fix, opened, tmp_path, monkeypatch):
     folder = tmp_path / "a b"
     folder.mkdir()
     (folder / "libpython0.so").touch()
@@ -433,7 +419,7 @@ def test_libpython_in_other_hosts(
 @pytest.mark.skipif(
     f"{loading.LIBPYTHON}\n" not in Path("/proc/self/maps").read_text(), reason="a static Python"
 )
-def test_libpython_that_only_this_process_finds(opened: Opened) -> None:
+def test_libpython_that_only_this_process_finds(opened):
     linked = f"\t{loading.LIBPYTHON} => not found\n{LOADER}"
     assert status(loading.host(dataclasses.replace(opened(), linked=linked))) == "warning"
 
@@ -447,13 +433,13 @@ def test_libpython_that_only_this_process_finds(opened: Opened) -> None:
         (LOADER + "undefined symbol: gsl_sin\t(x.so)\n", "undefined symbols: gsl_sin"),
     ],
 )  # fmt: skip
-def test_libraries_that_are_missing(linked: str, text: str, opened: Opened) -> None:
+def test_libraries_that_are_missing(linked, text, opened):
     verdict = loading.libraries(dataclasses.replace(opened(), linked=linked))
     assert verdict is not None
     assert verdict[:2] == ("problem", text)
 
 
-def test_libraries_besides_libpython_are_all_there(opened: Opened) -> None:
+def test_libraries_besides_libpython_are_all_there(opened):
     linked = BOUND.format("9.so", "not found") + "undefined symbol: PyLong_AsLong\t(x.so)\n"
     assert status(loading.libraries(dataclasses.replace(opened(), linked=linked))) == "ok"
     assert loading.libraries(dataclasses.replace(opened(), linked="ldd: not found")) is None
@@ -469,16 +455,14 @@ def test_libraries_besides_libpython_are_all_there(opened: Opened) -> None:
         ({"resources/Stock.py": b"import a.b", "resources/a/b.py": b"\n1x"}, "b.py, line 2"),
     ],
 )
-def test_a_script_that_is_not_there_or_no_python(
-    changes: Changes, text: str, opened: Opened
-) -> None:
+def test_a_script_that_is_not_there_or_no_python(changes, text, opened):
     verdict = loading.script(opened(changes))
     assert verdict is not None
     assert verdict[0] == "problem"
     assert text in verdict[1]
 
 
-def test_an_fmu_of_python_without_its_resources(stock: Path, opened: Opened) -> None:
+def test_an_fmu_of_python_without_its_resources(stock, opened):
     with zipfile.ZipFile(stock) as archive:
         resources = [name for name in archive.namelist() if name.startswith("resources/")]
     assert status(loading.script(opened(dict.fromkeys(resources)))) == "problem"
@@ -507,9 +491,7 @@ def test_an_fmu_of_python_without_its_resources(stock: Path, opened: Opened) -> 
         ({"Stock": "'\\d'"}, None),
     ],
 )
-def test_what_a_script_imports_is_packed_or_installed(
-    files: dict[str, str], missing: str | None, opened: Opened
-) -> None:
+def test_what_a_script_imports_is_packed_or_installed(files, missing, opened):
     changes = {f"resources/{name}.py": text.encode() for name, text in files.items()}
     verdict = loading.script(opened({**changes}))
     assert verdict is not None
@@ -522,29 +504,25 @@ def test_what_a_script_imports_is_packed_or_installed(
         assert verdict[2] == f"{quote(sys.executable)} -m pip install {names}"
 
 
-def test_the_package_of_a_module_may_be_called_otherwise(
-    opened: Opened, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_package_of_a_module_may_be_called_otherwise(opened, monkeypatch):
     monkeypatch.setattr(loading, "_spec", lambda name: None)
     verdict = loading.script(opened({"resources/Stock.py": b"import yaml"}))
     assert verdict is not None
     assert (verdict[2] or "").endswith(" pip install pyyaml")
 
 
-def test_an_extension_module_may_be_packed(opened: Opened) -> None:
+def test_an_extension_module_may_be_packed(opened):
     changes = {"resources/Stock.py": b"import fast", "resources/fast.abi3.so": b""}
     assert status(loading.script(opened({**changes}))) == "ok"
 
 
-def test_what_is_imported_is_named(opened: Opened) -> None:
+def test_what_is_imported_is_named(opened):
     verdict = loading.script(opened({"resources/Stock.py": b"import numpy, math"}))
     assert verdict is not None
     assert verdict[1] == "resources/Stock.py imports, besides the standard library: numpy"
 
 
-def test_a_module_whose_name_another_has(
-    opened: Opened, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_module_whose_name_another_has(opened, tmp_path, monkeypatch):
     assert status(loading.modules(opened())) == "ok"
     verdict = loading.modules(opened({"resources/statistics.py": b""}))
     assert verdict is not None
@@ -553,7 +531,7 @@ def test_a_module_whose_name_another_has(
     other = tmp_path / "elsewhere" / "twin.py"
     other.parent.mkdir()
     other.touch()
-    changes: list[Changes] = [{"resources/twin.py": b""}, {"resources/twin/__init__.py": b""}]
+    changes = [{"resources/twin.py": b""}, {"resources/twin/__init__.py": b""}]
     for change in changes:
         assert status(loading.modules(opened(change))) == "ok"
     monkeypatch.syspath_prepend(other.parent)
@@ -565,9 +543,7 @@ def test_a_module_whose_name_another_has(
 
 
 @pytest.mark.slow
-def test_a_temporary_folder_that_crashes_is_predicted_and_found(
-    stock: Path, unpack_in: UnpackIn
-) -> None:
+def test_a_temporary_folder_that_crashes_is_predicted_and_found(stock, unpack_in):
     folder = unpack_in("a#b")
     found = {f.check: f for f in examine(stock)}
     assert found["temp folder"].status == found["trial"].status == "problem"
@@ -585,14 +561,14 @@ def test_a_temporary_folder_that_crashes_is_predicted_and_found(
         ("import os\nos._exit(0)\n" + SCRIPT, "does not instantiate: no reason given"),
     ],
 )  # fmt: skip
-def test_a_trial_that_fails(script: str, text: str, opened: Opened) -> None:
+def test_a_trial_that_fails(script, text, opened):
     verdict = loading.trial(opened({"resources/Stock.py": script.encode()}))
     assert verdict[0] == "problem"
     assert text in verdict[1]
 
 
 @pytest.mark.slow
-def test_a_trial_that_does_not_end(opened: Opened) -> None:
+def test_a_trial_that_does_not_end(opened):
     script = b"import os, time\nopen('pid', 'w').write(str(os.getpid()))\ntime.sleep(60)\n"
     fmu = opened({"resources/Stock.py": script})
     assert loading.trial(fmu, timeout=2.0)[1] == "does not load and instantiate within 2 s"
@@ -600,7 +576,7 @@ def test_a_trial_that_does_not_end(opened: Opened) -> None:
     assert not pid.exists() or not Path("/proc", pid.read_text()).exists()
 
 
-def native(folder: Path, instantiate: str = "", options: tuple[str, ...] = ()) -> Path:
+def native(folder, instantiate="", options=()):
     """A native FMU, compiled here."""
     others = {f for f in dir(FMU2Slave) if f.startswith("fmi2")} - {"fmi2Instantiate"}
     code = [NATIVE.replace("INSTANTIATE", instantiate), *(f"void {f}(void) {{}}" for f in others)]
@@ -616,7 +592,7 @@ def native(folder: Path, instantiate: str = "", options: tuple[str, ...] = ()) -
 
 
 @gcc
-def test_a_native_fmu_loads_here(tmp_path: Path) -> None:
+def test_a_native_fmu_loads_here(tmp_path):
     found = {f.check: f for f in examine(native(tmp_path))}
     checks = ["python", "temp folder", "fmu", "binary", "libraries", "trial"]
     assert [name for name in found if name in checks] == checks
@@ -625,13 +601,13 @@ def test_a_native_fmu_loads_here(tmp_path: Path) -> None:
 
 
 @gcc
-def test_a_native_fmu_that_crashes(tmp_path: Path) -> None:
+def test_a_native_fmu_that_crashes(tmp_path):
     found = {f.check: f for f in examine(native(tmp_path, "*(volatile int *)0 = 1"))}
     assert found["trial"].text == "crashes with SIGSEGV when instantiated; it says nothing"
 
 
 @gcc
-def test_a_native_fmu_without_a_library(tmp_path: Path) -> None:
+def test_a_native_fmu_without_a_library(tmp_path):
     (tmp_path / "lost.c").write_text("int lost(void) { return 1; }")
     command = ["gcc", "-shared", "-fPIC", "-o", "liblost.so", "lost.c"]
     subprocess.run(command, cwd=tmp_path, check=True)
@@ -650,7 +626,7 @@ def test_a_native_fmu_without_a_library(tmp_path: Path) -> None:
 
 
 @gcc
-def test_a_native_fmu_with_an_undefined_symbol(tmp_path: Path) -> None:
+def test_a_native_fmu_with_an_undefined_symbol(tmp_path):
     fmu = native(tmp_path, "return lost() ? &model : 0")
     (tmp_path / "unpacked").mkdir()
     verdict = loading.libraries(linked(fmu, tmp_path / "unpacked"))

@@ -2,7 +2,6 @@
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ SHAPES = st.lists(st.integers(1, 4), min_size=1, max_size=4)
 
 
 @given(SHAPES)
-def test_names_and_values_go_row_by_row_as_numpy_does(shape: list[int]) -> None:
+def test_names_and_values_go_row_by_row_as_numpy_does(shape):
     array = np.arange(math.prod(shape)).reshape(shape)
     flat = flattened(array.tolist(), shape)
     assert flat == flattened(array, shape) == array.ravel().tolist()
@@ -32,13 +31,13 @@ def test_names_and_values_go_row_by_row_as_numpy_does(shape: list[int]) -> None:
 
 
 @given(SHAPES)
-def test_names_are_different_and_as_many_as_elements(shape: list[int]) -> None:
+def test_names_are_different_and_as_many_as_elements(shape):
     names = element_names("a b", shape)
     assert len(set(names)) == len(names) == size_of(shape)
 
 
 @given(SHAPES, st.floats(allow_nan=False))
-def test_a_text_is_read_as_it_is_written(shape: list[int], value: float) -> None:
+def test_a_text_is_read_as_it_is_written(shape, value):
     nested = np.full(shape, value).tolist()
     if math.isfinite(value):
         assert flattened(from_text(json.dumps(nested)), shape) == [value] * size_of(shape)
@@ -51,7 +50,7 @@ def test_a_text_is_read_as_it_is_written(shape: list[int], value: float) -> None
     ("value", "found"),
     [(1.5, [1.5] * 6), ([1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 6]), (((1, 2, 3), (4, 5, 6)), None)],
 )
-def test_one_value_a_flat_list_and_rows_are_taken(value: Any, found: list[Any] | None) -> None:
+def test_one_value_a_flat_list_and_rows_are_taken(value, found):
     assert flattened(value, (2, 3)) == (found or [1, 2, 3, 4, 5, 6])
 
 
@@ -65,12 +64,12 @@ def test_one_value_a_flat_list_and_rows_are_taken(value: Any, found: list[Any] |
         ([], r"is \[0\]"),
     ],
 )
-def test_another_shape_says_which(value: Any, message: str) -> None:
+def test_another_shape_says_which(value, message):
     with pytest.raises(ValueError, match=message):
         flattened(value, (2, 3))
 
 
-def test_sizes_are_counted_no_further_than_they_matter() -> None:
+def test_sizes_are_counted_no_further_than_they_matter():
     assert size_of((2, 3)) == 6
     assert size_of(()) == 1
     assert size_of((2**40, 0)) == 0
@@ -79,5 +78,5 @@ def test_sizes_are_counted_no_further_than_they_matter() -> None:
     assert flattened(1.0, (2, 0)) == flattened([], (0,)) == []
 
 
-def test_shapes_are_written_like_lists() -> None:
+def test_shapes_are_written_like_lists():
     assert [shape_text(s) for s in ((3,), (2, 3))] == ["[3]", "[2, 3]"]

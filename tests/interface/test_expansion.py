@@ -1,12 +1,9 @@
 """Arrays of numbers as variables for their elements: sizes, starts, names, units, dependencies."""
 
-from pathlib import Path
-
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.interface.arrays import MOST_ELEMENTS, Element
 from grasp_cosim.interface.expansion import expanded, values_of
-from grasp_cosim.interface.interface import Interface
 from grasp_cosim.interface.read import read_interface
 from support.state_space import TYPES, state_space
 
@@ -14,17 +11,17 @@ MATRIX = ("A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]")
 FIXED = '<Float64 name="{}" valueReference="300" causality="{}" {}>{}</Float64>'
 
 
-def of(*dimensions: int) -> str:
+def of(*dimensions: int):
     """A further array of fixed size."""
     sizes = "".join(f'<Dimension start="{n}"/>' for n in dimensions)
     return FIXED.format("F", "input", 'start="0"', sizes)
 
 
-def declared(folder: Path, more: str = "", types: bool = False) -> Interface:
+def declared(folder, more="", types=False):
     return read_interface(state_space(folder, types=types, more=more, binary=False))
 
 
-def test_elements_have_the_reference_and_the_place_in_the_array(tmp_path: Path) -> None:
+def test_elements_have_the_reference_and_the_place_in_the_array(tmp_path):
     found = expanded(declared(tmp_path), {"n": 2})
     assert found.arrays["A"].shape == (2, 2)
     assert found.arrays["A"].names == MATRIX
@@ -36,7 +33,7 @@ def test_elements_have_the_reference_and_the_place_in_the_array(tmp_path: Path) 
     assert "A" not in found.by_name
 
 
-def test_starts_go_to_elements_and_one_goes_to_all(tmp_path: Path) -> None:
+def test_starts_go_to_elements_and_one_goes_to_all(tmp_path):
     found = expanded(declared(tmp_path), {})
     assert [found.by_name[n].start for n in found.arrays["u"].names] == ["1", "2", "3"]
     assert [found.by_name[n].start for n in found.arrays["x0"].names] == ["0"] * 3
@@ -45,7 +42,7 @@ def test_starts_go_to_elements_and_one_goes_to_all(tmp_path: Path) -> None:
     assert [resized.by_name[n].start for n in resized.arrays["x0"].names] == ["0"] * 5
 
 
-def test_dependencies_on_an_array_are_on_its_elements(tmp_path: Path) -> None:
+def test_dependencies_on_an_array_are_on_its_elements(tmp_path):
     found = expanded(declared(tmp_path), {"m": 2, "n": 1, "r": 1})
     assert found.arrays["y"].names == ("y[1]",)
     expected = ("C[1,1]", "D[1,1]", "D[1,2]", "u[1]", "u[2]", "x")
@@ -53,7 +50,7 @@ def test_dependencies_on_an_array_are_on_its_elements(tmp_path: Path) -> None:
     assert found.by_name["y[1]"].initial_dependencies == (*expected[:3], "x0[1]", *expected[3:5])
 
 
-def test_all_types_of_numbers_are_taken_apart(tmp_path: Path) -> None:
+def test_all_types_of_numbers_are_taken_apart(tmp_path):
     found = expanded(declared(tmp_path, types=True), {"k": 1})
     for fmi_type in TYPES:
         names = found.arrays[f"u_{fmi_type}"].names
@@ -61,14 +58,14 @@ def test_all_types_of_numbers_are_taken_apart(tmp_path: Path) -> None:
         assert {found.by_name[n].type for n in names} == {fmi_type}
 
 
-def test_an_interface_without_arrays_is_itself(tmp_path: Path) -> None:
+def test_an_interface_without_arrays_is_itself(tmp_path):
     whole = declared(tmp_path)
     assert whole.sized_by == ("n", "m", "r")
     assert expanded(whole, {"n": 2}) is expanded(whole, {"n": 2})
     assert expanded(whole, {"n": 2}) is not expanded(whole, {"n": 3})
 
 
-def test_a_size_of_0_leaves_nothing(tmp_path: Path) -> None:
+def test_a_size_of_0_leaves_nothing(tmp_path):
     found = expanded(declared(tmp_path), {"m": 0})
     assert found.arrays["u"].names == found.arrays["B"].names == ()
     assert values_of(found, "here", "u", []) == values_of(found, "here", "u", 1.0) == {}
@@ -76,9 +73,7 @@ def test_a_size_of_0_leaves_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("dimensions", [(2**40,), (2**20, 2**20), (2**63, 3), (1, 10**5 + 1)])
-def test_too_many_elements_are_left_alone_by_name(
-    tmp_path: Path, dimensions: tuple[int, ...]
-) -> None:
+def test_too_many_elements_are_left_alone_by_name(tmp_path, dimensions):
     found = expanded(declared(tmp_path, of(*dimensions)), {})
     assert "F" not in found.arrays
     assert "u" in found.arrays
@@ -87,13 +82,13 @@ def test_too_many_elements_are_left_alone_by_name(
         values_of(found, "here", "F", 1.0)
 
 
-def test_many_dimensions(tmp_path: Path) -> None:
+def test_many_dimensions(tmp_path):
     found = expanded(declared(tmp_path, of(*[1] * 60, 2)), {})
     ones = ",".join(["1"] * 60)
     assert found.arrays["F"].names == (f"F[{ones},1]", f"F[{ones},2]")
 
 
-def test_a_variable_by_the_name_of_an_element_keeps_it(tmp_path: Path) -> None:
+def test_a_variable_by_the_name_of_an_element_keeps_it(tmp_path):
     scalar = '<Float64 name="F[2]" valueReference="301" causality="input" start="7"/>'
     found = expanded(declared(tmp_path, of(3) + scalar), {})
     assert "F" not in found.arrays
@@ -101,7 +96,7 @@ def test_a_variable_by_the_name_of_an_element_keeps_it(tmp_path: Path) -> None:
     assert found.by_name["F"].shape == (3,)
 
 
-def test_an_array_is_renamed_whole_and_by_elements(tmp_path: Path) -> None:
+def test_an_array_is_renamed_whole_and_by_elements(tmp_path):
     found = expanded(declared(tmp_path), {})
     whole = found.renamed({"force": "u"})
     assert whole.arrays["force"].names == ("force[1]", "force[2]", "force[3]")
@@ -118,13 +113,13 @@ def test_an_array_is_renamed_whole_and_by_elements(tmp_path: Path) -> None:
         found.renamed({"a": "u[4]"})
 
 
-def test_units_are_named_whole_and_by_elements(tmp_path: Path) -> None:
+def test_units_are_named_whole_and_by_elements(tmp_path):
     found = expanded(declared(tmp_path), {}).in_units({"u": "mm", "y[2]": "N"})
     assert [found.by_name[n].unit for n in found.arrays["u"].names] == ["mm"] * 3
     assert [found.by_name[n].unit for n in found.arrays["y"].names] == [None, "N", None]
 
 
-def test_values_of_an_array_are_checked_one_by_one(tmp_path: Path) -> None:
+def test_values_of_an_array_are_checked_one_by_one(tmp_path):
     found = expanded(declared(tmp_path, types=True), {"k": 1})
     name = "u_Enumeration"
     assert values_of(found, "here", name, [["fast"], [1]]) == {f"{name}[1,1]": 2, f"{name}[2,1]": 1}
@@ -144,7 +139,7 @@ def test_values_of_an_array_are_checked_one_by_one(tmp_path: Path) -> None:
         values_of(found, "here", "u_Int64", "9007199254740993.0", text=True)
 
 
-def test_a_start_that_is_no_number_is_a_flaw(tmp_path: Path) -> None:
+def test_a_start_that_is_no_number_is_a_flaw(tmp_path):
     wrong = FIXED.format("F", "input", 'start="1 two 3"', '<Dimension start="3"/>')
     with pytest.raises(InputError, match="variable 'F': start = 'two': must be a number"):
         declared(tmp_path, wrong)

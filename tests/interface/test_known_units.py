@@ -1,7 +1,6 @@
 """Units that an FMU defines, in place of those known by their names."""
 
 import zipfile
-from pathlib import Path
 
 import pytest
 from grasp_cosim.interface.read import read_interface
@@ -18,9 +17,7 @@ LAZY = """<fmiModelDescription fmiVersion="2.0" modelName="lazy" guid="1">
 @pytest.mark.parametrize(
     ("name", "defined"), [("mm", False), ("N", False), ("rad", True), ("%", True), ("cubit", True)]
 )
-def test_a_definition_without_a_dimension_is_none_of_a_unit_that_has_one(
-    tmp_path: Path, name: str, defined: bool
-) -> None:
+def test_a_definition_without_a_dimension_is_none_of_a_unit_that_has_one(tmp_path, name, defined):
     path = tmp_path / "lazy.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", LAZY.format(name=name))

@@ -1,6 +1,5 @@
 """The likely reason why an FMU does not load, by what is said of it."""
 
-from pathlib import Path
 from tempfile import gettempdir
 
 import pytest
@@ -21,13 +20,13 @@ from support.native_fmus import needs_gcc
         ("cannot allocate memory", False),
     ],
 )
-def test_a_licence_is_wanted_where_that_is_said(said: str, licence: bool, tmp_path: Path) -> None:
+def test_a_licence_is_wanted_where_that_is_said(said, licence, tmp_path):
     obstacle = of_loading(describe(build_model("stair", tmp_path)), said)
     assert (obstacle is not None and "licence" in obstacle.what) == licence
 
 
 @needs_gcc
-def test_a_folder_without_execution_is_named(tmp_path: Path) -> None:
+def test_a_folder_without_execution_is_named(tmp_path):
     """The words are those of glibc, where TMPDIR is mounted with noexec."""
     said = "binaries/linux64/stair.so: failed to map segment from shared object"
     obstacle = of_loading(describe(build_model("stair", tmp_path)), said)

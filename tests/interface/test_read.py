@@ -4,12 +4,10 @@ import math
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import fmpy
 import pytest
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.interface.interface import Interface, Value
 from grasp_cosim.interface.read import describe, read_interface
 from support.native_fmus import build, needs_gcc
 
@@ -50,10 +48,10 @@ Write = Callable[[str], Path]
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Write:
+def write(tmp_path):
     """Writes an FMU of a description."""
 
-    def fmu(description: str) -> Path:
+    def fmu(description):
         with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
             archive.writestr("modelDescription.xml", description)
         return tmp_path / "x.fmu"
@@ -61,11 +59,11 @@ def write(tmp_path: Path) -> Write:
     return fmu
 
 
-def number(text: str | None, absent: float) -> float:
+def number(text, absent):
     return absent if text is None else float(text)
 
 
-def value(fmi_type: str, text: str | None) -> Value | None:
+def value(fmi_type, text):
     if text is None or fmi_type in ("String", "Binary"):
         return text
     if fmi_type == "Boolean":
@@ -73,11 +71,11 @@ def value(fmi_type: str, text: str | None) -> Value | None:
     return float(text) if fmi_type.startswith(("Real", "Float")) else int(text)
 
 
-def names(variables: list[Any] | None) -> tuple[str, ...] | None:
+def names(variables):
     return None if variables is None else tuple(v.name for v in variables)
 
 
-def same_as_fmpy(path: Path) -> Interface:
+def same_as_fmpy(path):
     """Compare each typed field with what FMPy reads, validating; return what is read."""
     ours, theirs = read_interface(path), fmpy.read_model_description(path)
     able = theirs.coSimulation
@@ -123,7 +121,7 @@ def same_as_fmpy(path: Path) -> Interface:
 
 
 @pytest.mark.parametrize("name", OURS)
-def test_our_fmus_are_read_as_fmpy_reads_them(fmus: Path, name: str) -> None:
+def test_our_fmus_are_read_as_fmpy_reads_them(fmus, name):
     interface = same_as_fmpy(fmus / f"{name}.fmu")
     assert interface.python
     assert interface.units
@@ -131,19 +129,19 @@ def test_our_fmus_are_read_as_fmpy_reads_them(fmus: Path, name: str) -> None:
 
 @needs_gcc
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_native_fmus_are_read_as_fmpy_reads_them(tmp_path: Path, version: str) -> None:
+def test_native_fmus_are_read_as_fmpy_reads_them(tmp_path, version):
     interface = same_as_fmpy(build(tmp_path, version=version, units={"x": "m"}))
     assert not interface.python
     assert interface.by_name["x"].unit == "m"
 
 
-def test_all_of_a_small_one(write: Write) -> None:
+def test_all_of_a_small_one(write):
     interface = same_as_fmpy(write(FMI_2))
     assert interface.by_name["mode"].items == {"open": 1, "shut": 2}
     assert interface.by_name["y"].dependencies == ("u",)
 
 
-def test_aliases_and_dimensions_of_fmi_3(write: Write) -> None:
+def test_aliases_and_dimensions_of_fmi_3(write):
     path = write(FMI_3)
     everything, runs = describe(path), read_interface(path)
     assert [v.name for v in everything.variables] == ["u", "y", "n", "v", "z"]
@@ -169,9 +167,7 @@ FLAWS = [
 
 
 @pytest.mark.parametrize(("before", "after", "message"), FLAWS)
-def test_a_number_that_only_a_master_needs(
-    write: Write, before: str, after: str, message: str
-) -> None:
+def test_a_number_that_only_a_master_needs(write, before, after, message):
     assert FMI_2.count(before) == 1
     path = write(FMI_2.replace(before, after))
     assert describe(path).flaw == message
@@ -203,9 +199,7 @@ def test_a_number_that_only_a_master_needs(
         (FMI_3, "ModelVariables", "Variables", "no ModelVariables"),
     ],
 )
-def test_what_makes_no_sense_to_anybody(
-    write: Write, xml: str, before: str, after: str, message: str
-) -> None:
+def test_what_makes_no_sense_to_anybody(write, xml, before, after, message):
     assert before in xml
     path = write(xml.replace(before, after))
     with pytest.raises(InputError) as caught:
@@ -224,9 +218,7 @@ def test_what_makes_no_sense_to_anybody(
         ),
     ],
 )
-def test_what_no_master_runs_can_be_described(
-    write: Write, before: str, after: str, message: str
-) -> None:
+def test_what_no_master_runs_can_be_described(write, before, after, message):
     xml = FMI_3 if "Scheduled" in after else FMI_2
     path = write(xml.replace(before, after))
     assert "u" in describe(path).by_name
@@ -235,7 +227,7 @@ def test_what_no_master_runs_can_be_described(
     assert str(caught.value).startswith(f"{path}: {message}")
 
 
-def test_a_file_is_read_once_until_it_changes(write: Write) -> None:
+def test_a_file_is_read_once_until_it_changes(write):
     path = write(FMI_2)
     first = read_interface(path)
     assert read_interface(path) is first
@@ -244,7 +236,7 @@ def test_a_file_is_read_once_until_it_changes(write: Write) -> None:
 
 
 @pytest.mark.parametrize("name", ["top/modelDescription.xml", "ModelDescription.xml"])
-def test_a_description_in_another_place_is_named(tmp_path: Path, name: str) -> None:
+def test_a_description_in_another_place_is_named(tmp_path, name):
     with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
         archive.writestr(name, FMI_2)
     with pytest.raises(InputError, match=rf"must be there, and called so: there is {name}$"):

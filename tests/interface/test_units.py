@@ -2,7 +2,6 @@
 
 import math
 import zipfile
-from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
@@ -22,9 +21,7 @@ LENGTH, FORCE, TEMPERATURE = (0, 1, *[0] * 6), (1, 1, -2, *[0] * 5), (*[0] * 4, 
 
 
 @given(exponents, factors, offsets, factors, offsets, values)
-def test_a_value_means_the_same_in_base_units(
-    powers: tuple[int, ...], a: float, b: float, c: float, d: float, value: float
-) -> None:
+def test_a_value_means_the_same_in_base_units(powers, a, b, c, d, value):
     source, target = Unit("source", powers, a, b), Unit("target", powers, c, d)
     found = conversion(source, target)
     assert found is not None
@@ -35,14 +32,12 @@ def test_a_value_means_the_same_in_base_units(
 
 
 @given(exponents, factors, offsets)
-def test_a_unit_converts_to_itself_exactly(powers: tuple[int, ...], a: float, b: float) -> None:
+def test_a_unit_converts_to_itself_exactly(powers, a, b):
     assert conversion(Unit("one", powers, a, b), Unit("other", powers, a, b)) == (1.0, 0.0)
 
 
 @given(exponents, exponents, factors)
-def test_other_quantities_do_not_convert(
-    one: tuple[int, ...], other: tuple[int, ...], a: float
-) -> None:
+def test_other_quantities_do_not_convert(one, other, a):
     found = conversion(Unit("one", one, a), Unit("other", other))
     assert (found is None) is (one != other)
 
@@ -62,7 +57,7 @@ def test_other_quantities_do_not_convert(
         (Unit("lbf", FORCE, 4.4482216152605), Unit("kN", FORCE, 1e3), 1000.0, 4.4482216152605),
     ],
 )
-def test_known_values(source: Unit, target: Unit, value: float, expected: float) -> None:
+def test_known_values(source, target, value, expected):
     found = conversion(source, target)
     assert found is not None
     assert found[0] * value + found[1] == pytest.approx(expected, rel=1e-13)
@@ -88,7 +83,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 RISE = 'declaredType="Rise" start="0"'
 
 
-def from_y_to_u(folder: Path, y: str, u: str) -> tuple[float, float]:
+def from_y_to_u(folder, y, u):
     """Factor and offset of a connection between variables with these attributes."""
     with zipfile.ZipFile(folder / "t.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION.format(y=y, u=u))
@@ -99,13 +94,13 @@ def from_y_to_u(folder: Path, y: str, u: str) -> tuple[float, float]:
     )
 
 
-def test_the_offset_of_a_unit_does_not_apply_to_a_difference(tmp_path: Path) -> None:
+def test_the_offset_of_a_unit_does_not_apply_to_a_difference(tmp_path):
     assert from_y_to_u(tmp_path, 'unit="degF"', 'unit="K" start="0"') == (0.5, 255.0)
     assert from_y_to_u(tmp_path, 'unit="degF" relativeQuantity="true"', RISE) == (0.5, 0.0)
 
 
 @pytest.mark.parametrize("relative", ["", 'relativeQuantity="false"'])
-def test_a_difference_is_no_temperature(tmp_path: Path, relative: str) -> None:
+def test_a_difference_is_no_temperature(tmp_path, relative):
     with pytest.raises(InputError, match=r"only one of them is a difference .* factor = "):
         from_y_to_u(tmp_path, f'unit="degF" {relative}', RISE)
 
@@ -118,5 +113,5 @@ def test_a_difference_is_no_temperature(tmp_path: Path, relative: str) -> None:
         (Unit("a", TEMPERATURE, 1.0, 1e308), Unit("b", TEMPERATURE, 1e-5)),
     ],
 )
-def test_a_conversion_beyond_what_a_number_can_be_is_none(source: Unit, target: Unit) -> None:
+def test_a_conversion_beyond_what_a_number_can_be_is_none(source, target):
     assert conversion(source, target) is None

@@ -1,8 +1,6 @@
 """Arrays in a run: a state-space model against its exact solution and FMPy, and all types."""
 
 import json
-from pathlib import Path
-from typing import Any
 
 import fmpy
 import numpy as np
@@ -10,10 +8,7 @@ import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.cli.entry import main
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.recording.result import Result
-from grasp_cosim.system.parts import Isolation
 from scipy.linalg import expm
 from support.both_engines import engines
 from support.isolated import isolated
@@ -27,14 +22,7 @@ STEP, STOP = 0.125, 2.0
 Floats = npt.NDArray[np.float64]
 
 
-def load(
-    folder: Path,
-    tables: str,
-    connections: str = "",
-    scheme: str = "sequential",
-    types: bool = True,
-    kind: str = "CoSimulation",
-) -> System:
+def load(folder, tables, connections="", scheme="sequential", types=True, kind="CoSimulation"):
     """A system of ss.fmu."""
     state_space(folder, types=types, kind=kind)
     path = folder / "system.toml"
@@ -46,16 +34,16 @@ def load(
     return System.load(path)
 
 
-def alone(folder: Path) -> System:
+def alone(folder):
     return load(folder, '[components.ss]\nfmu = "ss.fmu"\n', types=False)
 
 
-def two(folder: Path, connections: str, more: str = "", scheme: str = "sequential") -> System:
+def two(folder, connections, more="", scheme="sequential"):
     tables = '[components.a]\nfmu = "ss.fmu"\n[components.b]\nfmu = "ss.fmu"\n'
     return load(folder, tables + more, connections, scheme)
 
 
-def values_of(n: int, m: int, r: int, seed: int = 1) -> dict[str, Any]:
+def values_of(n, m, r, seed=1):
     """A stable system of that many states, inputs and outputs."""
     draw = np.random.default_rng(seed).normal
     a = draw(size=(n, n)) - 2.0 * np.eye(n)
@@ -63,7 +51,7 @@ def values_of(n: int, m: int, r: int, seed: int = 1) -> dict[str, Any]:
     return {"A": a, "B": b, "C": c, "D": d, "x0": draw(size=n), "u": draw(size=m)}
 
 
-def exact(given: dict[str, Any]) -> Floats:
+def exact(given):
     """y at each step, for an input that is held."""
     a, b, c, d, x, u = (given[k] for k in ("A", "B", "C", "D", "x0", "u"))
     n, m = b.shape
@@ -77,15 +65,13 @@ def exact(given: dict[str, Any]) -> Floats:
     return np.array(rows)
 
 
-def signals(result: Result, name: str, count: int) -> Floats:
+def signals(result, name, count):
     return np.array([result[f"{name}[{i}]"] for i in range(1, count + 1)]).T
 
 
 @engines
 @pytest.mark.parametrize("sizes", [(3, 3, 3), (1, 1, 1), (7, 2, 5), (2, 6, 1), (24, 4, 3)])
-def test_a_state_space_model_is_exact(
-    tmp_path: Path, engine: Engine, sizes: tuple[int, int, int]
-) -> None:
+def test_a_state_space_model_is_exact(tmp_path, engine, sizes):
     given = values_of(*sizes)
     values = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
     values |= {f"ss.{name}": value for name, value in given.items()}
@@ -97,12 +83,10 @@ def test_a_state_space_model_is_exact(
 @needs_cvode
 @pytest.mark.parametrize("sizes", [(3, 3, 3), (7, 2, 5)])
 @pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
-def test_it_is_as_exact_by_a_solver(
-    tmp_path: Path, isolation: Isolation, sizes: tuple[int, int, int]
-) -> None:
+def test_it_is_as_exact_by_a_solver(tmp_path, isolation, sizes):
     table = '[components.ss]\nfmu = "ss.fmu"\nsolver = { relative_tolerance = 1e-10 }\n'
     given = values_of(*sizes)
-    values: dict[str, Any] = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
+    values = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
     values |= {f"ss.{name}": value for name, value in given.items()}
     system = load(tmp_path, table, types=False, kind="ModelExchange").with_values(values)
     result = simulate(isolated(system, isolation))
@@ -111,7 +95,7 @@ def test_it_is_as_exact_by_a_solver(
 
 @engines
 @pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
-def test_stimuli_drive_elements(tmp_path: Path, engine: Engine, isolation: Isolation) -> None:
+def test_stimuli_drive_elements(tmp_path, engine, isolation):
     (tmp_path / "drive.csv").write_text("time,ss.u[2]\n0,1\n1,3\n", "utf-8")
     table = '[components.ss]\nfmu = "ss.fmu"\nvalues = { C = 0 }\n[input]\nfile = "drive.csv"\n'
     system = isolated(load(tmp_path, table, types=False), isolation)
@@ -122,7 +106,7 @@ def test_stimuli_drive_elements(tmp_path: Path, engine: Engine, isolation: Isola
 
 
 @engines
-def test_fmpy_finds_the_same_bits(tmp_path: Path, engine: Engine) -> None:
+def test_fmpy_finds_the_same_bits(tmp_path, engine):
     skip_where_fmpy_runs_none("3.0")
     given = values_of(3, 3, 3)
     result = simulate(
@@ -141,7 +125,7 @@ def test_fmpy_finds_the_same_bits(tmp_path: Path, engine: Engine) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["compiled", pytest.param("python", marks=pytest.mark.slow)])
-def test_a_process_of_its_own_changes_no_bit(tmp_path: Path, engine: Engine) -> None:
+def test_a_process_of_its_own_changes_no_bit(tmp_path, engine):
     more = '[[events]]\nat = 0.5\nset = { "b.u[3]" = 4.0, "b.A[1,2]" = 0.5 }\n'
     system = two(tmp_path, '"a.y[2] -> b.u[1]", "a.y_Int8 -> b.u_Int8"', more)
     system = system.with_values({"a.r": 2, "a.u_Int8": 5, "b.u_Float32": [[1, 2, 3], [4, 5, 6]]})
@@ -154,9 +138,7 @@ def test_a_process_of_its_own_changes_no_bit(tmp_path: Path, engine: Engine) -> 
 
 @engines
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_whole_arrays_and_their_elements_are_connected(
-    tmp_path: Path, engine: Engine, scheme: str
-) -> None:
+def test_whole_arrays_and_their_elements_are_connected(tmp_path, engine, scheme):
     parts = [f"a.y[{i}] -> b.u[{i}]" for i in (3, 1, 2)]
     ends = '{ from = "a.y_Float32", to = "b.u_Float32", factor = 2.0 }'
     whole = simulate(two(tmp_path, f'"a.y -> b.u", {ends}', "", scheme), engine=engine)
@@ -168,7 +150,7 @@ def test_whole_arrays_and_their_elements_are_connected(
 
 
 @engines
-def test_the_rest_of_an_array_keeps_its_value_or_start(tmp_path: Path, engine: Engine) -> None:
+def test_the_rest_of_an_array_keeps_its_value_or_start(tmp_path, engine):
     """B = D = 0 but for one row, so that y[1] is u[2] and so on."""
     system = two(tmp_path, '"a.y[1] -> b.u[2]"').with_values(
         {"a.C": 0, "a.D": 0, "a.D[1,3]": 1.0, "a.u[3]": 9.0}
@@ -180,7 +162,7 @@ def test_the_rest_of_an_array_keeps_its_value_or_start(tmp_path: Path, engine: E
 
 
 @engines
-def test_without_a_start_the_rest_is_what_the_fmu_has(tmp_path: Path, engine: Engine) -> None:
+def test_without_a_start_the_rest_is_what_the_fmu_has(tmp_path, engine):
     system = two(tmp_path, '"a.y[1] -> b.u[2]"').with_values(
         {"b.m": 4, "b.C": 0, "b.D": np.eye(3, 4), "b.B": 0}
     )
@@ -189,9 +171,9 @@ def test_without_a_start_the_rest_is_what_the_fmu_has(tmp_path: Path, engine: En
 
 
 @engines
-def test_all_types_pass_whole(tmp_path: Path, engine: Engine) -> None:
+def test_all_types_pass_whole(tmp_path, engine):
     links = ", ".join(f'"a.y_{t} -> b.u_{t}"' for t in TYPES)
-    given: dict[str, Any] = {
+    given = {
         f"a.u_{t}": np.arange(6).reshape(2, 3) + 1 if "Int" in t else [[1.5] * 3, [-0.25] * 3]
         for t in TYPES[:-2]
     }
@@ -208,7 +190,7 @@ def test_all_types_pass_whole(tmp_path: Path, engine: Engine) -> None:
 
 
 @engines
-def test_events_set_elements_of_arrays(tmp_path: Path, engine: Engine) -> None:
+def test_events_set_elements_of_arrays(tmp_path, engine):
     more = (
         '[[events]]\nat = 0.5\nset = { "b.u[3]" = 4.0, "a.u[2]" = 7.0, "a.D[1,1]" = 0.0 }\n'
         "[[events]]\nwhen = \"a.y_Enumeration[2,1] == 'fast'\"\n"
@@ -228,7 +210,7 @@ def test_events_set_elements_of_arrays(tmp_path: Path, engine: Engine) -> None:
 
 
 @engines
-def test_faults_act_on_elements(tmp_path: Path, engine: Engine) -> None:
+def test_faults_act_on_elements(tmp_path, engine):
     more = (
         '[[faults]]\nconnection = "a.y[2] -> b.u[2]"\nkind = "bias"\nvalue = 10.0\n'
         '[[faults]]\nconnection = "b.u_Enumeration[1,1]"\nkind = "stuck"\nvalue = "fast"\n'
@@ -241,8 +223,8 @@ def test_faults_act_on_elements(tmp_path: Path, engine: Engine) -> None:
 
 
 @engines
-def test_sizes_of_0(tmp_path: Path, engine: Engine) -> None:
-    values: dict[str, Any] = {"a.m": 0, "a.k": 0, "a.n": 0, "b.m": 2, "b.r": 1, "a.r": 2}
+def test_sizes_of_0(tmp_path, engine):
+    values = {"a.m": 0, "a.k": 0, "a.n": 0, "b.m": 2, "b.r": 1, "a.r": 2}
     result = simulate(two(tmp_path, '"a.y -> b.u"').with_values({"b.m": 3}), engine=engine)
     assert result["b.y[1]"][0] == 1.0
     result = simulate(
@@ -256,7 +238,7 @@ def test_sizes_of_0(tmp_path: Path, engine: Engine) -> None:
 
 
 @engines
-def test_a_loop_of_arrays_is_solved(tmp_path: Path, engine: Engine) -> None:
+def test_a_loop_of_arrays_is_solved(tmp_path, engine):
     """u = D y + ... both ways: the fixed point of y = u / 2, at t = 0."""
     system = two(tmp_path, '"a.y -> b.u", "b.y -> a.u"').with_values(
         {f"{c}.D": 0.5 * np.eye(3) for c in "ab"} | {f"{c}.x0": [1, 2, 3] for c in "ab"}
@@ -266,7 +248,7 @@ def test_a_loop_of_arrays_is_solved(tmp_path: Path, engine: Engine) -> None:
     np.testing.assert_allclose(signals(result, "b.y", 3)[0], [2.0, 4.0, 6.0], 1e-9)
 
 
-def test_a_recorded_run_reads_back(tmp_path: Path) -> None:
+def test_a_recorded_run_reads_back(tmp_path):
     two(tmp_path, '"a.y -> b.u"')
     out, file = tmp_path / "out", str(tmp_path / "system.toml")
     assert main(["run", file, "--set", "a.u=4,5,6", "--set", "b.A[1,2]=2", "--out", str(out)]) == 0
@@ -281,7 +263,7 @@ def test_a_recorded_run_reads_back(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read[name], result[name])
 
 
-def test_a_long_integer_in_an_array_ends_the_run_by_name(tmp_path: Path) -> None:
+def test_a_long_integer_in_an_array_ends_the_run_by_name(tmp_path):
     system = load(tmp_path, '[components.a]\nfmu = "ss.fmu"\n')
     long = system.with_values({"a.u_Int64[2,1]": 2**53 + 1})
     with pytest.raises(InputError, match=r"^a\.y_Int64\[2,1\] = 9007199254740993 at step 0"):
@@ -293,6 +275,6 @@ def test_a_long_integer_in_an_array_ends_the_run_by_name(tmp_path: Path) -> None
             session.step(1)
 
 
-def test_what_the_fmu_refuses_is_said(tmp_path: Path) -> None:
+def test_what_the_fmu_refuses_is_said(tmp_path):
     with pytest.raises(InputError, match=r"^ss: ss\.fmu refused its initialisation: at most 24$"):
         simulate(alone(tmp_path).with_values({"ss.r": 25}))

@@ -5,16 +5,15 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from c_compilers import find_compiler
-from grasp_cosim import InputError, System, simulate
+from grasp_cosim import InputError, simulate
 from grasp_cosim.base.calls import STEP_2, Call, Native
 from grasp_cosim.master import compiled, loop
-from grasp_cosim.master.engine import Loop, make_loop
+from grasp_cosim.master.engine import make_loop
 from grasp_cosim.master.plan import Plan
 from support.both_engines import needs_compiler
 
@@ -22,7 +21,7 @@ pytestmark = needs_compiler
 
 
 @pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def cache(tmp_path, monkeypatch):
     """An empty cache folder, of a process that has not loaded the loop."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     forget()
@@ -30,20 +29,20 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     forget()
 
 
-def forget() -> None:
+def forget():
     compiled.library.cache_clear()
     compiled._file.cache_clear()
 
 
-def kept(cache: Path) -> list[Path]:
+def kept(cache):
     return sorted(path for path in cache.rglob("*") if path.is_file())
 
 
-def counts(steps: int = 3) -> int:
+def counts(steps=3):
     """Runs a loop of one call; how often it was made."""
-    seen: list[int] = []
+    seen = []
 
-    def call() -> int:
+    def call():
         seen.append(1)
         return 0
 
@@ -53,7 +52,7 @@ def counts(steps: int = 3) -> int:
     return len(seen)
 
 
-def test_it_is_built_once_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_is_built_once_and_kept(cache, monkeypatch):
     assert not compiled.is_there()
     assert counts() == 3
     (file,) = kept(cache)
@@ -64,16 +63,14 @@ def test_it_is_built_once_and_kept(cache: Path, monkeypatch: pytest.MonkeyPatch)
     assert counts() == 3
 
 
-def test_what_was_built_from_other_constants_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_built_from_other_constants_is_not_taken(monkeypatch):
     before = compiled._job().kept_as
     monkeypatch.setattr(compiled, "EARLY", 7)
     assert compiled._job().kept_as != before
 
 
 @pytest.mark.usefixtures("cache")
-def test_where_nothing_can_be_kept_it_is_built_for_this_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_nothing_can_be_kept_it_is_built_for_this_process(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert counts() == 3
@@ -81,8 +78,8 @@ def test_where_nothing_can_be_kept_it_is_built_for_this_process(
 
 
 @pytest.mark.usefixtures("cache")
-def test_where_the_user_has_no_home(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_home() -> Path:
+def test_where_the_user_has_no_home(monkeypatch):
+    def no_home():
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.delenv("XDG_CACHE_HOME")
@@ -91,7 +88,7 @@ def test_where_the_user_has_no_home(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_processes_that_build_it_at_once_all_run(cache: Path) -> None:
+def test_processes_that_build_it_at_once_all_run(cache):
     code = (
         "from grasp_cosim.master import compiled; import sys; sys.stdin.read(1)\n"
         "print(compiled.library(True).run.argtypes is not None, compiled.is_there())"
@@ -116,9 +113,7 @@ def test_processes_that_build_it_at_once_all_run(cache: Path) -> None:
         ("nonexistent", "CC=nonexistent: no such program; must be a C compiler, or unset"),
     ],
 )
-def test_a_compiler_that_is_none_is_one_line_and_auto_goes_on(
-    grasp: System, monkeypatch: pytest.MonkeyPatch, cc: str, said: str
-) -> None:
+def test_a_compiler_that_is_none_is_one_line_and_auto_goes_on(grasp, monkeypatch, cc, said):
     monkeypatch.setenv("CC", cc)
     with pytest.raises(InputError) as error:
         simulate(grasp, stop=1e-3, engine="compiled")
@@ -127,7 +122,7 @@ def test_a_compiler_that_is_none_is_one_line_and_auto_goes_on(
     assert simulate(grasp, stop=1e-3).complete
 
 
-def test_it_compiles_without_warnings(tmp_path: Path) -> None:
+def test_it_compiles_without_warnings(tmp_path):
     strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
     for level in ("-O0", "-O2", "-O3"):
         macros = [f"-D{macro}" for macro in compiled._constants()]
@@ -135,7 +130,7 @@ def test_it_compiles_without_warnings(tmp_path: Path) -> None:
         subprocess.run([*command, "-o", tmp_path / "loop.so"], check=True)
 
 
-def calling(function: str, argument: int, keeps_lock: bool = False) -> Loop:
+def calling(function, argument, keeps_lock=False):
     """A loop of one native call, function(argument) of the C library, by the shape of a step."""
     address = ctypes.cast(ctypes.CDLL(None)[function], ctypes.c_void_p).value or 0
     call = Call(lambda: 0, Native(STEP_2, address, argument), keeps_lock)
@@ -144,11 +139,11 @@ def calling(function: str, argument: int, keeps_lock: bool = False) -> Loop:
 
 
 @pytest.mark.parametrize("keeps_lock", [False, True])
-def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock: bool) -> None:
+def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock):
     run = calling("usleep", 1000, keeps_lock)
     begun, ran = threading.Event(), threading.Event()
 
-    def other() -> None:
+    def other():
         begun.wait()
         ran.set()
 
@@ -169,7 +164,7 @@ def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock: bo
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_in_the_loop_is_raised_behind_it() -> None:
+def test_ctrl_c_in_the_loop_is_raised_behind_it():
     run = calling("raise", signal.SIGINT)
     rows = np.zeros((5, 1))
     with pytest.raises(KeyboardInterrupt):

@@ -1,35 +1,31 @@
 """The interpreted and the compiled loop give the same bits, the same errors, the same rows."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim import SimulationError, simulate
 from grasp_cosim.master import compiled
 from grasp_cosim.master import engine as engines
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.plan import Plan
-from grasp_cosim.recording.result import Rejection, Result
+from grasp_cosim.recording.result import Rejection
 from grasp_cosim.system.parts import Connection, Port
 from support.both_engines import needs_compiler
 from support.cases import CASES
 from support.mocks import Mock, Run, make_system
 
 pytestmark = needs_compiler
-ENGINES: tuple[Engine, ...] = ("python", "compiled")
+ENGINES = ("python", "compiled")
 
 
-def both(system: System, **options: Any) -> tuple[Result, Result]:
+def both(system, **options):
     one, two = (simulate(system, engine=engine, **options) for engine in ENGINES)
     return one, two
 
 
-def assert_same_bits(one: Result, two: Result) -> None:
+def assert_same_bits(one, two):
     assert list(one) == list(two)
     assert one.time.tobytes() == two.time.tobytes()
     assert [n for n in one if one[n].tobytes() != two[n].tobytes()] == []
@@ -37,13 +33,13 @@ def assert_same_bits(one: Result, two: Result) -> None:
 
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize(("case", "step"), [(0, 2e-4), (1, 1e-3), (2, 1e-3)])
-def test_the_grasp(grasp: System, case: int, step: float, scheme: str) -> None:
+def test_the_grasp(grasp, case, step, scheme):
     stop = 0.4 if case == 0 else 2.5
     assert_same_bits(*both(grasp.with_values(CASES[case]), step=step, stop=stop, scheme=scheme))
 
 
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_slow_sensors_and_scaled_connections(grasp: System, scheme: str) -> None:
+def test_slow_sensors_and_scaled_connections(grasp, scheme):
     components = tuple(
         replace(c, step_ns=3_000_000) if c.name == "sensor_1" else c for c in grasp.components
     )
@@ -63,7 +59,7 @@ def test_slow_sensors_and_scaled_connections(grasp: System, scheme: str) -> None
     assert held[6] != held[5]
 
 
-def test_decimation_keeps_each_nth_row_and_the_last(grasp: System) -> None:
+def test_decimation_keeps_each_nth_row_and_the_last(grasp):
     whole = simulate(grasp, step=1e-3, stop=0.1)
     for few in both(grasp, step=1e-3, stop=0.1, every=7):
         kept = [*range(0, 101, 7), 100]
@@ -73,9 +69,7 @@ def test_decimation_keeps_each_nth_row_and_the_last(grasp: System) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_an_fmu_that_fails_is_the_same_error(
-    grasp: System, altered: Callable[..., Path], engine: Engine
-) -> None:
+def test_an_fmu_that_fails_is_the_same_error(grasp, altered, engine):
     nan = "l = float('nan') if u.gap < 0.044 else u.gap"
     fmu = altered(
         "ProximitySensor", "proximity_sensor/optics.py", "l = 0.0 if u.gap < 0.0 else u.gap", nan
@@ -87,15 +81,15 @@ def test_an_fmu_that_fails_is_the_same_error(
     assert not caught.value.result.complete
 
 
-def chain(tmp_path: Path, engine: Engine, *mocks: Mock) -> Run:
+def chain(tmp_path, engine, *mocks):
     connections = [Connection(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
     return Run(make_system(mocks, connections), mocks, engine)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean", "String"])
-def test_components_in_python_run_in_both(tmp_path: Path, engine: Engine, kind: str) -> None:
-    def output(u: float, t: float) -> Any:
+def test_components_in_python_run_in_both(tmp_path, engine, kind):
+    def output(u, t):
         return {"Real": t, "Integer": round(10 * t), "Boolean": t > 0.15, "String": f"{t:g}"}[kind]
 
     a, b = Mock(tmp_path, "a", output, kind), Mock(tmp_path, "b", lambda u, t: u, kind)
@@ -104,7 +98,7 @@ def test_components_in_python_run_in_both(tmp_path: Path, engine: Engine, kind: 
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_rejected_steps_are_resolved_in_both(tmp_path: Path, engine: Engine) -> None:
+def test_rejected_steps_are_resolved_in_both(tmp_path, engine):
     clock = Mock(tmp_path, "clock", lambda u, t: t, direct=False)
     slow = Mock(
         tmp_path, "slow", lambda u, t: t, direct=False,
@@ -117,10 +111,10 @@ def test_rejected_steps_are_resolved_in_both(tmp_path: Path, engine: Engine) -> 
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_what_a_call_raises_ends_the_run(tmp_path: Path, engine: Engine) -> None:
+def test_what_a_call_raises_ends_the_run(tmp_path, engine):
     """An exception must not get lost in compiled code."""
 
-    def output(u: float, t: float) -> float:
+    def output(u, t):
         if t > 0.25:
             raise SimulationError("a: enough")
         return t
@@ -132,9 +126,7 @@ def test_what_a_call_raises_ends_the_run(tmp_path: Path, engine: Engine) -> None
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_value_that_is_not_finite_at_t_0_is_kept_too(
-    tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_value_that_is_not_finite_at_t_0_is_kept_too(tmp_path, engine, monkeypatch):
     mock = Mock(tmp_path, "a", lambda u, t: math.nan)
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
     with pytest.raises(SimulationError, match=r"^a\.y = nan at step 0: must be finite") as caught:
@@ -149,8 +141,8 @@ def test_a_value_that_is_not_finite_at_t_0_is_kept_too(
 @pytest.mark.parametrize("there", [True, False])
 @pytest.mark.parametrize("steps", [1, engines.LONG - 1, engines.LONG, None])
 def test_auto_takes_it_where_it_is_there_and_builds_it_for_long_runs(
-    monkeypatch: pytest.MonkeyPatch, there: bool, compiler: bool, steps: int | None
-) -> None:
+    monkeypatch, there, compiler, steps
+):
     monkeypatch.setattr(compiled, "is_there", lambda: there)
     monkeypatch.setattr(compiled, "has_compiler", lambda: compiler)
     monkeypatch.setattr(compiled, "CompiledLoop", lambda plan: "in C")

@@ -1,7 +1,6 @@
 """Events and faults at communication points, with components that only note what they are given."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
 
@@ -9,16 +8,16 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.fmi.instance import Instance
-from grasp_cosim.interface.interface import Interface, Value, Variable
+from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.master.scenario import Scenario
 from grasp_cosim.system import parts
-from grasp_cosim.system.parts import Component, Condition, Connection, Event, Fault, Port, Relation
+from grasp_cosim.system.parts import Component, Condition, Connection, Event, Fault, Port
 
 STEP = 100_000_000
 """ns"""
 
 
-def interface(path: Path) -> Interface:
+def interface(path):
     """Outputs y and on, a connected input u, a free one v, tunable parameters p, n and label."""
     variables = [
         ("y", "Real", "output"),
@@ -52,19 +51,19 @@ def interface(path: Path) -> Interface:
 
 
 @pytest.fixture(autouse=True)
-def _no_files(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_files(monkeypatch):
     monkeypatch.setattr(parts, "read_interface", interface)
 
 
 class Mock:
     """A component that notes what is set."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name):
         self.name = name
         self.interface = interface(Path("mock.fmu"))
-        self.given: list[tuple[str, Value]] = []
+        self.given = []
 
-    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+    def set(self, variables, values):
         for variable, value in zip(variables, values, strict=True):
             if value == -1.0:
                 raise SimulationError(f"{self.name}: {variable.name}")
@@ -74,7 +73,7 @@ class Mock:
 class Rig:
     """A scenario of components a, b and slow, which steps every third base step."""
 
-    def __init__(self, events: Sequence[Event] = (), faults: Sequence[Fault] = ()) -> None:
+    def __init__(self, events=(), faults=()):
         names = ("a", "b", "slow")
         system = System(
             "mock.toml",
@@ -98,7 +97,7 @@ class Rig:
             self.values,
         )
 
-    def run(self, steps: int, y: Sequence[float] = ()) -> list[str]:
+    def run(self, steps, y=()):
         """Ask before every step; y are the values of a.y. The log."""
         for step in range(steps):
             self.values[0] = y[step] if step < len(y) else 0.0
@@ -106,18 +105,18 @@ class Rig:
         return self.scenario.log
 
 
-def at(seconds: float, **values: Value) -> Event:
+def at(seconds, **values):
     """Sets a's variables at a time."""
     settings = {Port("a", name): value for name, value in values.items()}
     return Event(settings, at_ns=round(seconds * 1e9))
 
 
-def when(relation: Relation, value: float, port: str = "y", **values: Value) -> Event:
+def when(relation, value, port="y", **values):
     settings = {Port("a", name): value for name, value in values.items()}
     return Event(settings, when=Condition(Port("a", port), relation, value))
 
 
-def test_an_event_happens_once_at_its_time() -> None:
+def test_an_event_happens_once_at_its_time():
     rig = Rig([at(0.5, p=0.6)])
     assert rig.run(5) == []
     assert rig.run(10) == ["t = 0.5 s: a.p = 0.6"]
@@ -125,9 +124,7 @@ def test_an_event_happens_once_at_its_time() -> None:
 
 
 @pytest.mark.parametrize(("seconds", "step"), [(0.0, 0), (0.5, 5), (0.500000001, 6), (0.41, 5)])
-def test_an_event_happens_at_the_first_point_at_or_after_its_time(
-    seconds: float, step: int
-) -> None:
+def test_an_event_happens_at_the_first_point_at_or_after_its_time(seconds, step):
     rig = Rig([at(seconds, p=1.0)])
     rig.run(step)
     assert not rig.mocks["a"].given
@@ -135,7 +132,7 @@ def test_an_event_happens_at_the_first_point_at_or_after_its_time(
     assert rig.mocks["a"].given
 
 
-def test_events_at_one_time_happen_in_the_order_of_the_file() -> None:
+def test_events_at_one_time_happen_in_the_order_of_the_file():
     rig = Rig([at(0.2, p=1.0), at(0.1, p=2.0, v=3.0), at(0.2, p=4.0)])
     assert rig.run(4) == [
         "t = 0.1 s: a.p = 2.0",
@@ -146,20 +143,20 @@ def test_events_at_one_time_happen_in_the_order_of_the_file() -> None:
     assert rig.mocks["a"].given == [("p", 2.0), ("v", 3.0), ("p", 1.0), ("p", 4.0)]
 
 
-def test_values_arrive_in_the_declared_type() -> None:
+def test_values_arrive_in_the_declared_type():
     rig = Rig([at(0.0, p=1, n=2.0, label="x")])
     rig.run(1)
     assert repr(rig.mocks["a"].given) == "[('p', 1.0), ('n', 2), ('label', 'x')]"
 
 
-def test_an_event_may_set_several_components() -> None:
+def test_an_event_may_set_several_components():
     event = Event({Port("a", "p"): 1.0, Port("b", "p"): 2.0}, at_ns=0)
     rig = Rig([event])
     rig.run(1)
     assert [rig.mocks[name].given for name in "ab"] == [[("p", 1.0)], [("p", 2.0)]]
 
 
-def test_a_condition_is_looked_at_until_it_holds_and_then_no_more() -> None:
+def test_a_condition_is_looked_at_until_it_holds_and_then_no_more():
     rig = Rig([when("<", 0.01, p=1.0)])
     log = rig.run(8, [1.0, 0.5, 0.01, 0.005, 0.5, 0.001])
     assert log == ["t = 0.3 s: a.p = 1.0 (a.y < 0.01)"]
@@ -169,7 +166,7 @@ def test_a_condition_is_looked_at_until_it_holds_and_then_no_more() -> None:
     ("relation", "steps"),
     [("<", [0]), ("<=", [0, 1]), (">", [2]), (">=", [1, 2])],
 )
-def test_relations(relation: Relation, steps: list[int]) -> None:
+def test_relations(relation, steps):
     logs = [Rig([when(relation, 1.0, p=1.0)]).run(1, [y]) for y in (0.5, 1.0, 1.5)]
     assert [k for k, log in enumerate(logs) if log] == steps
 
@@ -177,38 +174,38 @@ def test_relations(relation: Relation, steps: list[int]) -> None:
 @pytest.mark.parametrize("relation", ["==", "!="])
 @pytest.mark.parametrize("value", [False, True])
 @pytest.mark.parametrize("now", [0.0, 1.0])
-def test_conditions_on_a_boolean(relation: Relation, value: bool, now: float) -> None:
+def test_conditions_on_a_boolean(relation, value, now):
     rig = Rig([when(relation, value, "on", p=1.0)])
     rig.values[1] = now
     rig.scenario.before_step(0)
     assert bool(rig.scenario.log) is ((bool(now) == value) == (relation == "=="))
 
 
-def test_no_condition_holds_for_what_is_no_number() -> None:
-    relations: list[Relation] = ["<", "<=", ">", ">="]
+def test_no_condition_holds_for_what_is_no_number():
+    relations = ["<", "<=", ">", ">="]
     for relation in relations:
         assert not Rig([when(relation, 1.0, p=1.0)]).run(1, [math.nan])
 
 
 @pytest.mark.parametrize(("seconds", "expected"), [(0.0, 0.0), (0.1, 0.3), (0.3, 0.3), (0.4, 0.6)])
-def test_a_slow_component_is_set_at_its_own_points(seconds: float, expected: float) -> None:
+def test_a_slow_component_is_set_at_its_own_points(seconds, expected):
     """In between it stands elsewhere in time."""
     event = Event({Port("slow", "p"): 1.0}, at_ns=round(seconds * 1e9))
     assert Rig([event]).run(10) == [f"t = {expected:g} s: slow.p = 1.0"]
 
 
-def test_a_condition_counts_at_the_points_of_what_it_sets() -> None:
+def test_a_condition_counts_at_the_points_of_what_it_sets():
     event = Event({Port("slow", "p"): 1.0}, when=Condition(Port("a", "y"), ">", 0.5))
     assert Rig([event]).run(6, [0, 1, 0, 0]) == []
     assert Rig([event]).run(6, [0, 1, 1, 1]) == ["t = 0.3 s: slow.p = 1.0 (a.y > 0.5)"]
 
 
-def test_a_refusal_ends_the_run() -> None:
+def test_a_refusal_ends_the_run():
     with pytest.raises(SimulationError, match="a: p"):
         Rig([at(0.1, p=-1.0)]).run(2)
 
 
-def test_faults_are_logged_where_they_begin_and_end() -> None:
+def test_faults_are_logged_where_they_begin_and_end():
     fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 4 * STEP)
     assert Rig(faults=[fault]).run(8) == [
         "t = 0.2 s: b.u: bias begins",
@@ -224,7 +221,7 @@ def test_faults_are_logged_where_they_begin_and_end() -> None:
         ([0, 0, 1, 0], 2),
     ],
 )
-def test_a_condition_begins_a_fault_within_its_window(y: list[float], first: int) -> None:
+def test_a_condition_begins_a_fault_within_its_window(y, first):
     condition = Condition(Port("a", "y"), ">", 0.5)
     fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 2 * STEP, 7 * STEP, when=condition)
     rig = Rig(faults=[fault])
@@ -241,7 +238,7 @@ def test_a_condition_begins_a_fault_within_its_window(y: list[float], first: int
     ]
 
 
-def test_a_condition_that_comes_too_late_begins_no_fault() -> None:
+def test_a_condition_that_comes_too_late_begins_no_fault():
     condition = Condition(Port("a", "y"), ">", 0.5)
     fault = Fault(Port("b", "u"), "bias", {"value": 1.0}, 0, 3 * STEP, when=condition)
     rig = Rig(faults=[fault])
@@ -250,7 +247,7 @@ def test_a_condition_that_comes_too_late_begins_no_fault() -> None:
     assert rig.scenario.pending() == ["faults[0] did not begin: b.u: bias"]
 
 
-def test_what_did_not_happen_is_said() -> None:
+def test_what_did_not_happen_is_said():
     rig = Rig([at(0.1, p=1.0), at(5.0, p=2.0), when("<", -1.0, p=3.0)])
     rig.run(8)
     assert rig.scenario.pending() == [
@@ -259,7 +256,7 @@ def test_what_did_not_happen_is_said() -> None:
     ]
 
 
-def test_without_a_scenario_no_step_needs_it() -> None:
+def test_without_a_scenario_no_step_needs_it():
     rig = Rig()
     assert rig.scenario.next_step(0) is None
     assert (rig.run(3), rig.scenario.pending(), rig.scenario.fault_functions) == ([], [], {})
@@ -281,7 +278,7 @@ FULL = (
 
 
 @pytest.mark.parametrize("rise", [0, 3, 7, 25, 40])
-def test_asked_only_where_it_says_so_it_does_the_same(rise: int) -> None:
+def test_asked_only_where_it_says_so_it_does_the_same(rise):
     """So that a compiled loop can run freely in between."""
     y = [-0.6 if k % 5 == 4 else float(k >= rise) for k in range(30)]
     every, needed = Rig(*FULL), Rig(*FULL)
@@ -302,7 +299,7 @@ def test_asked_only_where_it_says_so_it_does_the_same(rise: int) -> None:
         assert asked == [0, 2, 3, 4, 6, 8, 9, 20]
 
 
-def test_what_is_set_by_hand_is_noted_with_the_events() -> None:
+def test_what_is_set_by_hand_is_noted_with_the_events():
     rig = Rig([at(0.2, p=1.0)])
     rig.run(4)
     rig.scenario.set("a.n", 3.0, 7)
@@ -320,7 +317,7 @@ def test_what_is_set_by_hand_is_noted_with_the_events() -> None:
         ("a.p", "1", r"^set: a\.p: p = '1': must be a finite number"),
     ],
 )
-def test_what_cannot_be_set_by_hand(name: str, value: Value, message: str) -> None:
+def test_what_cannot_be_set_by_hand(name, value, message):
     rig = Rig()
     with pytest.raises(InputError, match=message):
         rig.scenario.set(name, value, 0)

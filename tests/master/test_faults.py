@@ -1,13 +1,10 @@
 """Faults on a connection, each against NumPy; seeds, windows, and being asked more than once."""
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from grasp_cosim.master.fault_windows import FaultFunction, Window, fault_functions
+from grasp_cosim.master.fault_windows import Window, fault_functions
 from grasp_cosim.system.faults import INITIAL
 from grasp_cosim.system.parts import Fault, Port
 from hypothesis import given
@@ -22,84 +19,74 @@ SIGNAL = np.sin(0.1 * np.arange(100)) + 1e-3 * np.arange(100)
 """No two values are equal."""
 
 
-def fault(
-    kind: str,
-    start: float = 0,
-    end: float | None = None,
-    *,
-    target: Port = WIRE,
-    seed: int = 0,
-    **parameters: float,
-) -> Fault:
+def fault(kind, start=0, end=None, *, target=WIRE, seed=0, **parameters):
     """A fault with a window in steps."""
     until = None if end is None else round(end * STEP)
     return Fault(target, kind, parameters, round(start * STEP), until, seed=seed)
 
 
-def on_connection(*faults: Fault) -> FaultFunction:
+def on_connection(*faults: Fault):
     """What a connection with these faults makes of a value."""
     windows = [Window(f"faults[{i}]", f, STEP) for i, f in enumerate(faults)]
     return fault_functions(windows, STEP)[faults[0].target]
 
 
-def passed(
-    function: FaultFunction, values: npt.ArrayLike, steps: Sequence[int] | None = None
-) -> npt.NDArray[Any]:
+def passed(function, values, steps=None):
     """What becomes of values at steps, by default 0, 1, 2, ..."""
     listed = np.asarray(values).tolist()
     numbers = range(len(listed)) if steps is None else steps
     return np.array([function(v, k) for v, k in zip(listed, numbers, strict=True)])
 
 
-def test_stuck_holds_the_value_where_it_begins() -> None:
+def test_stuck_holds_the_value_where_it_begins():
     expected = SIGNAL.copy()
     expected[20:50] = SIGNAL[20]
     assert (passed(on_connection(fault("stuck", 20, 50)), SIGNAL) == expected).all()
 
 
-def test_stuck_at_a_value() -> None:
+def test_stuck_at_a_value():
     expected = SIGNAL.copy()
     expected[20:50] = -3.0
     assert (passed(on_connection(fault("stuck", 20, 50, value=-3.0)), SIGNAL) == expected).all()
 
 
-def test_a_boolean_is_stuck_as_a_number() -> None:
+def test_a_boolean_is_stuck_as_a_number():
     assert repr(on_connection(fault("stuck", value=True))(0.0, 3)) == "1.0"
 
 
-def test_bias() -> None:
+def test_bias():
     expected = np.where(np.arange(100) < 30, SIGNAL, SIGNAL + 0.25)
     assert (passed(on_connection(fault("bias", 30, value=0.25)), SIGNAL) == expected).all()
 
 
 @pytest.mark.parametrize("limits", [{"low": -0.5}, {"high": 0.5}, {"low": -0.2, "high": 0.3}])
-def test_saturation(limits: dict[str, float]) -> None:
+def test_saturation(limits):
     expected = np.clip(SIGNAL, limits.get("low"), limits.get("high"))
     assert (passed(on_connection(Fault(WIRE, "saturation", limits)), SIGNAL) == expected).all()
 
 
 @QUICK
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e3))
-def test_quantisation(value: float, width: float) -> None:
+def test_quantisation(value, width):
     """The nearest level; NumPy rounds to even as well."""
     result = on_connection(fault("quantisation", step=width))(value, 0)
     assert result == np.rint(value / width) * width
     assert abs(result - value) <= 0.5 * width * (1 + 1e-9) + 1e-9 * abs(value)
 
 
-def test_quantisation_between_two_levels_takes_the_even_one() -> None:
+def test_quantisation_between_two_levels_takes_the_even_one():
     values = np.array([-1.5, -0.5, 0.5, 1.5, 2.5]) * 0.25
     expected = [-0.5, 0.0, 0.0, 0.5, 0.5]
     assert passed(on_connection(fault("quantisation", step=0.25)), values).tolist() == expected
 
 
 @pytest.mark.parametrize("steps", [0, 1, 7, 40])
-def test_delay_is_exact(steps: int) -> None:
+def test_delay_is_exact(steps):
     expected = SIGNAL[np.maximum(np.arange(100) - steps, 0)]
     assert (passed(on_connection(fault("delay", time=steps / 1000)), SIGNAL) == expected).all()
 
 
-def test_a_delay_knows_what_was_passed_before_it_began() -> None:
+def test_a_delay_knows_what_was_passed_before_it_began():
     expected = SIGNAL.copy()
     expected[20:50] = SIGNAL[13:43]
     assert (passed(on_connection(fault("delay", 20, 50, time=0.007)), SIGNAL) == expected).all()
@@ -107,9 +94,7 @@ def test_a_delay_knows_what_was_passed_before_it_began() -> None:
 
 @pytest.mark.parametrize("delay", [1, 2, 5, 7])
 @pytest.mark.parametrize(("period", "phase"), [(1, 0), (3, 0), (3, 2)])
-def test_a_delay_counts_base_steps_on_a_slow_connection_too(
-    delay: int, period: int, phase: int
-) -> None:
+def test_a_delay_counts_base_steps_on_a_slow_connection_too(delay, period, phase):
     """The value is the one that was the newest so many base steps ago."""
     steps = np.arange(phase, 100, period)
     newest = np.searchsorted(steps, steps - delay, side="right") - 1
@@ -118,17 +103,17 @@ def test_a_delay_counts_base_steps_on_a_slow_connection_too(
     assert (passed(function, values, steps.tolist()) == values[np.maximum(newest, 0)]).all()
 
 
-def test_a_delay_starts_with_the_value_of_the_initialisation() -> None:
+def test_a_delay_starts_with_the_value_of_the_initialisation():
     function = on_connection(fault("delay", time=0.002))
     assert passed(function, [5.0, 1.0, 2.0, 3.0], [INITIAL, 0, 1, 2]).tolist() == [5, 5, 5, 1]
 
 
-def lost(result: npt.NDArray[Any], values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+def lost(result, values):
     """Where a dropout made another value of one; no two neighbours in values are equal."""
     return np.asarray(result != values)
 
 
-def test_a_dropout_holds_the_last_value_that_got_through() -> None:
+def test_a_dropout_holds_the_last_value_that_got_through():
     result = passed(on_connection(fault("dropout", probability=0.6, seed=4)), SIGNAL)
     through = ~lost(result, SIGNAL)
     assert 10 < through.sum() < 90
@@ -138,7 +123,7 @@ def test_a_dropout_holds_the_last_value_that_got_through() -> None:
 
 
 @pytest.mark.parametrize(("probability", "share"), [(0.0, 0.0), (1.0, 1.0), (0.3, 0.3)])
-def test_how_many_a_dropout_loses(probability: float, share: float) -> None:
+def test_how_many_a_dropout_loses(probability, share):
     n = 20_000
     values = np.arange(n, dtype=float)
     hits = lost(passed(on_connection(fault("dropout", probability=probability)), values), values)[
@@ -150,19 +135,19 @@ def test_how_many_a_dropout_loses(probability: float, share: float) -> None:
     assert abs(pairs - share**2) <= 5 * math.sqrt(variance / n)
 
 
-def test_a_dropout_holds_what_was_passed_before_its_window() -> None:
+def test_a_dropout_holds_what_was_passed_before_its_window():
     result = passed(on_connection(fault("dropout", 20, 50, probability=1.0)), SIGNAL)
     expected = SIGNAL.copy()
     expected[20:50] = SIGNAL[19]
     assert (result == expected).all()
 
 
-def noise(seed: int = 1, target: Port = WIRE, n: int = 20_000) -> npt.NDArray[Any]:
+def noise(seed=1, target=WIRE, n=20_000):
     function = on_connection(fault("noise", target=target, seed=seed, standard_deviation=2.0))
     return passed(function, np.zeros(n))
 
 
-def test_noise_is_gaussian_and_white() -> None:
+def test_noise_is_gaussian_and_white():
     """Bounds of five standard errors of the mean, the deviation and the correlations."""
     x = noise() / 2.0
     n = len(x)
@@ -173,13 +158,13 @@ def test_noise_is_gaussian_and_white() -> None:
         assert abs((x[lag:] * x[:-lag]).mean()) < 5 / math.sqrt(n)
 
 
-def test_noise_of_another_seed_or_connection_is_independent() -> None:
+def test_noise_of_another_seed_or_connection_is_independent():
     x = noise()
     for y in (noise(seed=2), noise(target=OTHER)):
         assert abs(np.corrcoef(x, y)[0, 1]) < 5 / math.sqrt(len(x))
 
 
-def test_two_noises_on_a_connection_are_independent() -> None:
+def test_two_noises_on_a_connection_are_independent():
     """Their variances add up; the same numbers twice would add up to four times one of them."""
     twice = on_connection(*2 * [fault("noise", standard_deviation=1.0)])
     variance = passed(twice, np.zeros(20_000)).var()
@@ -193,7 +178,7 @@ def test_two_noises_on_a_connection_are_independent() -> None:
         fault("dropout", seed=3, probability=0.5),
     ],
 )
-def test_a_random_number_depends_on_the_step_alone(one: Fault) -> None:
+def test_a_random_number_depends_on_the_step_alone(one):
     """Not on the window, on other faults, on the steps asked before, nor on their order."""
     whole = on_connection(one)
     part = on_connection(
@@ -210,7 +195,7 @@ def test_a_random_number_depends_on_the_step_alone(one: Fault) -> None:
         assert (passed(on_connection(one), SIGNAL[::-1], steps)[::-1][41:60] == expected).all()
 
 
-def test_random_numbers_stay_the_same_from_release_to_release() -> None:
+def test_random_numbers_stay_the_same_from_release_to_release():
     function = on_connection(fault("noise", seed=7, standard_deviation=1.0))
     kept = [-0.7353820911792353, 0.8132515606280434, 0.7269561280503712, 0.6529768198539552]
     result = passed(function, np.zeros(4), [INITIAL, 0, 1, 1000])
@@ -229,26 +214,24 @@ def test_random_numbers_stay_the_same_from_release_to_release() -> None:
         (99, 200, range(99, 100)),
     ],
 )
-def test_a_window_is_exact_to_the_step(
-    start: float, end: float | None, acts: Sequence[int]
-) -> None:
+def test_a_window_is_exact_to_the_step(start, end, acts):
     result = passed(on_connection(fault("bias", start, end, value=1.0)), np.zeros(100))
     assert np.flatnonzero(result).tolist() == list(acts)
 
 
 @pytest.mark.parametrize(("start", "acts"), [(0, True), (1, False), (1e-6, False)])
-def test_only_a_fault_from_0_acts_in_initialisation(start: float, acts: bool) -> None:
+def test_only_a_fault_from_0_acts_in_initialisation(start, acts):
     assert on_connection(fault("bias", start, value=1.0))(0.0, INITIAL) == float(acts)
 
 
-def test_faults_of_a_connection_act_in_the_order_of_the_file() -> None:
+def test_faults_of_a_connection_act_in_the_order_of_the_file():
     bias, limit = fault("bias", value=1.0), fault("saturation", high=0.5)
     assert on_connection(bias, limit)(0.0, 0) == 0.5
     assert on_connection(limit, bias)(0.0, 0) == 1.0
     assert on_connection(limit, bias)(2.0, 1) == 1.5
 
 
-def test_each_connection_has_its_own_faults() -> None:
+def test_each_connection_has_its_own_faults():
     faults = (fault("bias", value=1.0), fault("bias", value=2.0, target=OTHER))
     functions = fault_functions([Window("", f, STEP) for f in faults], STEP)
     assert {port: f(0.0, 0) for port, f in functions.items()} == {WIRE: 1.0, OTHER: 2.0}
@@ -274,9 +257,7 @@ VALUES = st.lists(st.floats(-10.0, 10.0), min_size=13, max_size=13)
     VALUES,
     st.lists(st.lists(st.floats(-10.0, 10.0), max_size=3), min_size=13, max_size=13),
 )
-def test_asked_again_at_a_step_it_answers_the_same(
-    faults: list[Fault], values: list[float], before: list[list[float]]
-) -> None:
+def test_asked_again_at_a_step_it_answers_the_same(faults, values, before):
     """And what it was asked before at the same step leaves no trace."""
     once, often = on_connection(*faults), on_connection(*faults)
     for step, (value, others) in enumerate(zip(values, before, strict=True), INITIAL):
@@ -288,7 +269,7 @@ def test_asked_again_at_a_step_it_answers_the_same(
 
 @pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
 @pytest.mark.parametrize("one", ALL, ids=lambda f: f.kind)
-def test_what_is_not_finite_is_not_hidden_by_an_exception(one: Fault, value: float) -> None:
+def test_what_is_not_finite_is_not_hidden_by_an_exception(one, value):
     function = on_connection(one)
     results = [function(value, step) for step in range(12)]
     if one.kind not in ("saturation", "stuck"):

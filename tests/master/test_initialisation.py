@@ -1,9 +1,7 @@
 """Values at t = 0: the order they are passed on in, algebraic loops, wrong declarations."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import count
-from pathlib import Path
-from typing import Any
 
 import pytest
 from grasp_cosim import InputError, SimulationError
@@ -14,35 +12,35 @@ Make = Callable[..., Mock]
 
 
 @pytest.fixture
-def mock(tmp_path: Path) -> Make:
+def mock(tmp_path):
     return lambda *args, **kwargs: Mock(tmp_path, *args, **kwargs)
 
 
-def through(u: float, t: float) -> float:
+def through(u, t):
     return u
 
 
-def run(mocks: Sequence[Mock], pairs: Sequence[str], **more: Any) -> Run:
+def run(mocks, pairs, **more):
     """Each pair 'ab' is a connection from a's y to b's u."""
     connections = [Connection(Port(a, "y"), Port(b, "u")) for a, b in map(tuple, pairs)]
     return Run(make_system(mocks, connections, **more), mocks)
 
 
-def test_values_propagate_against_the_order_of_execution(mock: Make) -> None:
+def test_values_propagate_against_the_order_of_execution(mock):
     mocks = [mock("c", through), mock("b", through), mock("a", lambda u, t: 7.0)]
     started = run(mocks, ["ab", "bc"])
     started.master.initialise()
     assert [started.signals()[f"{name}.y"] for name in "abc"] == [[7.0]] * 3
 
 
-def test_each_port_is_passed_on_in_initialisation_mode(mock: Make) -> None:
+def test_each_port_is_passed_on_in_initialisation_mode(mock):
     b = mock("b", through)
     run([mock("a", lambda u, t: 1.0), b], ["ab"]).master.initialise()
     assert b.calls[0] == "enter"
     assert set(b.calls[1 : b.calls.index("exit")]) == {"send", "receive"}
 
 
-def test_nothing_is_sent_that_no_output_has_put_out(mock: Make) -> None:
+def test_nothing_is_sent_that_no_output_has_put_out(mock):
     """a runs before its source: what it is sent is the source's value, not a zero."""
     a = mock("a", lambda u, t: 1.0 / u)
     a.u = 1.0  # the start value
@@ -50,7 +48,7 @@ def test_nothing_is_sent_that_no_output_has_put_out(mock: Make) -> None:
     assert a.u == 5.0
 
 
-def test_a_ring_without_direct_feedthrough_is_no_loop(mock: Make) -> None:
+def test_a_ring_without_direct_feedthrough_is_no_loop(mock):
     mocks = [mock("a", lambda u, t: 3.0 + t, direct=False), mock("b", through)]
     started = run(mocks, ["ab", "ba"], initialisation=Initialisation("refuse"))
     started.master.initialise()
@@ -58,7 +56,7 @@ def test_a_ring_without_direct_feedthrough_is_no_loop(mock: Make) -> None:
     assert started.master.log == []
 
 
-def test_a_linear_loop_is_solved_and_said(mock: Make) -> None:
+def test_a_linear_loop_is_solved_and_said(mock):
     """y = 1 - 5 u, u = y: y = 1/6, where repeating it would diverge."""
     mocks = [mock("a", lambda u, t: 1.0 - 5.0 * u), mock("b", through)]
     started = run(mocks, ["ab", "ba"])
@@ -68,7 +66,7 @@ def test_a_linear_loop_is_solved_and_said(mock: Make) -> None:
     assert line.startswith("algebraic loop at t = 0 through a.u: solved in ")
 
 
-def test_a_loop_that_any_value_solves_keeps_its_start_and_says_so(mock: Make) -> None:
+def test_a_loop_that_any_value_solves_keeps_its_start_and_says_so(mock):
     started = run([mock("a", through), mock("b", through)], ["ab", "ba"])
     started.master.initialise()
     assert started.signals()["a.y"] == [0.0]
@@ -76,21 +74,21 @@ def test_a_loop_that_any_value_solves_keeps_its_start_and_says_so(mock: Make) ->
     assert "a.u: its start values solve it and are kept, to a relative residual of 0" in line
 
 
-def test_a_nonlinear_loop_is_solved(mock: Make) -> None:
+def test_a_nonlinear_loop_is_solved(mock):
     """y = 2 - u^3, u = y has the solution 1."""
     started = run([mock("a", lambda u, t: 2.0 - u**3), mock("b", through)], ["ab", "ba"])
     started.master.initialise()
     assert started.signals()["a.y"][0] == pytest.approx(1.0, abs=1e-9)
 
 
-def test_a_loop_of_small_values_is_solved(mock: Make) -> None:
+def test_a_loop_of_small_values_is_solved(mock):
     """y = 1e-11 - 5 u, u = y has the solution 1e-11 / 6; the start value 0 is none."""
     started = run([mock("a", lambda u, t: 1e-11 - 5.0 * u), mock("b", through)], ["ab", "ba"])
     started.master.initialise()
     assert started.signals()["a.y"][0] == pytest.approx(1e-11 / 6.0, rel=1e-6)
 
 
-def test_a_residual_is_relative_to_the_nominal_value(mock: Make) -> None:
+def test_a_residual_is_relative_to_the_nominal_value(mock):
     """y = 2e-9 - u^3 / 1e-18, u = y has the solution 1e-9."""
     cubic = mock("a", lambda u, t: 2e-9 - u**3 / 1e-18, nominal=1e-9)
     started = run([cubic, mock("b", through, nominal=1e-9)], ["ab", "ba"])
@@ -98,7 +96,7 @@ def test_a_residual_is_relative_to_the_nominal_value(mock: Make) -> None:
     assert started.signals()["a.y"][0] == pytest.approx(1e-9, rel=1e-9)
 
 
-def test_two_loops_are_solved_together(mock: Make) -> None:
+def test_two_loops_are_solved_together(mock):
     mocks = [
         mock("a", lambda u, t: 1.0 - 2.0 * u), mock("b", through),
         mock("c", lambda u, t: 3.0 + 0.5 * u), mock("d", through),
@@ -112,31 +110,31 @@ def test_two_loops_are_solved_together(mock: Make) -> None:
     assert line.startswith("2 algebraic loops at t = 0 through a.u, c.u: solved in ")
 
 
-def test_a_loop_is_refused_by_its_path_where_that_is_chosen(mock: Make) -> None:
+def test_a_loop_is_refused_by_its_path_where_that_is_chosen(mock):
     mocks = [mock("a", lambda u, t: 1.0 - 0.5 * u), mock("b", through)]
     with pytest.raises(InputError, match=r"a\.u -> a\.y -> b\.u -> b\.y -> a\.u; must have"):
         run(mocks, ["ab", "ba"], initialisation=Initialisation("refuse")).master.initialise()
 
 
-def test_a_loop_without_a_solution_is_refused(mock: Make) -> None:
+def test_a_loop_without_a_solution_is_refused(mock):
     with pytest.raises(InputError, match=r"a\.u -> .* does not converge to a relative residual of"):
         run([mock("a", lambda u, t: u + 1.0), mock("b", through)], ["ab", "ba"]).master.initialise()
 
 
-def test_a_loop_of_booleans_is_refused(mock: Make) -> None:
+def test_a_loop_of_booleans_is_refused(mock):
     mocks = [mock("a", lambda u, t: not u, "Boolean"), mock("b", through, "Boolean")]
     with pytest.raises(InputError, match=r"a\.u is Boolean: only loops of Real values"):
         run(mocks, ["ab", "ba"]).master.initialise()
 
 
-def test_undeclared_dependencies_count_as_all(mock: Make) -> None:
+def test_undeclared_dependencies_count_as_all(mock):
     mocks = [mock("a", lambda u, t: 1.0 - 0.5 * u, direct=None), mock("b", through)]
     started = run(mocks, ["ab", "ba"])
     started.master.initialise()
     assert started.signals()["a.y"][0] == pytest.approx(2.0 / 3.0, rel=1e-9)
 
 
-def test_a_dependency_that_is_not_declared_is_found_and_said(mock: Make) -> None:
+def test_a_dependency_that_is_not_declared_is_found_and_said(mock):
     liar = mock("a", lambda u, t: 2.0 * u, direct=False)
     started = run([liar, mock("b", through), mock("s", lambda u, t: 4.0)], ["sa", "ab"])
     started.master.initialise()
@@ -145,13 +143,13 @@ def test_a_dependency_that_is_not_declared_is_found_and_said(mock: Make) -> None
     assert line.startswith("a.y changed at t = 0 with an input that it does not declare")
 
 
-def test_a_loop_that_no_declaration_shows_is_refused(mock: Make) -> None:
+def test_a_loop_that_no_declaration_shows_is_refused(mock):
     mocks = [mock("a", lambda u, t: u + 1.0, direct=False), mock("b", through)]
     with pytest.raises(InputError, match="do not settle, a loop through"):
         run(mocks, ["ab", "ba"]).master.initialise()
 
 
-def test_an_output_that_changes_each_time_it_is_read_is_said(mock: Make) -> None:
+def test_an_output_that_changes_each_time_it_is_read_is_said(mock):
     """As the time of day does: nothing is connected to it, so it is no loop."""
     clock = count()
     started = run([mock("a", through), mock("b", lambda u, t: float(next(clock)))], ["ab"])
@@ -159,7 +157,7 @@ def test_an_output_that_changes_each_time_it_is_read_is_said(mock: Make) -> None
     assert started.master.log == ["b.y changes each time it is read"]
 
 
-def test_a_failure_in_initialisation_is_a_wrong_input(mock: Make) -> None:
+def test_a_failure_in_initialisation_is_a_wrong_input(mock):
     a = mock("a", through)
     a.statuses["receive"] = 3
     with pytest.raises(InputError, match="a: status 3") as caught:
@@ -167,7 +165,7 @@ def test_a_failure_in_initialisation_is_a_wrong_input(mock: Make) -> None:
     assert isinstance(caught.value.__cause__, SimulationError)
 
 
-def test_an_integer_that_a_float_does_not_hold_is_refused(mock: Make) -> None:
+def test_an_integer_that_a_float_does_not_hold_is_refused(mock):
     mocks = [mock("a", lambda u, t: 2**53 + 1, "Integer"), mock("b", through, "Integer")]
     with pytest.raises(InputError, match=r"^a\.y = 9007199254740993 at step 0: must be smaller th"):
         run(mocks, ["ab"]).master.initialise()

@@ -1,12 +1,10 @@
 """The loop itself, interpreted and compiled: moves, casts of every type, rates, statuses."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from grasp_cosim.base.calls import Call
 from grasp_cosim.master import loop
-from grasp_cosim.master.engine import Engine, Loop, make_loop
+from grasp_cosim.master.engine import make_loop
 from grasp_cosim.master.loop import CALL, COPY, LOAD, LOAD_LONG, SCALE, STEP, STORE
 from grasp_cosim.master.plan import Plan
 from support.both_engines import engines
@@ -27,19 +25,19 @@ TYPES = [
 pytestmark = engines
 
 
-def plan(values: Any, operations: Any, **parts: Any) -> Plan:
+def plan(values, operations, **parts):
     lists = {name: list(part) for name, part in parts.items()}
     return Plan(np.array(values, float), np.zeros(2), list(operations), **lists)
 
 
-def run(made: Plan, engine: Engine, steps: int, operation: int = 0) -> tuple[Any, Any]:
+def run(made, engine, steps, operation=0):
     """What the loop returns, and the rows."""
-    call: Loop = make_loop(made, engine)
+    call = make_loop(made, engine)
     rows = np.full((steps, len(made.values)), np.nan)
     return call(rows, operation, 0, steps, 0, 1_000_000), rows
 
 
-def test_a_copy_keeps_the_sign_of_zero_and_a_scale_computes(engine: Engine) -> None:
+def test_a_copy_keeps_the_sign_of_zero_and_a_scale_computes(engine):
     connections = ((0, 1, 1.0, 0.0), (0, 2, 3.0, 0.1))
     made = plan(
         [-0.0, 5.0, 5.0], [(COPY, 0, 1, 1, 0), (SCALE, 1, 2, 1, 0)], connections=connections
@@ -50,9 +48,9 @@ def test_a_copy_keeps_the_sign_of_zero_and_a_scale_computes(engine: Engine) -> N
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_numbers_of_every_type_come_through(engine: Engine, name: str) -> None:
+def test_numbers_of_every_type_come_through(engine, name):
     dtype = np.dtype(name)
-    ends: list[Any] = [0, 1]
+    ends = [0, 1]
     if dtype.kind in "iu":
         info = np.iinfo(dtype)
         ends = [max(info.min, 1 - 2**53), min(info.max, 2**53 - 1)]
@@ -70,7 +68,7 @@ def test_numbers_of_every_type_come_through(engine: Engine, name: str) -> None:
     assert target.tobytes() == source.tobytes()
 
 
-def test_any_byte_but_zero_is_true(engine: Engine) -> None:
+def test_any_byte_but_zero_is_true(engine):
     """As a C compiler that does not know fmi3Boolean for a bool leaves it."""
     found = np.array([0, 1, 255], np.uint8).view(np.bool_)
     casts = tuple((0, i, i) for i in range(3))
@@ -79,9 +77,7 @@ def test_any_byte_but_zero_is_true(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [("int64", -(2**53)), ("uint64", 2**64 - 1)])
-def test_an_integer_that_a_float_does_not_hold_is_refused(
-    engine: Engine, name: str, value: int
-) -> None:
+def test_an_integer_that_a_float_does_not_hold_is_refused(engine, name, value):
     made = plan(
         [7.0], [(LOAD_LONG, 0, 1, 1, 0)], casts=((0, 0, 0),), buffers=(np.array([value], name),)
     )
@@ -89,10 +85,10 @@ def test_an_integer_that_a_float_does_not_hold_is_refused(
     assert made.values[0] == 7.0
 
 
-def test_a_slow_operation_runs_in_its_phase_with_its_own_time(engine: Engine) -> None:
-    seen: list[tuple[float, float]] = []
+def test_a_slow_operation_runs_in_its_phase_with_its_own_time(engine):
+    seen = []
 
-    def call() -> int:
+    def call():
         seen.append((float(made.clock[0]), float(made.clock[1])))
         return 0
 
@@ -101,7 +97,7 @@ def test_a_slow_operation_runs_in_its_phase_with_its_own_time(engine: Engine) ->
     assert seen == [(0.0, 2.0), (0.003, 5.0)]
 
 
-def test_a_bad_status_says_where_and_the_run_can_go_on_behind_it(engine: Engine) -> None:
+def test_a_bad_status_says_where_and_the_run_can_go_on_behind_it(engine):
     statuses = iter([0, 1, 2, 0, 0])
     made = plan([0.0], [(CALL, 0, 1, 1, 0), (CALL, 1, 2, 1, 0)], calls=(
         Call(lambda: next(statuses)), Call(lambda: 0),

@@ -1,14 +1,13 @@
 """Events and faults in runs of the built-in grasp, against the sensor's equation and NumPy."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim import InputError, Result, SimulationError, System, simulate
+from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.system.parts import Condition, Event, Fault, Port
 from support.both_engines import needs_compiler
 
@@ -19,27 +18,27 @@ GAP = Port("sensor_1", "gap")
 REFLECTANCE = Port("sensor_1", "reflectance")
 
 
-def intensity(gap: Array, reflectance: Array | float = 1.0) -> Array:
+def intensity(gap, reflectance=1.0):
     """Eq. (9) in V, for a gap in m."""
     return np.asarray(0.0024 * reflectance / (np.maximum(gap, 0.0) + 0.005) ** 1.1506)
 
 
-def seen(result: Result) -> Array:
+def seen(result):
     """The gap in m that sensor 1 must have got for what it puts out, in each row."""
     return np.asarray((0.0024 / result["sensor_1.intensity"]) ** (1 / 1.1506) - 0.005)
 
 
-def run(system: System, stop: float = 0.3, **changes: Any) -> Result:
+def run(system, stop=0.3, **changes):
     return simulate(replace(system, **changes), step=STEP, stop=stop)
 
 
-def on_gap(kind: str, start: int = 0, end: int | None = None, **given: float) -> Fault:
+def on_gap(kind, start=0, end=None, **given):
     """A fault of the connection to sensor 1, with a window in steps."""
     unit = round(STEP * 1e9)
     return Fault(GAP, kind, given, start * unit, None if end is None else end * unit)
 
 
-def test_a_change_of_reflectance_moves_the_target(grasp: System) -> None:
+def test_a_change_of_reflectance_moves_the_target(grasp):
     """Finger 1's side gets darker: it looks further away, so the target moves its way."""
     event = Event({REFLECTANCE: 0.6}, at_ns=100_000_000)
     plain, changed = run(grasp), run(grasp, events=(event,))
@@ -58,7 +57,7 @@ def test_a_change_of_reflectance_moves_the_target(grasp: System) -> None:
     assert "t = 0.1 s: sensor_1.reflectance = 0.6" in changed.log
 
 
-TUNED: dict[str, bool | float] = {
+TUNED = {
     "plant.finger_mass[1]": 0.8,
     "plant.friction.coulomb[2]": 0.05,
     "plant.actuator.force_limit[1]": 0.5,
@@ -68,7 +67,7 @@ TUNED: dict[str, bool | float] = {
 """What acts by the steps alone."""
 
 
-def test_an_event_at_the_start_is_a_start_value(grasp: System) -> None:
+def test_an_event_at_the_start_is_a_start_value(grasp):
     at_once = Event({Port(*name.split(".", 1)): v for name, v in TUNED.items()}, at_ns=0)
     changed, began = run(grasp, events=(at_once,)), run(grasp.with_values(TUNED))
     for name in began:
@@ -77,7 +76,7 @@ def test_an_event_at_the_start_is_a_start_value(grasp: System) -> None:
     assert "t = 0 s: controller.simultaneous_contact.enabled = false" in changed.log
 
 
-def test_values_that_do_not_go_together_end_the_run_with_the_reason(grasp: System) -> None:
+def test_values_that_do_not_go_together_end_the_run_with_the_reason(grasp):
     low, high = (Port("sensor_1", f"adc.range[{i}]") for i in (1, 2))
     event = Event({low: 20.0, Port("sensor_1", "surface"): "black"}, at_ns=10_000_000)
     with pytest.raises(SimulationError, match=r"adc\.range = 20\.0, 10\.0 V: the second must be"):
@@ -89,7 +88,7 @@ def test_values_that_do_not_go_together_end_the_run_with_the_reason(grasp: Syste
     )
 
 
-def test_an_event_on_a_condition_happens_where_it_holds_first(grasp: System) -> None:
+def test_an_event_on_a_condition_happens_where_it_holds_first(grasp):
     condition = Condition(Port("plant", "gap[1]"), "<", 0.04)
     result = run(grasp, events=(Event({REFLECTANCE: 0.5}, when=condition),))
     k = int(np.argmax(result["plant.gap[1]"] < 0.04))
@@ -101,7 +100,7 @@ def test_an_event_on_a_condition_happens_where_it_holds_first(grasp: System) -> 
     assert line in result.log
 
 
-def test_an_event_on_a_slow_component_waits_for_its_next_own_step(grasp: System) -> None:
+def test_an_event_on_a_slow_component_waits_for_its_next_own_step(grasp):
     """The sensor steps every 5 ms: of what is set at 12 ms, it knows from 15 ms on."""
     components = tuple(
         replace(c, step_ns=5_000_000) if c.name == "sensor_1" else c for c in grasp.components
@@ -114,13 +113,13 @@ def test_an_event_on_a_slow_component_waits_for_its_next_own_step(grasp: System)
     assert result.log == ("t = 0.015 s: sensor_1.reflectance = 0.6",)
 
 
-def window(rows: int, start: int, end: int) -> npt.NDArray[np.bool_]:
+def window(rows, start, end):
     """The rows that the steps from start until end lead to; row 0 is the initialisation's."""
     steps = np.arange(rows) - 1
     return np.asarray((steps >= start) & (steps < end))
 
 
-DETERMINISTIC: list[tuple[Fault, Callable[[Array], Array]]] = [
+DETERMINISTIC = [
     (on_gap("stuck", 50, 90), lambda gap: np.full_like(gap, gap[51])),
     (on_gap("stuck", 50, 90, value=0.02), lambda gap: np.full_like(gap, 0.02)),
     (on_gap("bias", 50, 90, value=0.003), lambda gap: gap + 0.003),
@@ -133,9 +132,7 @@ DETERMINISTIC: list[tuple[Fault, Callable[[Array], Array]]] = [
 @pytest.mark.parametrize(
     ("fault", "expected"), DETERMINISTIC, ids=[fault.kind for fault, _ in DETERMINISTIC]
 )
-def test_a_fault_of_a_connection(
-    grasp: System, fault: Fault, expected: Callable[[Array], Array]
-) -> None:
+def test_a_fault_of_a_connection(grasp, fault, expected):
     result = run(grasp, stop=0.15, faults=(fault,))
     gap = result["plant.gap[1]"]
     got = np.where(window(151, 50, 90), expected(gap), gap)
@@ -149,20 +146,20 @@ def test_a_fault_of_a_connection(
     ]
 
 
-def test_a_fault_from_0_acts_at_t_0(grasp: System) -> None:
+def test_a_fault_from_0_acts_at_t_0(grasp):
     result = run(grasp, stop=0.01, faults=(on_gap("bias", value=0.003),))
     expected = intensity(result["plant.gap[1]"] + 0.003)
     assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_delay_from_0_repeats_the_value_of_t_0(grasp: System) -> None:
+def test_a_delay_from_0_repeats_the_value_of_t_0(grasp):
     result = run(grasp, stop=0.05, faults=(on_gap("delay", time=0.005),))
     gap = result["plant.gap[1]"]
     expected = intensity(gap[np.maximum(np.arange(51) - 5, 0)])
     assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
 
 
-def test_noise_of_a_connection(grasp: System) -> None:
+def test_noise_of_a_connection(grasp):
     result = run(grasp, faults=(on_gap("noise", standard_deviation=1e-4),))
     x = (seen(result) - result["plant.gap[1]"]) / 1e-4
     n = len(x)
@@ -171,7 +168,7 @@ def test_noise_of_a_connection(grasp: System) -> None:
     assert abs((x[1:] * x[:-1]).mean()) < 5 / math.sqrt(n)
 
 
-def test_dropouts_of_a_connection(grasp: System) -> None:
+def test_dropouts_of_a_connection(grasp):
     result = run(grasp, stop=0.2, faults=(on_gap("dropout", probability=0.5),))
     gap = result["plant.gap[1]"]
     through = np.isclose(seen(result), gap, rtol=0, atol=1e-12)
@@ -180,7 +177,7 @@ def test_dropouts_of_a_connection(grasp: System) -> None:
     assert result["sensor_1.intensity"] == pytest.approx(intensity(gap[newest]), rel=1e-12)
 
 
-def test_a_fault_may_begin_on_a_condition(grasp: System) -> None:
+def test_a_fault_may_begin_on_a_condition(grasp):
     condition = Condition(Port("plant", "gap[1]"), "<", 0.04)
     fault = replace(on_gap("bias", 50, value=0.003), when=condition)
     result = run(grasp, faults=(fault,))
@@ -190,7 +187,7 @@ def test_a_fault_may_begin_on_a_condition(grasp: System) -> None:
     assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
 
 
-FULL: dict[str, Any] = {
+FULL = {
     "events": (
         Event({REFLECTANCE: 0.6}, at_ns=50_000_000),
         Event({REFLECTANCE: 0.8}, when=Condition(Port("plant", "gap[1]"), "<", 0.04)),
@@ -207,13 +204,13 @@ FULL: dict[str, Any] = {
 }
 
 
-def bits(result: Result) -> dict[str, bytes]:
+def bits(result):
     return {name: np.ascontiguousarray(result[name]).tobytes() for name in result}
 
 
 @needs_compiler
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_both_engines_give_the_same_bits(grasp: System, scheme: str) -> None:
+def test_both_engines_give_the_same_bits(grasp, scheme):
     system = replace(grasp, **FULL).with_experiment(STEP, 0.3, scheme)
     plain = simulate(system, engine="python")
     compiled = simulate(system, engine="compiled")
@@ -222,17 +219,17 @@ def test_both_engines_give_the_same_bits(grasp: System, scheme: str) -> None:
     assert sum("sensor_1.reflectance" in line for line in plain.log) == 2
 
 
-def test_the_same_run_twice_gives_the_same_bits(grasp: System) -> None:
+def test_the_same_run_twice_gives_the_same_bits(grasp):
     assert bits(run(grasp, **FULL)) == bits(run(grasp, **FULL))
 
 
-def test_another_seed_gives_other_values(grasp: System) -> None:
+def test_another_seed_gives_other_values(grasp):
     fault = on_gap("noise", standard_deviation=1e-4)
     one, two = (run(grasp, 0.02, faults=(replace(fault, seed=seed),)) for seed in (1, 2))
     assert (one["sensor_1.intensity"] != two["sensor_1.intensity"]).all()
 
 
-def test_steps_may_be_done_one_by_one(grasp: System) -> None:
+def test_steps_may_be_done_one_by_one(grasp):
     whole = run(grasp, 0.05, **FULL)
     with simulate.session(replace(grasp, **FULL), step=STEP, stop=0.05) as session:
         while session.step():
@@ -240,7 +237,7 @@ def test_steps_may_be_done_one_by_one(grasp: System) -> None:
         assert bits(session.result()) == bits(whole)
 
 
-def test_what_a_session_sets_is_what_an_event_sets(grasp: System) -> None:
+def test_what_a_session_sets_is_what_an_event_sets(grasp):
     event = Event({REFLECTANCE: 0.6}, at_ns=20_000_000)
     whole = run(grasp, 0.05, events=(event,))
     with simulate.session(grasp, step=STEP, stop=0.05) as session:
@@ -256,7 +253,7 @@ def test_what_a_session_sets_is_what_an_event_sets(grasp: System) -> None:
     assert result.log == whole.log == ("t = 0.02 s: sensor_1.reflectance = 0.6",)
 
 
-def test_a_surface_set_by_name_has_its_reflectance(grasp: System) -> None:
+def test_a_surface_set_by_name_has_its_reflectance(grasp):
     results = []
     for name, value in (("sensor_1.reflectance", 0.86), ("sensor_1.surface", "brown")):
         with simulate.session(grasp, step=STEP, stop=0.1) as session:
@@ -268,7 +265,7 @@ def test_a_surface_set_by_name_has_its_reflectance(grasp: System) -> None:
     assert bits(by_name) == bits(by_number) != bits(run(grasp, 0.1))
 
 
-def test_what_did_not_happen_is_in_the_log(grasp: System) -> None:
+def test_what_did_not_happen_is_in_the_log(grasp):
     event = Event({REFLECTANCE: 0.6}, at_ns=10_000_000)
     with simulate.session(replace(grasp, events=(event,)), step=STEP, stop=0.01) as session:
         session.step(9)

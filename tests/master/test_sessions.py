@@ -5,17 +5,14 @@ import os
 import signal
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from fmi.instances import KINDS
 from fmi.test_rejected_steps import alone
-from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.master import master, simulation
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.system.parts import Isolation
 from support.both_engines import engines
 from support.mocks import Mock, make_system
 from support.native_fmus import needs_gcc
@@ -24,7 +21,7 @@ pytestmark = needs_gcc
 
 
 @engines
-def test_a_closed_session_calls_no_fmu(tmp_path: Path, engine: Engine) -> None:
+def test_a_closed_session_calls_no_fmu(tmp_path, engine):
     with simulate.session(alone(tmp_path, "3.0", "none"), engine=engine) as session:
         session.step(3)
     closed = "^alone: the session is closed; must be a new one$"
@@ -37,7 +34,7 @@ def test_a_closed_session_calls_no_fmu(tmp_path: Path, engine: Engine) -> None:
 
 
 @engines
-def test_after_a_failure_no_fmu_is_called(tmp_path: Path, engine: Engine) -> None:
+def test_after_a_failure_no_fmu_is_called(tmp_path, engine):
     system = alone(tmp_path, "3.0", "none", error_at=0.35)
     with simulate.session(system, engine=engine) as session:
         with pytest.raises(SimulationError):
@@ -48,7 +45,7 @@ def test_after_a_failure_no_fmu_is_called(tmp_path: Path, engine: Engine) -> Non
         assert len(session.result().time) == 4
 
 
-def test_a_value_that_does_not_fit_breaks_nothing(tmp_path: Path) -> None:
+def test_a_value_that_does_not_fit_breaks_nothing(tmp_path):
     with simulate.session(alone(tmp_path, "3.0", "none")) as session:
         with pytest.raises(InputError, match="must be a finite number"):
             session.set("part.gain", float("nan"))
@@ -58,9 +55,7 @@ def test_a_value_that_does_not_fit_breaks_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize(("version", "isolation"), KINDS)
-def test_an_interrupted_session_does_not_go_on(
-    tmp_path: Path, version: str, isolation: Isolation
-) -> None:
+def test_an_interrupted_session_does_not_go_on(tmp_path, version, isolation):
     """Its FMU is further than its rows."""
     part = alone(tmp_path, version, isolation, interrupt_at=0.001_000_5, interrupted=os.getpid())
     system = replace(part, step_ns=1000, stop_ns=100_000_000_000)
@@ -75,10 +70,8 @@ def test_an_interrupted_session_does_not_go_on(
 
 
 @pytest.mark.usefixtures("ctrl_c")
-def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(
-    grasp: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def load(_: object) -> None:
+def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(grasp, monkeypatch):
+    def load(_):
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:  # as pythonfmu does
@@ -90,15 +83,13 @@ def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_an_fmu_that_goes_to_another_folder_takes_nobody_with_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_fmu_that_goes_to_another_folder_takes_nobody_with_it(tmp_path, monkeypatch):
     """Paths are relative to where the user stands, to the end of the run."""
     here = Path.cwd()
     with simulate.session(alone(tmp_path, "2.0", "none"), engine="python") as session:
         advance = session._master.advance
 
-        def away(steps: int) -> int:
+        def away(steps):
             os.chdir("/")
             return advance(steps)
 
@@ -109,14 +100,14 @@ def test_an_fmu_that_goes_to_another_folder_takes_nobody_with_it(
     assert Path.cwd() == here
 
 
-def test_a_session_that_has_not_stepped_has_metrics(tmp_path: Path) -> None:
+def test_a_session_that_has_not_stepped_has_metrics(tmp_path):
     with simulate.session(alone(tmp_path, "3.0", "none")) as session:
         metrics = session.result().metrics
     assert (metrics["steps"], metrics["real_time_factor"]) == (0, 0.0)
 
 
 @pytest.mark.parametrize("steps", [0, -1, 1.5, True, 2**63])
-def test_steps_are_counted_in_whole_numbers(grasp: System, steps: int) -> None:
+def test_steps_are_counted_in_whole_numbers(grasp, steps):
     with simulate.session(grasp, stop=0.01) as session:
         with pytest.raises(InputError, match=r"steps = .*: must be a whole number from 1 to"):
             session.step(steps)
@@ -124,7 +115,7 @@ def test_steps_are_counted_in_whole_numbers(grasp: System, steps: int) -> None:
         assert session.time == 3e-4
 
 
-def test_an_engine_that_does_not_exist_is_refused(grasp: System) -> None:
+def test_an_engine_that_does_not_exist_is_refused(grasp):
     with pytest.raises(InputError, match="engine = 'complied': must be one of auto, python, comp"):
         simulate(grasp, stop=1e-3, engine="complied")  # type: ignore[arg-type]
 
@@ -132,18 +123,16 @@ def test_an_engine_that_does_not_exist_is_refused(grasp: System) -> None:
 class Blocks(MemoryListener):
     """Remembers how many rows came at once."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
-        self.sizes: list[int] = []
+        self.sizes = []
 
-    def block(self, steps: Any, rows: Any) -> None:
+    def block(self, steps, rows):
         self.sizes.append(len(steps))
         super().block(steps, rows)
 
 
-def test_rows_of_single_steps_are_handed_on_together(
-    grasp: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_of_single_steps_are_handed_on_together(grasp, monkeypatch):
     monkeypatch.setattr(master, "LONG", math.inf)
     blocks = Blocks()
     with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
@@ -159,9 +148,7 @@ def test_rows_of_single_steps_are_handed_on_together(
     )
 
 
-def test_rows_that_wait_are_handed_on_after_a_while(
-    grasp: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_that_wait_are_handed_on_after_a_while(grasp, monkeypatch):
     monkeypatch.setattr(master, "LONG", 0.0)
     blocks = Blocks()
     with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
@@ -171,9 +158,7 @@ def test_rows_that_wait_are_handed_on_after_a_while(
 
 
 @engines
-def test_a_value_that_is_not_finite_is_found_in_its_step(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
-) -> None:
+def test_a_value_that_is_not_finite_is_found_in_its_step(tmp_path, monkeypatch, engine):
     """Also where it has gone again at the end of the call."""
     monkeypatch.setattr(master, "LONG", math.inf)
     mock = Mock(tmp_path, "a", lambda u, t: math.inf if 0.45 < t < 0.65 else t)
@@ -189,13 +174,11 @@ def test_a_value_that_is_not_finite_is_found_in_its_step(
         assert len(error.value.result.time) == 6
 
 
-def test_a_listener_that_fails_at_a_look_breaks_the_session(
-    grasp: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_listener_that_fails_at_a_look_breaks_the_session(grasp, monkeypatch):
     monkeypatch.setattr(master, "LONG", math.inf)
 
     class Full(Blocks):
-        def block(self, steps: Any, rows: Any) -> None:
+        def block(self, steps, rows):
             if len(self.sizes):
                 raise SimulationError("full")
             super().block(steps, rows)
@@ -210,7 +193,7 @@ def test_a_listener_that_fails_at_a_look_breaks_the_session(
             session.step()
 
 
-def test_a_setting_is_checked_each_time(grasp: System) -> None:
+def test_a_setting_is_checked_each_time(grasp):
     with simulate.session(grasp, stop=0.1) as session:
         session.set("sensor_1.reflectance", 0.5)
         session.set("sensor_1.reflectance", 0.25)

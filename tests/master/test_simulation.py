@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Altered, UnpackIn
-from grasp_cosim import InputError, SimulationError, System, simulate
+from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from support.cases import CASES
 from support.packages import needs_pythonfmu
@@ -25,7 +24,7 @@ from support.packages import needs_pythonfmu
 SHORT = 0.05
 
 
-def test_every_output_is_recorded_with_its_unit(grasp: System) -> None:
+def test_every_output_is_recorded_with_its_unit(grasp):
     result = simulate(grasp, stop=SHORT)
     outputs = {
         f"{c.name}.{v.name}": v.unit for c in grasp.components for v in c.interface.of("output")
@@ -36,12 +35,12 @@ def test_every_output_is_recorded_with_its_unit(grasp: System) -> None:
     assert result["plant.contact[1]"].dtype == bool
 
 
-def test_time_is_k_times_the_step(grasp: System) -> None:
+def test_time_is_k_times_the_step(grasp):
     result = simulate(grasp, stop=SHORT)
     assert result.time.tolist() == [k * 100_000 / 1e9 for k in range(501)]
 
 
-def test_outputs_at_t_0_are_consistent(grasp: System) -> None:
+def test_outputs_at_t_0_are_consistent(grasp):
     result = simulate(grasp, stop=1e-4)
     for j, gap in ((1, 0.045), (2, 0.105)):
         assert result[f"plant.gap[{j}]"][0] == pytest.approx(gap, rel=1e-14)
@@ -53,7 +52,7 @@ def test_outputs_at_t_0_are_consistent(grasp: System) -> None:
     assert result["controller.simultaneous_contact_force"][0] == pytest.approx(f_s, rel=1e-13)
 
 
-def test_nothing_jumps_at_the_start(grasp: System) -> None:
+def test_nothing_jumps_at_the_start(grasp):
     """The virtual objects start where the fingers are measured, wherever the FMUs' inputs start."""
     moved = grasp.with_values(
         {"plant.initial_position[1]": 0.15, "plant.initial_position[2]": -0.1}
@@ -66,7 +65,7 @@ def test_nothing_jumps_at_the_start(grasp: System) -> None:
         assert np.abs(np.diff(result[f"controller.force[{j}]"])).max() < 0.02
 
 
-def test_start_values_are_honoured(grasp: System) -> None:
+def test_start_values_are_honoured(grasp):
     values = {"plant.initial_object_position": 0.01, "sensor_2.reflectance": 0.5}
     result = simulate(grasp.with_values(values), stop=1e-3)
     assert (result["plant.object_position"] == 0.01).all()
@@ -74,12 +73,12 @@ def test_start_values_are_honoured(grasp: System) -> None:
     assert result["sensor_2.intensity"][0] == pytest.approx(expected, rel=1e-13)
 
 
-def test_repeated_runs_give_the_same_bits(grasp: System) -> None:
+def test_repeated_runs_give_the_same_bits(grasp):
     one, two = simulate(grasp, stop=SHORT), simulate(grasp, stop=SHORT)
     assert all((one[name] == two[name]).all() for name in one)
 
 
-def test_a_swapped_fmu_is_the_one_that_runs(grasp: System, fmus: Path, tmp_path: Path) -> None:
+def test_a_swapped_fmu_is_the_one_that_runs(grasp, fmus, tmp_path):
     other = tmp_path / "other.fmu"
     other.write_bytes((fmus / "GripperPlant.fmu").read_bytes())
     swapped = grasp.swap("plant", other)
@@ -88,7 +87,7 @@ def test_a_swapped_fmu_is_the_one_that_runs(grasp: System, fmus: Path, tmp_path:
     assert all((one[name] == two[name]).all() for name in one)
 
 
-def test_a_refused_parameter_is_one_line_with_the_reason(grasp: System) -> None:
+def test_a_refused_parameter_is_one_line_with_the_reason(grasp):
     wide = grasp.with_values({"plant.object_width": 0.5})
     with pytest.raises(
         InputError, match=r"^plant: GripperPlant.fmu refused .*object_width = 0.5 m"
@@ -99,9 +98,7 @@ def test_a_refused_parameter_is_one_line_with_the_reason(grasp: System) -> None:
 GAP = "l = 0.0 if u.gap < 0.0 else u.gap"
 
 
-def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
-    grasp: System, altered: Altered
-) -> None:
+def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(grasp, altered):
     trap = f"if u.gap < 0.044:\n        raise RuntimeError('the lamp is broken')\n    {GAP}"
     fmu = altered("ProximitySensor", "proximity_sensor/optics.py", GAP, trap)
     with pytest.raises(
@@ -120,7 +117,7 @@ def test_an_fmu_that_fails_on_the_way_leaves_what_was_recorded(
 
 @needs_pythonfmu
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux which libraries are loaded")
-def test_a_python_fmu_that_refuses_a_step_says_why_and_is_freed(grasp: System) -> None:
+def test_a_python_fmu_that_refuses_a_step_says_why_and_is_freed(grasp):
     """pythonfmu answers fmi2Fatal, after which FMI forbids to free it: ours outlives that."""
     before = Path("/proc/self/maps").read_text().count("GripperPlant.so")
     reason = r"^plant: \S+ returned fatal at t = 0 s: step of 20\.0 s: must be at most \S+ s "
@@ -130,9 +127,7 @@ def test_a_python_fmu_that_refuses_a_step_says_why_and_is_freed(grasp: System) -
     assert Path("/proc/self/maps").read_text().count("GripperPlant.so") == before
 
 
-def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
-    grasp: System, altered: Altered
-) -> None:
+def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(grasp, altered):
     nan = "l = float('nan') if u.gap < 0.044 else u.gap"
     fmu = altered("ProximitySensor", "proximity_sensor/optics.py", GAP, nan)
     with pytest.raises(
@@ -147,7 +142,7 @@ def test_a_value_that_is_not_finite_ends_the_run_where_it_arises(
 
 
 @needs_pythonfmu
-def test_a_damaged_archive_is_a_wrong_input(grasp: System, fmus: Path, tmp_path: Path) -> None:
+def test_a_damaged_archive_is_a_wrong_input(grasp, fmus, tmp_path):
     data = bytearray((fmus / "GripperPlant.fmu").read_bytes())
     data[len(data) // 4] ^= 0xFF  # in the compressed binary
     damaged = tmp_path / "damaged.fmu"
@@ -157,9 +152,7 @@ def test_a_damaged_archive_is_a_wrong_input(grasp: System, fmus: Path, tmp_path:
 
 
 @needs_pythonfmu
-def test_a_library_that_does_not_load_leaves_the_working_folder(
-    grasp: System, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_library_that_does_not_load_leaves_the_working_folder(grasp, fmus, tmp_path):
     here = Path.cwd()
     broken = tmp_path / "broken.fmu"
     with zipfile.ZipFile(fmus / "GripperPlant.fmu") as good, zipfile.ZipFile(broken, "w") as bad:
@@ -170,9 +163,7 @@ def test_a_library_that_does_not_load_leaves_the_working_folder(
     assert Path.cwd() == here
 
 
-def test_nothing_stays_in_the_temporary_folder_or_on_the_path(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_stays_in_the_temporary_folder_or_on_the_path(grasp, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     before = sys.path.copy()
     simulate(grasp, stop=1e-3)
@@ -183,22 +174,20 @@ def test_nothing_stays_in_the_temporary_folder_or_on_the_path(
 
 
 @needs_pythonfmu
-def test_a_temporary_folder_that_crashes_pythonfmu_is_refused(
-    grasp: System, unpack_in: UnpackIn
-) -> None:
+def test_a_temporary_folder_that_crashes_pythonfmu_is_refused(grasp, unpack_in):
     folder = unpack_in("a+b")
     with pytest.raises(InputError, match="set TMPDIR to a folder of plain ASCII letters"):
         simulate(grasp, stop=1e-3)
     assert list(folder.iterdir()) == []
 
 
-def test_a_temporary_folder_with_a_space_is_fine(grasp: System, unpack_in: UnpackIn) -> None:
+def test_a_temporary_folder_with_a_space_is_fine(grasp, unpack_in):
     unpack_in("a b")
     assert simulate(grasp, stop=1e-3).complete
 
 
-def test_runs_in_another_thread(grasp: System) -> None:
-    results: list[bool] = []
+def test_runs_in_another_thread(grasp):
+    results = []
     thread = threading.Thread(target=lambda: results.append(simulate(grasp, stop=SHORT).complete))
     thread.start()
     thread.join()
@@ -207,7 +196,7 @@ def test_runs_in_another_thread(grasp: System) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_keeps_what_was_recorded(fmus: Path, tmp_path: Path) -> None:
+def test_ctrl_c_keeps_what_was_recorded(fmus, tmp_path):
     """On a terminal there is a progress bar; Ctrl-C is sent once it has begun to move."""
     terminal, side = pty.openpty()
     termios.tcsetwinsize(side, (24, 100))
@@ -234,7 +223,7 @@ def test_ctrl_c_keeps_what_was_recorded(fmus: Path, tmp_path: Path) -> None:
     assert len(lines[-1].split(",")) == len(lines[0].split(","))
 
 
-def system_file(fmus: Path, folder: Path) -> Path:
+def system_file(fmus, folder):
     """The built-in system as a user's own file beside its FMUs."""
     path = folder / "mine.toml"
     text = SYSTEM.read_text("utf-8")
@@ -245,7 +234,7 @@ def system_file(fmus: Path, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_schemes_agree_but_for_the_delay(grasp: System, case: int) -> None:
+def test_schemes_agree_but_for_the_delay(grasp, case):
     """Jacobi adds a delay of a few steps: the same motion within first order in the step."""
     system = grasp.with_values(CASES[case])
     one = simulate(system, step=1e-3, stop=1.0)

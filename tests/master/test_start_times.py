@@ -4,13 +4,10 @@ import json
 import re
 from dataclasses import replace
 from math import floor
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Run
 from grasp_cosim import InputError, System, load_run, simulate
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Connection, Event, Fault, Port
 from grasp_cosim.system.stimuli import read_stimuli
@@ -24,7 +21,7 @@ START, STEP, STOP = 5.3, 0.1, 7.9
 TIMES = np.array([(5_300_000_000 + k * 100_000_000) / 1e9 for k in range(27)])
 
 
-def system(fmu: Path, more: str = "", table: str = "") -> System:
+def system(fmu, more="", table=""):
     path = fmu.with_suffix(".toml")
     path.write_text(
         f"connections = []\n[experiment]\nstep = {STEP}\nstart = {START}\nstop = {STOP}\n{more}"
@@ -37,7 +34,7 @@ def system(fmu: Path, more: str = "", table: str = "") -> System:
 @needs_cvode
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_a_foreign_fmu_goes_by_it(tmp_path: Path, version: str, kind: str) -> None:
+def test_a_foreign_fmu_goes_by_it(tmp_path, version, kind):
     """It counts the zeros of sin(2 pi f t) since the start."""
     fmu = build_model("sine", tmp_path, version, [kind])
     found = simulate(system(fmu, table="values = { f = 0.7 }\n"))
@@ -50,7 +47,7 @@ def test_a_foreign_fmu_goes_by_it(tmp_path: Path, version: str, kind: str) -> No
 @needs_cvode
 @pytest.mark.parametrize("isolation", ["none", "process"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_its_time_events_and_its_end_do(tmp_path: Path, kind: str, isolation: str) -> None:
+def test_its_time_events_and_its_end_do(tmp_path, kind, isolation):
     fmu = build_model("stair", tmp_path, "3.0", [kind])
     table = f'isolation = "{isolation}"\nvalues = {{ width = 0.5, last = 4 }}\n'
     found = simulate(system(fmu, table=table))
@@ -61,7 +58,7 @@ def test_its_time_events_and_its_end_do(tmp_path: Path, kind: str, isolation: st
 
 
 @engines
-def test_steps_events_faults_and_stimuli_do(tmp_path: Path, engine: Engine) -> None:
+def test_steps_events_faults_and_stimuli_do(tmp_path, engine):
     """What was due before the start is done there."""
     (tmp_path / "drive.csv").write_text("time,x.u\n0,0\n10,10\n")
     mocks = [Mock(tmp_path, "x", lambda u, t: u), Mock(tmp_path, "z", lambda u, t: u)]
@@ -91,12 +88,12 @@ def test_steps_events_faults_and_stimuli_do(tmp_path: Path, engine: Engine) -> N
 
 
 @pytest.fixture
-def later(grasp: System) -> System:
+def later(grasp):
     """The grasp of the paper, two seconds later."""
     return grasp.with_settings({"experiment.start": 2.0, "experiment.stop": 5.0})
 
 
-def test_what_does_not_go_by_the_clock_is_the_same_later(grasp: System, later: System) -> None:
+def test_what_does_not_go_by_the_clock_is_the_same_later(grasp, later):
     first = simulate(grasp, step=1e-3)
     second = simulate(later, step=1e-3, every=7)
     assert second.time[-1] == 5.0
@@ -108,7 +105,7 @@ def test_what_does_not_go_by_the_clock_is_the_same_later(grasp: System, later: S
     assert (second.metrics["steps"], second.settings["start"]) == (3000, 2.0)
 
 
-def test_in_real_time_sessions_files_and_archives(later: System, tmp_path: Path) -> None:
+def test_in_real_time_sessions_files_and_archives(later, tmp_path):
     with simulate.session(later, step=1e-3, realtime=True) as session:
         assert session.time == 2.0
         session.step(20)
@@ -124,7 +121,7 @@ def test_in_real_time_sessions_files_and_archives(later: System, tmp_path: Path)
     assert (again.start_ns, again.stop_ns) == (2_000_000_000, 5_000_000_000)
 
 
-def test_the_command_takes_it(command: Run) -> None:
+def test_the_command_takes_it(command):
     code, out, err = command("run", "--set", "experiment.start=1", "--stop", "1.01", "--json")
     assert code == 0, err
     assert json.loads(out)["steps"] == 100
@@ -141,13 +138,13 @@ def test_the_command_takes_it(command: Run) -> None:
         ("x", "experiment.start = 'x' s: must be a number"),
     ],
 )
-def test_one_that_does_not_fit_is_refused(tmp_path: Path, start: object, said: str) -> None:
+def test_one_that_does_not_fit_is_refused(tmp_path, start, said):
     made = make_system([Mock(tmp_path, "x", lambda u, t: u)], [], 10)
     with pytest.raises(InputError, match=re.escape(said)):
         made.with_settings({"experiment.start": start})
 
 
-def test_it_may_be_before_0(tmp_path: Path) -> None:
+def test_it_may_be_before_0(tmp_path):
     mocks = [Mock(tmp_path, "x", lambda u, t: t)]
     made = make_system(mocks, [], 10).with_settings({"experiment.start": -0.2})
     found = MockRun(made, mocks).to_the_end()

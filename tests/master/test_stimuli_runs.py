@@ -1,12 +1,9 @@
 """Runs whose inputs a CSV file drives: the values of each step, as FMPy's simulate_fmu has them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
-from grasp_cosim import InputError, Realtime, Result, System, simulate
-from grasp_cosim.master.engine import Engine
+from grasp_cosim import InputError, Realtime, System, simulate
 from grasp_cosim.system.stimuli import read_stimuli
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,13 +27,13 @@ TEXT = """time,a.u_{0},a.u_Boolean,a.u_Enumeration
 ROWS = [tuple(map(float, line.split(","))) for line in TEXT.splitlines()[1:]]
 
 
-def column(result: Result, name: str) -> list[float]:
+def column(result, name):
     return [float(x) for x in result[name]]
 
 
 @engines
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_values_are_those_of_fmpy(engine: Engine, version: str, tmp_path: Path) -> None:
+def test_values_are_those_of_fmpy(engine, version, tmp_path):
     skip_where_fmpy_runs_none(version)
     real = REALS[version]
     result = simulate(
@@ -57,7 +54,7 @@ def test_values_are_those_of_fmpy(engine: Engine, version: str, tmp_path: Path) 
 
 
 @engines
-def test_held_holds_reals_too(engine: Engine, tmp_path: Path) -> None:
+def test_held_holds_reals_too(engine, tmp_path):
     text = "time,a.u_Real\n0.25,1\n0.5,2\n0.5,3\n2,9\n"
     path = driven(tmp_path, text, more=INPUT + 'interpolation = "held"\n')
     result = simulate(System.load(path), engine=engine)
@@ -68,9 +65,7 @@ def test_held_holds_reals_too(engine: Engine, tmp_path: Path) -> None:
 
 @engines
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_an_own_step_takes_the_value_at_its_beginning(
-    engine: Engine, scheme: str, tmp_path: Path
-) -> None:
+def test_an_own_step_takes_the_value_at_its_beginning(engine, scheme, tmp_path):
     path = driven(tmp_path, "time,a.u_Real\n0,0\n1,1\n", more=INPUT, own="step = 0.5")
     result = simulate(System.load(path), engine=engine, scheme=scheme)
     assert column(result, "a.y_Real") == [0.0] * 10 + [0.5]
@@ -82,9 +77,7 @@ def test_an_own_step_takes_the_value_at_its_beginning(
     values=st.lists(st.floats(-1e6, 1e6), min_size=6, max_size=6),
 )
 @examples(25)
-def test_both_engines_give_the_same_bits(
-    times: list[int], values: list[float], tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_both_engines_give_the_same_bits(times, values, tmp_path_factory):
     folder = tmp_path_factory.mktemp("drawn")
     rows = "".join(f"{0.1 * t!r},{v!r}\n" for t, v in zip(times, values, strict=False))
     system = System.load(driven(folder, f"time,a.u_Real\n{rows}", more=INPUT))
@@ -97,13 +90,13 @@ def test_both_engines_give_the_same_bits(
             assert y == last[round(0.1 * k, 1)]
 
 
-def test_the_first_output_agrees_with_the_first_value(tmp_path: Path) -> None:
+def test_the_first_output_agrees_with_the_first_value(tmp_path):
     result = simulate(System.load(driven(tmp_path, "time,a.u_Real\n0,5\n1,6\n", more=INPUT)))
     assert column(result, "a.y_Real")[:2] == [5.0, 5.0]
 
 
 @pytest.mark.slow
-def test_isolation_and_real_time_change_nothing(tmp_path: Path) -> None:
+def test_isolation_and_real_time_change_nothing(tmp_path):
     system = System.load(driven(tmp_path, TEXT.format("Real"), more=INPUT))
     plain = simulate(system)
     for other in (
@@ -113,7 +106,7 @@ def test_isolation_and_real_time_change_nothing(tmp_path: Path) -> None:
         assert all(column(plain, n) == column(other, n) for n in ("a.y_Real", "a.x", "a.y_Boolean"))
 
 
-def test_a_session_goes_along_and_does_not_set_what_is_driven(tmp_path: Path) -> None:
+def test_a_session_goes_along_and_does_not_set_what_is_driven(tmp_path):
     system = System.load(driven(tmp_path, "time,a.u_Real\n0,0\n1,1\n", more=INPUT))
     with simulate.session(system) as session:
         session.step(6)
@@ -122,7 +115,7 @@ def test_a_session_goes_along_and_does_not_set_what_is_driven(tmp_path: Path) ->
             session.set("a.u_Real", 1.0)
 
 
-def test_run_json_names_the_file(tmp_path: Path) -> None:
+def test_run_json_names_the_file(tmp_path):
     system = System.load(driven(tmp_path, "time,a.u_Real\n0,0\n1,1\n", more=INPUT))
     entry = simulate(system).settings["input"]
     assert (entry["file"], entry["interpolation"]) == ("drive.csv", "linear")
@@ -131,7 +124,7 @@ def test_run_json_names_the_file(tmp_path: Path) -> None:
     assert entry["sha256"] != other["sha256"]
 
 
-def test_a_swap_to_another_unit_keeps_what_is_meant(tmp_path: Path) -> None:
+def test_a_swap_to_another_unit_keeps_what_is_meant(tmp_path):
     build(tmp_path, "milli", "2.0", {"u_Real": "mm"})
     path = driven(tmp_path, "time,a.u_Real\n0,2\n", more=INPUT)
     build(tmp_path, "native", "2.0", {"u_Real": "m"})

@@ -2,35 +2,33 @@
 
 import re
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import Result, System, load_run, simulate
+from grasp_cosim import System, load_run, simulate
 from grasp_cosim.cli import main
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.report.page import page_html
 from support.both_engines import engines, needs_compiler
 from support.mocks import Mock, Run, make_system
 from support.native_fmus import TYPES, build, needs_gcc
 from support.slow import slow
 
-ENGINES: tuple[Engine, ...] = ("python", "compiled")
+ENGINES = ("python", "compiled")
 STARTS = {"Boolean": "false", "String": "'at rest'", "Enumeration": "1"}
 TEXTS = ("=1+1", 'a "b", c\r\n\\n', "\x1b[31mred\u202e", "", "ü\u2028", "@x", "1.5", "nan")
 """What a String may be changed to, one at each step."""
 
 
 @engines
-def test_a_text_that_changes_at_every_own_step(tmp_path: Path, engine: Engine) -> None:
+def test_a_text_that_changes_at_every_own_step(tmp_path, engine):
     mock = Mock(tmp_path, "a", lambda u, t: f"t = {t:g}", "String")  # type: ignore[arg-type, return-value]
     run = Run(make_system([mock], [], own={"a": 200_000_000}), [mock], engine)
     first, second = "t = 0", "t = 0.2"
-    texts: object = {"a.y": [first, first, second, second, "t = 0.4"]}
+    texts = {"a.y": [first, first, second, second, "t = 0.4"]}
     assert run.to_the_end() == texts
 
 
-def changing(folder: Path, version: str, isolation: str, scheme: str = "sequential") -> System:
+def changing(folder, version, isolation, scheme="sequential"):
     """Two FMUs, from one of which a String goes to the other; it is another at every 0.1 s."""
     fmu = build(folder, version=version)
     system = ""
@@ -59,9 +57,7 @@ def changing(folder: Path, version: str, isolation: str, scheme: str = "sequenti
 @pytest.mark.parametrize(
     ("version", "isolation"), [("2.0", "none"), ("3.0", "none"), slow("3.0", "process")]
 )
-def test_native_fmus_and_what_is_read_back(
-    tmp_path: Path, version: str, isolation: str, scheme: str
-) -> None:
+def test_native_fmus_and_what_is_read_back(tmp_path, version, isolation, scheme):
     system = changing(tmp_path, version, isolation, scheme)
     for engine in ENGINES:
         result = simulate(system, engine=engine)
@@ -81,7 +77,7 @@ def test_native_fmus_and_what_is_read_back(
 
 
 @needs_gcc
-def test_nothing_that_takes_a_result_stumbles_over_a_text(tmp_path: Path) -> None:
+def test_nothing_that_takes_a_result_stumbles_over_a_text(tmp_path):
     pytest.importorskip("matplotlib")
     system = changing(tmp_path, "2.0", "none")
     result = simulate(system)
@@ -92,7 +88,7 @@ def test_nothing_that_takes_a_result_stumbles_over_a_text(tmp_path: Path) -> Non
 
 
 @needs_gcc
-def test_a_session_has_the_text_of_now(tmp_path: Path) -> None:
+def test_a_session_has_the_text_of_now(tmp_path):
     with simulate.session(changing(tmp_path, "3.0", "none")) as session:
         assert session["b.y_String"] == "at rest"
         assert session.step()
@@ -100,7 +96,7 @@ def test_a_session_has_the_text_of_now(tmp_path: Path) -> None:
 
 
 @needs_gcc
-def test_mdf_has_the_texts(tmp_path: Path) -> None:
+def test_mdf_has_the_texts(tmp_path):
     asammdf = pytest.importorskip("asammdf")
     result = simulate(changing(tmp_path, "3.0", "none"))
     result.to_mdf(tmp_path / "signals.mf4")
@@ -113,13 +109,13 @@ def test_mdf_has_the_texts(tmp_path: Path) -> None:
 
 
 @needs_gcc
-def test_null_and_bytes_that_are_no_text(tmp_path: Path) -> None:
+def test_null_and_bytes_that_are_no_text(tmp_path):
     from grasp_cosim.fmi.loaded import _OF_KIND
 
     assert [_OF_KIND["String"](v) for v in (None, b"\xff", "x")] == ["", "\ufffd", "x"]
 
 
-def without_scalars(fmu: Path) -> None:
+def without_scalars(fmu):
     """Leaves an FMI 3.0 FMU the outputs that cannot be recorded."""
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
@@ -140,7 +136,7 @@ def without_scalars(fmu: Path) -> None:
 
 
 @pytest.fixture
-def unrecordable(tmp_path: Path) -> Path:
+def unrecordable(tmp_path):
     without_scalars(build(tmp_path, "arrays"))
     path = tmp_path / "arrays.toml"
     path.write_text(
@@ -150,9 +146,7 @@ def unrecordable(tmp_path: Path) -> Path:
 
 
 @needs_gcc
-def test_a_run_that_records_nothing_is_no_success(
-    unrecordable: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_records_nothing_is_no_success(unrecordable, tmp_path, capfd):
     pytest.importorskip("asammdf")
     out = tmp_path / "out"
     assert main(["run", str(unrecordable), "--out", str(out), "--json", "--plot", "--mdf"]) == 1
@@ -170,8 +164,8 @@ def test_a_run_that_records_nothing_is_no_success(
 
 
 @needs_gcc
-def test_a_result_of_nothing_says_so(unrecordable: Path) -> None:
-    result: Result = simulate(System.load(unrecordable))
+def test_a_result_of_nothing_says_so(unrecordable):
+    result = simulate(System.load(unrecordable))
     assert dict(result) == {}
     assert np.array_equal(result.time, np.arange(11) * 0.01)
     assert "nothing is recorded" in result.log[-1]

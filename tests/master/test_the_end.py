@@ -1,7 +1,6 @@
 """An FMU that asks for the end of the simulation ends the run in good order."""
 
 import json
-from pathlib import Path
 
 import pytest
 from grasp_cosim import System, simulate
@@ -19,7 +18,7 @@ KINDS = [pytest.param("ModelExchange", marks=needs_cvode), "CoSimulation"]
 BEFORE = "; its values there are in the last row, that of t = "
 
 
-def stair(folder: Path, kind: str = "CoSimulation", step: float = 0.2, **values: float) -> System:
+def stair(folder, kind="CoSimulation", step=0.2, **values):
     """A stair that asks for the end at 9 s, and two that go on, before and behind it."""
     fmu = build_model("stair", folder, "2.0", [kind])
     other = build_model("dahlquist", folder, "2.0")
@@ -36,9 +35,7 @@ def stair(folder: Path, kind: str = "CoSimulation", step: float = 0.2, **values:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("step", "end", "said"), [(0.2, 9.0, ""), (0.7, 9.1, f"{BEFORE}9.1 s")])
-def test_a_run_ends_with_the_last_sample(
-    tmp_path: Path, kind: str, engine: str, step: float, end: float, said: str
-) -> None:
+def test_a_run_ends_with_the_last_sample(tmp_path, kind, engine, step, end, said):
     """The other components are then at the same communication point."""
     system = stair(tmp_path, kind, step)
     result = simulate(system, engine=engine)  # type: ignore[arg-type]
@@ -52,7 +49,7 @@ def test_a_run_ends_with_the_last_sample(
 
 
 @needs_cvode
-def test_the_end_at_the_very_beginning(tmp_path: Path) -> None:
+def test_the_end_at_the_very_beginning(tmp_path):
     """In the event at the end of the initialisation."""
     system = stair(tmp_path, "ModelExchange", last=1)
     result = simulate(system, realtime=Realtime(factor=1000.0))
@@ -62,7 +59,7 @@ def test_the_end_at_the_very_beginning(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_session_and_real_time(tmp_path: Path, kind: str) -> None:
+def test_a_session_and_real_time(tmp_path, kind):
     system = stair(tmp_path, kind, 0.1, width=0.1)
     with simulate.session(system, realtime=Realtime(factor=100.0)) as session:
         while session.step():
@@ -73,7 +70,7 @@ def test_a_session_and_real_time(tmp_path: Path, kind: str) -> None:
     assert result.timing is not None
 
 
-def test_the_command_is_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_is_done(tmp_path, capsys):
     build_model("stair", tmp_path)
     path, out = tmp_path / "stair.toml", tmp_path / "out"
     path.write_text(
@@ -88,7 +85,7 @@ def test_the_command_is_done(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 
 
 @pytest.mark.slow
-def test_a_candidate_that_ends_sooner_is_not_qualified(tmp_path: Path) -> None:
+def test_a_candidate_that_ends_sooner_is_not_qualified(tmp_path):
     system = stair(tmp_path, step=0.1, width=0.5)
     fmu = build_model("stair", tmp_path, "3.0", file="other")
     same = qualify(system, "stair", fmu, isolation="none")

@@ -1,16 +1,13 @@
 """Vendor FMUs in a system file: names, units, types, and what is refused, and how."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.interface.interface import limits
 from grasp_cosim.interface.read import read_interface
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.system.parts import Event, Port
 from grasp_cosim.system.validity import connection_transform, remarks
 from support.both_engines import engines
@@ -21,14 +18,8 @@ STARTS = {"Boolean": "false", "String": "''", "Enumeration": "1"}
 
 
 def pair(
-    folder: Path,
-    connection: str,
-    units: tuple[Mapping[str, str], Mapping[str, str]] = ({}, {}),
-    versions: tuple[str, str] = ("3.0", "3.0"),
-    first: str = "",
-    given: str = "",
-    without: str = "",
-) -> System:
+    folder, connection, units=({}, {}), versions=("3.0", "3.0"), first="", given="", without=""
+):
     """Two native FMUs, a and b, with one connection.
 
     first is more of a's table, given of its values; the inputs named in without get no value.
@@ -49,11 +40,11 @@ def pair(
     return System.load(path)
 
 
-def connected(source: str, target: str) -> str:
+def connected(source, target):
     return f'"a.y_{source} -> b.u_{target}"'
 
 
-def test_the_interface_of_fmi_3(tmp_path: Path) -> None:
+def test_the_interface_of_fmi_3(tmp_path):
     found = read_interface(build(tmp_path, units={"x": "m"}))
     assert (found.version, found.guid, found.identifier) == ("3.0", "{native}", "native")
     assert found.can_vary_step is True
@@ -76,7 +67,7 @@ def test_the_interface_of_fmi_3(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_limits_are_those_of_numpy(version: str) -> None:
+def test_limits_are_those_of_numpy(version):
     types = {"Enumeration": "Int32" if version == "2.0" else "Int64", "Integer": "Int32"}
     for fmi_type in TYPES[version]:
         if "Int" in fmi_type or fmi_type == "Enumeration":
@@ -96,9 +87,7 @@ def test_limits_are_those_of_numpy(version: str) -> None:
         ("u_Boolean", 1, False), ("u_String", 1, False), ("u_Enumeration", True, False),
     ],
 )  # fmt: skip
-def test_values_must_fit_their_type(
-    tmp_path: Path, name: str, value: float | str, fits: bool
-) -> None:
+def test_values_must_fit_their_type(tmp_path, name, value, fits):
     interface = read_interface(build(tmp_path))
     if fits:
         assert interface.parse("here", name, value, text=True) == (7 if value == "7.0" else value)
@@ -107,7 +96,7 @@ def test_values_must_fit_their_type(
             interface.parse("here", name, value, text=True)
 
 
-def test_large_integers_are_exact(tmp_path: Path) -> None:
+def test_large_integers_are_exact(tmp_path):
     interface = read_interface(build(tmp_path))
     assert interface.parse("here", "u_Int64", str(2**53 + 1), text=True) == 2**53 + 1
 
@@ -121,13 +110,7 @@ def test_large_integers_are_exact(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("versions", [("2.0", "3.0"), ("3.0", "2.0")])
-def test_units_are_converted_on_the_connection(
-    tmp_path: Path,
-    versions: tuple[str, str],
-    source: str | None,
-    target: str | None,
-    expected: tuple[float, float],
-) -> None:
+def test_units_are_converted_on_the_connection(tmp_path, versions, source, target, expected):
     ends = [next(iter(TYPES[version])) for version in versions]
     units = (
         {f"y_{ends[0]}": source} if source else {},
@@ -142,7 +125,7 @@ def test_units_are_converted_on_the_connection(
     assert (unknown in "; ".join(remarks(system))) is (source is None and target is not None)
 
 
-def test_a_declared_factor_overrides_the_units(tmp_path: Path) -> None:
+def test_a_declared_factor_overrides_the_units(tmp_path):
     connection = '{ from = "a.y_Float64", to = "b.u_Float64", factor = -2, offset = 0.5 }'
     units = ({"y_Float64": "m"}, {"u_Float64": "N"})
     result = simulate(pair(tmp_path, connection, units, given="u_Float64 = 3.0"))
@@ -159,9 +142,7 @@ ALLOWED = [
 
 @pytest.mark.parametrize(("source", "target"), ALLOWED)
 @engines
-def test_types_that_may_be_connected_pass_their_values(
-    tmp_path: Path, source: str, target: str, engine: Engine
-) -> None:
+def test_types_that_may_be_connected_pass_their_values(tmp_path, source, target, engine):
     value = STARTS.get(source, "5")
     value = {"false": "true", "''": "'text'"}.get(value, value)
     system = pair(tmp_path, connected(source, target), given=f"u_{source} = {value}")
@@ -174,18 +155,14 @@ def test_types_that_may_be_connected_pass_their_values(
 
 @engines
 @pytest.mark.parametrize(("source", "least"), [("Int8", -(2**7)), ("Int16", -(2**15))])
-def test_a_float32_takes_every_small_integer(
-    tmp_path: Path, source: str, least: int, engine: Engine
-) -> None:
+def test_a_float32_takes_every_small_integer(tmp_path, source, least, engine):
     system = pair(tmp_path, connected(source, "Float32"), given=f"u_{source} = {least}")
     assert simulate(system, engine=engine)["b.y_Float32"].tolist() == [least] * 11
 
 
 @engines
 @pytest.mark.parametrize(("source", "value"), [("Int64", -(2**53)), ("UInt64", 2**63)])
-def test_an_integer_that_gets_too_long_on_the_way_ends_the_run(
-    tmp_path: Path, source: str, value: int, engine: Engine
-) -> None:
+def test_an_integer_that_gets_too_long_on_the_way_ends_the_run(tmp_path, source, value, engine):
     """The event acts on the step from 0.5 s on, the sixth."""
     system = pair(tmp_path, connected(source, source), given=f"u_{source} = 7")
     event = Event({Port("a", f"u_{source}"): value}, at_ns=500_000_000)
@@ -221,7 +198,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("connection", "message"), REFUSED)
-def test_connections_that_are_refused(tmp_path: Path, connection: str, message: str) -> None:
+def test_connections_that_are_refused(tmp_path, connection, message):
     with pytest.raises(InputError, match=rf"^pair.toml: connections\[0\].*{message}") as caught:
         pair(tmp_path, connection)
     assert "\n" not in str(caught.value)
@@ -235,14 +212,14 @@ def test_connections_that_are_refused(tmp_path: Path, connection: str, message: 
         ("bare", "m", "which their FMUs do not define in SI units; { from = "),
     ],
 )
-def test_units_that_are_refused(tmp_path: Path, source: str, target: str, message: str) -> None:
+def test_units_that_are_refused(tmp_path, source, target, message):
     units = ({"y_Float64": source}, {"u_Float64": target})
     with pytest.raises(InputError, match=message) as caught:
         pair(tmp_path, connected("Float64", "Float64"), units)
     assert f"gives the factor from {source} to {target}" in str(caught.value)
 
 
-def test_a_rename_table_gives_the_systems_names(tmp_path: Path) -> None:
+def test_a_rename_table_gives_the_systems_names(tmp_path):
     table = 'rename = { u_force = "u_Float64", "gap[1]" = "x", k = "gain" }\n'
     values = "u_force = 2.0, k = 3.0"
     text = '"a.gap[1] -> b.u_Float64"'
@@ -269,18 +246,18 @@ def test_a_rename_table_gives_the_systems_names(tmp_path: Path) -> None:
         ("step = true", "step = True s: must be a number"),
     ],
 )
-def test_component_entries_that_are_refused(tmp_path: Path, table: str, message: str) -> None:
+def test_component_entries_that_are_refused(tmp_path, table, message):
     with pytest.raises(InputError, match=message) as caught:
         pair(tmp_path, connected("Float64", "Float64"), first=f"{table}\n")
     assert "\n" not in str(caught.value)
 
 
-def test_what_cannot_be_set_is_named(tmp_path: Path) -> None:
+def test_what_cannot_be_set_is_named(tmp_path):
     with pytest.raises(InputError, match="u_Binary is of type Binary, which cannot be set; must"):
         pair(tmp_path, connected("Float64", "Float64"), given="u_Binary = '00'")
 
 
-def test_what_is_left_alone_is_named(tmp_path: Path) -> None:
+def test_what_is_left_alone_is_named(tmp_path):
     lines = remarks(pair(tmp_path, connected("Float64", "Float64")))
     assert "a.u_Binary is of type Binary: keeps its start value" in lines
     assert "b.y_array is of type array of String: not recorded" in lines
@@ -296,7 +273,7 @@ def test_what_is_left_alone_is_named(tmp_path: Path) -> None:
         ('m="1"', 'm="one"', "not a readable FMU: unit 'm': m = 'one': must be a whole number"),
     ],
 )
-def test_fmus_that_are_refused(tmp_path: Path, before: str, after: str, message: str) -> None:
+def test_fmus_that_are_refused(tmp_path, before, after, message):
     import zipfile
 
     with zipfile.ZipFile(build(tmp_path)) as archive:

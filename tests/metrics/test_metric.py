@@ -2,14 +2,11 @@
 
 import pickle
 import re
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Metric, System, metric, simulate
+from grasp_cosim import InputError, metric, simulate
 from grasp_cosim.base.parallel import run_all
 from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS, time_difference
 from grasp_cosim.metrics.metric import (
@@ -50,18 +47,18 @@ def alpha(run):
 '''
 
 
-def signals(roles: dict[str, str] | None = None, component: str = "plant") -> Signals:
+def signals(roles=None, component="plant"):
     return Signals(TIME, {f"{component}.gap": GAP, f"{component}.on": GAP < 0.15}, roles or {})
 
 
-def made(name: str, function: Callable[[Signals], Any], **more: Any) -> Metric:
+def made(name, function, **more):
     return metric(name, **more)(function)
 
 
 # ------------------------------------------------------------------------- signals
 
 
-def test_a_signal_is_found_by_the_role_of_its_component_and_by_its_name() -> None:
+def test_a_signal_is_found_by_the_role_of_its_component_and_by_its_name():
     run = signals({"plant": "gripper"}, "gripper")
     assert run["plant.gap"] is run["gripper.gap"] is run.by_name["gripper.gap"]
     assert "plant.gap" in run
@@ -69,7 +66,7 @@ def test_a_signal_is_found_by_the_role_of_its_component_and_by_its_name() -> Non
     assert len(run) == 2
 
 
-def test_a_component_plays_the_role_of_its_name_where_no_other_does() -> None:
+def test_a_component_plays_the_role_of_its_name_where_no_other_does():
     assert signals()["plant.gap"] is not None
     swapped = Signals(TIME, {"plant.gap": GAP, "other.gap": 2 * GAP}, {"plant": "other"})
     assert swapped["plant.gap"] is swapped.by_name["other.gap"]
@@ -85,9 +82,7 @@ def test_a_component_plays_the_role_of_its_name_where_no_other_does() -> None:
         ("plan.gap", {}, 'no component is the plan; name it under [roles]: plan = "plant"'),
     ],
 )
-def test_a_signal_that_is_not_there_is_missed_with_the_reason(
-    name: str, roles: dict[str, str], reason: str
-) -> None:
+def test_a_signal_that_is_not_there_is_missed_with_the_reason(name, roles, reason):
     run = signals(roles)
     with pytest.raises(MissingSignalError) as caught:
         run[name]
@@ -99,7 +94,7 @@ def test_a_signal_that_is_not_there_is_missed_with_the_reason(
 # ------------------------------------------------------------------------- values
 
 
-def test_values_come_in_the_order_of_their_metrics_with_their_units() -> None:
+def test_values_come_in_the_order_of_their_metrics_with_their_units():
     found = measure(
         signals(),
         [
@@ -131,7 +126,7 @@ def test_values_come_in_the_order_of_their_metrics_with_their_units() -> None:
         (None, None),
     ],
 )
-def test_numbers_become_pythons_own(value: Any, plain: Any) -> None:
+def test_numbers_become_pythons_own(value, plain):
     (found,) = measure(signals(), [made("x", lambda _: value)]).values.values()
     assert repr(found) == repr(plain)
 
@@ -149,15 +144,15 @@ def test_numbers_become_pythons_own(value: Any, plain: Any) -> None:
         (None, ("a", "b"), "returned None; must be a value for each of a, b"),
     ],
 )
-def test_another_value_is_refused(value: Any, entries: tuple[str, ...], message: str) -> None:
+def test_another_value_is_refused(value, entries, message):
     line = rf"^metric 'x': test_metric\.py, line \d+: {re.escape(message)}"
     with pytest.raises(InputError, match=line) as caught:
         measure(signals(), [made("x", lambda _: value, entries=entries)]).check()
     assert "\n" not in str(caught.value)
 
 
-def test_a_function_that_raises_is_a_wrong_input_that_names_it_and_its_line() -> None:
-    def raising(_: Signals) -> float:
+def test_a_function_that_raises_is_a_wrong_input_that_names_it_and_its_line():
+    def raising(_):
         raise ValueError("no\n  good")
 
     line = raising.__code__.co_firstlineno + 1
@@ -171,10 +166,10 @@ def test_a_function_that_raises_is_a_wrong_input_that_names_it_and_its_line() ->
             asked()
 
 
-def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> None:
+def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp):
     short = grasp.with_experiment(step=1e-3, stop=0.01)
 
-    def late(run: Signals) -> float:
+    def late(run):
         return 1.0 / float(run.time[-1] - 0.01)
 
     outcome = run_row(Task(short, (made("late", late),)), 3, {})
@@ -186,14 +181,14 @@ def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp: System) -> N
 # ------------------------------------------------------------------------- what is missing
 
 
-def grasp_signals(without: str = "") -> Signals:
+def grasp_signals(without=""):
     """Signals of a grasp that does not move, but for some of them."""
     every = (*OBJECT_NEEDS, "controller.force[1]")
     names = [n for n in every if not (without and n.startswith(without))]
     return Signals(TIME, {name: np.zeros(3) for name in names})
 
 
-def test_a_grasp_has_all_its_metrics_but_those_of_other_objects() -> None:
+def test_a_grasp_has_all_its_metrics_but_those_of_other_objects():
     found = measure(grasp_signals(), METRICS)
     assert [m.name for m in found.metrics] == [m.name for m in METRICS if not m.optional]
     assert found.missing == ()  # an optional one is left out in silence
@@ -206,7 +201,7 @@ def test_a_grasp_has_all_its_metrics_but_those_of_other_objects() -> None:
         ("controller.target", "controller lacks target_position"),
     ],
 )
-def test_a_signal_that_a_grasp_lacks_is_said_once(without: str, reason: str) -> None:
+def test_a_signal_that_a_grasp_lacks_is_said_once(without, reason):
     found = measure(grasp_signals(without), METRICS)
     assert found.missing == (f"no metrics of the grasp: {reason}",)
     assert (dict(found.values), found.metrics, found.flat()) == ({}, (), {})
@@ -217,14 +212,14 @@ def test_a_signal_that_a_grasp_lacks_is_said_once(without: str, reason: str) -> 
     )
 
 
-def test_a_plant_that_does_not_tell_where_the_object_is_has_the_other_metrics() -> None:
+def test_a_plant_that_does_not_tell_where_the_object_is_has_the_other_metrics():
     found = measure(grasp_signals("plant.object_position"), METRICS)
     lost = ["object_shift", "object_drift"]
     assert [*found.values, *lost] == [m.name for m in METRICS if not m.optional]
     assert found.missing == tuple(f"no {name}: plant lacks object_position" for name in lost)
 
 
-def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles() -> None:
+def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles():
     run = grasp_signals()
     names = {"plant": "gripper", "controller": "law"}
     other = {
@@ -240,8 +235,8 @@ def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles() -> Non
     assert measure(Signals(run.time, other, roles), METRICS) == measure(run, METRICS)
 
 
-def test_a_metric_without_a_description_has_the_first_line_of_its_docstring() -> None:
-    def documented(run: Signals) -> float:
+def test_a_metric_without_a_description_has_the_first_line_of_its_docstring():
+    def documented(run):
         """Half the gap.
 
         And more.
@@ -254,7 +249,7 @@ def test_a_metric_without_a_description_has_the_first_line_of_its_docstring() ->
     assert all(m.description for m in METRICS)
 
 
-def test_a_metric_of_its_own_says_what_it_lacks() -> None:
+def test_a_metric_of_its_own_says_what_it_lacks():
     needing = made("speed", lambda run: run["plant.speed"][-1], needs=("plant.speed",))
     trying = made("force", lambda run: run["plant.force"][-1])
     silent = made("tilt", lambda run: run["plant.tilt"][-1], needs=("plant.tilt",), optional=True)
@@ -269,12 +264,12 @@ def test_a_metric_of_its_own_says_what_it_lacks() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "rise time", "1st", "a.b", "gap[1]"])
-def test_a_name_is_a_column_and_a_key(name: str) -> None:
+def test_a_name_is_a_column_and_a_key(name):
     with pytest.raises(InputError, match=r"must be a name of letters, digits and _$"):
         metric(name)
 
 
-def test_what_every_run_tells_is_no_name_of_a_metric(grasp: System, tmp_path: Path) -> None:
+def test_what_every_run_tells_is_no_name_of_a_metric(grasp, tmp_path):
     """No figure of run.json can take the place of a metric, or a metric that of one."""
     import json
 
@@ -287,7 +282,7 @@ def test_what_every_run_tells_is_no_name_of_a_metric(grasp: System, tmp_path: Pa
             metric(name)
 
 
-def test_two_metrics_of_one_name_are_refused() -> None:
+def test_two_metrics_of_one_name_are_refused():
     again = made("time_to_contact", lambda _: 1.0)
     with pytest.raises(InputError, match=r"^metric 'time_to_contact': is defined twice; must have"):
         metrics_of(["grasp"], [again])
@@ -298,9 +293,7 @@ def test_two_metrics_of_one_name_are_refused() -> None:
     assert metrics_of([], [own]) == (own,)
 
 
-def test_a_result_has_the_metrics_of_its_system(
-    grasp: System, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_result_has_the_metrics_of_its_system(grasp, monkeypatch):
     end = made("end", lambda run: run.time[-1])
     bring_group(monkeypatch, "ends", end)
     for groups, names in (
@@ -314,7 +307,7 @@ def test_a_result_has_the_metrics_of_its_system(
         assert result.measured.missing == ()
 
 
-def test_titles_and_columns() -> None:
+def test_titles_and_columns():
     both = made("rise_time", lambda _: [1.0, 2.0], unit="s", entries=("right", "left"))
     assert (both.title, both.columns) == ("rise time", ("rise_time[1]", "rise_time[2]"))
     assert both.column_title("rise_time[2]") == "rise time, left"
@@ -332,8 +325,8 @@ def test_titles_and_columns() -> None:
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Callable[[str], Path]:
-    def write(text: str) -> Path:
+def file(tmp_path):
+    def write(text):
         path = tmp_path / "mine.py"
         path.write_text(text, "utf-8")
         return path
@@ -341,9 +334,7 @@ def file(tmp_path: Path) -> Callable[[str], Path]:
     return write
 
 
-def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(
-    file: Callable[[str], Path],
-) -> None:
+def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(file):
     zeta, alpha = load_metrics(file(FILE))
     assert (zeta.name, zeta.columns, alpha.name) == ("zeta", ("zeta[1]", "zeta[2]"), "alpha")
     assert dict(measure(signals(), [zeta, alpha]).values) == {
@@ -378,9 +369,7 @@ def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(
         ),
     ],
 )
-def test_a_file_without_metrics_is_one_line(
-    file: Callable[[str], Path], text: str, message: str
-) -> None:
+def test_a_file_without_metrics_is_one_line(file, text, message):
     path = file(text)
     for _ in range(2):  # what has failed once is not taken for done
         with pytest.raises(InputError) as caught:
@@ -389,7 +378,7 @@ def test_a_file_without_metrics_is_one_line(
         assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_is_one_line(tmp_path):
     path = tmp_path / "mine.py"
     with pytest.raises(InputError, match=r"mine\.py: No such file.*; must be a Python file"):
         load_metrics(path)
@@ -398,7 +387,7 @@ def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         load_metrics(path)
 
 
-def test_a_file_that_is_no_python_is_not_run(tmp_path: Path) -> None:
+def test_a_file_that_is_no_python_is_not_run(tmp_path):
     """It might do something all the same: system = ... is Python, too."""
     path = tmp_path / "ball.toml"
     path.write_text("raise_an_error_if_run", "utf-8")
@@ -406,7 +395,7 @@ def test_a_file_that_is_no_python_is_not_run(tmp_path: Path) -> None:
         load_metrics(path)
 
 
-def test_ctrl_c_in_a_file_is_no_wrong_input(file: Callable[[str], Path]) -> None:
+def test_ctrl_c_in_a_file_is_no_wrong_input(file):
     with pytest.raises(KeyboardInterrupt):
         load_metrics(file("raise KeyboardInterrupt\n"))
 
@@ -415,16 +404,16 @@ def test_ctrl_c_in_a_file_is_no_wrong_input(file: Callable[[str], Path]) -> None
 
 
 @metric("at_end", unit="m")
-def at_end(run: Signals) -> float:
+def at_end(run):
     return float(run["plant.gap"][-1])
 
 
-def _measured(job: tuple[Metric, ...]) -> tuple[list[str], dict[str, Any]]:
+def _measured(job):
     return [m.name for m in job], dict(measure(signals(), job).values)
 
 
 @pytest.mark.slow
-def test_metrics_work_in_another_process(file: Callable[[str], Path]) -> None:
+def test_metrics_work_in_another_process(file):
     """Of a file that is gone meanwhile, of a module, and of every result."""
     path = file(FILE)
     own = (*load_metrics(path), at_end)
@@ -435,20 +424,20 @@ def test_metrics_work_in_another_process(file: Callable[[str], Path]) -> None:
     assert values == {"zeta": [0.3, 0.1], "alpha": 0.1, "at_end": 0.1}
 
 
-def test_a_metric_of_every_result_comes_back_as_itself() -> None:
+def test_a_metric_of_every_result_comes_back_as_itself():
     assert all(pickle.loads(pickle.dumps(m)) is m for m in METRICS)
     assert pickle.loads(pickle.dumps(at_end)) is at_end
 
 
-def test_a_metric_that_cannot_go_to_another_process_is_refused() -> None:
+def test_a_metric_that_cannot_go_to_another_process_is_refused():
     with pytest.raises(InputError, match=r"^metric 'x': cannot go to another process \(.*\); must"):
         check_portable([at_end, made("x", lambda _: 1.0)])
 
 
 @pytest.mark.parametrize("value", [float("nan"), [1.0, float("inf")], np.float64("-inf")])
-def test_what_is_not_finite_is_no_value(value: Any) -> None:
+def test_what_is_not_finite_is_no_value(value):
     @metric("odd")
-    def odd(run: Signals) -> Any:
+    def odd(run):
         return value
 
     measured = measure(Signals(np.zeros(1), {}), [odd])

@@ -1,8 +1,7 @@
 """Metrics get signals in SI units, or the system is refused before any FMU is loaded."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,25 +23,24 @@ Load = Callable[..., System]
 
 
 @metric("travel", unit="m", needs={"room.x": "m", "room.y": "m"})
-def travel(run: Signals) -> float:
+def travel(run):
     """How far x goes."""
     return float(run["room.x"][-1] - run["room.x"][0])
 
 
-def unit(text: str, name: str, more: str = "") -> str:
+def unit(text, name, more=""):
     return text.replace("| Real", f'| Real unit="{name}"{more}')
 
 
 @pytest.fixture
-def load(tmp_path: Path) -> Load:
+def load(tmp_path):
     """A room whose outputs x and y go to the inputs a and b of a sink."""
 
-    def system(
-        room: Mapping[str, str] = {},
-        sink: Mapping[str, str] = {},
-        links: Sequence[str] = ('"room.x -> sink.a"', '"room.y -> sink.b"'),
-        units: str = "",
-    ) -> System:
+    def system(room=None, sink=None, links=('"room.x -> sink.a"', '"room.y -> sink.b"'), units=""):
+        if sink is None:
+            sink = {}
+        if room is None:
+            room = {}
         write_fmu(tmp_path / "room.fmu", {**ROOM, **room})
         write_fmu(tmp_path / "sink.fmu", {"a": INPUT, "b": INPUT, "c": INPUT, **sink})
         values = {v: 0.0 for v in "abc" if not any(f"sink.{v}" in link for link in links)}
@@ -59,7 +57,7 @@ def load(tmp_path: Path) -> Load:
     return system
 
 
-def scaled(factor: float, offset: float | None = None, target: str = "a") -> list[str]:
+def scaled(factor, offset=None, target="a"):
     more = "" if offset is None else f", offset = {offset}"
     return [f'{{ from = "room.x", to = "sink.{target}", factor = {factor}{more} }}']
 
@@ -69,11 +67,11 @@ MM_IN, M_IN = unit(INPUT, "mm"), unit(INPUT, "m")
 MILLI = Conversion(1e-3, 0.0)
 
 
-def found(system: System, *metrics: Metric) -> InSi:
+def found(system, *metrics):
     return in_si(system, metrics or (travel,))
 
 
-def refusal(system: System, *metrics: Metric) -> str:
+def refusal(system, *metrics):
     with pytest.raises(InputError) as caught:
         found(system, *metrics)
     assert "\n" not in str(caught.value)
@@ -83,21 +81,21 @@ def refusal(system: System, *metrics: Metric) -> str:
 # ------------------------------------------------------------------------- the unit of a signal
 
 
-def test_a_declared_unit_is_converted(load: Load) -> None:
+def test_a_declared_unit_is_converted(load):
     assert found(load({"x": MM, "y": M})) == InSi({"room.x": MILLI}, ())
 
 
-def test_a_named_unit_is_converted(load: Load) -> None:
+def test_a_named_unit_is_converted(load):
     assert found(load({"y": M}, units='x = "mm"')) == InSi({"room.x": MILLI}, ())
     assert found(load({"x": M, "y": M}, units='x = "mm"')) == InSi({"room.x": MILLI}, ())
 
 
-def test_a_unit_that_is_not_defined_is_known_by_its_name(load: Load) -> None:
+def test_a_unit_that_is_not_defined_is_known_by_its_name(load):
     room = {"x": unit(OUTPUT, "cm"), "y": M}  # made.py defines no cm
     assert found(load(room)) == InSi({"room.x": Conversion(1e-2, 0.0)}, ())
 
 
-def test_without_any_unit_it_is_that_of_si_and_that_is_said(load: Load) -> None:
+def test_without_any_unit_it_is_that_of_si_and_that_is_said(load):
     """Whatever is beside it, takes it or scales it."""
     said = "room.x, room.y: no unit, taken to be in SI"
     assert found(load()) == InSi({}, (said,))
@@ -113,7 +111,7 @@ def test_without_any_unit_it_is_that_of_si_and_that_is_said(load: Load) -> None:
     assert found(load({"x": MM})).conversions == {"room.x": MILLI}
 
 
-def test_a_signal_of_another_quantity_is_refused(load: Load) -> None:
+def test_a_signal_of_another_quantity_is_refused(load):
     assert "rooms.toml: room.x is in N; travel must know" in refusal(
         load({"x": unit(OUTPUT, "N"), "y": M})
     )
@@ -121,14 +119,14 @@ def test_a_signal_of_another_quantity_is_refused(load: Load) -> None:
     assert "room.x is in 'cubit', which its FMU does not define in SI units" in refusal(unknown)
 
 
-def test_of_several_that_are_refused_the_first_that_is_expected_is_named(load: Load) -> None:
+def test_of_several_that_are_refused_the_first_that_is_expected_is_named(load):
     wrong = load({name: unit(OUTPUT, "N") for name in "xy"})
     needs = {"room.y": "m", "room.x": "m"}
     assert "room.y is in N" in refusal(wrong, Metric("back", travel.function, needs=needs))
     assert "room.x is in N" in refusal(wrong)
 
 
-def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
+def test_only_what_a_metric_expects_is_asked_for(load):
     odd = load({"x": unit(OUTPUT, "N"), "y": unit(OUTPUT, "cubit")})
     silent = Metric("silent", travel.function, needs=("room.x",))
     elsewhere = Metric("elsewhere", travel.function, needs={"room.x": "m", "room.z": "m"})
@@ -136,21 +134,21 @@ def test_only_what_a_metric_expects_is_asked_for(load: Load) -> None:
 
 
 @pytest.mark.parametrize("name", ["mm", "cubit", ""])
-def test_a_metric_expects_units_of_si(load: Load, name: str) -> None:
+def test_a_metric_expects_units_of_si(load, name):
     wrong = Metric("wrong", travel.function, needs={"room.x": name})
     message = rf"^wrong: needs room\.x in '{name}'; must be a unit of SI like 'm'"
     with pytest.raises(InputError, match=message):
         found(load({"x": MM}), wrong)
 
 
-def test_the_offset_of_a_temperature_does_not_apply_to_a_difference(load: Load) -> None:
+def test_the_offset_of_a_temperature_does_not_apply_to_a_difference(load):
     warm = Metric("warm", travel.function, needs={"room.x": "K", "room.y": "K"})
     rise = unit(OUTPUT, "degC", ' relativeQuantity="true"')
     system = load({"x": unit(OUTPUT, "degC"), "y": rise})
     assert found(system, warm).conversions == {"room.x": Conversion(1.0, 273.15)}
 
 
-def test_an_angle_may_be_a_number(load: Load) -> None:
+def test_an_angle_may_be_a_number(load):
     turn = Metric("turn", travel.function, needs={"room.x": "rad", "room.y": "1"})
     system = load({"x": unit(OUTPUT, "1"), "y": unit(OUTPUT, "rad")})
     assert found(system, turn) == InSi({}, ())
@@ -159,13 +157,11 @@ def test_an_angle_may_be_a_number(load: Load) -> None:
 # ------------------------------------------------------------------------- before anything runs
 
 
-def test_every_way_to_run_a_system_refuses_it_first(
-    load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_way_to_run_a_system_refuses_it_first(load, tmp_path, monkeypatch):
     """These FMUs have no binary: loading one would be another error."""
     bring_group(monkeypatch, "travels", travel)
     wrong = replace(load({"x": unit(OUTPUT, "N")}), metrics=("travels",))
-    ways: list[Callable[[], object]] = [
+    ways = [
         lambda: simulate(wrong),
         lambda: simulate.session(wrong),
         lambda: sweep(wrong, [{"room.p": 1.0}], native=False),
@@ -193,7 +189,7 @@ COLUMN = np.array([1.0, 3.0])
 
 
 @given(st.floats(1e-6, 1e6) | st.floats(-1e6, -1e-6), st.floats(-1e3, 1e3))
-def test_signals_come_in_si(factor: float, offset: float) -> None:
+def test_signals_come_in_si(factor, offset):
     to_si = {"room.x": Conversion(factor, offset)}
     run = Signals(TIME, {"room.x": COLUMN, "room.y": COLUMN}, {"hall": "room"}, to_si)
     assert (run["hall.x"] == factor * COLUMN + offset).all()
@@ -202,12 +198,12 @@ def test_signals_come_in_si(factor: float, offset: float) -> None:
     assert run.by_name["room.x"] is COLUMN
 
 
-def test_all_that_metrics_expect_of_a_signal_is_checked(load: Load) -> None:
+def test_all_that_metrics_expect_of_a_signal_is_checked(load):
     @metric("milli", needs={"room.x": "mm"})
-    def milli(run: Signals) -> None: ...
+    def milli(run): ...
 
     @metric("force", needs={"room.x": "N"})
-    def force(run: Signals) -> None: ...
+    def force(run): ...
 
     room = load({"x": M})
     assert refusal(room, travel, milli).startswith("milli: needs room.x in 'mm'; must be a unit")
@@ -216,13 +212,13 @@ def test_all_that_metrics_expect_of_a_signal_is_checked(load: Load) -> None:
     )
 
 
-def test_what_a_metric_may_read_without_a_unit_is_said(load: Load) -> None:
+def test_what_a_metric_may_read_without_a_unit_is_said(load):
     @metric("free")
-    def free(run: Signals) -> float:
+    def free(run):
         return float(run["room.x"][-1])
 
     @metric("bound", needs={"room.x": "m"})
-    def bound(run: Signals) -> None: ...
+    def bound(run): ...
 
     room = load({"y": M})
     assert found(room, free).notes == ("room.x: no unit, taken to be in SI",)

@@ -1,6 +1,5 @@
 """The box on the floor: it sticks, slides, tilts, falls back; each by its equation."""
 
-from collections.abc import Iterator
 from itertools import islice
 from math import atan2, cos, sin
 
@@ -25,18 +24,18 @@ REST = Box(0.0, 0.0, 0.0, 0.0)
 NOTHING = Pushes(0.0, 0.0)
 
 
-def run(q: Shape, box: Box, push: Pushes, d: float) -> Iterator[Box]:
+def run(q, box, push, d):
     while True:
         box = advance(q, box, push, d)
         yield box
 
 
-def after(q: Shape, box: Box, push: Pushes, d: float, n: int) -> Box:
+def after(q, box, push, d, n):
     return next(islice(run(q, box, push, d), n - 1, None))
 
 
 @st.composite
-def shapes(draw: st.DrawFn) -> Shape:
+def shapes(draw):
     a = draw(st.floats(0.02, 0.1))
     return Shape(
         draw(st.floats(0.01, 0.1)),
@@ -48,7 +47,7 @@ def shapes(draw: st.DrawFn) -> Shape:
 
 
 @st.composite
-def boxes(draw: st.DrawFn) -> tuple[Shape, Box]:
+def boxes(draw):
     """Flat or tilted, anywhere short of its balance, moving."""
     q = draw(shapes())
     tilt = draw(st.sampled_from([0.0, draw(st.floats(-0.9, 0.9))])) * balance(q)
@@ -63,33 +62,33 @@ STEPS = st.floats(1e-5, 5e-4)
 # ------------------------------------------------------------------------ on its base
 
 
-def test_a_box_that_slides_stops_after_its_stopping_distance() -> None:
+def test_a_box_that_slides_stops_after_its_stopping_distance():
     box = after(UPRIGHT, Box(0.02, 0.0, -0.4, 0.0), NOTHING, 1e-2, 20)
     assert box.x == pytest.approx(0.02 - 0.4**2 / (2.0 * 0.3 * GRAVITY), rel=1e-12)
     assert (box.v, box.tilt, box.w) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_push_below_the_friction_of_the_floor_does_not_shift_it(way: float) -> None:
+def test_a_push_below_the_friction_of_the_floor_does_not_shift_it(way):
     weak = 0.2999 * WEIGHT
     push = Pushes(weak, 0.0) if way > 0.0 else Pushes(0.0, weak)
     assert after(UPRIGHT, REST, push, 1e-3, 100) == REST
 
 
-def test_a_push_above_it_does() -> None:
+def test_a_push_above_it_does():
     box = after(UPRIGHT, REST, Pushes(0.4 * WEIGHT, 0.0), 1e-3, 100)
     assert box.x == pytest.approx(0.5 * 0.1 * GRAVITY * 0.1**2, rel=1e-9)
     assert box.tilt == 0.0
 
 
-def test_what_both_fingers_press_alike_does_not_shift_it() -> None:
+def test_what_both_fingers_press_alike_does_not_shift_it():
     assert after(UPRIGHT, REST, Pushes(50.0, 50.0), 1e-3, 100) == REST
 
 
 # --------------------------------------------------------------------------- on its edge
 
 
-def test_it_tilts_where_the_push_exceeds_m_g_w_over_2h() -> None:
+def test_it_tilts_where_the_push_exceeds_m_g_w_over_2h():
     threshold = WEIGHT * 2.0 * ROUGH.b / (2.0 * ROUGH.h)
     assert threshold < ROUGH.mu * WEIGHT
     for way in (1.0, -1.0):
@@ -101,7 +100,7 @@ def test_it_tilts_where_the_push_exceeds_m_g_w_over_2h() -> None:
         assert way * after(ROUGH, REST, above, 1e-4, 500).tilt > 0.0
 
 
-def test_a_sliding_box_tilts_by_its_own_friction_where_mu_exceeds_w_over_h() -> None:
+def test_a_sliding_box_tilts_by_its_own_friction_where_mu_exceeds_w_over_h():
     """The floor's mu·m·g at the height of the centre against m·g·b."""
     sliding = Box(0.0, 0.0, 0.5, 0.0)
     for mu, tilts in ((0.99 * 0.035 / 0.05, False), (1.01 * 0.035 / 0.05, True)):
@@ -109,11 +108,11 @@ def test_a_sliding_box_tilts_by_its_own_friction_where_mu_exceeds_w_over_h() -> 
         assert (box.tilt > 0.0) is tilts
 
 
-def test_tilting_under_a_constant_push_is_that_of_the_equation() -> None:
+def test_tilting_under_a_constant_push_is_that_of_the_equation():
     """On an edge that sticks: 4/3·m·r^2·theta'' = Q - m·g·X."""
     push = 0.25
 
-    def slope(_: float, z: list[float]) -> list[float]:
+    def slope(_, z):
         x = ROUGH.b * cos(z[0]) - ROUGH.a * sin(z[0])
         arm = (ROUGH.h - 2.0 * ROUGH.b * sin(z[0])) / cos(z[0]) ** 2
         inertia = 4.0 / 3.0 * ROUGH.m * (ROUGH.a**2 + ROUGH.b**2)
@@ -127,7 +126,7 @@ def test_tilting_under_a_constant_push_is_that_of_the_equation() -> None:
     assert 0.05 < box.tilt < balance(ROUGH)
 
 
-def test_on_a_smooth_floor_the_centre_is_shifted_by_pushes_alone() -> None:
+def test_on_a_smooth_floor_the_centre_is_shifted_by_pushes_alone():
     """No friction: the centre stays above where it was while the box falls back."""
     q = UPRIGHT._replace(mu=0.0)
     tilted = Box(0.0, 0.3, 0.0, 0.0)
@@ -137,7 +136,7 @@ def test_on_a_smooth_floor_the_centre_is_shifted_by_pushes_alone() -> None:
     assert centre(q, box) == pytest.approx(centre(q, tilted), abs=1e-8)
 
 
-def test_it_falls_back_flat_and_loses_the_energy_of_the_fall() -> None:
+def test_it_falls_back_flat_and_loses_the_energy_of_the_fall():
     q = ROUGH._replace(mu=0.5)
     states = list(islice(run(q, Box(0.0, 0.3, 0.0, 0.0), NOTHING, 1e-4), 3000))
     assert states[0].tilt > 0.299
@@ -146,17 +145,17 @@ def test_it_falls_back_flat_and_loses_the_energy_of_the_fall() -> None:
     assert energy(q, states[-1]) == 0.0
 
 
-def fall(q: Shape, tilt: float) -> tuple[float, float]:
+def fall(q, tilt):
     """When a box left alone on an edge that sticks lands, in s, and how fast it turns, rad/s.
 
     Of 4/3·m·r^2·theta'' = -m·g·X, by an integrator that finds the moment.
     """
 
-    def slope(_: float, z: list[float]) -> list[float]:
+    def slope(_, z):
         x = q.b * cos(z[0]) - q.a * sin(z[0])
         return [z[1], -GRAVITY * x / (4.0 / 3.0 * (q.a**2 + q.b**2))]
 
-    def flat(_: float, z: list[float]) -> float:
+    def flat(_, z):
         return z[0]
 
     flat.terminal = True  # type: ignore[attr-defined]
@@ -165,9 +164,7 @@ def fall(q: Shape, tilt: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_it_lands_when_it_should_and_slides_on_as_far_as_the_impulse_of_the_floor_lets_it(
-    side: float,
-) -> None:
+def test_it_lands_when_it_should_and_slides_on_as_far_as_the_impulse_of_the_floor_lets_it(side):
     """The floor stops m·b·|w| upright; by friction it takes mu times as much off m·a·|w| forward.
     With what is left the box slides, back from its edge, until friction has stopped it.
     """
@@ -187,7 +184,7 @@ def test_it_lands_when_it_should_and_slides_on_as_far_as_the_impulse_of_the_floo
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_low_box_on_a_rough_floor_stays_where_it_lands(side: float) -> None:
+def test_a_low_box_on_a_rough_floor_stays_where_it_lands(side):
     """The floor could take more off than there is: mu·b > a."""
     q = Shape(b=0.06, a=0.03, m=0.05, mu=0.9, h=0.03)
     states = list(islice(run(q, Box(0.01, side * 0.2, 0.0, 0.0), NOTHING, 1e-4), 1000))
@@ -197,7 +194,7 @@ def test_a_low_box_on_a_rough_floor_stays_where_it_lands(side: float) -> None:
 
 
 @pytest.mark.parametrize("v", [0.2, -0.3])
-def test_on_a_smooth_floor_a_landing_changes_no_momentum(v: float) -> None:
+def test_on_a_smooth_floor_a_landing_changes_no_momentum(v):
     """No force acts along the floor: the centre keeps its speed, before and after."""
     q, d, n = UPRIGHT._replace(mu=0.0), 1e-4, 2000
     begin = Box(0.0, 0.2, v, 0.0)
@@ -207,7 +204,7 @@ def test_on_a_smooth_floor_a_landing_changes_no_momentum(v: float) -> None:
     assert centre(q, box) == pytest.approx(centre(q, begin) + v * n * d, abs=1e-6)
 
 
-def test_the_balance_is_where_the_centre_is_above_the_edge() -> None:
+def test_the_balance_is_where_the_centre_is_above_the_edge():
     assert balance(UPRIGHT) == pytest.approx(atan2(0.035, 0.05))
     for share, rises in ((0.999, False), (1.001, True)):
         box = Box(0.0, share * balance(UPRIGHT), 0.0, 0.0)
@@ -216,7 +213,7 @@ def test_the_balance_is_where_the_centre_is_above_the_edge() -> None:
     assert centre(UPRIGHT, over) == pytest.approx(0.035)
 
 
-def test_squeezing_a_tilted_box_rights_it() -> None:
+def test_squeezing_a_tilted_box_rights_it():
     """Both fingertips at one height: the box is narrowest there when it is upright."""
     tilted = Box(0.0, 0.1, 0.0, 0.0)
     squeezed = after(ROUGH, tilted, Pushes(5.0, 5.0), 1e-4, 50)
@@ -224,13 +221,13 @@ def test_squeezing_a_tilted_box_rights_it() -> None:
     assert 0.0 <= squeezed.tilt < alone.tilt
 
 
-def test_the_faces_at_the_height_of_the_fingertips() -> None:
+def test_the_faces_at_the_height_of_the_fingertips():
     """Corners turned about the edge, and the height h found on the lines between them."""
     for tilt in (-0.4, 0.0, 0.3):
         q, side = ROUGH, 1.0 if tilt >= 0.0 else -1.0
         edge = side * q.b
 
-        def turned(x: float, z: float, edge: float = edge, tilt: float = tilt) -> np.ndarray:
+        def turned(x, z, edge=edge, tilt=tilt):
             arm = x - edge
             return np.array(
                 [edge + arm * cos(tilt) + z * sin(tilt), z * cos(tilt) - arm * sin(tilt)]
@@ -251,9 +248,7 @@ def test_the_faces_at_the_height_of_the_fingertips() -> None:
 
 @QUICK
 @given(boxes(), PUSHES, STEPS)
-def test_the_mirrored_box_does_exactly_the_mirrored_thing(
-    start: tuple[Shape, Box], push: tuple[float, float], d: float
-) -> None:
+def test_the_mirrored_box_does_exactly_the_mirrored_thing(start, push, d):
     q, box = start
     image = Box(*(-value for value in box))
     for _ in range(20):
@@ -264,7 +259,7 @@ def test_the_mirrored_box_does_exactly_the_mirrored_thing(
 
 @QUICK
 @given(boxes(), STEPS)
-def test_left_alone_it_never_gains_energy(start: tuple[Shape, Box], d: float) -> None:
+def test_left_alone_it_never_gains_energy(start, d):
     """Flat not at all; on its edge what the midpoint rule errs by in a sub-step, third order."""
     q, box = start
     for _ in range(30):
@@ -276,7 +271,7 @@ def test_left_alone_it_never_gains_energy(start: tuple[Shape, Box], d: float) ->
         assert energy(q, box) - energy(q, before) <= (slack + 1e-14) * scale
 
 
-def test_the_order_of_convergence() -> None:
+def test_the_order_of_convergence():
     """Second, from flat and sliding through a tilt on an edge that slides."""
     q = Shape(b=0.03, a=0.06, m=0.1, mu=0.1, h=0.11)
     start, push, t = Box(0.0, 0.0, 1.0, 0.0), Pushes(0.6, 0.0), 0.04
@@ -291,7 +286,7 @@ def test_the_order_of_convergence() -> None:
 
 @QUICK
 @given(shapes(), st.floats(0.0, 1.0))
-def test_friction_of_the_floor_never_jams_the_edge(q: Shape, share: float) -> None:
+def test_friction_of_the_floor_never_jams_the_edge(q, share):
     """Painleve's paradox: for mu < 4/3 a sliding edge always has an acceleration."""
     tilt = share * balance(q)
     x, z = q.b * cos(tilt) - q.a * sin(tilt), q.b * sin(tilt) + q.a * cos(tilt)

@@ -1,6 +1,5 @@
 """An object that gives: known impacts, never a pull, no energy from nothing, damage remembered."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from math import cos, exp, sin, sqrt
@@ -8,7 +7,7 @@ from math import cos, exp, sin, sqrt
 import numpy as np
 import pytest
 from gripper_plant import compliant, contact_laws, friction
-from gripper_plant.compliant import Inputs, Pair, Params, State
+from gripper_plant.compliant import Inputs, Params, State
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt, mean_force
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,28 +25,28 @@ HUNT = Params(hunt_crossley=HuntCrossley(True, 30000.0, 1.5, 2.0))
 LAWS = {"Kelvin-Voigt": VOIGT, "Hunt-Crossley": HUNT}
 
 
-def arrival(p: Params) -> State:
+def arrival(p):
     """Finger 1 at the surface, on its way in."""
     right = p.sides[0].surface
     return State((right, -0.11), (-V, 0.0), (0.0, 0.0), False)
 
 
-def run(p: Params, x: State, force: Pair, h: float) -> Iterator[State]:
+def run(p, x, force, h):
     """Step after step, the force held."""
     while True:
         x = compliant.step(p, x, Inputs(force), h)
         yield x
 
 
-def after(p: Params, x: State, force: Pair, h: float, n: int) -> State:
+def after(p, x, force, h, n):
     return next(islice(run(p, x, force, h), n - 1, None))
 
 
-def depth(p: Params, x: State) -> float:
+def depth(p, x):
     return p.sides[0].surface - x.position[0]
 
 
-def stored(p: Params, x: State) -> float:
+def stored(p, x):
     """Energy of the motion and of both sides of the object, J."""
     law = contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
     right, left = (side.surface for side in p.sides)
@@ -59,13 +58,13 @@ def stored(p: Params, x: State) -> float:
 # ------------------------------------------------------------------------ known impacts
 
 
-def test_an_impact_on_kelvin_voigt_is_the_damped_oscillator_until_it_lets_go() -> None:
+def test_an_impact_on_kelvin_voigt_is_the_damped_oscillator_until_it_lets_go():
     """It lets go where k·delta + c·delta' = 0, which is before delta = 0, and flies on."""
     k, c = VOIGT.kelvin_voigt.stiffness, VOIGT.kelvin_voigt.damping
     sigma = 0.5 * c / M
     w = sqrt(k / M - sigma**2)
 
-    def solution(t: float) -> Pair:
+    def solution(t):
         delta = V / w * exp(-sigma * t) * sin(w * t)
         return delta, V * exp(-sigma * t) * cos(w * t) - sigma * delta
 
@@ -85,14 +84,14 @@ def test_an_impact_on_kelvin_voigt_is_the_damped_oscillator_until_it_lets_go() -
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.5, 2.0])
-def test_an_impact_on_hunt_crossley_is_that_of_its_equation(damping: float) -> None:
+def test_an_impact_on_hunt_crossley_is_that_of_its_equation(damping):
     p = Params(hunt_crossley=HuntCrossley(True, 30000.0, 1.5, damping))
 
-    def slope(_: float, z: list[float]) -> list[float]:
+    def slope(_, z):
         delta, rate = max(z[0], 0.0), z[1]
         return [rate, -30000.0 * delta**1.5 * (1.0 + damping * rate) / M]
 
-    def out(_: float, z: list[float]) -> float:
+    def out(_, z):
         return z[0]
 
     out.terminal, out.direction = True, -1.0  # type: ignore[attr-defined]
@@ -110,7 +109,7 @@ def test_an_impact_on_hunt_crossley_is_that_of_its_equation(damping: float) -> N
 
 
 @pytest.mark.parametrize("enabled", [False, True], ids=["linear", "Hertz"])
-def test_without_damping_a_finger_leaves_as_fast_as_it_came(enabled: bool) -> None:
+def test_without_damping_a_finger_leaves_as_fast_as_it_came(enabled):
     p = Params(
         kelvin_voigt=KelvinVoigt(2000.0, 0.0), hunt_crossley=HuntCrossley(enabled, damping=0.0)
     )
@@ -119,7 +118,7 @@ def test_without_damping_a_finger_leaves_as_fast_as_it_came(enabled: bool) -> No
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_the_order_of_convergence(name: str) -> None:
+def test_the_order_of_convergence(name):
     """Second, from before the contact into it: half the step, a quarter of the error.
 
     The object is so narrow that no step is divided.
@@ -135,7 +134,7 @@ def test_the_order_of_convergence(name: str) -> None:
     assert order == pytest.approx(2.0, abs=0.3)
 
 
-def test_a_long_step_is_made_of_sub_steps() -> None:
+def test_a_long_step_is_made_of_sub_steps():
     """5 ms is a tenth of the impact; alone it would be a caricature of it."""
     coarse = after(HUNT, arrival(HUNT), (0.0, 0.0), 5e-3, 30)
     fine = after(HUNT, arrival(HUNT), (0.0, 0.0), 1e-5, 15_000)
@@ -146,7 +145,7 @@ def test_a_long_step_is_made_of_sub_steps() -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_a_pressed_object_gives_what_its_law_says(name: str) -> None:
+def test_a_pressed_object_gives_what_its_law_says(name):
     p, force = replace(LAWS[name], initial_position=(0.066, -0.006)), 3.43
     x = after(p, compliant.initial_state(p, Inputs()), (-force, force), 2e-3, 1500)
     y = compliant.outputs(p, x, Inputs())
@@ -158,13 +157,13 @@ def test_a_pressed_object_gives_what_its_law_says(name: str) -> None:
     assert y.object_position == 0.03
 
 
-def test_the_gap_is_the_distance_until_the_finger_touches() -> None:
+def test_the_gap_is_the_distance_until_the_finger_touches():
     y = compliant.outputs(VOIGT, compliant.initial_state(VOIGT, Inputs()), Inputs())
     assert y.gap == pytest.approx((0.045, 0.105))
     assert (y.contact, y.squeeze, y.damaged) == ((False, False), 0.0, False)
 
 
-def test_damage_is_remembered() -> None:
+def test_damage_is_remembered():
     p = Params(
         initial_position=(0.066, -0.006),
         squeeze_limit=0.003,
@@ -179,7 +178,7 @@ def test_damage_is_remembered() -> None:
     assert seen == [(False, False), (True, True), (False, True), (False, True)]
 
 
-def test_damage_between_two_communication_points_counts() -> None:
+def test_damage_between_two_communication_points_counts():
     p = Params(squeeze_limit=0.003, kelvin_voigt=KelvinVoigt(2000.0, 0.0))
     x = compliant.step(p, arrival(p), Inputs(), 0.06)
     assert x.contact_force == (0.0, 0.0)
@@ -188,7 +187,7 @@ def test_damage_between_two_communication_points_counts() -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_fingers_with_friction_stick_in_the_object(name: str) -> None:
+def test_fingers_with_friction_stick_in_the_object(name):
     p = Params(
         kelvin_voigt=LAWS[name].kelvin_voigt,
         hunt_crossley=LAWS[name].hunt_crossley,
@@ -207,7 +206,7 @@ HISTORIES = st.lists(st.tuples(FORCES, st.floats(1e-5, 3e-3)), min_size=5, max_s
 
 
 @st.composite
-def plants(draw: st.DrawFn) -> tuple[Params, State]:
+def plants(draw):
     """Fingers near the object or in it, moving."""
     near = st.floats(-3e-3, 2e-3)
     p = Params(
@@ -225,9 +224,7 @@ def plants(draw: st.DrawFn) -> tuple[Params, State]:
 
 @QUICK
 @given(plants(), HISTORIES)
-def test_the_object_never_pulls_and_gives_no_more_than_it_was_given(
-    start: tuple[Params, State], history: list[tuple[Pair, float]]
-) -> None:
+def test_the_object_never_pulls_and_gives_no_more_than_it_was_given(start, history):
     p, x = start
     for force, h in history:
         before, x = x, compliant.step(p, x, Inputs(force), h)
@@ -242,9 +239,7 @@ def test_the_object_never_pulls_and_gives_no_more_than_it_was_given(
 
 @QUICK
 @given(plants(), HISTORIES)
-def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(
-    start: tuple[Params, State], history: list[tuple[Pair, float]]
-) -> None:
+def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(start, history):
     p, x = start
     q = Params(
         p.finger_mass[::-1],
@@ -253,7 +248,7 @@ def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(
         hunt_crossley=p.hunt_crossley,
     )
 
-    def image(x: State) -> State:
+    def image(x):
         return State(swapped(x.position), swapped(x.velocity), swapped(x.contact_force), x.damaged)
 
     z = image(x)
@@ -265,9 +260,7 @@ def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(
 
 @QUICK
 @given(st.floats(-1e-3, 5e-3), st.floats(-1e-3, 5e-3), st.floats(1e-5, 1e-3), st.booleans())
-def test_the_held_force_does_the_work_of_the_spring(
-    before: float, after: float, d: float, hunt: bool
-) -> None:
+def test_the_held_force_does_the_work_of_the_spring(before, after, d, hunt):
     """Without damping to the last digits, whatever the way; with damping more, and never back."""
     p = HuntCrossley(hunt, 3e4, 1.5, 0.0)
     law = contact_laws.law(KelvinVoigt(2e3, 0.0), p)
@@ -279,7 +272,7 @@ def test_the_held_force_does_the_work_of_the_spring(
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_the_mean_force_is_the_law_for_a_short_way(name: str) -> None:
+def test_the_mean_force_is_the_law_for_a_short_way(name):
     """Through where one formula takes over from the other."""
     law = contact_laws.law(LAWS[name].kelvin_voigt, LAWS[name].hunt_crossley)
     k, n, c, lam = law
@@ -292,12 +285,12 @@ def test_the_mean_force_is_the_law_for_a_short_way(name: str) -> None:
 # ----------------------------------------------------------------------------- parameters
 
 
-def test_values_outside_their_ranges_are_refused() -> None:
+def test_values_outside_their_ranges_are_refused():
     assert_ranges_are_checked(Params, but=("initial_position", "object_width"))
     assert_ranges_are_checked(KelvinVoigt, "kelvin_voigt.")
     assert_ranges_are_checked(HuntCrossley, "hunt_crossley.")
 
 
-def test_an_object_that_does_not_fit_is_refused() -> None:
+def test_an_object_that_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="must fit between the fingertips"):
         Params(object_width=0.5)

@@ -8,29 +8,29 @@ import numpy as np
 import pytest
 from gripper_plant import contact, fingers, friction, rigid
 from gripper_plant.fingers import Actuator, Inputs, Side
-from gripper_plant.friction import Law, Params, move, resistance
+from gripper_plant.friction import Params, move, resistance
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from support.declared import Parameter, parameters
+from support.declared import parameters
 from support.examples import examples
 
 QUICK = examples(100)
 
-STRIBECK: Law = (0.4, 0.7, 2.0, 0.02)
+STRIBECK = (0.4, 0.7, 2.0, 0.02)
 MASSES = st.floats(0.01, 100.0)
 SPEEDS = st.floats(-1.0, 1.0)
 STEPS = st.floats(1e-5, 5e-3)
 
 
-def run(x: float, v: float, m: float, f: float, law: Law, d: float, n: int) -> tuple[float, float]:
+def run(x, v, m, f, law, d, n):
     for _ in range(n):
         x, v = move(x, v, m, f, law, d)
     return x, v
 
 
 @pytest.mark.parametrize("n", [1, 3, 100])
-def test_a_sliding_block_stops_after_its_stopping_distance(n: int) -> None:
+def test_a_sliding_block_stops_after_its_stopping_distance(n):
     """v^2 / (2·mu·g), in whatever steps, and then it is at rest."""
     mu, g, v, m = 0.3, 9.80665, 0.8, 0.05
     law = (mu * m * g, mu * m * g, 0.0, 1.0)
@@ -39,7 +39,7 @@ def test_a_sliding_block_stops_after_its_stopping_distance(n: int) -> None:
     assert rate == 0.0
 
 
-def test_a_block_that_is_pushed_back_stops_turns_and_goes() -> None:
+def test_a_block_that_is_pushed_back_stops_turns_and_goes():
     """Both ways on the analytic parabolas, though the stop is within the step."""
     m, v, f, mu = 2.0, 0.5, -9.0, 4.0
     law = (mu, mu, 0.0, 1.0)
@@ -52,21 +52,19 @@ def test_a_block_that_is_pushed_back_stops_turns_and_goes() -> None:
 
 @QUICK
 @given(MASSES, st.floats(-0.7, 0.7), STEPS)
-def test_at_rest_below_breakaway_nothing_moves_at_all(m: float, f: float, d: float) -> None:
+def test_at_rest_below_breakaway_nothing_moves_at_all(m, f, d):
     assert run(0.123, 0.0, m, f, STRIBECK, d, 10) == (0.123, 0.0)
 
 
 @QUICK
 @given(MASSES, st.floats(0.7001, 50.0), st.sampled_from([-1.0, 1.0]), STEPS)
-def test_above_breakaway_it_goes_the_way_of_the_force(
-    m: float, f: float, way: float, d: float
-) -> None:
+def test_above_breakaway_it_goes_the_way_of_the_force(m, f, way, d):
     x, v = move(0.0, 0.0, m, way * f, STRIBECK, d)
     assert way * x > 0.0
     assert way * v > 0.0
 
 
-def test_breakaway_is_at_the_static_force_under_a_slow_ramp() -> None:
+def test_breakaway_is_at_the_static_force_under_a_slow_ramp():
     """And then the Stribeck curve lets it run away from where it stuck."""
     x, v, moved = 0.0, 0.0, 0.0
     for k in range(20_000):
@@ -80,7 +78,7 @@ def test_breakaway_is_at_the_static_force_under_a_slow_ramp() -> None:
 
 @QUICK
 @given(MASSES, SPEEDS, st.floats(-5.0, 5.0), STEPS)
-def test_friction_never_gives_energy(m: float, v: float, f: float, d: float) -> None:
+def test_friction_never_gives_energy(m, v, f, d):
     x, rate = move(0.0, v, m, f, STRIBECK, d)
     gained = 0.5 * m * (rate**2 - v**2) - f * x
     assert gained <= 1e-12 * (0.5 * m * (rate**2 + v**2) + abs(f * x))
@@ -88,13 +86,13 @@ def test_friction_never_gives_energy(m: float, v: float, f: float, d: float) -> 
 
 @QUICK
 @given(MASSES, SPEEDS, st.floats(-5.0, 5.0), STEPS)
-def test_left_is_as_right(m: float, v: float, f: float, d: float) -> None:
+def test_left_is_as_right(m, v, f, d):
     x, rate = move(0.1, v, m, f, STRIBECK, d)
     y, mirrored = move(-0.1, -v, m, -f, STRIBECK, d)
     assert (y, mirrored) == (-x, -rate)
 
 
-def test_there_is_no_chatter_about_a_stop() -> None:
+def test_there_is_no_chatter_about_a_stop():
     """Slowed down under a force that cannot move it, the velocity falls to zero and stays."""
     x, v = 0.0, 0.05
     speeds = []
@@ -107,14 +105,14 @@ def test_there_is_no_chatter_about_a_stop() -> None:
     assert set(speeds[stopped:]) == {0.0}
 
 
-def test_viscous_friction_alone_is_an_exponential() -> None:
+def test_viscous_friction_alone_is_an_exponential():
     m, b, v, t = 0.5, 2.0, 0.3, 0.4
     x, rate = run(0.0, v, m, 0.0, (0.0, 0.0, b, 1.0), t / 4000, 4000)
     assert rate == pytest.approx(v * exp(-b * t / m), rel=1e-6)
     assert x == pytest.approx(v * m / b * (1.0 - exp(-b * t / m)), rel=1e-6)
 
 
-def test_coulomb_and_viscous_friction_stop_at_a_finite_time() -> None:
+def test_coulomb_and_viscous_friction_stop_at_a_finite_time():
     """t = m/b·ln(1 + b·v/F_C)."""
     m, b, v, coulomb = 0.5, 2.0, 0.3, 0.1
     stop = m / b * log(1.0 + b * v / coulomb)
@@ -125,13 +123,13 @@ def test_coulomb_and_viscous_friction_stop_at_a_finite_time() -> None:
     assert after == 0.0
 
 
-def test_the_stribeck_curve() -> None:
+def test_the_stribeck_curve():
     assert resistance(STRIBECK, 0.0) == 0.7
     assert resistance(STRIBECK, 0.02) == pytest.approx(0.4 + 0.3 / exp(1.0) + 0.04)
     assert resistance(STRIBECK, 1.0) == pytest.approx(2.4)
 
 
-def test_the_order_of_convergence() -> None:
+def test_the_order_of_convergence():
     """Second, on the whole Stribeck curve: half the step, a quarter of the error."""
     m, f, v, t = 0.5, -0.2, 0.08, 0.035
     motion = solve_ivp(
@@ -151,17 +149,17 @@ def test_the_order_of_convergence() -> None:
 # ---------------------------------------------------------------------------- the fingers
 
 
-def gripper(**values: Any) -> rigid.Params:
+def gripper(**values: Any):
     return rigid.Params(friction=Params(**values))
 
 
-def after(p: rigid.Params, x: rigid.State, force: fingers.Pair, h: float, n: int) -> rigid.State:
+def after(p, x, force, h, n):
     for _ in range(n):
         x = rigid.step(p, x, Inputs(force), h)
     return x
 
 
-def test_a_finger_sticks_until_its_own_breakaway_force() -> None:
+def test_a_finger_sticks_until_its_own_breakaway_force():
     p = gripper(static=(0.5, 0.2))
     start = rigid.initial_state(p, Inputs())
     assert after(p, start, (-0.5, 0.2), 1e-3, 50) == start
@@ -170,13 +168,13 @@ def test_a_finger_sticks_until_its_own_breakaway_force() -> None:
     assert x.velocity[1] > 0.0
 
 
-def test_a_static_force_below_coulombs_counts_as_that() -> None:
+def test_a_static_force_below_coulombs_counts_as_that():
     p = gripper(coulomb=(0.5, 0.5), static=(0.1, 0.9))
     assert friction.laws(p.friction) == ((0.5, 0.5, 0.0, 0.01), (0.5, 0.9, 0.0, 0.01))
 
 
 @pytest.mark.parametrize("h", [1e-4, 1e-3, 5e-3])
-def test_a_pressed_finger_with_friction_comes_to_rest_exactly(h: float) -> None:
+def test_a_pressed_finger_with_friction_comes_to_rest_exactly(h):
     """In contact, and what the object bears is within the breakaway force of what is pressed."""
     p = gripper(coulomb=(0.1, 0.1), static=(0.15, 0.15), viscous=(1.0, 1.0))
     x = after(p, rigid.initial_state(p, Inputs()), (-3.0, 3.0), h, round(0.8 / h))
@@ -188,7 +186,7 @@ def test_a_pressed_finger_with_friction_comes_to_rest_exactly(h: float) -> None:
     assert after(p, x, (-3.0, 3.0), h, 10) == x
 
 
-def test_the_moment_of_contact_with_friction() -> None:
+def test_the_moment_of_contact_with_friction():
     """It gathers speed under what friction leaves of the force, and meets the object on time."""
     p = gripper(coulomb=(0.4, 0.4))
     a, way = (1.0 - 0.4) / 0.5, 0.11 - 0.065
@@ -209,9 +207,7 @@ def test_the_moment_of_contact_with_friction() -> None:
     st.floats(-1e-4, 1e-3),
     STEPS,
 )
-def test_contact_beside_friction_pushes_only_and_gives_no_energy(
-    force: fingers.Pair, velocity: fingers.Pair, gap: float, h: float
-) -> None:
+def test_contact_beside_friction_pushes_only_and_gives_no_energy(force, velocity, gap, h):
     """With m·beta^2·depth^2/2 counted as stored."""
     p = gripper(coulomb=(0.4, 0.2), static=(0.7, 0.2), viscous=(0.0, 3.0))
     x = rigid.State((0.065 + gap, -0.005 - gap), velocity, (0.0, 0.0))
@@ -226,13 +222,13 @@ def test_contact_beside_friction_pushes_only_and_gives_no_energy(
             assert gained <= work + 1e-12
 
 
-def stored(p: rigid.Params, x: rigid.State, j: int) -> float:
+def stored(p, x, j):
     gap = rigid.outputs(p, x, Inputs()).gap[j]
     m = p.finger_mass[j]
     return 0.5 * m * (x.velocity[j] ** 2 + (p.baumgarte_beta * min(gap, 0.0)) ** 2)
 
 
-def test_without_friction_the_fingers_are_those_of_the_contact_alone() -> None:
+def test_without_friction_the_fingers_are_those_of_the_contact_alone():
     """Bit for bit, from flight into rest."""
     p, h = rigid.Params(), 1e-3
     assert not any(map(friction.acts, (*friction.laws(p.friction), friction.NONE)))
@@ -249,7 +245,7 @@ def test_without_friction_the_fingers_are_those_of_the_contact_alone() -> None:
 # ------------------------------------------------------------------------------ the actuator
 
 
-def test_the_actuator_gives_no_more_than_its_limit() -> None:
+def test_the_actuator_gives_no_more_than_its_limit():
     p = rigid.Params(actuator=Actuator((2.0, 0.5)))
     assert fingers.forces(p.actuator, Inputs((-3.0, 0.4))) == (-2.0, 0.4)
     assert fingers.forces(p.actuator, Inputs((1.9, 0.6))) == (1.9, 0.5)
@@ -260,7 +256,7 @@ def test_the_actuator_gives_no_more_than_its_limit() -> None:
 
 
 @pytest.mark.parametrize("parameter", parameters(Params), ids=lambda p: p.name)
-def test_a_value_outside_its_range_is_refused(parameter: Parameter) -> None:
+def test_a_value_outside_its_range_is_refused(parameter):
     for number, value in parameter.invalid():
         with pytest.raises(ValueError, match=r".+") as caught:
             Params(**{parameter.name: value})
@@ -269,6 +265,6 @@ def test_a_value_outside_its_range_is_refused(parameter: Parameter) -> None:
         assert text.endswith(parameter.valid)
 
 
-def test_a_force_limit_below_zero_is_refused() -> None:
+def test_a_force_limit_below_zero_is_refused():
     with pytest.raises(ValueError, match=r"^actuator.force_limit = -1.0 N: must be from 0 to 1e"):
         Actuator((-1.0, 1.0))

@@ -1,7 +1,6 @@
 """The plants of a hand against scipy, and what they refuse."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,14 +15,14 @@ ANGLES = hand.Params().angle
 G = 9.80665
 
 
-def run(block: Any, p: Any, forces: tuple[float, ...], seconds: float) -> Any:
+def run(block, p, forces, seconds):
     x = block.initial_state(p, block.Inputs(forces))
     for _ in range(round(seconds / H)):
         x = block.step(p, x, block.Inputs(forces), H)
     return x
 
 
-def test_a_free_finger_arrives_where_its_face_is() -> None:
+def test_a_free_finger_arrives_where_its_face_is():
     """At once: s = s_0 - u·t^2/(2·m) meets the surface of a prism that is off centre and turned."""
     p = hand.Params(initial_object_position=(0.004, -0.007), initial_object_angle=0.1)
     for k, angle in enumerate(ANGLES):
@@ -38,9 +37,7 @@ def test_a_free_finger_arrives_where_its_face_is() -> None:
 
 
 @given(st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(0.0, 2.0 * math.pi))
-def test_a_disc_begins_on_a_ray_where_it_is_as_far_from_the_centre_as_its_radius(
-    x: float, y: float, angle: float
-) -> None:
+def test_a_disc_begins_on_a_ray_where_it_is_as_far_from_the_centre_as_its_radius(x, y, angle):
     ray = Ray(math.cos(angle), math.sin(angle), angle, 1.0)
     s = surface(Shape.DISC, 0.035, ray, Pose(x, y, 0.0))
     assert math.hypot(s * ray.x - x, s * ray.y - y) == pytest.approx(0.035)
@@ -49,13 +46,13 @@ def test_a_disc_begins_on_a_ray_where_it_is_as_far_from_the_centre_as_its_radius
     assert math.hypot(at.x, at.y) == pytest.approx(1.0)
 
 
-def of_scipy(p: hand_movable.Params, forces: tuple[float, ...], seconds: float) -> Any:
+def of_scipy(p, forces, seconds):
     """The same equations, friction of the floor smoothed over 10 um/s and 0.1 mrad/s."""
     k, c = p.kelvin_voigt.stiffness, p.kelvin_voigt.damping
     m, r = p.object_mass, p.radius_of_gyration
     drag = p.floor_friction * m * G
 
-    def rates(_: float, z: Any) -> Any:
+    def rates(_, z):
         s, v, (x, y, turn), (vx, vy, w) = z[:3], z[3:6], z[6:9], z[9:]
         push, moment, on_fingers = np.zeros(2), 0.0, []
         for i, angle in enumerate(ANGLES):
@@ -95,7 +92,7 @@ def of_scipy(p: hand_movable.Params, forces: tuple[float, ...], seconds: float) 
     ("forces", "turned"),
     [((-1.0, -0.4, -0.7), 0.0), ((-1.0, -1.0, -1.0), 0.05), ((-1.0, 0.0, -0.2), 0.0)],
 )
-def test_a_free_prism_moves_as_scipy_has_it(forces: tuple[float, ...], turned: float) -> None:
+def test_a_free_prism_moves_as_scipy_has_it(forces, turned):
     p = hand_movable.Params(initial_position=(0.04,) * 3, initial_object_angle=turned)
     body = run(hand_movable, p, forces, 0.3).body
     theirs = of_scipy(p, forces, 0.3)[6:9]
@@ -104,7 +101,7 @@ def test_a_free_prism_moves_as_scipy_has_it(forces: tuple[float, ...], turned: f
     assert body.pose.angle == pytest.approx(theirs[2], rel=0.05, abs=2e-4)
 
 
-def test_a_finger_that_went_around_an_edge_touches_nothing() -> None:
+def test_a_finger_that_went_around_an_edge_touches_nothing():
     p = hand_movable.Params(face_length=0.02, initial_object_position=(0.0, 0.03))
     x = run(hand_movable, p, (-1.0, 0.0, 0.0), 1.0)
     y = hand_movable.outputs(p, x, hand_movable.Inputs())
@@ -122,6 +119,6 @@ def test_a_finger_that_went_around_an_edge_touches_nothing() -> None:
         ({"finger_mass": (0.5, 0.0, 0.5)}, "finger_mass = 0.0 kg: must be from"),
     ],
 )
-def test_what_no_hand_can_have_is_refused(more: dict[str, Any], said: str) -> None:
+def test_what_no_hand_can_have_is_refused(more, said):
     with pytest.raises(ValueError, match=said):
         hand.Params(**more)

@@ -1,6 +1,5 @@
 """Fingers and a box that moves: who pushes alone shifts it, who pushes high topples it."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 
@@ -10,7 +9,7 @@ from gripper_plant import box as standing
 from gripper_plant import contact_laws, friction, movable
 from gripper_plant.box import GRAVITY, Box
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt
-from gripper_plant.movable import Inputs, Pair, Params, State
+from gripper_plant.movable import Inputs, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
@@ -25,25 +24,25 @@ TALL = replace(NEAR, floor_friction=0.9, contact_height=0.08)
 """It topples before it slides."""
 
 
-def run(p: Params, x: State, force: Pair, h: float) -> Iterator[State]:
+def run(p, x, force, h):
     while True:
         x = movable.step(p, x, Inputs(force), h)
         yield x
 
 
-def after(p: Params, x: State, force: Pair, h: float, n: int) -> State:
+def after(p, x, force, h, n):
     return next(islice(run(p, x, force, h), n - 1, None))
 
 
-def start(p: Params) -> State:
+def start(p):
     return movable.initial_state(p, Inputs())
 
 
-def position(p: Params, x: State) -> float:
+def position(p, x):
     return movable.outputs(p, x, Inputs()).object_position
 
 
-def stored(p: Params, x: State) -> float:
+def stored(p, x):
     """Energy of fingers, box and contacts, J."""
     q, law = standing.shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
     right, left = standing.faces(q, x.box)
@@ -52,7 +51,7 @@ def stored(p: Params, x: State) -> float:
     return kinetic + standing.energy(q, x.box) + sum(contact_laws.energy(law, z) for z in depths)
 
 
-def test_the_start_is_at_rest_where_the_parameters_say() -> None:
+def test_the_start_is_at_rest_where_the_parameters_say():
     y = movable.outputs(Params(), start(Params()), Inputs())
     assert y.position == (0.11, -0.11)
     assert y.gap == pytest.approx((0.045, 0.105))
@@ -60,7 +59,7 @@ def test_the_start_is_at_rest_where_the_parameters_say() -> None:
     assert (y.object_position, y.tilt, y.toppled) == (0.03, 0.0, False)
 
 
-def test_a_symmetric_push_does_not_shift_it() -> None:
+def test_a_symmetric_push_does_not_shift_it():
     """Impact, grip and all, to the last bit."""
     for x in islice(run(NEAR, start(NEAR), (-2.0, 2.0), 1e-3), 1200):
         assert x.box == Box(0.0, 0.0, 0.0, 0.0)
@@ -68,7 +67,7 @@ def test_a_symmetric_push_does_not_shift_it() -> None:
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_one_sided_push_shifts_it(way: float) -> None:
+def test_a_one_sided_push_shifts_it(way):
     """And in the end both go as one body, slowed down by the floor."""
     force = (0.0, 0.6) if way > 0.0 else (-0.6, 0.0)
     position = (1.0, -0.036) if way > 0.0 else (0.036, -1.0)
@@ -80,7 +79,7 @@ def test_a_one_sided_push_shifts_it(way: float) -> None:
     assert (x.box.tilt, x.toppled) == (0.0, False)
 
 
-def test_a_finger_that_presses_less_than_the_floor_holds_does_not_shift_it() -> None:
+def test_a_finger_that_presses_less_than_the_floor_holds_does_not_shift_it():
     """Put to it gently: a viscous finger arrives at 1 mm/s."""
     p = replace(NEAR, friction=friction.Params(viscous=(100.0, 100.0)))
     x = after(p, start(p), (0.0, 0.1), 2e-3, 4000)
@@ -88,7 +87,7 @@ def test_a_finger_that_presses_less_than_the_floor_holds_does_not_shift_it() -> 
     assert x.contact_force[1] == pytest.approx(-0.1, rel=1e-3)
 
 
-def test_a_push_near_the_top_topples_it_for_good() -> None:
+def test_a_push_near_the_top_topples_it_for_good():
     x = start(TALL)
     seen = []
     for force in (0.3, 0.3, -0.3):  # m·g·w/(2·h) = 0.21 N
@@ -99,7 +98,7 @@ def test_a_push_near_the_top_topples_it_for_good() -> None:
     assert y.tilt == pytest.approx(standing.balance(standing.shape(TALL)), rel=0.02)
 
 
-def test_a_short_push_tilts_it_and_it_falls_back() -> None:
+def test_a_short_push_tilts_it_and_it_falls_back():
     pushed = after(TALL, start(TALL), (0.0, 1.0), 1e-4, 1010)
     states = list(islice(run(TALL, pushed, (0.0, -8.0), 1e-4), 6000))
     x, tilts = states[-1], [x.box.tilt for x in states]
@@ -109,13 +108,13 @@ def test_a_short_push_tilts_it_and_it_falls_back() -> None:
     assert x.contact_force == (0.0, 0.0)
 
 
-def test_a_toppled_box_stays_as_it_was() -> None:
+def test_a_toppled_box_stays_as_it_was():
     x = after(TALL, start(TALL), (0.0, 0.4), 1e-3, 800)
     assert x.toppled
     assert after(TALL, x, (-3.0, 3.0), 1e-3, 300).box == x.box
 
 
-def test_the_other_finger_stops_what_the_first_has_set_going() -> None:
+def test_the_other_finger_stops_what_the_first_has_set_going():
     """In the grip the box is at rest, exactly; and so are fingers with friction."""
     p = replace(NEAR, friction=friction.Params((0.05, 0.05), (0.05, 0.05)))
     x = after(p, start(p), (0.0, 0.6), 1e-3, 300)
@@ -126,7 +125,7 @@ def test_the_other_finger_stops_what_the_first_has_set_going() -> None:
 
 
 @pytest.mark.parametrize("enabled", [False, True], ids=["Kelvin-Voigt", "Hunt-Crossley"])
-def test_an_impact_hands_over_the_momentum(enabled: bool) -> None:
+def test_an_impact_hands_over_the_momentum(enabled):
     """On a smooth floor, and without damping the speeds are those of an elastic collision."""
     p = replace(
         NEAR,
@@ -142,7 +141,7 @@ def test_an_impact_hands_over_the_momentum(enabled: bool) -> None:
     assert x.velocity[1] == pytest.approx((big - m) / (m + big) * 0.1, rel=1e-9)
 
 
-def test_the_order_of_convergence() -> None:
+def test_the_order_of_convergence():
     """Second, over a push that comes, shifts the box and presses on."""
     p = replace(NEAR, kelvin_voigt=KelvinVoigt(200.0, 1.0))
     x = State((0.04, -0.0361), (0.0, 0.1), (0.0, 0.0), Box(0.0, 0.0, 0.0, 0.0), False)
@@ -162,7 +161,7 @@ HISTORIES = st.lists(st.tuples(FORCES, st.floats(5e-5, 2e-3)), min_size=5, max_s
 
 
 @st.composite
-def plants(draw: st.DrawFn) -> tuple[Params, State]:
+def plants(draw):
     """A box that slides or tilts between fingers that are near, in motion."""
     height = draw(st.floats(0.05, 0.2))
     p = Params(
@@ -182,9 +181,7 @@ def plants(draw: st.DrawFn) -> tuple[Params, State]:
 
 @QUICK
 @given(plants(), HISTORIES)
-def test_contacts_push_only_and_nothing_gives_energy(
-    begin: tuple[Params, State], history: list[tuple[Pair, float]]
-) -> None:
+def test_contacts_push_only_and_nothing_gives_energy(begin, history):
     """Exactly while the box is flat; on its edge but for the midpoint rule's third order."""
     p, x = begin
     for force, h in history:
@@ -201,13 +198,11 @@ def test_contacts_push_only_and_nothing_gives_energy(
 
 @QUICK
 @given(plants(), HISTORIES)
-def test_the_mirrored_plant_does_the_mirrored_thing(
-    begin: tuple[Params, State], history: list[tuple[Pair, float]]
-) -> None:
+def test_the_mirrored_plant_does_the_mirrored_thing(begin, history):
     p, x = begin
     q = replace(p, finger_mass=p.finger_mass[::-1])
 
-    def image(x: State) -> State:
+    def image(x):
         box = Box(*(-value for value in x.box))
         pairs = (swapped(x.position), swapped(x.velocity), swapped(x.contact_force))
         return State(*pairs, box, x.toppled)
@@ -222,11 +217,11 @@ def test_the_mirrored_plant_does_the_mirrored_thing(
 # ----------------------------------------------------------------------------- parameters
 
 
-def test_values_outside_their_ranges_are_refused() -> None:
+def test_values_outside_their_ranges_are_refused():
     apart = ("initial_position", "object_width", "contact_height", "object_height")
     assert_ranges_are_checked(Params, but=apart)
 
 
-def test_fingertips_above_the_object_are_refused() -> None:
+def test_fingertips_above_the_object_are_refused():
     with pytest.raises(ValueError, match=r"^contact_height = 0.2 m: must be from 0 to object_he"):
         Params(contact_height=0.2)

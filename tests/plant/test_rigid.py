@@ -6,21 +6,21 @@ from typing import Any
 
 import pytest
 from gripper_plant import rigid
-from gripper_plant.rigid import Inputs, Pair, Params, State
+from gripper_plant.rigid import Inputs, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
-from support.declared import Parameter, parameters
+from support.declared import parameters
 from support.examples import examples
 
 PARAMETERS = parameters(Params)
 
-WIDE: dict[str, Any] = {"initial_position": (10.0, -10.0), "initial_object_position": 0.0}
+WIDE = {"initial_position": (10.0, -10.0), "initial_object_position": 0.0}
 """The widest opening there is."""
 
-POINT: dict[str, Any] = WIDE | {"object_width": 0.0}
+POINT = WIDE | {"object_width": 0.0}
 """An object that fits wherever the fingers are."""
 
-SURROUNDINGS: dict[str, dict[str, Any]] = {
+SURROUNDINGS = {
     "finger_mass": {},
     "initial_position": {"object_width": 0.0},
     "object_width": WIDE,
@@ -31,19 +31,19 @@ SURROUNDINGS: dict[str, dict[str, Any]] = {
 """Per parameter, the others such that both ends of its range are possible."""
 
 
-def message(**values: Any) -> str:
+def message(**values: Any):
     with pytest.raises(ValueError, match=r".+") as caught:
         Params(**values)
     return str(caught.value)
 
 
-def test_every_number_has_a_range() -> None:
+def test_every_number_has_a_range():
     assert {p.name for p in PARAMETERS} == set(SURROUNDINGS)
     assert all(p.low < p.high for p in PARAMETERS)
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
-def test_a_value_outside_its_range_is_refused(parameter: Parameter) -> None:
+def test_a_value_outside_its_range_is_refused(parameter):
     for number, value in parameter.invalid():
         text = message(**SURROUNDINGS[parameter.name] | {parameter.name: value})
         assert text.startswith(f"{parameter.name} = {number!r} {parameter.unit}: ")
@@ -52,7 +52,7 @@ def test_a_value_outside_its_range_is_refused(parameter: Parameter) -> None:
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
-def test_both_ends_of_a_range_are_accepted(parameter: Parameter) -> None:
+def test_both_ends_of_a_range_are_accepted(parameter):
     if parameter.name == "initial_position":
         return  # both fingers must move together with the object, see below
     for bound in (parameter.low, parameter.high):
@@ -64,14 +64,14 @@ def test_both_ends_of_a_range_are_accepted(parameter: Parameter) -> None:
 @pytest.mark.parametrize(
     ("position", "x_m"), [((10.0, -10.0), 3.0), ((10.0, 10.0), 10.0), ((-10.0, -10.0), -10.0)]
 )
-def test_both_ends_of_the_travel_are_accepted(position: Pair, x_m: float) -> None:
+def test_both_ends_of_the_travel_are_accepted(position, x_m):
     p = Params(initial_position=position, initial_object_position=x_m, object_width=0.0)
     assert p.initial_position == position
 
 
 @pytest.mark.parametrize("mass", [-0.5, 0.0, nan, inf])
 @pytest.mark.parametrize("finger", [0, 1])
-def test_a_mass_that_is_none_is_refused_by_name(mass: float, finger: int) -> None:
+def test_a_mass_that_is_none_is_refused_by_name(mass, finger):
     masses = (mass, 0.5) if finger == 0 else (0.5, mass)
     valid = "must be from 0.001 to 1000 kg"
     assert message(finger_mass=masses) == f"finger_mass = {mass!r} kg: {valid}"
@@ -82,7 +82,7 @@ def test_a_mass_that_is_none_is_refused_by_name(mass: float, finger: int) -> Non
     [(0.25, 0.0), (0.07, 0.08), (0.07, -0.08), (0.07, 0.5), (0.07, -0.5)],
     ids=["wider than the opening", "into 1", "into 2", "outside 1", "outside 2"],
 )
-def test_an_object_that_is_not_between_the_fingers_is_refused(width: float, x_m: float) -> None:
+def test_an_object_that_is_not_between_the_fingers_is_refused(width, x_m):
     text = message(object_width=width, initial_object_position=x_m)
     assert f"object_width = {width!r} m" in text
     assert f"initial_object_position = {x_m!r} m" in text
@@ -91,11 +91,11 @@ def test_an_object_that_is_not_between_the_fingers_is_refused(width: float, x_m:
     assert "\n" not in text
 
 
-def test_fingers_the_wrong_way_round_are_refused() -> None:
+def test_fingers_the_wrong_way_round_are_refused():
     assert "-0.11" in message(initial_position=(-0.11, 0.11))
 
 
-def test_an_object_as_wide_as_the_opening_touches_both_fingers_and_pushes_neither() -> None:
+def test_an_object_as_wide_as_the_opening_touches_both_fingers_and_pushes_neither():
     p = Params(initial_position=(1.0, -0.5), object_width=1.5, initial_object_position=0.25)
     y = rigid.outputs(p, rigid.initial_state(p, Inputs()), Inputs())
     assert y.gap == (0.0, 0.0)
@@ -103,7 +103,7 @@ def test_an_object_as_wide_as_the_opening_touches_both_fingers_and_pushes_neithe
     assert y.contact_force == (0.0, 0.0)
 
 
-def test_the_start_is_at_rest_where_the_parameters_say() -> None:
+def test_the_start_is_at_rest_where_the_parameters_say():
     p = Params(initial_position=(0.2, -0.15), initial_object_position=-0.01)
     y = rigid.outputs(p, rigid.initial_state(p, Inputs()), Inputs())
     assert y.position == (0.2, -0.15)
@@ -114,18 +114,18 @@ def test_the_start_is_at_rest_where_the_parameters_say() -> None:
     assert y.gap == pytest.approx((0.2 - 0.025, 0.15 - 0.045), rel=1e-14)
 
 
-def swapped(pair: Pair) -> Pair:
+def swapped(pair):
     first, second = pair
     return -second, -first
 
 
-def mirrored(x: State) -> State:
+def mirrored(x):
     """The same motion seen from behind the gripper."""
     return State(swapped(x.position), swapped(x.velocity), swapped(x.contact_force))
 
 
 @st.composite
-def grippers(draw: st.DrawFn) -> Params:
+def grippers(draw):
     """Close to an object anywhere, so that a few steps reach it."""
     x_m, width = draw(st.floats(-0.1, 0.1)), draw(st.floats(0.0, 0.1))
     near = st.floats(1e-6, 2e-3)
@@ -145,9 +145,7 @@ HISTORIES = st.lists(st.tuples(FORCES, st.floats(1e-5, 5e-3)), min_size=10, max_
 
 @examples(60)
 @given(grippers(), HISTORIES)
-def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(
-    p: Params, history: list[tuple[Pair, float]]
-) -> None:
+def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(p, history):
     q = replace(
         p,
         finger_mass=p.finger_mass[::-1],

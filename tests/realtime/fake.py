@@ -1,16 +1,9 @@
 """A clock that moves only as it is told, and runs of mocks by it."""
 
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
-
 from grasp_cosim.exchange.dispatch import Dispatcher
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import Master
 from grasp_cosim.realtime.pacer import Clock, Pacer
-from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.system.description import System
 from grasp_cosim.system.realtime import Realtime
 from support.mocks import Mock, make_system
 
@@ -27,23 +20,23 @@ NEAR = 1e-4
 class Fake:
     """Time in ns. oversleeps are added to the sleeps, one by one."""
 
-    def __init__(self, oversleeps: Sequence[int] = ()) -> None:
+    def __init__(self, oversleeps=()):
         self.time = 123_456_789
-        self.sleeps: list[float] = []
+        self.sleeps = []
         self.oversleeps = list(oversleeps)
-        self.on_sleep: Callable[[], None] = lambda: None
+        self.on_sleep = lambda: None
 
-    def now(self) -> int:
+    def now(self):
         self.time += TICK
         return self.time
 
-    def sleep(self, seconds: float) -> None:
+    def sleep(self, seconds):
         self.sleeps.append(seconds)
         self.time += round(seconds * 1e9) + (self.oversleeps.pop(0) if self.oversleeps else 0)
         self.on_sleep()
 
     @property
-    def clock(self) -> Clock:
+    def clock(self):
         return Clock(self.now, self.sleep)
 
 
@@ -55,31 +48,24 @@ class Paced:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        costs: Mapping[str, Mapping[int, int]],
-        realtime: Realtime | None = None,
-        engine: Engine = "python",
-        steps: int = 10,
-        fake: Fake | None = None,
-        **system: Any,
-    ) -> None:
+        self, folder, costs, realtime=None, engine="python", steps=10, fake=None, **system
+    ):
         self.fake = fake or Fake()
-        self.began: dict[str, list[int]] = {name: [] for name in costs}
+        self.began = {name: [] for name in costs}
         mocks = [Mock(folder, name, self._output(name, own)) for name, own in costs.items()]
-        self.system: System = make_system(mocks, [], steps, 100 * MS, **system)
+        self.system = make_system(mocks, [], steps, 100 * MS, **system)
         self.halted = False
         self.pacer = Pacer(
             self.system, realtime or Realtime(), lambda: self.halted, self.fake.clock
         )
         self.memory = MemoryListener()
-        self.recording: Callable[[], None] = lambda: None
+        self.recording = lambda: None
         self.master = Master(self.system, mocks, self._receive, engine, self.pacer)
         self.dispatch = Dispatcher(self.system, self.master.slots, [self.memory])
         self.master.initialise()
 
-    def _output(self, name: str, costs: Mapping[int, int]) -> Callable[[float, float], float]:
-        def output(u: float, t: float) -> float:
+    def _output(self, name, costs):
+        def output(u, t):
             step = round(t / 0.1) - 1
             if step >= 0:
                 self.began[name].append(self.fake.time)
@@ -88,13 +74,13 @@ class Paced:
 
         return output
 
-    def _receive(self, steps: Any, rows: Any) -> None:
+    def _receive(self, steps, rows):
         self.recording()
         self.dispatch(steps, rows)
 
-    def to_the_end(self) -> Timing:
+    def to_the_end(self):
         self.master.advance(self.master.total_steps)
         return self.timing()
 
-    def timing(self) -> Timing:
+    def timing(self):
         return self.pacer.timing((), ())

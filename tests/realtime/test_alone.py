@@ -3,8 +3,6 @@
 import os
 import signal
 import threading
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +13,6 @@ from grasp_cosim.master import master, side_thread
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.recording.result import Result
 from support.both_engines import needs_compiler
 from support.native_fmus import TYPES, build, needs_gcc
 from support.slow import slow
@@ -28,9 +25,7 @@ pytestmark = [
 FAST = Realtime(factor=1e4)
 
 
-def system(
-    folder: Path, version: str = "2.0", scheme: str = "sequential", **given: float
-) -> System:
+def system(folder, version="2.0", scheme="sequential", **given):
     """Two native FMUs, the integral of one the input of the other; 2 s at 1 ms."""
     fmu = build(folder, "native", version, strings=False)
     real, whole = ("Real", "Integer") if version == "2.0" else ("Float64", "Int32")
@@ -51,31 +46,29 @@ def system(
 class Once:
     """A listener that does something with the first step that it hears of."""
 
-    def __init__(self, act: Callable[[], object]) -> None:
+    def __init__(self, act):
         self.left = [act]
 
-    def begin(self, *_: Any) -> None: ...
-    def end(self, *_: Any) -> None: ...
-    def block(self, steps: Any, _: Any) -> None:
+    def begin(self, *_: Any): ...
+    def end(self, *_: Any): ...
+    def block(self, steps, _):
         if steps[-1] > 0 and self.left:
             self.left.pop()()
 
 
-def kills(number: int) -> Once:
+def kills(number):
     """Sends this process a signal."""
     return Once(lambda: os.kill(os.getpid(), number))
 
 
-def same_bits(one: Result, two: Result) -> bool:
+def same_bits(one, two):
     same = [one[name].tobytes() == two[name].tobytes() for name in one]
     return all(same) and one.time.tobytes() == two.time.tobytes() and list(one) == list(two)
 
 
 @pytest.mark.parametrize("version", ["2.0", slow("3.0")])
 @pytest.mark.parametrize("scheme", ["jacobi", slow("sequential")])
-def test_it_has_the_bits_of_a_free_run_and_a_timing(
-    tmp_path: Path, version: str, scheme: str
-) -> None:
+def test_it_has_the_bits_of_a_free_run_and_a_timing(tmp_path, version, scheme):
     two = system(tmp_path, version, scheme)
     with simulate.session(two, realtime=FAST) as session:
         assert session._master.runs_alone
@@ -89,7 +82,7 @@ def test_it_has_the_bits_of_a_free_run_and_a_timing(
     assert "recording" not in {*paced.timing.culprits, *paced.timing.parts}
 
 
-def test_rows_go_round_in_their_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_go_round_in_their_room(tmp_path, monkeypatch):
     two = system(tmp_path)
     monkeypatch.setattr(master, "ROOM", 7)
     monkeypatch.setattr(side_thread, "PAUSE", 1e-6)
@@ -97,7 +90,7 @@ def test_rows_go_round_in_their_room(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert same_bits(simulate(two), simulate(two, realtime=FAST))
 
 
-def test_steps_in_pieces_and_looks_in_between_come_to_the_same(tmp_path: Path) -> None:
+def test_steps_in_pieces_and_looks_in_between_come_to_the_same(tmp_path):
     two = system(tmp_path)
     with simulate.session(two, realtime=FAST) as session:
         for steps in (1, 1, 3, 700, 5, 5000):
@@ -107,7 +100,7 @@ def test_steps_in_pieces_and_looks_in_between_come_to_the_same(tmp_path: Path) -
         assert same_bits(session.result(), simulate(two))
 
 
-def test_it_keeps_to_the_clock(tmp_path: Path) -> None:
+def test_it_keeps_to_the_clock(tmp_path):
     """Each step begins at or after its time, in order, whatever the machine does."""
     two = system(tmp_path).with_experiment(stop=0.2)
     timing = simulate(two, realtime=Realtime(factor=1.0)).timing
@@ -116,7 +109,7 @@ def test_it_keeps_to_the_clock(tmp_path: Path) -> None:
     assert timing.parts["start"].median >= 0.0
 
 
-def test_the_folder_has_every_row_of_it(tmp_path: Path) -> None:
+def test_the_folder_has_every_row_of_it(tmp_path):
     two = system(tmp_path)
     with RunFolder(tmp_path / "out", two, paced=True) as folder:
         result = simulate(two, realtime=FAST, listeners=[folder])
@@ -125,14 +118,14 @@ def test_the_folder_has_every_row_of_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("at", [0.5005, 1.9995])
-def test_an_fmu_that_fails_ends_it_with_what_was_recorded(tmp_path: Path, at: float) -> None:
+def test_an_fmu_that_fails_ends_it_with_what_was_recorded(tmp_path, at):
     with pytest.raises(SimulationError, match="returned error") as caught:
         simulate(system(tmp_path, error_at=at), realtime=FAST)
     assert caught.value.result is not None
     assert len(caught.value.result.time) == int(at * 1e3) + 1
 
 
-def test_a_step_that_is_discarded_is_taken_in_parts(tmp_path: Path) -> None:
+def test_a_step_that_is_discarded_is_taken_in_parts(tmp_path):
     two = system(tmp_path, discard_at=0.5005)
     free, paced = simulate(two), simulate(two, realtime=FAST)
     assert free.rejections == paced.rejections
@@ -140,16 +133,16 @@ def test_a_step_that_is_discarded_is_taken_in_parts(tmp_path: Path) -> None:
     assert same_bits(free, paced)
 
 
-def test_a_late_step_ends_it_where_it_should(tmp_path: Path) -> None:
+def test_a_late_step_ends_it_where_it_should(tmp_path):
     with pytest.raises(SimulationError, match=r"the step at t = 0(\.\d+)? s ended .* ms late"):
         simulate(system(tmp_path), realtime=Realtime(factor=1e6, overrun="stop"))
 
 
-def test_what_a_listener_raises_ends_it(tmp_path: Path) -> None:
+def test_what_a_listener_raises_ends_it(tmp_path):
     class Full:
-        def begin(self, *_: Any) -> None: ...
-        def end(self, *_: Any) -> None: ...
-        def block(self, steps: Any, rows: Any) -> None:
+        def begin(self, *_: Any): ...
+        def end(self, *_: Any): ...
+        def block(self, steps, rows):
             if steps[-1] > 10:
                 raise SimulationError("the disk is full")
 
@@ -158,7 +151,7 @@ def test_what_a_listener_raises_ends_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("waits", [True, False])
-def test_ctrl_c_ends_it_soon_and_keeps_what_was_recorded(tmp_path: Path, waits: bool) -> None:
+def test_ctrl_c_ends_it_soon_and_keeps_what_was_recorded(tmp_path, waits):
     """While it sleeps between steps, and where it never does."""
     long = system(tmp_path).with_experiment(stop=1e5)
     realtime = Realtime(factor=1.0 if waits else 1e6)
@@ -167,7 +160,7 @@ def test_ctrl_c_ends_it_soon_and_keeps_what_was_recorded(tmp_path: Path, waits: 
     assert 0 < result.time[-1] < 1e5
 
 
-def test_ctrl_c_in_a_session_is_raised_and_keeps_what_was_recorded(tmp_path: Path) -> None:
+def test_ctrl_c_in_a_session_is_raised_and_keeps_what_was_recorded(tmp_path):
     long = system(tmp_path).with_experiment(stop=1e5)
     ends = kills(signal.SIGINT)
     with simulate.session(long, realtime=Realtime(), listeners=[ends]) as session:
@@ -179,13 +172,13 @@ def test_ctrl_c_in_a_session_is_raised_and_keeps_what_was_recorded(tmp_path: Pat
             session.step()
 
 
-def test_a_halt_from_another_thread_ends_it(tmp_path: Path) -> None:
+def test_a_halt_from_another_thread_ends_it(tmp_path):
     long = system(tmp_path).with_experiment(stop=1e5)
     begun = threading.Event()
     ends = Once(begun.set)
     with simulate.session(long, realtime=Realtime(), every=100, listeners=[ends]) as session:
 
-        def halt() -> None:
+        def halt():
             begun.wait()
             session.halt.set()
 
@@ -197,8 +190,8 @@ def test_a_halt_from_another_thread_ends_it(tmp_path: Path) -> None:
         assert not session.step(1)
 
 
-def test_another_signal_does_not_end_it(tmp_path: Path) -> None:
-    seen: list[int] = []
+def test_another_signal_does_not_end_it(tmp_path):
+    seen = []
     before = signal.signal(signal.SIGUSR1, lambda number, _: seen.append(number))
     try:
         two = system(tmp_path).with_experiment(stop=0.3)
@@ -209,7 +202,7 @@ def test_another_signal_does_not_end_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_python_call_in_the_plan_keeps_the_pacer_in_python(tmp_path: Path) -> None:
+def test_a_python_call_in_the_plan_keeps_the_pacer_in_python(tmp_path):
     """An event, say: nobody would hand the rows on in its wait otherwise."""
     system(tmp_path)
     path = tmp_path / "two.toml"

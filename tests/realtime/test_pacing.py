@@ -2,39 +2,34 @@
 
 from fractions import Fraction
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, Realtime, SimulationError
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import CHUNK
 from grasp_cosim.master.plan import Planner
 from grasp_cosim.realtime.meter import LISTED
 from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
-from grasp_cosim.realtime.timing import Timing
-from grasp_cosim.system.realtime import Overrun
 from realtime.fake import MS, NEAR, US, Fake, Paced
 from support.both_engines import ENGINES
 from support.mocks import Mock, make_system
 
 
 @pytest.fixture(params=ENGINES)
-def engine(request: pytest.FixtureRequest) -> Engine:
-    chosen: Engine = request.param
-    return chosen
+def engine(request):
+    return request.param
 
 
-def culprits(timing: Timing) -> list[tuple[int, str]]:
+def culprits(timing):
     return [(overrun.step, overrun.culprit) for overrun in timing.listed]
 
 
-def make_pacer(folder: Path, fake: Fake, realtime: Realtime, step_ns: int = 100 * MS) -> Pacer:
+def make_pacer(folder, fake, realtime, step_ns=100 * MS):
     system = make_system([Mock(folder, "a", lambda u, t: t)], [], 10, step_ns)
     return Pacer(system, realtime, clock=fake.clock)
 
 
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_each_step_begins_at_its_time(tmp_path: Path, engine: Engine, scheme: str) -> None:
+def test_each_step_begins_at_its_time(tmp_path, engine, scheme):
     run = Paced(tmp_path, {"a": {-1: 30 * MS}, "b": {-1: 20 * MS}}, engine=engine, scheme=scheme)
     timing = run.to_the_end()
     first, *others = run.began["a"]
@@ -49,7 +44,7 @@ def test_each_step_begins_at_its_time(tmp_path: Path, engine: Engine, scheme: st
     assert timing.parts["step"].worst == pytest.approx(0.05, abs=NEAR)
 
 
-def test_it_sleeps_in_slices_and_spins_at_the_end(tmp_path: Path) -> None:
+def test_it_sleeps_in_slices_and_spins_at_the_end(tmp_path):
     fake = Fake()
     pace = make_pacer(tmp_path, fake, Realtime())
     pace(0)
@@ -65,7 +60,7 @@ def test_it_sleeps_in_slices_and_spins_at_the_end(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("factor", [3.0, 0.1, 1.7])
-def test_the_schedule_does_not_drift(tmp_path: Path, factor: float) -> None:
+def test_the_schedule_does_not_drift(tmp_path, factor):
     """Where the period is no whole number of ns; and 0.1 is a tenth."""
     fake = Fake()
     system = make_system([Mock(tmp_path, "a", lambda u, t: t)], [], 10, 1 * MS)
@@ -77,7 +72,7 @@ def test_the_schedule_does_not_drift(tmp_path: Path, factor: float) -> None:
     assert fake.time - start == pytest.approx(10**6 * MS / Fraction(str(factor)), abs=1 * US)
 
 
-def test_catch_up_keeps_to_the_schedule(tmp_path: Path, engine: Engine) -> None:
+def test_catch_up_keeps_to_the_schedule(tmp_path, engine):
     """Step 3 takes 350 ms: 3 to 5 end late, by 250, 160 and 70 ms, and 7 begins in time."""
     run = Paced(tmp_path, {"a": {-1: 10 * MS, 3: 350 * MS}, "b": {}}, engine=engine)
     timing = run.to_the_end()
@@ -92,7 +87,7 @@ def test_catch_up_keeps_to_the_schedule(tmp_path: Path, engine: Engine) -> None:
     assert (timing.parts["a"].worst_at, timing.parts["start"].worst_at) == (0.3, 0.4)
 
 
-def test_continue_shifts_the_schedule(tmp_path: Path, engine: Engine) -> None:
+def test_continue_shifts_the_schedule(tmp_path, engine):
     run = Paced(
         tmp_path, {"a": {-1: 10 * MS, 3: 350 * MS}}, Realtime(overrun="continue"), engine
     )  # fmt: skip
@@ -104,7 +99,7 @@ def test_continue_shifts_the_schedule(tmp_path: Path, engine: Engine) -> None:
     assert timing.real_time_factor == pytest.approx(1.0 / 1.25, abs=1e-3)
 
 
-def test_stop_ends_the_run_and_keeps_what_was_recorded(tmp_path: Path, engine: Engine) -> None:
+def test_stop_ends_the_run_and_keeps_what_was_recorded(tmp_path, engine):
     costs = {"a": {-1: 10 * MS}, "b": {-1: 20 * MS, 3: 140 * MS}}
     run = Paced(tmp_path, costs, Realtime(overrun="stop"), engine)
     error = r"^mock.toml: the step at t = 0\.3 s ended 50 ms late: b took 140 ms; must end within 1"
@@ -115,7 +110,7 @@ def test_stop_ends_the_run_and_keeps_what_was_recorded(tmp_path: Path, engine: E
     assert culprits(run.timing()) == [(3, "b")]
 
 
-def test_stop_after_single_steps_says_the_same(tmp_path: Path) -> None:
+def test_stop_after_single_steps_says_the_same(tmp_path):
     """Where no row waits to be handed on when it is found out."""
     run = Paced(tmp_path, {"a": {3: 140 * MS}}, Realtime(overrun="stop"))
     for _ in range(4):
@@ -127,7 +122,7 @@ def test_stop_after_single_steps_says_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("overrun", ["catch-up", "continue"])
-def test_the_last_step_can_be_late(tmp_path: Path, engine: Engine, overrun: Overrun) -> None:
+def test_the_last_step_can_be_late(tmp_path, engine, overrun):
     run = Paced(tmp_path, {"a": {9: 150 * MS}}, Realtime(overrun=overrun), engine)
     timing = run.to_the_end()
     assert culprits(timing) == [(9, "a")]
@@ -136,14 +131,14 @@ def test_the_last_step_can_be_late(tmp_path: Path, engine: Engine, overrun: Over
     assert timing.real_time_factor == pytest.approx(1.0 / 1.05, abs=1e-4)
 
 
-def test_the_last_step_can_stop_the_run(tmp_path: Path, engine: Engine) -> None:
+def test_the_last_step_can_stop_the_run(tmp_path, engine):
     run = Paced(tmp_path, {"a": {9: 150 * MS}}, Realtime(overrun="stop"), engine)
     with pytest.raises(SimulationError, match=r"the step at t = 0\.9 s ended 50 ms late: a took"):
         run.to_the_end()
     assert len(run.memory.columns()[0]) == 11
 
 
-def test_a_machine_that_wakes_us_late_is_to_blame(tmp_path: Path) -> None:
+def test_a_machine_that_wakes_us_late_is_to_blame(tmp_path):
     fake = Fake()
     run = Paced(tmp_path, {"a": {-1: 50 * MS}}, fake=fake)
     run.master.advance(3)
@@ -156,11 +151,11 @@ def test_a_machine_that_wakes_us_late_is_to_blame(tmp_path: Path) -> None:
     assert timing.parts["step"].worst == pytest.approx(0.05, abs=NEAR)
 
 
-def test_recording_is_to_blame_where_it_takes_too_long(tmp_path: Path) -> None:
+def test_recording_is_to_blame_where_it_takes_too_long(tmp_path):
     run = Paced(tmp_path, {"a": {-1: 50 * MS}})
     run.master.advance(3)
 
-    def slow() -> None:
+    def slow():
         run.fake.time += 80 * MS
 
     run.recording = slow
@@ -172,12 +167,12 @@ def test_recording_is_to_blame_where_it_takes_too_long(tmp_path: Path) -> None:
     assert timing.parts["recording"].worst_at == 0.2
 
 
-def test_rows_are_handed_on_while_there_is_time_to_wait(tmp_path: Path, engine: Engine) -> None:
+def test_rows_are_handed_on_while_there_is_time_to_wait(tmp_path, engine):
     """And what is recorded is all of them, in order."""
     run = Paced(tmp_path, {"a": {-1: 10 * MS}}, engine=engine, steps=1500)
-    took: list[int] = []
+    took = []
 
-    def slow() -> None:
+    def slow():
         took.append(len(run.memory.columns()[0]))
         run.fake.time += 50 * MS
 
@@ -189,11 +184,11 @@ def test_rows_are_handed_on_while_there_is_time_to_wait(tmp_path: Path, engine: 
     assert run.memory.columns()[1]["a.y"] == pytest.approx(run.memory.columns()[0])
 
 
-def test_rows_wait_where_there_is_no_time_for_them(tmp_path: Path, engine: Engine) -> None:
+def test_rows_wait_where_there_is_no_time_for_them(tmp_path, engine):
     run = Paced(tmp_path, {"a": {-1: 60 * MS}}, engine=engine, steps=CHUNK + 500)
-    took: list[int] = []
+    took = []
 
-    def slow() -> None:
+    def slow():
         took.append(len(run.memory.columns()[0]))
         run.fake.time += 50 * MS
 
@@ -207,7 +202,7 @@ def test_rows_wait_where_there_is_no_time_for_them(tmp_path: Path, engine: Engin
     assert len(run.memory.columns()[0]) == CHUNK + 501
 
 
-def test_who_calls_single_steps_is_to_blame_for_a_pause(tmp_path: Path) -> None:
+def test_who_calls_single_steps_is_to_blame_for_a_pause(tmp_path):
     run = Paced(tmp_path, {"a": {-1: 50 * MS}})
     run.master.advance(3)
     run.fake.time += 80 * MS
@@ -217,7 +212,7 @@ def test_who_calls_single_steps_is_to_blame_for_a_pause(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_a_slow_component_is_counted_where_it_steps(tmp_path: Path, scheme: str) -> None:
+def test_a_slow_component_is_counted_where_it_steps(tmp_path, scheme):
     """It takes its time at every fifth step, and is then to blame although that is usual."""
     run = Paced(
         tmp_path, {"a": {-1: 10 * MS}, "slow": {-1: 95 * MS}}, steps=10, scheme=scheme,
@@ -230,21 +225,21 @@ def test_a_slow_component_is_counted_where_it_steps(tmp_path: Path, scheme: str)
     assert counts["a"] == counts["step"] == counts["start"] == counts["between"] == 10
 
 
-def test_where_the_machine_is_too_slow_the_longest_part_is_to_blame(tmp_path: Path) -> None:
+def test_where_the_machine_is_too_slow_the_longest_part_is_to_blame(tmp_path):
     costs = {"a": {-1: 40 * MS, 5: 50 * MS}, "b": {-1: 90 * MS}}
     timing = Paced(tmp_path, costs).to_the_end()
     assert timing.culprits == {"b": 10}
     assert timing.real_time_factor == pytest.approx(100 / 131, abs=0.01)
 
 
-def test_all_overruns_are_counted_and_the_first_are_listed(tmp_path: Path, engine: Engine) -> None:
+def test_all_overruns_are_counted_and_the_first_are_listed(tmp_path, engine):
     steps = LISTED + 500
     timing = Paced(tmp_path, {"a": {-1: 150 * MS}}, engine=engine, steps=steps).to_the_end()
     assert (timing.overruns, timing.culprits) == (steps, {"a": steps})
     assert [o.step for o in timing.listed] == list(range(LISTED))
 
 
-def test_the_time_between_two_beginnings_is_divided_without_a_gap(tmp_path: Path) -> None:
+def test_the_time_between_two_beginnings_is_divided_without_a_gap(tmp_path):
     """In overload, where there is no waiting, the parts are the whole of the wall time."""
     run = Paced(tmp_path, {"a": {-1: 110 * MS}, "b": {-1: 7 * MS}}, steps=600)
     before = run.fake.time
@@ -259,13 +254,11 @@ def test_the_time_between_two_beginnings_is_divided_without_a_gap(tmp_path: Path
     assert total == pytest.approx((run.fake.time - before) / 1e9, rel=1 / 16)
 
 
-def test_interrupted_in_a_binary_it_keeps_what_was_handed_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupted_in_a_binary_it_keeps_what_was_handed_on(tmp_path, monkeypatch):
     monkeypatch.setattr(Planner, "_guarded", lambda _, call: call)  # as of calls of binaries
     run = Paced(tmp_path, {"a": {-1: 10 * MS}}, steps=200)
 
-    def interrupt() -> None:
+    def interrupt():
         if len(run.began["a"]) == 150:
             raise KeyboardInterrupt
 
@@ -279,9 +272,7 @@ def test_interrupted_in_a_binary_it_keeps_what_was_handed_on(
     assert run.timing().steps <= done
 
 
-def test_halted_it_stops_at_a_communication_point_and_can_go_on(
-    tmp_path: Path, engine: Engine
-) -> None:
+def test_halted_it_stops_at_a_communication_point_and_can_go_on(tmp_path, engine):
     run = Paced(tmp_path, {"a": {}}, engine=engine)
     run.master.advance(3)
     run.fake.on_sleep = lambda: setattr(run, "halted", True)
@@ -293,7 +284,7 @@ def test_halted_it_stops_at_a_communication_point_and_can_go_on(
     assert run.memory.columns()[1]["a.y"].tolist() == pytest.approx([k / 10 for k in range(11)])
 
 
-def test_at_a_priority_others_get_to_run_in_overload(tmp_path: Path) -> None:
+def test_at_a_priority_others_get_to_run_in_overload(tmp_path):
     run = Paced(tmp_path, {"a": {-1: 101 * MS}}, steps=20)
     run.pacer.breathes = True
     run.to_the_end()
@@ -304,11 +295,11 @@ def test_at_a_priority_others_get_to_run_in_overload(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["step", "recording", "backlog"])
-def test_a_component_must_not_be_called_like_another_part(tmp_path: Path, name: str) -> None:
+def test_a_component_must_not_be_called_like_another_part(tmp_path, name):
     with pytest.raises(InputError, match=rf"^mock.toml: component '{name}': in real time must not"):
         Paced(tmp_path, {name: {}})
 
 
-def test_a_run_without_steps_has_a_timing(tmp_path: Path) -> None:
+def test_a_run_without_steps_has_a_timing(tmp_path):
     timing = Paced(tmp_path, {"a": {}}).timing()
     assert (timing.steps, timing.real_time_factor, timing.parts) == (0, 0.0, {})

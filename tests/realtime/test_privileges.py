@@ -5,9 +5,6 @@ import errno
 import gc
 import os
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 from grasp_cosim import Realtime
@@ -18,8 +15,8 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has these
 ALL = Realtime(priority=20, cpu=0, lock_memory=True)
 
 
-def refuses(code: int) -> Callable[..., Any]:
-    def call(*_: object) -> None:
+def refuses(code):
+    def call(*_: object):
         raise OSError(code, os.strerror(code))
 
     return call
@@ -28,8 +25,8 @@ def refuses(code: int) -> Callable[..., Any]:
 class System:
     """What an operating system that grants all of it was asked."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.asked: list[tuple[Any, ...]] = []
+    def __init__(self, monkeypatch):
+        self.asked = []
         for name in ("sched_setscheduler", "sched_setaffinity"):
             monkeypatch.setattr(os, name, self._remember(name), raising=False)
         monkeypatch.setattr(os, "sched_getscheduler", lambda thread: 0, raising=False)
@@ -38,21 +35,21 @@ class System:
         self.code = 0
         monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: self)
 
-    def _remember(self, name: str) -> Callable[..., None]:
+    def _remember(self, name):
         return lambda thread, *arguments: self.asked.append((name, *arguments))
 
-    def mlockall(self, flags: int) -> int:
+    def mlockall(self, flags):
         self.asked.append(("mlockall", flags))
         ctypes.set_errno(self.code)
         return -1 if self.code else 0
 
-    def munlockall(self) -> int:
+    def munlockall(self):
         self.asked.append(("munlockall",))
         return 0
 
 
 @linux
-def test_what_was_granted_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_granted_is_put_back(monkeypatch):
     system = System(monkeypatch)
     with privileges(ALL) as found:
         assert found.granted == ["CPU 0", "memory locked", "SCHED_FIFO, priority 20"]
@@ -66,7 +63,7 @@ def test_what_was_granted_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @linux
-def test_what_is_not_permitted_is_said_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_not_permitted_is_said_with_the_remedy(monkeypatch):
     system = System(monkeypatch)
     system.code = errno.ENOMEM
     monkeypatch.setattr(os, "sched_setscheduler", refuses(errno.EPERM))
@@ -82,7 +79,7 @@ def test_what_is_not_permitted_is_said_with_the_remedy(monkeypatch: pytest.Monke
     assert system.asked == [("mlockall", 7)]
 
 
-def test_a_system_that_has_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_that_has_none_of_it(monkeypatch):
     for name in ("sched_setscheduler", "sched_getscheduler", "sched_getaffinity"):
         monkeypatch.delattr(os, name, raising=False)
     monkeypatch.setattr(sys, "platform", "darwin")
@@ -106,8 +103,8 @@ def test_a_system_that_has_none_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_a_priority_that_the_kernel_breaks_off_is_said(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, runtime: int | None, sleeps: bool, said: int
-) -> None:
+    monkeypatch, tmp_path, runtime, sleeps, said
+):
     System(monkeypatch)
     monkeypatch.setattr("grasp_cosim.realtime.privileges.THROTTLE", tmp_path)
     if runtime is not None:
@@ -120,7 +117,7 @@ def test_a_priority_that_the_kernel_breaks_off_is_said(
 
 
 @pytest.mark.parametrize("collecting", [True, False])
-def test_no_garbage_is_collected_on_the_way(collecting: bool) -> None:
+def test_no_garbage_is_collected_on_the_way(collecting):
     before = gc.isenabled()
     (gc.enable if collecting else gc.disable)()
     try:
@@ -135,7 +132,7 @@ def test_no_garbage_is_collected_on_the_way(collecting: bool) -> None:
 
 
 @linux
-def test_a_cpu_of_this_machine_is_granted() -> None:
+def test_a_cpu_of_this_machine_is_granted():
     before = os.sched_getaffinity(0)
     with privileges(Realtime(cpu=min(before))) as found:
         assert os.sched_getaffinity(0) == {min(before)}

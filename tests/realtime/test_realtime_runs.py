@@ -8,13 +8,10 @@ import re
 import signal
 import sys
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
-from grasp_cosim import InputError, Realtime, System, simulate
+from grasp_cosim import InputError, Realtime, simulate
 from grasp_cosim.base.calls import CLOCK
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.privileges import check_cpu
 from grasp_cosim.realtime.timing import Timing
@@ -32,14 +29,13 @@ PARTS = ["step", "start", "plant", "sensor_1", "sensor_2", "controller", "exchan
 
 
 @pytest.fixture(params=ENGINES)
-def engine(request: pytest.FixtureRequest) -> Engine:
-    chosen: Engine = request.param
-    return chosen
+def engine(request):
+    return request.param
 
 
 @pytest.mark.parametrize("scheme", ["sequential", slow("jacobi")])
-def test_a_paced_run_has_the_same_bits(grasp: System, engine: Engine, scheme: str) -> None:
-    options: dict[str, Any] = {"step": 1e-3, "stop": 2.0, "scheme": scheme, "engine": engine}
+def test_a_paced_run_has_the_same_bits(grasp, engine, scheme):
+    options = {"step": 1e-3, "stop": 2.0, "scheme": scheme, "engine": engine}
     free, paced = simulate(grasp, **options), simulate(grasp, realtime=FAST, **options)
     assert free.timing is None
     assert list(free) == list(paced)
@@ -56,7 +52,7 @@ def test_a_paced_run_has_the_same_bits(grasp: System, engine: Engine, scheme: st
 
 
 @pytest.mark.skipif(not HAS_CLOCK, reason="this system's clock is read in Python")
-def test_compiled_code_reads_the_clock_itself(grasp: System) -> None:
+def test_compiled_code_reads_the_clock_itself(grasp):
     with simulate.session(grasp, stop=0.01, realtime=FAST) as session:
         natives = [call.native for call in session._master.plan.calls]
     assert [n.shape for n in natives if n].count(CLOCK) == 8
@@ -65,7 +61,7 @@ def test_compiled_code_reads_the_clock_itself(grasp: System) -> None:
         assert len(session._master.values) == len(session._master.slots)
 
 
-def test_the_timing_comes_back_from_the_folder(grasp: System, tmp_path: Path) -> None:
+def test_the_timing_comes_back_from_the_folder(grasp, tmp_path):
     result = simulate(grasp, step=1e-3, stop=0.1, realtime=FAST)
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")
@@ -83,7 +79,7 @@ def test_the_timing_comes_back_from_the_folder(grasp: System, tmp_path: Path) ->
         load_run(tmp_path)
 
 
-def test_a_run_that_is_not_paced_has_no_timing(grasp: System, tmp_path: Path) -> None:
+def test_a_run_that_is_not_paced_has_no_timing(grasp, tmp_path):
     result = simulate(grasp, stop=0.01)
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")
@@ -91,7 +87,7 @@ def test_a_run_that_is_not_paced_has_no_timing(grasp: System, tmp_path: Path) ->
     assert load_run(tmp_path).timing is None
 
 
-def test_a_session_is_paced_as_well(grasp: System, engine: Engine) -> None:
+def test_a_session_is_paced_as_well(grasp, engine):
     with simulate.session(grasp, stop=0.1, engine=engine, realtime=FAST) as session:
         while session.step(7):
             pass
@@ -102,7 +98,7 @@ def test_a_session_is_paced_as_well(grasp: System, engine: Engine) -> None:
 
 
 @pytest.mark.slow
-def test_the_page_of_a_paced_run_takes_its_timing_for_no_metric(grasp: System) -> None:
+def test_the_page_of_a_paced_run_takes_its_timing_for_no_metric(grasp):
     result = simulate(grasp, stop=0.01, realtime=FAST)
     assert result.timing is not None
     assert metrics_table(result) == metrics_table(replace(result, timing=None))
@@ -110,12 +106,12 @@ def test_the_page_of_a_paced_run_takes_its_timing_for_no_metric(grasp: System) -
 
 
 class Terminal(io.StringIO):
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 
 @pytest.mark.slow
-def test_a_terminal_shows_how_it_goes(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_shows_how_it_goes(grasp, monkeypatch):
     terminal, file = Terminal(), io.StringIO()
     for stream in (terminal, file):
         monkeypatch.setattr(sys, "stderr", stream)
@@ -124,10 +120,8 @@ def test_a_terminal_shows_how_it_goes(grasp: System, monkeypatch: pytest.MonkeyP
     assert re.search(r"0\.05 of 0\.05 s .*x, worst step [\d.]+ ms, 500 over", terminal.getvalue())
 
 
-def test_what_is_refused_is_said_and_the_run_goes_on(
-    grasp: System, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def refuse(*_: object) -> None:
+def test_what_is_refused_is_said_and_the_run_goes_on(grasp, monkeypatch, caplog):
+    def refuse(*_: object):
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setaffinity", refuse, raising=False)
@@ -142,9 +136,7 @@ def test_what_is_refused_is_said_and_the_run_goes_on(
 
 @pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("engine", ["python", "auto"])
-def test_ctrl_c_does_not_wait_for_the_next_step(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
-) -> None:
+def test_ctrl_c_does_not_wait_for_the_next_step(tmp_path, monkeypatch, engine):
     """Which would begin only after 1000 s."""
     mock, fake = Mock(tmp_path, "a", lambda u, t: t), Fake()
     fake.on_sleep = lambda: os.kill(os.getpid(), signal.SIGINT)
@@ -169,14 +161,14 @@ def test_ctrl_c_does_not_wait_for_the_next_step(
         ({"lock_memory": 1}, "lock_memory = 1: must be True or False"),
     ],
 )
-def test_an_option_that_is_none_is_refused(wrong: dict[str, Any], message: str) -> None:
+def test_an_option_that_is_none_is_refused(wrong, message):
     with pytest.raises(InputError, match=f"^{message}"):
         Realtime(**wrong)
 
 
-def test_the_system_says_how_it_is_paced_unless_the_call_does(grasp: System) -> None:
+def test_the_system_says_how_it_is_paced_unless_the_call_does(grasp):
     system = grasp.with_settings({"realtime.factor": "2000", "realtime.overrun": "continue"})
-    options: dict[str, Any] = {"step": 1e-3, "stop": 0.02}
+    options = {"step": 1e-3, "stop": 0.02}
     paced = simulate(system, realtime=True, **options).timing
     assert paced is not None
     assert (paced.factor, paced.overrun) == (2000.0, "continue")
@@ -189,9 +181,7 @@ def test_the_system_says_how_it_is_paced_unless_the_call_does(grasp: System) -> 
 @pytest.mark.parametrize(
     ("listed", "there"), [("0", [0]), ("0-1", [0, 1]), ("0,2-4,9", [0, 2, 3, 4, 9])]
 )
-def test_a_cpu_that_is_not_there_is_refused(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, listed: str, there: list[int]
-) -> None:
+def test_a_cpu_that_is_not_there_is_refused(monkeypatch, tmp_path, listed, there):
     (tmp_path / "online").write_text(f"{listed}\n")
     monkeypatch.setattr("grasp_cosim.realtime.privileges.ONLINE", tmp_path / "online")
     valid = ", ".join(map(str, there))
@@ -205,17 +195,13 @@ def test_a_cpu_that_is_not_there_is_refused(
             check_cpu(Realtime(cpu=cpu))
 
 
-def test_where_a_system_does_not_list_its_cpus_any_may_be_asked_for(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_where_a_system_does_not_list_its_cpus_any_may_be_asked_for(monkeypatch, tmp_path):
     monkeypatch.setattr("grasp_cosim.realtime.privileges.ONLINE", tmp_path / "none")
     check_cpu(Realtime(cpu=99))
 
 
 @pytest.mark.parametrize("engine", ["python", "auto"])
-def test_a_halted_session_does_not_wait_and_does_no_step(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: Engine
-) -> None:
+def test_a_halted_session_does_not_wait_and_does_no_step(tmp_path, monkeypatch, engine):
     """The second step would begin only after 1000 s."""
     mock = Mock(tmp_path, "a", lambda u, t: t)
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
@@ -228,6 +214,6 @@ def test_a_halted_session_does_not_wait_and_does_no_step(
 
 
 @pytest.mark.parametrize("factor", [1e-12, 1e9])
-def test_a_period_that_no_clock_can_keep_is_refused(grasp: System, factor: float) -> None:
+def test_a_period_that_no_clock_can_keep_is_refused(grasp, factor):
     with pytest.raises(InputError, match=r"a step of 0\.0001 s would begin every .* 1 ns to a yea"):
         simulate(grasp, stop=0.1, realtime=Realtime(factor=factor))

@@ -2,8 +2,6 @@
 
 import json
 import math
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 from grasp_cosim.base.errors import InputError
@@ -12,24 +10,24 @@ from report.timings import paced
 
 
 @pytest.mark.parametrize(("hiccups", "listed"), [(0, 1000), (12, 1000), (12, 5)])
-def test_there_and_back(hiccups: int, listed: int) -> None:
+def test_there_and_back(hiccups, listed):
     timing = paced(steps=200, hiccups=hiccups, listed=listed)
     assert Timing.from_dict("here", json.loads(json.dumps(timing.as_dict()))) == timing
 
 
-def no_plant(d: Any) -> None:
+def no_plant(d):
     del d["parts"]["plant"]
 
 
-def no_counts(d: Any) -> None:
+def no_counts(d):
     d["histograms"]["plant"]["counts"] = []
 
 
-def nothing_counted(d: Any) -> None:
+def nothing_counted(d):
     d["histograms"]["plant"] = {"edges": [1e-6, 2e-6], "counts": [0]}
 
 
-def falling_edges(d: Any) -> None:
+def falling_edges(d):
     d["histograms"]["plant"]["edges"][0] = 1.0
 
 
@@ -53,7 +51,7 @@ def falling_edges(d: Any) -> None:
         (lambda d: d["overruns"]["listed"][0].update(culprit="x"), "those of all overruns"),
     ],
 )
-def test_what_is_damaged_is_refused_in_one_line(damage: Callable[[Any], Any], message: str) -> None:
+def test_what_is_damaged_is_refused_in_one_line(damage, message):
     found = paced(steps=200, hiccups=4).as_dict()
     damage(found)
     with pytest.raises(InputError, match=r"^here: is damaged \(") as raised:

@@ -1,13 +1,11 @@
 """What the tests of the listeners share: signals of each kind, and a run that is only rows."""
 
 import tracemalloc
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from grasp_cosim.exchange.listener import Experiment, Listener, Signal
+from grasp_cosim.exchange.listener import Experiment, Signal
 
 EXPERIMENT = Experiment.of({"system": "bare", "scheme": "sequential", "step": 1e-4, "stop": 1.0})
 SIGNALS = (
@@ -17,7 +15,7 @@ SIGNALS = (
 )
 
 
-def rows(count: int, seed: int = 1) -> npt.NDArray[np.float64]:
+def rows(count, seed=1):
     """Values for SIGNALS."""
     random = np.random.default_rng(seed)
     return np.column_stack(
@@ -29,14 +27,7 @@ def rows(count: int, seed: int = 1) -> npt.NDArray[np.float64]:
     )
 
 
-def play(
-    listener: Listener,
-    table: npt.NDArray[np.float64],
-    steps: npt.NDArray[np.int64] | None = None,
-    block: int = 1000,
-    signals: tuple[Signal, ...] = SIGNALS,
-    complete: bool = True,
-) -> None:
+def play(listener, table, steps=None, block=1000, signals=SIGNALS, complete=True):
     """A run of these rows. Like the master, it reuses the arrays that it hands on."""
     numbers = np.arange(len(table)) if steps is None else steps
     listener.begin(EXPERIMENT, signals)
@@ -48,7 +39,7 @@ def play(
     listener.end(complete)
 
 
-def peak(work: Callable[[], None]) -> int:
+def peak(work):
     """The most bytes that Python and NumPy had at once for the work."""
     tracemalloc.start()
     try:
@@ -59,7 +50,7 @@ def peak(work: Callable[[], None]) -> int:
 
 
 @contextmanager
-def full_disk(size: int) -> Iterator[None]:
+def full_disk(size):
     """No file can grow beyond size bytes."""
     resource = pytest.importorskip("resource", reason="NO limits of processes on this system")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)

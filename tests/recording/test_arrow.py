@@ -1,12 +1,10 @@
 """Arrow: the rows of a CSV, in less time, and what a kill left behind."""
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Run
-from grasp_cosim import InputError, SimulationError, System, compare, load_run, simulate
+from grasp_cosim import InputError, SimulationError, compare, load_run, simulate
 from grasp_cosim.exchange.listener import Signal, Texts
 from grasp_cosim.recording import arrow as module
 from grasp_cosim.recording import load
@@ -17,7 +15,7 @@ from recording.rows import EXPERIMENT, full_disk
 pyarrow = pytest.importorskip("pyarrow")
 
 
-def test_a_run_is_written_and_read_back_as_it_was(grasp: System, tmp_path: Path) -> None:
+def test_a_run_is_written_and_read_back_as_it_was(grasp, tmp_path):
     with RunFolder(tmp_path, grasp, ["run"], form="arrow") as folder:
         result = simulate(grasp, step=1e-3, listeners=[folder])
         folder.finish(result)
@@ -31,7 +29,7 @@ def test_a_run_is_written_and_read_back_as_it_was(grasp: System, tmp_path: Path)
     assert compare(tmp_path, result).alike
 
 
-def test_others_read_it_with_its_units(grasp: System, tmp_path: Path) -> None:
+def test_others_read_it_with_its_units(grasp, tmp_path):
     result = simulate(grasp, step=1e-3, stop=0.1)
     result.to_arrow(tmp_path / "signals.arrow")
     frame = pytest.importorskip("pandas").read_feather(tmp_path / "signals.arrow")
@@ -44,7 +42,7 @@ def test_others_read_it_with_its_units(grasp: System, tmp_path: Path) -> None:
     assert str(fields["plant.contact[1]"].type) == "bool"
 
 
-def test_texts_and_integers_come_back(tmp_path: Path) -> None:
+def test_texts_and_integers_come_back(tmp_path):
     texts = Texts()
     numbers = [texts.number(text) for text in ("a", "ä,\n", "a")]
     signals = [Signal("a.n", None, "Integer"), Signal("a.s", None, "String", texts=texts)]
@@ -59,9 +57,7 @@ def test_texts_and_integers_come_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("lost", [1, 100, 5000])
-def test_of_a_file_that_was_cut_off_whole_batches_are_read(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: int
-) -> None:
+def test_of_a_file_that_was_cut_off_whole_batches_are_read(grasp, tmp_path, monkeypatch, lost):
     monkeypatch.setattr(module, "BATCH", 10)
     folder = RunFolder(tmp_path, grasp, ["run"], form="arrow")
     with folder, simulate.session(grasp, step=1e-3, listeners=[folder]) as session:
@@ -77,7 +73,7 @@ def test_of_a_file_that_was_cut_off_whole_batches_are_read(
     assert not found.complete
 
 
-def test_a_run_takes_the_place_of_one_in_the_other_form(command: Run, tmp_path: Path) -> None:
+def test_a_run_takes_the_place_of_one_in_the_other_form(command, tmp_path):
     for form in ("csv", "arrow", "csv"):
         code, _, err = command("run", "--stop", "0.01", "--out", "out", "--format", form)
         assert code == 0, err
@@ -89,15 +85,13 @@ def test_a_run_takes_the_place_of_one_in_the_other_form(command: Run, tmp_path: 
     )  # fmt: skip
 
 
-def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_such_file_is_refused(tmp_path):
     (tmp_path / "s.arrow").write_bytes(b"ARROW1\0\0 and no more")
     with pytest.raises(InputError, match=r"s\.arrow: is damaged, or no Arrow file of a run: "):
         read_arrow(tmp_path / "s.arrow")
 
 
-def test_a_full_disk_ends_the_run_with_a_line(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_ends_the_run_with_a_line(grasp, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "BATCH", 10)
     session = simulate.session(grasp, step=1e-3, listeners=[ArrowListener(tmp_path / "s.arrow")])
     refused = pytest.raises(SimulationError, match=r"s\.arrow: cannot be written: File too large$")
@@ -105,9 +99,7 @@ def test_a_full_disk_ends_the_run_with_a_line(
         session.step(2999)
 
 
-def test_a_large_csv_has_the_same_bits_whoever_reads_it(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_large_csv_has_the_same_bits_whoever_reads_it(grasp, tmp_path, monkeypatch):
     result = simulate(grasp, step=1e-3)
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")

@@ -8,7 +8,6 @@ import struct
 from io import FileIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from hypothesis import strategies as st
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows
 
 
-def bits(value: float) -> bytes:
+def bits(value):
     return b"nan" if math.isnan(value) else struct.pack("d", value)
 
 
@@ -28,9 +27,7 @@ ROW = st.tuples(st.floats(), st.integers(-(2**53), 2**53), st.booleans())
 
 
 @given(st.lists(ROW, min_size=1, max_size=20), st.integers(1, 7))
-def test_every_number_reads_back_with_the_same_bits(
-    table: list[tuple[float, int, bool]], block: int
-) -> None:
+def test_every_number_reads_back_with_the_same_bits(table, block):
     with TemporaryDirectory() as folder:
         path = Path(folder) / "signals.csv"
         play(CsvListener(path), np.array(table, np.float64), block=block)
@@ -44,7 +41,7 @@ def test_every_number_reads_back_with_the_same_bits(
         assert (n, on) == (str(row[1]), str(int(row[2])))
 
 
-def test_the_text_is_the_shortest_one(tmp_path: Path) -> None:
+def test_the_text_is_the_shortest_one(tmp_path):
     table = np.array([[0.1, 1, 0], [-1e16, -5, 1], [1e-7, 0, 1], [float("nan"), 2, 0]])
     play(CsvListener(tmp_path / "s.csv"), table, np.array([0, 3, 20_000, 7]))
     assert (tmp_path / "s.csv").read_bytes().split(b"\n") == [
@@ -57,12 +54,12 @@ def test_the_text_is_the_shortest_one(tmp_path: Path) -> None:
     ]
 
 
-def test_a_run_without_signals_is_its_time(tmp_path: Path) -> None:
+def test_a_run_without_signals_is_its_time(tmp_path):
     play(CsvListener(tmp_path / "s.csv"), np.empty((3, 0)), signals=())
     assert (tmp_path / "s.csv").read_text() == '"time"\n0.0\n0.0001\n0.0002\n'
 
 
-def test_names_may_have_commas_and_quotes(tmp_path: Path) -> None:
+def test_names_may_have_commas_and_quotes(tmp_path):
     name = "a.der('x,y\", [1]')"
     play(CsvListener(tmp_path / "s.csv"), np.zeros((1, 1)), signals=(Signal(name, "m", "Real"),))
     with (tmp_path / "s.csv").open(newline="") as file:
@@ -70,7 +67,7 @@ def test_names_may_have_commas_and_quotes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("complete", [True, False])
-def test_the_file_takes_its_name_at_the_end(tmp_path: Path, complete: bool) -> None:
+def test_the_file_takes_its_name_at_the_end(tmp_path, complete):
     path, table = tmp_path / "new" / "s.csv", rows(10)
     listener = CsvListener(path)
     listener.begin(EXPERIMENT, SIGNALS)
@@ -83,15 +80,15 @@ def test_the_file_takes_its_name_at_the_end(tmp_path: Path, complete: bool) -> N
     assert len(path.read_text().splitlines()) == 11
 
 
-def test_a_run_without_a_row_leaves_no_file(tmp_path: Path) -> None:
+def test_a_run_without_a_row_leaves_no_file(tmp_path):
     """Where initialisation fails, a file that was there stays."""
     (tmp_path / "s.csv").write_text("before")
     play(CsvListener(tmp_path / "s.csv"), rows(0), complete=False)
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.csv", "before")]
 
 
-def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
-    def run(count: int) -> int:
+def test_memory_does_not_grow_with_the_run(tmp_path):
+    def run(count):
         table, steps = rows(count), np.arange(count)
         return peak(lambda: play(CsvListener(tmp_path / "s.csv"), table, steps))
 
@@ -100,8 +97,8 @@ def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
     assert four < 1_000_000
 
 
-def test_memory_does_not_grow_with_a_block(tmp_path: Path) -> None:
-    def run(count: int) -> int:
+def test_memory_does_not_grow_with_a_block(tmp_path):
+    def run(count):
         table, steps = rows(count), np.arange(count)
         return peak(lambda: play(CsvListener(tmp_path / "s.csv"), table, steps, block=count))
 
@@ -110,7 +107,7 @@ def test_memory_does_not_grow_with_a_block(tmp_path: Path) -> None:
     assert four < one + copied + 10_000
 
 
-def test_a_full_disk_leaves_whole_lines(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_whole_lines(tmp_path):
     listener = CsvListener(tmp_path / "s.csv")
     listener.begin(EXPERIMENT, SIGNALS)
     with full_disk(60_000):
@@ -129,14 +126,14 @@ class Broken(FileIO):
 
     writes = 0
 
-    def write(self, data: Any) -> int:
+    def write(self, data):
         self.writes += 1
         if self.writes < 3:
             return super().write(data if self.writes < 2 else data[: len(data) // 2])
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
 
-def test_a_broken_disk_leaves_whole_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_broken_disk_leaves_whole_lines(tmp_path, monkeypatch):
     monkeypatch.setattr("grasp_cosim.recording.csv.FileIO", Broken)
     listener = CsvListener(tmp_path / "s.csv")
     listener.begin(EXPERIMENT, SIGNALS)
@@ -149,7 +146,7 @@ def test_a_broken_disk_leaves_whole_lines(tmp_path: Path, monkeypatch: pytest.Mo
     assert not list(tmp_path.iterdir())
 
 
-def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"^.*file/s.csv: cannot be written: "):
         CsvListener(tmp_path / "file" / "s.csv").begin(EXPERIMENT, SIGNALS)

@@ -2,13 +2,12 @@
 
 import json
 import os
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
+from grasp_cosim import InputError, Realtime, SimulationError, simulate
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.load import load_run
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, rows
@@ -19,12 +18,12 @@ DRAWN = ("grasp.png", "timing.png", "report.html", "signals.mf4")
 
 
 @pytest.fixture
-def run(grasp: System, tmp_path: Path) -> Iterator[RunFolder]:
+def run(grasp, tmp_path):
     with RunFolder(tmp_path, grasp, ["grasp-cosim", "run"]) as folder:
         yield folder
 
 
-def test_it_ends_as_a_result_writes_it(grasp: System, tmp_path: Path) -> None:
+def test_it_ends_as_a_result_writes_it(grasp, tmp_path):
     with RunFolder(tmp_path / "on", grasp) as folder:
         result = simulate(grasp, stop=STOP, listeners=[folder])
         folder.finish(result)
@@ -37,7 +36,7 @@ def test_it_ends_as_a_result_writes_it(grasp: System, tmp_path: Path) -> None:
     assert {key: written[key] for key in plain} == plain
 
 
-def test_a_paced_run_writes_the_same(grasp: System, tmp_path: Path) -> None:
+def test_a_paced_run_writes_the_same(grasp, tmp_path):
     system = grasp.with_experiment(step=1e-3, stop=0.3)
     with RunFolder(tmp_path / "paced", system, paced=True) as folder:
         result = simulate(system, realtime=Realtime(), listeners=[folder])
@@ -47,7 +46,7 @@ def test_a_paced_run_writes_the_same(grasp: System, tmp_path: Path) -> None:
     assert paced == (tmp_path / "signals.csv").read_bytes()
 
 
-def test_what_waits_is_written_in_spare_time(grasp: System, tmp_path: Path) -> None:
+def test_what_waits_is_written_in_spare_time(grasp, tmp_path):
     table = rows(100)
     with RunFolder(tmp_path, grasp, paced=True) as folder:
         folder.begin(EXPERIMENT, SIGNALS)
@@ -63,7 +62,7 @@ def test_what_waits_is_written_in_spare_time(grasp: System, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("torn", [0, 1, 7, 40])
-def test_it_can_be_read_while_the_run_goes_on(run: RunFolder, tmp_path: Path, torn: int) -> None:
+def test_it_can_be_read_while_the_run_goes_on(run, tmp_path, torn):
     """Also where a kill came while a line was written."""
     table = rows(50)
     run.begin(EXPERIMENT, SIGNALS)
@@ -71,7 +70,7 @@ def test_it_can_be_read_while_the_run_goes_on(run: RunFolder, tmp_path: Path, to
     data = (tmp_path / "signals.csv").read_bytes()
     (tmp_path / "signals.csv").write_bytes(data[: len(data) - torn])
     settings = json.loads((tmp_path / "run.json").read_text())
-    missing: dict[str, object] = {"components": {}, "connections": [], "events": [], "faults": []}
+    missing = {"components": {}, "connections": [], "events": [], "faults": []}
     (tmp_path / "run.json").write_text(json.dumps({**missing, "initialisation": {}, **settings}))
     read = load_run(tmp_path)
     whole = 50 if not torn else 49
@@ -83,7 +82,7 @@ def test_it_can_be_read_while_the_run_goes_on(run: RunFolder, tmp_path: Path, to
     run.end(complete=False)
 
 
-def test_without_a_row_the_older_run_stays(run: RunFolder, tmp_path: Path) -> None:
+def test_without_a_row_the_older_run_stays(run, tmp_path):
     for name in ("run.json", "signals.csv", *DRAWN):
         (tmp_path / name).write_text("older")
     run.begin(EXPERIMENT, SIGNALS)
@@ -91,7 +90,7 @@ def test_without_a_row_the_older_run_stays(run: RunFolder, tmp_path: Path) -> No
     assert {p.read_text() for p in tmp_path.iterdir()} == {"older"}
 
 
-def test_no_picture_of_another_run_stays(run: RunFolder, tmp_path: Path) -> None:
+def test_no_picture_of_another_run_stays(run, tmp_path):
     theirs = ("notes.txt", "photo.png", "evaluation.json")
     for name in ("run.json", "signals.csv", *DRAWN, *theirs):
         (tmp_path / name).write_text("older")
@@ -103,7 +102,7 @@ def test_no_picture_of_another_run_stays(run: RunFolder, tmp_path: Path) -> None
     )
 
 
-def test_what_is_not_of_a_run_is_not_removed(run: RunFolder, tmp_path: Path) -> None:
+def test_what_is_not_of_a_run_is_not_removed(run, tmp_path):
     (tmp_path / "report.html").write_text("theirs")
     run.begin(EXPERIMENT, SIGNALS)
     run.block(np.arange(1), rows(1))
@@ -116,18 +115,16 @@ class Killed(BaseException):
 
 
 @pytest.mark.parametrize("moment", range(12))
-def test_a_kill_at_no_moment_leaves_a_mixture(
-    run: RunFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: int
-) -> None:
+def test_a_kill_at_no_moment_leaves_a_mixture(run, tmp_path, monkeypatch, moment):
     """The older run with what there is of it, ours, or no run at all: nothing without run.json."""
     for name in ("run.json", "signals.csv", *DRAWN):
         (tmp_path / name).write_text("older")
     left = moment
 
-    def counted(change: str) -> None:
+    def counted(change):
         real = getattr(Path, change)
 
-        def changed(self: Path, *arguments: object, **options: object) -> object:
+        def changed(self, *arguments, **options):
             nonlocal left
             if left == 0:
                 raise Killed
@@ -152,7 +149,7 @@ def test_a_kill_at_no_moment_leaves_a_mixture(
         assert not there & {*DRAWN}
 
 
-def test_two_runs_do_not_share_a_folder(run: RunFolder, grasp: System, tmp_path: Path) -> None:
+def test_two_runs_do_not_share_a_folder(run, grasp, tmp_path):
     run.begin(EXPERIMENT, SIGNALS)
     run.block(np.arange(2), rows(2))
     with RunFolder(tmp_path, grasp) as second:
@@ -164,9 +161,7 @@ def test_two_runs_do_not_share_a_folder(run: RunFolder, grasp: System, tmp_path:
     assert len((tmp_path / "signals.csv").read_text().splitlines()) == 3
 
 
-def test_rows_that_are_not_there_are_not_told_of(
-    grasp: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_that_are_not_there_are_not_told_of(grasp, tmp_path, monkeypatch):
     """A full disk: run.json stays the one of a run that did not end."""
     result = simulate(grasp, stop=STOP)
     with RunFolder(tmp_path, grasp) as folder:
@@ -180,7 +175,7 @@ def test_rows_that_are_not_there_are_not_told_of(
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_is_one_line(run: RunFolder, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_one_line(run, tmp_path):
     tmp_path.chmod(0o555)
     run.begin(EXPERIMENT, SIGNALS)
     with pytest.raises(InputError, match="cannot be written: Permission denied"):

@@ -1,11 +1,10 @@
 """Reads back what a run left behind."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, System, simulate
+from grasp_cosim import InputError, simulate
 from grasp_cosim.recording.load import load_log, load_run
 
 CSV = '"time","a.x","a.on"\n0.0,1.5,1\n0.1,2.5e-300,0\n'
@@ -17,14 +16,14 @@ RUN = {
 JSON = {**RUN, "units": {"a.x": "m", "a.on": None}, "types": {"a.on": "bool"}}
 
 
-def folder(path: Path, csv: str | bytes = CSV, settings: object = JSON) -> Path:
+def folder(path, csv=CSV, settings=JSON):
     (path / "signals.csv").write_bytes(csv if isinstance(csv, bytes) else csv.encode())
     text = settings if isinstance(settings, str) else json.dumps(settings)
     (path / "run.json").write_text(text, encoding="utf-8")
     return path
 
 
-def test_a_run_comes_back_as_it_was(grasp: System, tmp_path: Path) -> None:
+def test_a_run_comes_back_as_it_was(grasp, tmp_path):
     result = simulate(grasp, stop=0.01, diverging="continue")
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")
@@ -39,7 +38,7 @@ def test_a_run_comes_back_as_it_was(grasp: System, tmp_path: Path) -> None:
     assert run.settings["diverging"] == "continue"
 
 
-def test_columns_have_their_types_and_real_is_the_default(tmp_path: Path) -> None:
+def test_columns_have_their_types_and_real_is_the_default(tmp_path):
     run = load_run(folder(tmp_path))
     assert run.signals["a.x"].tolist() == [1.5, 2.5e-300]
     assert run.signals["a.on"].dtype == np.bool_
@@ -47,20 +46,20 @@ def test_columns_have_their_types_and_real_is_the_default(tmp_path: Path) -> Non
     assert run.descriptions == {}
 
 
-def test_values_that_are_not_finite_are_kept(tmp_path: Path) -> None:
+def test_values_that_are_not_finite_are_kept(tmp_path):
     """A run that failed ends with them."""
     run = load_run(folder(tmp_path, CSV + "0.2,nan,1\n0.3,-inf,1\n"))
     np.testing.assert_array_equal(run.signals["a.x"][2:], [np.nan, -np.inf])
 
 
-def test_a_single_row_and_a_run_without_signals_are_runs(tmp_path: Path) -> None:
+def test_a_single_row_and_a_run_without_signals_are_runs(tmp_path):
     run = load_run(folder(tmp_path, '"time"\n0.0\n', {**RUN, "units": {}}))
     assert run.time.tolist() == [0.0]
     assert run.signals == {}
 
 
 @pytest.mark.parametrize("name", ["signals.csv", "run.json"])
-def test_a_missing_file_is_named(tmp_path: Path, name: str) -> None:
+def test_a_missing_file_is_named(tmp_path, name):
     (folder(tmp_path) / name).unlink()
     with pytest.raises(InputError, match=rf"^.*{name}: No such file or directory; must be a fold"):
         load_run(tmp_path)
@@ -87,9 +86,7 @@ def test_a_missing_file_is_named(tmp_path: Path, name: str) -> None:
         (CSV.encode() + b"0.2,\xff,1\n", "damaged: "),
     ],
 )
-def test_damaged_signals_are_refused_in_one_line(
-    tmp_path: Path, csv: str | bytes, reason: str
-) -> None:
+def test_damaged_signals_are_refused_in_one_line(tmp_path, csv, reason):
     with pytest.raises(InputError) as caught:
         load_run(folder(tmp_path, csv))
     message = str(caught.value)
@@ -120,9 +117,7 @@ def test_damaged_signals_are_refused_in_one_line(
         ({**RUN, "units": {"a.x": "m"}}, "must be those of the recorded columns: a.x, a.on"),
     ],
 )
-def test_damaged_settings_are_refused_in_one_line(
-    tmp_path: Path, settings: object, reason: str
-) -> None:
+def test_damaged_settings_are_refused_in_one_line(tmp_path, settings, reason):
     with pytest.raises(InputError) as caught:
         load_run(folder(tmp_path, settings=settings))
     message = str(caught.value)
@@ -134,11 +129,11 @@ def test_damaged_settings_are_refused_in_one_line(
 # ------------------------------------------------------------------------- units
 
 
-def in_unit(path: Path, unit: str | None, **more: object) -> Path:
+def in_unit(path, unit, **more):
     return folder(path, settings={**JSON, "units": {"a.x": unit, "a.on": None}, **more})
 
 
-def test_metrics_get_si_as_run_json_says_and_signals_stay_as_recorded(tmp_path: Path) -> None:
+def test_metrics_get_si_as_run_json_says_and_signals_stay_as_recorded(tmp_path):
     entry = {"a.x": {"factor": 0.5, "offset": 1.0}}
     run = load_run(in_unit(tmp_path, "mm", to_si=entry))
     assert run.by_role["a.x"][0] == 0.5 * 1.5 + 1.0
@@ -150,22 +145,20 @@ def test_metrics_get_si_as_run_json_says_and_signals_stay_as_recorded(tmp_path: 
 @pytest.mark.parametrize(
     ("unit", "si"), [("mm", 1.5e-3), ("m", 1.5), ("degC", 274.65), ("cubit", 1.5), (None, 1.5)]
 )
-def test_an_earlier_run_has_the_units_that_are_known_by_name(
-    tmp_path: Path, unit: str | None, si: float
-) -> None:
+def test_an_earlier_run_has_the_units_that_are_known_by_name(tmp_path, unit, si):
     run = load_run(in_unit(tmp_path, unit))
     assert run.by_role["a.x"][0] == pytest.approx(si, rel=1e-15)
 
 
 @pytest.mark.parametrize("entry", [1.0, {}, {"factor": 1.0}, {"factor": "1", "offset": 0.0}])
-def test_a_damaged_conversion_is_one_line(tmp_path: Path, entry: object) -> None:
+def test_a_damaged_conversion_is_one_line(tmp_path, entry):
     with pytest.raises(InputError, match=r"run\.json: to_si: a\.x = .*; must be factor a"):
         load_run(in_unit(tmp_path, "mm", to_si={"a.x": entry}))
 
 
-def test_a_log_comes_in_si_where_the_run_beside_it_tells(tmp_path: Path) -> None:
+def test_a_log_comes_in_si_where_the_run_beside_it_tells(tmp_path):
     in_unit(tmp_path, "mm", to_si={"a.x": {"factor": 1e-3, "offset": 0.0}})
-    said: list[str] = []
+    said = []
     assert load_log(tmp_path / "signals.csv", said.append)["a.x"][0] == 1.5e-3
     assert not said
     other = tmp_path / "measured.csv"
@@ -176,7 +169,7 @@ def test_a_log_comes_in_si_where_the_run_beside_it_tells(tmp_path: Path) -> None
     ]
 
 
-def test_a_run_without_a_signal_says_so(tmp_path: Path) -> None:
+def test_a_run_without_a_signal_says_so(tmp_path):
     in_unit(tmp_path, "mm")
     (tmp_path / "signals.csv").unlink()
     path = tmp_path / "run.json"

@@ -2,13 +2,11 @@
 
 import json
 import sys
-from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, SimulationError, System
+from grasp_cosim import InputError, SimulationError
 from grasp_cosim.exchange.listener import Experiment, Signal
 from grasp_cosim.recording.mdf import PIECE, MdfListener
 from grasp_cosim.system.settings import settings
@@ -17,13 +15,13 @@ from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows
 asammdf = pytest.importorskip("asammdf")
 
 
-def channels(path: Path) -> dict[str, Any]:
+def channels(path):
     with asammdf.MDF(path) as file:
         return {channel.name: file.get(channel.name) for channel in file.groups[0].channels}
 
 
 @pytest.mark.parametrize(("count", "block"), [(100, 1), (100, 7), (PIECE, 100), (20_001, 5000)])
-def test_values_come_back_with_their_types(tmp_path: Path, count: int, block: int) -> None:
+def test_values_come_back_with_their_types(tmp_path, count, block):
     table, path = rows(count), tmp_path / "new" / "s.mf4"
     play(MdfListener(path), table, block=block)
     assert list(path.parent.iterdir()) == [path]
@@ -37,12 +35,12 @@ def test_values_come_back_with_their_types(tmp_path: Path, count: int, block: in
         assert found[name].timestamps.tolist() == found["time"].samples.tolist()
 
 
-def test_time_is_that_of_the_step_numbers(tmp_path: Path) -> None:
+def test_time_is_that_of_the_step_numbers(tmp_path):
     play(MdfListener(tmp_path / "s.mf4"), rows(4), np.array([0, 30_000, 60_000, 70_001]))
     assert channels(tmp_path / "s.mf4")["a.n"].timestamps.tolist() == [0.0, 3.0, 6.0, 7.0001]
 
 
-def test_channels_have_units_and_descriptions(tmp_path: Path) -> None:
+def test_channels_have_units_and_descriptions(tmp_path):
     play(MdfListener(tmp_path / "s.mf4"), rows(4))
     found = channels(tmp_path / "s.mf4")
     assert [c.unit for c in found.values()] == ["s", "m", "", ""]
@@ -50,7 +48,7 @@ def test_channels_have_units_and_descriptions(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("complete", [True, False])
-def test_the_header_has_the_settings(grasp: System, tmp_path: Path, complete: bool) -> None:
+def test_the_header_has_the_settings(grasp, tmp_path, complete):
     """An interrupted run is kept all the same."""
     listener = MdfListener(tmp_path / "s.mf4")
     listener.begin(Experiment.of(settings(grasp)), SIGNALS)
@@ -70,25 +68,25 @@ def test_the_header_has_the_settings(grasp: System, tmp_path: Path, complete: bo
     }
 
 
-def test_a_run_without_a_row_leaves_no_file(tmp_path: Path) -> None:
+def test_a_run_without_a_row_leaves_no_file(tmp_path):
     """Where initialisation fails, a file that was there stays."""
     (tmp_path / "s.mf4").write_text("before")
     play(MdfListener(tmp_path / "s.mf4"), rows(0), complete=False)
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.mf4", "before")]
 
 
-def test_a_run_without_signals_is_refused(tmp_path: Path) -> None:
+def test_a_run_without_signals_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"s.mf4: nothing to record; must be a system with out"):
         MdfListener(tmp_path / "s.mf4").begin(EXPERIMENT, ())
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
+def test_memory_does_not_grow_with_the_run(tmp_path):
     """asammdf writes a file in fragments of 4 MB; both runs have more than that."""
     signals = tuple(Signal(f"a.x[{i}]", "m", "Real") for i in range(64))
     table = np.random.default_rng(1).integers(0, 9, (1000, 64)).astype(np.float64)
 
-    def run(blocks: int) -> None:
+    def run(blocks):
         listener = MdfListener(tmp_path / f"{blocks}.mf4")
         listener.begin(EXPERIMENT, signals)
         for k in range(blocks):
@@ -104,7 +102,7 @@ def test_memory_does_not_grow_with_the_run(tmp_path: Path) -> None:
     assert last.timestamps.tolist() == [k * 100_000 / 1e9 for k in range(150_000)]
 
 
-def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_nothing(tmp_path):
     listener = MdfListener(tmp_path / "s.mf4")
     listener.begin(EXPERIMENT, SIGNALS)
     with full_disk(5_000):
@@ -114,15 +112,13 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"^.*file/s.mf4: cannot be written: "):
         MdfListener(tmp_path / "file" / "s.mf4").begin(EXPERIMENT, SIGNALS)
 
 
-def test_without_asammdf_the_message_says_how_to_get_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_asammdf_the_message_says_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "asammdf", None)
     with pytest.raises(InputError, match=r"^asammdf is not .*pip install 'asammdf>=[0-9.]+'$"):
         MdfListener(tmp_path / "s.mf4")

@@ -11,7 +11,7 @@ from recording.rows import EXPERIMENT, SIGNALS, peak, play, rows
 
 
 @pytest.mark.parametrize("block", [1, 7, 1000])
-def test_columns_have_the_values_and_the_types_of_their_signals(block: int) -> None:
+def test_columns_have_the_values_and_the_types_of_their_signals(block):
     table, memory = rows(100), MemoryListener()
     play(memory, table, block=block)
     assert list(memory.columns()[1]) == ["a.x[1]", "a.n", "a.on"]
@@ -21,21 +21,21 @@ def test_columns_have_the_values_and_the_types_of_their_signals(block: int) -> N
         assert column.tolist() == expected.tolist()
 
 
-def test_time_is_that_of_the_step_numbers() -> None:
+def test_time_is_that_of_the_step_numbers():
     """Decimated to every third point and the last."""
     steps, memory = np.array([0, 3, 6, 9, 10]), MemoryListener(every=3)
     play(memory, rows(5), steps)
     assert memory.columns()[0].tolist() == [k * 100_000 / 1e9 for k in (0, 3, 6, 9, 10)]
 
 
-def test_there_are_no_rows_before_the_first() -> None:
+def test_there_are_no_rows_before_the_first():
     memory = MemoryListener()
     memory.begin(EXPERIMENT, SIGNALS)
     assert memory.columns()[0].shape == (0,)
     assert [column.shape for column in memory.columns()[1].values()] == [(0,)] * 3
 
 
-def test_what_was_read_on_the_way_stays_as_it_was() -> None:
+def test_what_was_read_on_the_way_stays_as_it_was():
     table, memory = rows(100), MemoryListener()
     memory.begin(EXPERIMENT, SIGNALS)
     memory.block(np.arange(10), table[:10])
@@ -45,13 +45,13 @@ def test_what_was_read_on_the_way_stays_as_it_was() -> None:
 
 
 @pytest.mark.parametrize("stop", [10**18, 10**13])
-def test_a_run_that_does_not_fit_is_refused_at_the_start(stop: int) -> None:
+def test_a_run_that_does_not_fit_is_refused_at_the_start(stop):
     long = replace(EXPERIMENT, step_ns=1, stop_ns=stop)
     many = [Signal(f"a.x[{i}]", None, "Real") for i in range(1000)]
     with pytest.raises(InputError, match=rf"^bare: {stop} steps do not fit into memory; must"):
         MemoryListener().begin(long, many)
 
 
-def test_a_decimated_run_takes_memory_for_what_is_kept_only() -> None:
+def test_a_decimated_run_takes_memory_for_what_is_kept_only():
     long = replace(EXPERIMENT, step_ns=1, stop_ns=10**13)
     assert peak(lambda: MemoryListener(every=10**9).begin(long, SIGNALS)) < 2e6

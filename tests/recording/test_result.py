@@ -3,11 +3,10 @@
 import errno
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Result, SimulationError, System, simulate
+from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.base.files import in_one_piece
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.recording.result import Rejection
@@ -16,12 +15,12 @@ from recording.rows import full_disk
 
 
 @pytest.fixture(scope="module")
-def result(grasp: System) -> Result:
+def result(grasp):
     """A short run."""
     return simulate(grasp, stop=0.1)
 
 
-def decimated(result: Result, every: int) -> Result:
+def decimated(result, every):
     """Every n-th communication point, and the last."""
     kept = sorted({*range(0, len(result.time), every), len(result.time) - 1})
     return replace(
@@ -31,7 +30,7 @@ def decimated(result: Result, every: int) -> Result:
     )
 
 
-def test_csv_is_each_value_as_python_prints_it(result: Result, tmp_path: Path) -> None:
+def test_csv_is_each_value_as_python_prints_it(result, tmp_path):
     result.to_csv(tmp_path / "s.csv")
     columns = [result.time, *result.signals.values()]
     expected = [",".join(f'"{name}"' for name in ("time", *result))]
@@ -40,7 +39,7 @@ def test_csv_is_each_value_as_python_prints_it(result: Result, tmp_path: Path) -
     assert (tmp_path / "s.csv").read_text() == "\n".join(expected) + "\n"
 
 
-def test_a_decimated_result_keeps_its_times(result: Result, tmp_path: Path) -> None:
+def test_a_decimated_result_keeps_its_times(result, tmp_path):
     few = decimated(result, 300)
     assert few.metrics["steps"] == result.metrics["steps"] == 1000
     few.to_csv(tmp_path / "signals.csv")
@@ -50,9 +49,7 @@ def test_a_decimated_result_keeps_its_times(result: Result, tmp_path: Path) -> N
     assert run.signals["plant.gap[1]"].tolist() == few["plant.gap[1]"].tolist()
 
 
-def test_mdf_has_the_columns_and_whether_the_run_was_complete(
-    result: Result, tmp_path: Path
-) -> None:
+def test_mdf_has_the_columns_and_whether_the_run_was_complete(result, tmp_path):
     asammdf = pytest.importorskip("asammdf")
     described = replace(result, complete=False, descriptions={"plant.gap[1]": "to the object"})
     described.to_mdf(tmp_path / "s.mf4")
@@ -68,9 +65,7 @@ def test_mdf_has_the_columns_and_whether_the_run_was_complete(
         assert '<e name="complete">false</e>' in file.header.comment
 
 
-def test_json_has_the_metrics_and_what_led_to_them(
-    grasp: System, result: Result, tmp_path: Path
-) -> None:
+def test_json_has_the_metrics_and_what_led_to_them(grasp, result, tmp_path):
     told = replace(
         result,
         descriptions={"plant.gap[1]": "to the object"},
@@ -96,7 +91,7 @@ def test_json_has_the_metrics_and_what_led_to_them(
     }
 
 
-def test_a_full_disk_leaves_the_file_that_was_there(result: Result, tmp_path: Path) -> None:
+def test_a_full_disk_leaves_the_file_that_was_there(result, tmp_path):
     path = tmp_path / "s.csv"
     path.write_text("before")
     with full_disk(10_000), pytest.raises(SimulationError, match="cannot be written: File too"):
@@ -104,22 +99,22 @@ def test_a_full_disk_leaves_the_file_that_was_there(result: Result, tmp_path: Pa
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.csv", "before")]
 
 
-def test_a_result_of_integers_is_written_as_integers(result: Result, tmp_path: Path) -> None:
+def test_a_result_of_integers_is_written_as_integers(result, tmp_path):
     counts = np.arange(len(result.time), dtype=np.int64)
     replace(result, signals={"a.n": counts}, units={"a.n": None}).to_csv(tmp_path / "s.csv")
     assert (tmp_path / "s.csv").read_text().splitlines()[-1] == "0.1,1000"
 
 
-def test_a_result_without_signals_has_nothing_to_draw(result: Result, tmp_path: Path) -> None:
+def test_a_result_without_signals_has_nothing_to_draw(result, tmp_path):
     bare = replace(result, signals={}, units={})
     with pytest.raises(InputError, match=r"s\.png: nothing to draw; must be a result with "):
         bare.plot(tmp_path / "s.png")
 
 
-def test_a_file_that_cannot_be_written_is_named_and_not_left_behind(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_named_and_not_left_behind(tmp_path):
     """A write to a full disk fails without saying which file it was."""
 
-    def fill() -> None:
+    def fill():
         with in_one_piece(tmp_path / "a.json") as part:
             part.write_text("half")
             raise OSError(errno.ENOSPC, "No space left on device")

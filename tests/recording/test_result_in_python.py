@@ -18,7 +18,7 @@ from report.runs import grasp_run, ring_run, write_run
 GAP = "plant.gap[1]"
 
 
-def test_its_repr_is_five_short_lines() -> None:
+def test_its_repr_is_five_short_lines():
     lines = repr(grasp_run()).splitlines()
     assert len(lines) == 5
     assert max(map(len, lines)) <= 100
@@ -29,9 +29,7 @@ def test_its_repr_is_five_short_lines() -> None:
     assert "t = 0.5 s: sensor_1.reflectance = 0.6" in lines[4]
 
 
-def test_what_was_read_back_looks_and_works_like_what_was_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_read_back_looks_and_works_like_what_was_run(tmp_path, monkeypatch):
     run = grasp_run()
     monkeypatch.chdir(tmp_path)
     write_run(Path("run"), run)
@@ -52,7 +50,7 @@ def test_what_was_read_back_looks_and_works_like_what_was_run(
         {"log": ("\x1b[31mred\nlines" * 30,)},
     ],
 )
-def test_an_odd_result_has_a_repr_too(changes: dict[str, object]) -> None:
+def test_an_odd_result_has_a_repr_too(changes):
     text = repr(replace(grasp_run(), **changes))  # type: ignore[arg-type]
     assert len(text.splitlines()) == 5
     assert "\x1b" not in text
@@ -60,13 +58,13 @@ def test_an_odd_result_has_a_repr_too(changes: dict[str, object]) -> None:
 
 @pytest.mark.slow
 @given(names=st.lists(st.text(min_size=1), min_size=1, max_size=30, unique=True))
-def test_names_of_any_length_stay_in_their_line(names: list[str]) -> None:
+def test_names_of_any_length_stay_in_their_line(names):
     lines = repr(ring_run(names, rows=3)).split("\n")
     assert len(lines) == 5
     assert max(map(len, lines)) <= 100
 
 
-def test_html_shows_metrics_and_escapes_names() -> None:
+def test_html_shows_metrics_and_escapes_names():
     html = grasp_run()._repr_html_()
     assert "time to contact" in html
     assert "16 signals" in html
@@ -82,7 +80,7 @@ def test_html_shows_metrics_and_escapes_names() -> None:
         ("controller.target_postion", "controller.target_position"),
     ],
 )
-def test_a_wrong_name_is_a_key_error_with_the_nearest_ones(asked: str, near: str) -> None:
+def test_a_wrong_name_is_a_key_error_with_the_nearest_ones(asked, near):
     with pytest.raises(KeyError) as raised:
         grasp_run()[asked]
     said = str(raised.value)
@@ -91,7 +89,7 @@ def test_a_wrong_name_is_a_key_error_with_the_nearest_ones(asked: str, near: str
     assert str(pickle.loads(pickle.dumps(raised.value))) == said
 
 
-def test_so_is_a_wrong_name_of_a_metric() -> None:
+def test_so_is_a_wrong_name_of_a_metric():
     run = grasp_run()
     said = r"'time_to_contat': no such metric; did you mean time_to_contact"
     with pytest.raises(KeyError, match=said):
@@ -100,7 +98,7 @@ def test_so_is_a_wrong_name_of_a_metric() -> None:
     assert json.loads(json.dumps(run.metrics))["scheme"] == run.metrics["scheme"]
 
 
-def test_a_name_like_none_lists_all_and_looking_for_one_is_no_error() -> None:
+def test_a_name_like_none_lists_all_and_looking_for_one_is_no_error():
     run = ring_run(["a", "b"])
     with pytest.raises(KeyError, match=r"'zzzzzz': no such signal; valid: a.y, b.y"):
         run["zzzzzz"]
@@ -110,9 +108,7 @@ def test_a_name_like_none_lists_all_and_looking_for_one_is_no_error() -> None:
 
 
 @pytest.mark.slow
-def test_plot_returns_a_figure_that_a_notebook_shows_and_writes_it_where_asked(
-    tmp_path: Path,
-) -> None:
+def test_plot_returns_a_figure_that_a_notebook_shows_and_writes_it_where_asked(tmp_path):
     figure_module = pytest.importorskip("matplotlib.figure")
     figure = ring_run(["a", "b"]).plot(tmp_path / "own.png")
     assert isinstance(figure, figure_module.Figure)
@@ -125,7 +121,7 @@ def test_plot_returns_a_figure_that_a_notebook_shows_and_writes_it_where_asked(
 
 
 @pytest.mark.slow
-def test_pandas_has_the_same_numbers_types_and_units() -> None:
+def test_pandas_has_the_same_numbers_types_and_units():
     pytest.importorskip("pandas")
     run = grasp_run()
     frame = run.to_pandas()
@@ -139,7 +135,7 @@ def test_pandas_has_the_same_numbers_types_and_units() -> None:
 
 
 @pytest.mark.slow
-def test_a_csv_of_pandas_is_a_side_of_a_comparison(tmp_path: Path) -> None:
+def test_a_csv_of_pandas_is_a_side_of_a_comparison(tmp_path):
     pytest.importorskip("pandas")
     from grasp_cosim.comparison.compare import compare
 
@@ -151,7 +147,7 @@ def test_a_csv_of_pandas_is_a_side_of_a_comparison(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_xarray_has_the_same_numbers_units_and_descriptions() -> None:
+def test_xarray_has_the_same_numbers_units_and_descriptions():
     pytest.importorskip("xarray")
     run = grasp_run()
     data = run.to_xarray()
@@ -164,7 +160,7 @@ def test_xarray_has_the_same_numbers_units_and_descriptions() -> None:
     assert data.attrs == {"system": "grasp.toml", "scheme": "sequential", "step": 1e-3, "stop": 2.0}
 
 
-def test_what_is_missing_says_how_this_environment_gets_it() -> None:
+def test_what_is_missing_says_how_this_environment_gets_it():
     with pytest.raises(InputError) as raised:
         extra_module("no_such_package", "it makes the table", "pandas")
     assert str(raised.value) == (
@@ -174,14 +170,14 @@ def test_what_is_missing_says_how_this_environment_gets_it() -> None:
 
 
 @pytest.mark.parametrize("method", ["to_pandas", "to_xarray"])
-def test_without_the_extra_it_is_one_line(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extra_it_is_one_line(method, monkeypatch):
     monkeypatch.setitem(sys.modules, method.removeprefix("to_"), None)
     with pytest.raises(InputError, match=r"-m pip install ('pandas>=[0-9.]+'|xarray)$"):
         getattr(grasp_run(), method)()
 
 
 @pytest.mark.slow
-def test_tables_and_pictures_are_not_imported_before_they_are_asked_for() -> None:
+def test_tables_and_pictures_are_not_imported_before_they_are_asked_for():
     """Start-up stays short."""
     code = (
         "import sys, json; from grasp_cosim import Result, load_run, simulate; "

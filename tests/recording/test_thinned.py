@@ -1,34 +1,31 @@
 """Metrics are of every step, however few rows are recorded."""
 
 from dataclasses import replace
-from pathlib import Path
 from tempfile import gettempdir
-from typing import Any
 
 import pytest
-from grasp_cosim import Result, System, compare, load_run, metric, simulate
-from grasp_cosim.metrics.metric import Signals
+from grasp_cosim import compare, load_run, metric, simulate
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.result import UNITS
 from recording.rows import full_disk
 
 
 @metric("samples", unit="1")
-def samples(run: Signals) -> int:
+def samples(run):
     """How many there were, by one that a group would not name."""
     return len(run["sensor_1.intensity"])
 
 
-def run(grasp: System, every: int, **more: Any) -> Result:
+def run(grasp, every, **more):
     return simulate(grasp, step=1e-3, stop=2.5, every=every, metrics=[samples], **more)
 
 
-def measured(result: Result) -> dict[str, Any]:
+def measured(result):
     return {name: m for name, m in result.metrics.items() if name not in UNITS}
 
 
 @pytest.mark.parametrize("every", [2, 100, 499, 1000, 5000])
-def test_they_do_not_depend_on_what_is_recorded(grasp: System, every: int) -> None:
+def test_they_do_not_depend_on_what_is_recorded(grasp, every):
     whole, few = run(grasp, 1), run(grasp, every)
     assert len(few.time) == 2 + 2499 // every
     assert few.time[-1] == 2.5
@@ -37,7 +34,7 @@ def test_they_do_not_depend_on_what_is_recorded(grasp: System, every: int) -> No
     assert few.measured.metrics == whole.measured.metrics
 
 
-def test_on_the_way_they_are_of_the_steps_so_far(grasp: System) -> None:
+def test_on_the_way_they_are_of_the_steps_so_far(grasp):
     found = []
     for every in (1, 100):
         with simulate.session(grasp, step=1e-3, every=every, metrics=[samples]) as session:
@@ -50,7 +47,7 @@ def test_on_the_way_they_are_of_the_steps_so_far(grasp: System) -> None:
     assert few.time.tolist() == [0.0, 0.1, 0.2, 0.3, 0.4, 0.45]
 
 
-def test_they_are_read_back_as_they_were(grasp: System, tmp_path: Path) -> None:
+def test_they_are_read_back_as_they_were(grasp, tmp_path):
     few = run(grasp, 100)
     few.to_csv(tmp_path / "signals.csv")
     few.to_json(tmp_path / "run.json")
@@ -60,9 +57,7 @@ def test_they_are_read_back_as_they_were(grasp: System, tmp_path: Path) -> None:
     assert repr(back).splitlines()[1:] == repr(few).splitlines()[1:]
 
 
-def test_of_a_run_that_did_not_end_they_are_of_its_rows_which_is_said(
-    grasp: System, tmp_path: Path
-) -> None:
+def test_of_a_run_that_did_not_end_they_are_of_its_rows_which_is_said(grasp, tmp_path):
     folder = RunFolder(tmp_path, grasp, ["run"])
     with simulate.session(grasp, step=1e-3, every=100, listeners=[folder]) as session:
         session.step(550)
@@ -70,13 +65,13 @@ def test_of_a_run_that_did_not_end_they_are_of_its_rows_which_is_said(
     assert back.log[-1] == "one row in 100 was recorded: the metrics are of these"
 
 
-def test_a_comparison_says_that_they_are_of_the_rows_it_has(grasp: System) -> None:
+def test_a_comparison_says_that_they_are_of_the_rows_it_has(grasp):
     found = compare(run(grasp, 1), run(grasp, 100))
     assert "B recorded one row in 100: its metrics are of these" in found.notes
     assert not any(note.startswith("A recorded") for note in found.notes)
 
 
-def test_on_a_full_disk_they_are_of_the_rows_which_is_said(grasp: System) -> None:
+def test_on_a_full_disk_they_are_of_the_rows_which_is_said(grasp):
     with simulate.session(grasp, step=1e-3, every=10) as session:
         with full_disk(20_000):
             session.step(2999)

@@ -4,11 +4,8 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Sequence
 from html import escape, unescape
 from importlib.resources import files
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -64,7 +61,7 @@ NARROWEST = 500
 _NO_ADDRESS = "<head><script>history.replaceState = () => {};</script>"
 
 
-def run_node(scripts: Sequence[str], body: str, given: Any, folder: Path) -> Any:
+def run_node(scripts, body, given, folder):
     """What the body passes to output(), run after scripts of the page with `input` given."""
     node = shutil.which("node")
     if node is None:
@@ -85,15 +82,7 @@ def run_node(scripts: Sequence[str], body: str, given: Any, folder: Path) -> Any
     return json.loads(done.stdout)
 
 
-def in_browser(
-    html: str,
-    act: str,
-    folder: Path,
-    address: str = "",
-    size: tuple[int, int] = (1200, 1600),
-    dark: bool = False,
-    still: bool = False,
-) -> Any:
+def in_browser(html, act, folder, address="", size=(1200, 1600), dark=False, still=False):
     """What the function body act returns in the page, once it is ready; fails on any error in it.
 
     address is what follows the # in the address; still says that its user wants no motion.

@@ -1,8 +1,5 @@
 """Results made up for the pages: a grasp by formula, and any number of components in a ring."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 from grasp_cosim.recording.result import Rejection, Result
 from grasp_cosim.system.parts import NANOSECONDS
@@ -24,31 +21,31 @@ EXPERIMENT = {
 ORIGIN = {"date": "2026-01-02T03:04:05+00:00", "versions": {"grasp-cosim": "1.2.3"}}
 
 
-def evenly(rows: int, span_ns: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+def evenly(rows, span_ns):
     """Times in s as they are recorded, so that they are the same when read back."""
     return np.asarray(np.arange(rows) * (span_ns // max(rows - 1, 1)) / NANOSECONDS)
 
 
-def component(fmu: str, **values: Any) -> dict[str, Any]:
+def component(fmu, **values):
     """The entry of a component in run.json."""
     return {"fmu": fmu, "values": values, "step": None, "isolation": "none", "rename": {}}
 
 
-def connection(source: str, target: str, factor: float | None = None) -> dict[str, Any]:
+def connection(source, target, factor=None):
     """The entry of a connection in run.json."""
     return {"from": source, "to": target, "factor": factor, "offset": None}
 
 
-def position(finger: int, t: float) -> float:
+def position(finger, t):
     """Where a finger of grasp_run() is at t, in m."""
     end = CENTRE + SIDE[finger] * WIDTH / 2
     return START[finger] + (end - START[finger]) * min(t / TOUCH[finger], 1.0)
 
 
-def grasp_run(rows: int = 2001) -> Result:
+def grasp_run(rows=2001):
     """Two fingers that close on an object, one 0.2 s after the other, 2 s long."""
     time = evenly(rows, 2 * NANOSECONDS)
-    signals: dict[str, Any] = {}
+    signals = {}
     for j in (1, 2):
         x = np.array([position(j, t) for t in time])
         touching = time >= TOUCH[j]
@@ -97,7 +94,7 @@ def grasp_run(rows: int = 2001) -> Result:
     )  # fmt: skip
 
 
-def ring_run(names: list[str], rows: int = 50) -> Result:
+def ring_run(names, rows=50):
     """Components connected in a ring, each with an output y."""
     time = evenly(rows, 98 * NANOSECONDS // 100)
     signals = {f"{name}.y": np.sin(time + k) for k, name in enumerate(names)}
@@ -112,11 +109,11 @@ def ring_run(names: list[str], rows: int = 50) -> Result:
         "faults": [],
         "roles": {},
     }
-    units: dict[str, str | None] = dict.fromkeys(signals)
+    units = dict.fromkeys(signals)
     return Result(settings, time, signals, units, wall_time=1.5, complete=True, origin=ORIGIN)
 
 
-def write_run(folder: Path, result: Result) -> None:
+def write_run(folder, result):
     """As `run --out` does."""
     folder.mkdir()
     result.to_csv(folder / "signals.csv")

@@ -1,7 +1,6 @@
 """The page in a headless Chromium: it runs without an error, draws, zooms."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from grasp_cosim.comparison.compare import compare
@@ -29,11 +28,11 @@ const panels = () => [...document.querySelectorAll("#plots .panel")].map((panel)
 
 
 @pytest.fixture(scope="module")
-def html() -> str:
+def html():
     return page_html(grasp_run())
 
 
-def test_wheel_drag_and_double_click_change_the_time_in_view(html: str, tmp_path: Path) -> None:
+def test_wheel_drag_and_double_click_change_the_time_in_view(html, tmp_path):
     act = """
       const canvas = document.querySelector("#plots canvas"), seen = [];
       const note = async () => { await frame(); seen.push([view.from, view.to]); };
@@ -77,9 +76,7 @@ def test_wheel_drag_and_double_click_change_the_time_in_view(html: str, tmp_path
 
 @pytest.mark.parametrize("size", [(360, 800), (1900, 1000)])
 @pytest.mark.parametrize("kind", ["run", "comparison"])
-def test_nothing_sticks_out_of_a_narrow_or_wide_window(
-    size: tuple[int, int], kind: str, tmp_path: Path
-) -> None:
+def test_nothing_sticks_out_of_a_narrow_or_wide_window(size, kind, tmp_path):
     run = replace(grasp_run(), timing=paced(steps=50))
     scene = run.view.scene(run)
     html = page_html(run, scene=scene) if kind == "run" else comparison_html(compare(run, run))
@@ -94,7 +91,7 @@ def test_nothing_sticks_out_of_a_narrow_or_wide_window(
 
 
 @pytest.mark.parametrize("width", [420, 1101, 1900])
-def test_the_chart_of_a_paced_run_fits(width: int, tmp_path: Path) -> None:
+def test_the_chart_of_a_paced_run_fits(width, tmp_path):
     """It takes the width of the page, on a narrow one it scrolls; the page's own rules are kept."""
     html = page_html(replace(grasp_run(), timing=paced(steps=2000)))
     act = """
@@ -120,7 +117,7 @@ def test_the_chart_of_a_paced_run_fits(width: int, tmp_path: Path) -> None:
     assert found["joins"] == "miter"
 
 
-def test_any_system_has_traces(tmp_path: Path) -> None:
+def test_any_system_has_traces(tmp_path):
     html = page_html(ring_run(["<b>", "</script>"]).titled("<i>"))
     act = CANVASES + "return [panels(), document.title, document.querySelectorAll('i').length];"
     (panel,), title, italic = in_browser(html, act, tmp_path)
@@ -128,13 +125,13 @@ def test_any_system_has_traces(tmp_path: Path) -> None:
     assert sum(panel["colors"].values()) > 500
 
 
-def test_a_single_recorded_point_is_drawn(tmp_path: Path) -> None:
+def test_a_single_recorded_point_is_drawn(tmp_path):
     html = page_html(ring_run(["a"], rows=1))
     (panel,) = in_browser(html, CANVASES + "return panels();", tmp_path)
     assert panel["low"] == panel["high"] == 0.0
 
 
-def test_an_error_in_the_page_is_not_silent(html: str, tmp_path: Path) -> None:
+def test_an_error_in_the_page_is_not_silent(html, tmp_path):
     broken = html.replace('<script type="text/plain" id="time">', '<script id="time" type="x">!')
     with pytest.raises(AssertionError, match="not correctly encoded"):
         in_browser(broken, "return 1;", tmp_path)

@@ -12,7 +12,7 @@ from grasp_cosim.report.caption import about, caption, changes
 from report.runs import grasp_run, ring_run, write_run
 
 
-def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_path: Path) -> None:
+def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_path):
     run = grasp_run()
     assert caption(run).title == "grasp, case 2, GraspController"
     assert caption(ring_run(["a"])).title == "grasp"
@@ -22,7 +22,7 @@ def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_p
     assert caption(kept, "After").title == caption(kept.titled("After")).title == "After"
 
 
-def test_a_run_without_a_date_says_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_without_a_date_says_none(monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
     run = replace(grasp_run(), origin={})
     fresh = f"2001-09-09 · grasp-cosim {version('grasp-cosim')}"
@@ -32,13 +32,13 @@ def test_a_run_without_a_date_says_none(monkeypatch: pytest.MonkeyPatch) -> None
     assert caption(changed).about == f"as in the system file · {fresh}"
 
 
-def test_many_changes_are_counted() -> None:
+def test_many_changes_are_counted():
     assert changes({}) == "as in the system file"
     assert changes({"a": True, "b": 0.1, "c": "x.fmu"}) == "a = true, b = 0.1, c = x.fmu"
     assert changes({f"v{k}": k for k in range(8)}).endswith("v5 = 5, 2 more")
 
 
-def test_the_date_is_that_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_date_is_that_of_now(monkeypatch):
     monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
     before = now()
     said = about({})
@@ -46,7 +46,7 @@ def test_the_date_is_that_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("epoch", ["today", "1e9", "-1" + 30 * "0"])
-def test_a_date_that_is_none(epoch: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_date_that_is_none(epoch, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
     with pytest.raises(InputError, match=rf"^SOURCE_DATE_EPOCH={epoch}: must be the seconds"):
         about({})

@@ -1,12 +1,11 @@
 """The page of two runs: what differs at the top, A solid and B dashed, the band, the deviation."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim.comparison.bands import Bands, Given
-from grasp_cosim.comparison.compare import Comparison, compare
+from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.page import comparison_html
 from report.javascript import in_browser
 from report.runs import grasp_run, write_run
@@ -18,7 +17,7 @@ BANDS = Bands(signals={GAP: Given(absolute=2e-4), "plant.contact*": Given(absolu
 
 
 @pytest.fixture
-def found(tmp_path: Path) -> Comparison:
+def found(tmp_path):
     run = grasp_run()
     write_run(tmp_path / "a", run)
     settings = {**run.settings, "scheme": "jacobi"}
@@ -29,7 +28,7 @@ def found(tmp_path: Path) -> Comparison:
     return compare(tmp_path / "a", tmp_path / "b", bands=BANDS)
 
 
-def test_what_differs_is_at_the_top_and_metrics_are_side_by_side(found: Comparison) -> None:
+def test_what_differs_is_at_the_top_and_metrics_are_side_by_side(found):
     html = comparison_html(found)
     top, _, rest = html.partition('<section id="traces">')
     assert "The settings differ in" in top
@@ -41,22 +40,20 @@ def test_what_differs_is_at_the_top_and_metrics_are_side_by_side(found: Comparis
     assert f'data-show="{GAP}"' in rest
 
 
-def test_a_long_run_is_thinned_and_the_page_says_so(found: Comparison) -> None:
+def test_a_long_run_is_thinned_and_the_page_says_so(found):
     html = comparison_html(found, limit=20_000)
     assert "this page keeps the lowest and the highest value" in html
     assert len(html) < len(comparison_html(found))
 
 
-def test_hostile_names_stay_text(tmp_path: Path, found: Comparison) -> None:
+def test_hostile_names_stay_text(tmp_path, found):
     hostile = replace(found, notes=("<script>alert(1)</script>",))
     assert "<script>alert(1)" not in comparison_html(hostile)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
-def test_both_runs_their_band_and_their_deviation_are_drawn(
-    found: Comparison, dark: bool, tmp_path: Path
-) -> None:
+def test_both_runs_their_band_and_their_deviation_are_drawn(found, dark, tmp_path):
     act = """
       await choose(["plant.gap[1]", "plant.contact[1]"]);
       await frame();
@@ -84,7 +81,7 @@ def test_both_runs_their_band_and_their_deviation_are_drawn(
 
 
 @pytest.mark.slow
-def test_a_row_of_the_table_leads_to_its_worst_moment(found: Comparison, tmp_path: Path) -> None:
+def test_a_row_of_the_table_leads_to_its_worst_moment(found, tmp_path):
     act = """
       await choose(["plant.contact[1]"]);
       document.querySelector('button[data-show="plant.gap[1]"]').click();
@@ -100,7 +97,7 @@ def test_a_row_of_the_table_leads_to_its_worst_moment(found: Comparison, tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(500, 800), (1900, 1000)])
-def test_nothing_sticks_out(size: tuple[int, int], found: Comparison, tmp_path: Path) -> None:
+def test_nothing_sticks_out(size, found, tmp_path):
     act = "return [document.documentElement.scrollWidth, innerWidth];"
     width, window = in_browser(comparison_html(found), act, tmp_path, size=size)
     assert width <= window

@@ -17,21 +17,21 @@ Point = tuple[float, float]
 class Diagram:
     """What is drawn, read back: boxes by name as left, top, right, bottom; connections by name."""
 
-    def __init__(self, svg: str) -> None:
+    def __init__(self, svg):
         root = ET.fromstring(svg)
         self.width, self.height = float(root.attrib["width"]), float(root.attrib["height"])
-        self.boxes: dict[str, Box] = {}
-        self.ports: dict[tuple[str, str, str], float] = {}
-        self.connections: dict[str, list[Point]] = {}
-        self.labels: dict[str, str] = {}
-        self.kinds: dict[str, str] = {}
+        self.boxes = {}
+        self.ports = {}
+        self.connections = {}
+        self.labels = {}
+        self.kinds = {}
         for group in root.findall(f"{SVG}g"):
             if group.attrib["class"] == "box":
                 self._box(group)
             else:
                 self._connection(group)
 
-    def _box(self, group: ET.Element) -> None:
+    def _box(self, group):
         rect = group.find(f"{SVG}rect")
         assert rect is not None
         x, y, w, h = (float(rect.attrib[k]) for k in ("x", "y", "width", "height"))
@@ -41,7 +41,7 @@ class Diagram:
             side = "output" if port.get("text-anchor") == "end" else "input"
             self.ports[str(name.text), side, str(port.text)] = float(port.attrib["y"]) - 4.0
 
-    def _connection(self, group: ET.Element) -> None:
+    def _connection(self, group):
         title, *paths = (e for e in group if e.tag != f"{SVG}text")
         label = group.find(f"{SVG}text")
         assert len(paths) == 2
@@ -51,19 +51,19 @@ class Diagram:
         self.kinds[name] = group.attrib["class"]
 
 
-def corners(path: str) -> list[Point]:
+def corners(path):
     """The points of a path of M, L, C and Q, control points left out."""
     numbers = [[float(n) for n in text.split()] for text in re.findall(r"[MLCQ]([^MLCQ]*)", path)]
     return [(n[-2], n[-1]) for n in numbers]
 
 
-def link(text: str, label: str = "", fault: bool = False) -> Link:
+def link(text, label="", fault=False):
     source, target = text.split(" → ")
     a, b = source.split(".", 1), target.split(".", 1)
     return Link((a[0], a[1]), (b[0], b[1]), label, fault)
 
 
-def draw(names: list[str], links: list[Link]) -> Diagram:
+def draw(names, links):
     return Diagram(diagram_svg(dict.fromkeys(names, "X.fmu"), links, {}))
 
 
@@ -85,7 +85,7 @@ GRASP_CONNECTIONS = [
 ]
 
 
-def many(seed: int, components: int, connections: int) -> tuple[list[str], list[Link]]:
+def many(seed, components, connections):
     numbers = random.Random(seed)
     names = [f"c{k}" for k in range(components)]
     pairs = [(numbers.choice(names), numbers.choice(names)) for _ in range(connections)]
@@ -107,7 +107,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", [slow(c) if c == "ring of 64" else c for c in CASES])
-def test_every_connection_leads_from_its_port_to_its_port(case: str) -> None:
+def test_every_connection_leads_from_its_port_to_its_port(case):
     names, links = CASES[case]
     diagram = draw(names, links)
     assert list(diagram.boxes) == names
@@ -122,7 +122,7 @@ def test_every_connection_leads_from_its_port_to_its_port(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_boxes_stand_apart_and_inside(case: str) -> None:
+def test_boxes_stand_apart_and_inside(case):
     diagram = draw(*CASES[case])
     boxes = list(diagram.boxes.values())
     for k, (left, top, right, bottom) in enumerate(boxes):
@@ -133,7 +133,7 @@ def test_boxes_stand_apart_and_inside(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_no_connection_runs_through_a_box(case: str) -> None:
+def test_no_connection_runs_through_a_box(case):
     diagram = draw(*CASES[case])
     for name, points in diagram.connections.items():
         for (x, y), (to_x, to_y) in itertools.pairwise(points):
@@ -148,7 +148,7 @@ def test_no_connection_runs_through_a_box(case: str) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_data_flow_to_the_right_and_feedback_below(case: str) -> None:
+def test_data_flow_to_the_right_and_feedback_below(case):
     names, links = CASES[case]
     diagram = draw(names, links)
     lowest = max((box[3] for box in diagram.boxes.values()), default=0.0)
@@ -167,7 +167,7 @@ def test_data_flow_to_the_right_and_feedback_below(case: str) -> None:
     assert len(lanes) == sum("back" in kind for kind in diagram.kinds.values())
 
 
-def test_the_grasp_reads_from_the_plant_over_the_sensors_to_the_controller() -> None:
+def test_the_grasp_reads_from_the_plant_over_the_sensors_to_the_controller():
     diagram = draw(GRASP, GRASP_CONNECTIONS)
     left = {name: box[0] for name, box in diagram.boxes.items()}
     top = {name: box[1] for name, box in diagram.boxes.items()}
@@ -176,14 +176,14 @@ def test_the_grasp_reads_from_the_plant_over_the_sensors_to_the_controller() -> 
     assert diagram.width < 1184  # that of the page
 
 
-def test_labels_and_faults_stand_on_their_connections() -> None:
+def test_labels_and_faults_stand_on_their_connections():
     links = [link("a.y → b.u", "× 1000"), link("b.y → a.u", "noise", fault=True)]
     diagram = draw(["a", "b"], links)
     assert diagram.labels == {"a.y → b.u": "× 1000", "b.y → a.u": "b.y → a.u, noise"}
     assert diagram.kinds == {"a.y → b.u": "connection", "b.y → a.u": "connection back fault"}
 
 
-def test_names_are_escaped_and_units_shown() -> None:
+def test_names_are_escaped_and_units_shown():
     svg = diagram_svg(
         {"<b>&": "x<y>.fmu"}, [Link(("<b>&", "<o>"), ("<b>&", "<i>"))], {"<b>&.<o>": "µ<"}
     )
@@ -193,7 +193,7 @@ def test_names_are_escaped_and_units_shown() -> None:
     assert "µ&lt;" in svg
 
 
-def test_ports_stand_in_the_order_of_their_connections_and_those_of_feedback_lowest() -> None:
+def test_ports_stand_in_the_order_of_their_connections_and_those_of_feedback_lowest():
     links = [
         link("d.y → b.fed"),
         link("c.y → d.second"),

@@ -3,8 +3,6 @@
 import base64
 import struct
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -32,14 +30,14 @@ SAVED = """
 """
 
 
-def saved(html: str, which: list[str], folder: Path) -> list[tuple[str, str, bytes]]:
+def saved(html, which, folder):
     """What the buttons save: name, type, content."""
     act = f"{SAVED} for (const one of {which!r}) await click(one); return saved;"
-    found: list[list[Any]] = in_browser(html, act, folder)
+    found = in_browser(html, act, folder)
     return [(name, kind, base64.b64decode(data)) for name, kind, data in found]
 
 
-def test_the_csv_of_the_page_is_that_of_the_run(tmp_path: Path) -> None:
+def test_the_csv_of_the_page_is_that_of_the_run(tmp_path):
     run = grasp_run(rows=60)
     words = np.array(["=1+1", 'say "no"', "a\nb"] * 20, object)
     run = replace(
@@ -56,14 +54,14 @@ def test_the_csv_of_the_page_is_that_of_the_run(tmp_path: Path) -> None:
         np.testing.assert_array_equal(again[signal], column)
 
 
-def test_a_thinned_page_says_so_in_the_name_of_its_csv(tmp_path: Path) -> None:
+def test_a_thinned_page_says_so_in_the_name_of_its_csv(tmp_path):
     run = ring_run(["a", "b"], rows=5000)
     ((name, _, data),) = saved(page_html(run, limit=300), ["#csv"], tmp_path)
     assert name == "signals_thinned.csv"
     assert data.count(b"\n") < 110
 
 
-def test_each_panel_and_the_scene_are_saved_with_what_they_show(tmp_path: Path) -> None:
+def test_each_panel_and_the_scene_are_saved_with_what_they_show(tmp_path):
     run = grasp_run().titled("Before lunch")
     html = page_html(run, scene=run.view.scene(run))
     names = ["gap_in_mm", "contact_force_in_N", "velocity_in_mm_s", "target_position_in_mm"]
@@ -78,7 +76,7 @@ def test_each_panel_and_the_scene_are_saved_with_what_they_show(tmp_path: Path) 
         assert height > 168 + 3 * 17  # the title, what it is, and the legend above it
 
 
-def test_drawings_are_saved_as_svg_with_their_rules(tmp_path: Path) -> None:
+def test_drawings_are_saved_as_svg_with_their_rules(tmp_path):
     html = page_html(replace(ring_run(["a", "b"]), timing=paced(steps=200)))
     buttons = ["[data-name=connections]", "[data-name=timing]"]
     for name, kind, data in saved(html, buttons, tmp_path):

@@ -2,10 +2,8 @@
 
 import base64
 import zlib
-from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_cosim.report.embed import fit, packed
 from report.javascript import run_node
@@ -14,7 +12,7 @@ from support.slow import slow
 AWKWARD = [0.0, -0.0, 1.0, -1.0, 5e-324, 1.7976931348623157e308, np.inf, -np.inf, np.nan, 0.1, 1e-9]
 
 
-def unpacked(text: str) -> npt.NDArray[np.float64]:
+def unpacked(text):
     """The inverse of packed(), written from its description."""
     planes = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8).reshape(8, -1)
     second = np.zeros(planes.shape[1], np.uint64)
@@ -36,7 +34,7 @@ def unpacked(text: str) -> npt.NDArray[np.float64]:
     ],
     ids=["awkward", "smooth", "random", "booleans", "integers", "strided", "single"],
 )
-def test_values_come_back_to_the_bit(values: npt.NDArray[np.float64], tmp_path: Path) -> None:
+def test_values_come_back_to_the_bit(values, tmp_path):
     text = packed(values)
     expected = values.astype(np.float64).tobytes()
     assert unpacked(text).tobytes() == expected
@@ -48,12 +46,12 @@ def test_values_come_back_to_the_bit(values: npt.NDArray[np.float64], tmp_path: 
     assert run_node(["data.js"], script, text, tmp_path) == expected.hex()
 
 
-def test_a_smooth_signal_takes_a_quarter_of_its_base64() -> None:
+def test_a_smooth_signal_takes_a_quarter_of_its_base64():
     values = np.exp(-np.arange(30_000) * 1e-4)
     assert len(packed(values)) < 0.25 * 4 / 3 * values.nbytes
 
 
-def test_a_run_that_fits_stays_as_it_is() -> None:
+def test_a_run_that_fits_stays_as_it_is():
     time, signals = np.arange(100.0), {"a.y": np.arange(100.0)}
     shown = fit(time, signals, limit=200)
     assert shown.rows_per_pair is None
@@ -62,7 +60,7 @@ def test_a_run_that_fits_stays_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("rows", [1000, 1001, 1003, 9999])
-def test_a_thinned_run_keeps_the_extremes_of_each_block_and_the_end(rows: int) -> None:
+def test_a_thinned_run_keeps_the_extremes_of_each_block_and_the_end(rows):
     time = np.linspace(0.0, 1.0, rows)
     signals = {
         "a.y": np.random.default_rng(rows).normal(size=rows),
@@ -88,7 +86,7 @@ def test_a_thinned_run_keeps_the_extremes_of_each_block_and_the_end(rows: int) -
 
 
 @pytest.mark.parametrize("rows", [slow(1), slow(17), 1000])
-def test_extremes_of_pixel_columns_are_those_of_their_rows(rows: int, tmp_path: Path) -> None:
+def test_extremes_of_pixel_columns_are_those_of_their_rows(rows, tmp_path):
     """Those of each column's rows, and of at most a quarter of a column beside it."""
     values = np.random.default_rng(rows).normal(size=rows)
     values[rows // 2] = np.nan

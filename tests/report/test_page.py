@@ -4,11 +4,9 @@ import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
 from grasp_cosim.metrics.metric import Metric
-from grasp_cosim.recording.result import Result
 from grasp_cosim.report.page import Scene, Zoom, page_html, write_page
 from report.runs import grasp_run, ring_run
 from report.test_embed import unpacked
@@ -20,34 +18,34 @@ EMPTY = {"meta", "link", "input", "br"}
 class Elements(HTMLParser):
     """Collects elements and texts; an element that is not closed in its place is an error."""
 
-    def __init__(self, html: str) -> None:
+    def __init__(self, html):
         super().__init__()
-        self.open: list[str] = []
-        self.found: list[tuple[str, dict[str, str | None]]] = []
-        self.texts: dict[str, str] = {}
+        self.open = []
+        self.found = []
+        self.texts = {}
         self.visible = ""
         self.feed(html)
         self.close()
         assert not self.open
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.found.append((tag, dict(attrs)))
         if tag not in EMPTY:
             self.open.append(tag)
 
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_startendtag(self, tag, attrs):
         self.found.append((tag, dict(attrs)))
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         if self.open[-1:] == ["script"]:
             self.texts[str(self.found[-1][1].get("id"))] = data
         elif self.open[-1:] != ["style"]:
             self.visible += data
 
-    def ids(self) -> list[str]:
+    def ids(self):
         return [str(a["id"]) for _, a in self.found if "id" in a]
 
 
@@ -56,7 +54,7 @@ class Elements(HTMLParser):
     [grasp_run(), ring_run(["a", "b"]), replace(grasp_run(), timing=paced(steps=2000))],
     ids=["grasp", "ring", "paced"],
 )
-def test_the_page_is_whole_and_needs_nothing_from_outside(run: Result) -> None:
+def test_the_page_is_whole_and_needs_nothing_from_outside(run):
     html = page_html(run)
     page = Elements(html)
     for tag, attributes in page.found:
@@ -75,7 +73,7 @@ def test_the_page_is_whole_and_needs_nothing_from_outside(run: Result) -> None:
     assert not re.search(r"\$\w", Elements(html).visible)
 
 
-def test_the_data_in_the_page_are_those_of_the_run_to_the_bit() -> None:
+def test_the_data_in_the_page_are_those_of_the_run_to_the_bit():
     run = grasp_run()
     page = Elements(page_html(run))
     state = json.loads(page.texts["page"])
@@ -89,7 +87,7 @@ def test_the_data_in_the_page_are_those_of_the_run_to_the_bit() -> None:
         assert signal["steps"] == (values.dtype == bool)
 
 
-def test_a_long_run_is_thinned_and_the_page_says_so() -> None:
+def test_a_long_run_is_thinned_and_the_page_says_so():
     run = grasp_run()
     html = page_html(run, limit=len(run.time) * len(run.signals) // 2)
     state = json.loads(Elements(html).texts["page"])
@@ -99,7 +97,7 @@ def test_a_long_run_is_thinned_and_the_page_says_so() -> None:
     assert "to the last bit" in page_html(run)
 
 
-def test_names_stay_text() -> None:
+def test_names_stay_text():
     wicked = ["<b>", "</script><script>alert(1)</script>", "\"&'", "<!--"]
     html = page_html(ring_run(wicked).titled("<i>run</i> & $title"))
     page = Elements(html)
@@ -114,7 +112,7 @@ def test_names_stay_text() -> None:
     assert boxes == [f"{name}.y" for name in wicked]
 
 
-def test_metrics_and_settings_are_there() -> None:
+def test_metrics_and_settings_are_there():
     text = Elements(page_html(grasp_run())).visible
     for expected in (
         "2 s in 2\N{NARROW NO-BREAK SPACE}000 steps of 1 ms, sequential",
@@ -131,7 +129,7 @@ def test_metrics_and_settings_are_there() -> None:
     assert "not complete" not in text
 
 
-def test_a_run_that_was_broken_off_says_so() -> None:
+def test_a_run_that_was_broken_off_says_so():
     run = grasp_run()
     broken = replace(run, complete=False)
     assert "not complete" in Elements(page_html(broken)).visible
@@ -150,7 +148,7 @@ SCENE = Scene(
 )
 
 
-def test_a_scene_has_its_section_scripts_colours_buttons_and_marks() -> None:
+def test_a_scene_has_its_section_scripts_colours_buttons_and_marks():
     html = page_html(grasp_run(), scene=SCENE)
     page = Elements(html)
     assert {"scene", "stage"} <= set(page.ids())
@@ -171,7 +169,7 @@ def test_a_scene_has_its_section_scripts_colours_buttons_and_marks() -> None:
     assert "<Half>" in page.visible
 
 
-def test_without_a_scene_the_page_does_without() -> None:
+def test_without_a_scene_the_page_does_without():
     page = Elements(page_html(grasp_run()))
     assert "scene" not in page.ids()
     state = json.loads(page.texts["page"])
@@ -181,7 +179,7 @@ def test_without_a_scene_the_page_does_without() -> None:
     assert set(state["shown"]) <= ends  # the connected ones
 
 
-def test_metrics_stand_in_the_columns_of_their_entries() -> None:
+def test_metrics_stand_in_the_columns_of_their_entries():
     """One with other entries has a row for each; one without, or a list, is across all."""
     found = [
         Metric("a", lambda _: [0.5, 2.0, None], unit="m", entries=("x", "y", "z"), factor=1e3,
@@ -205,7 +203,7 @@ def test_metrics_stand_in_the_columns_of_their_entries() -> None:
     assert cells[1][1][0] == ' class="both" colspan="3"'
 
 
-def test_lines_of_the_log_with_a_time_are_marked() -> None:
+def test_lines_of_the_log_with_a_time_are_marked():
     run = grasp_run()
     log = ["t = 0.25 s: a.u = 1", "b: 3 steps rejected, first at t = 0.7 s", "t = 1e-3 s: fault"]
     logged = replace(run, log=tuple(log))
@@ -214,7 +212,7 @@ def test_lines_of_the_log_with_a_time_are_marked() -> None:
     assert marks == [("--fault", 0.25), ("--fault", 0.001)]
 
 
-def test_the_page_is_written_in_one_piece(tmp_path: Path) -> None:
+def test_the_page_is_written_in_one_piece(tmp_path):
     path = tmp_path / "page.html"
     write_page(ring_run(["a"]), path)
     assert path.read_text("utf-8") == page_html(ring_run(["a"]))

@@ -1,7 +1,6 @@
 """The panels of a page, in a headless Chromium: how many lines, signs, dashes, units."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from grasp_cosim.comparison.compare import compare
@@ -19,7 +18,7 @@ PANELS = """return panels.map((panel) => ({
 
 
 @pytest.mark.slow
-def test_many_lines_of_a_unit_are_in_several_panels(tmp_path: Path) -> None:
+def test_many_lines_of_a_unit_are_in_several_panels(tmp_path):
     names = [f"c{k}" for k in range(23)]
     html = page_html(ring_run(names))
     shown = ",".join(f"{name}.y" for name in names)
@@ -30,7 +29,7 @@ def test_many_lines_of_a_unit_are_in_several_panels(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_finger_2_is_dashed_and_presses_with_a_positive_force(tmp_path: Path) -> None:
+def test_finger_2_is_dashed_and_presses_with_a_positive_force(tmp_path):
     run = grasp_run()
     panels = in_browser(page_html(run, scene=run.view.scene(run)), PANELS, tmp_path)
     force = next(panel for panel in panels if panel["title"] == "contact force in N")
@@ -41,7 +40,7 @@ def test_finger_2_is_dashed_and_presses_with_a_positive_force(tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_so_it_is_in_a_comparison(tmp_path: Path) -> None:
+def test_so_it_is_in_a_comparison(tmp_path):
     run = grasp_run()
     name = "plant.contact_force[2]"
     weaker = replace(run, signals={**run.signals, name: 0.5 * run.signals[name]})
@@ -55,7 +54,7 @@ def test_so_it_is_in_a_comparison(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 1200])
-def test_what_is_far_away_says_how_far(width: int, tmp_path: Path) -> None:
+def test_what_is_far_away_says_how_far(width, tmp_path):
     act = """
       const said = [], pen = CanvasRenderingContext2D.prototype, write = pen.fillText;
       pen.fillText = function (text, ...more) { said.push(text); write.call(this, text, ...more); };
@@ -87,9 +86,7 @@ def test_what_is_far_away_says_how_far(width: int, tmp_path: Path) -> None:
         ("V", 0.02, 1e3, "mV"),
     ],
 )
-def test_units_are_alike(
-    unit: str, largest: float, factor: float, shown: str, tmp_path: Path
-) -> None:
+def test_units_are_alike(unit, largest, factor, shown, tmp_path):
     body = "output(scaled(input.unit, input.largest));"
     found = run_node(["traces.js"], body, {"unit": unit, "largest": largest}, tmp_path)
     assert found == {"factor": pytest.approx(factor), "unit": shown}

@@ -1,25 +1,22 @@
 """The picture of any result: its signals by unit."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.recording.result import Result
 from grasp_cosim.report import plot
 from grasp_cosim.report.page import page_html
-from matplotlib.figure import Figure
 from report.runs import grasp_run, ring_run
 
 
 @pytest.fixture
-def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+def saved(monkeypatch):
     """Collects the figures that are saved."""
-    figures: list[Figure] = []
+    figures = []
     save = plot.save
 
-    def keep(figure: Figure, path: Path) -> None:
+    def keep(figure, path):
         figures.append(figure)
         save(figure, path)
 
@@ -27,7 +24,7 @@ def saved(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     return figures
 
 
-def test_all_signals_by_unit_and_six_in_a_panel(tmp_path: Path, saved: list[Figure]) -> None:
+def test_all_signals_by_unit_and_six_in_a_panel(tmp_path, saved):
     run = ring_run([f"c{k}" for k in range(15)])
     units = {name: "m" if name < "c1" else None for name in run.signals}
     plot.plot_signals(replace(run, units=units), tmp_path / "signals.png")
@@ -48,9 +45,7 @@ def test_all_signals_by_unit_and_six_in_a_panel(tmp_path: Path, saved: list[Figu
 @pytest.mark.parametrize(
     ("suffix", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF"), ("SVG", b"<?")]
 )
-def test_the_suffix_says_the_format_and_the_bytes_are_the_same(
-    suffix: str, begins: bytes, tmp_path: Path
-) -> None:
+def test_the_suffix_says_the_format_and_the_bytes_are_the_same(suffix, begins, tmp_path):
     run = ring_run(["a", "b"])
     both = [tmp_path / f"{name}.{suffix}" for name in ("one", "two")]
     for path in both:
@@ -63,13 +58,13 @@ def test_the_suffix_says_the_format_and_the_bytes_are_the_same(
 
 
 @pytest.mark.parametrize("name", ["ring.jpg", "ring"])
-def test_another_suffix_is_refused(name: str, tmp_path: Path) -> None:
+def test_another_suffix_is_refused(name, tmp_path):
     with pytest.raises(InputError, match=rf"{name}: must end in \.png, \.svg, \.pdf$"):
         ring_run(["a"]).plot(tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
-def many(count: int) -> Result:
+def many(count):
     """A run of so many signals, of which two are connected."""
     run = grasp_run()
     names = [f"m.x[{k}]" for k in range(count)]
@@ -85,7 +80,7 @@ def many(count: int) -> Result:
     )
 
 
-def test_of_many_signals_a_picture_has_those_that_matter(tmp_path: Path) -> None:
+def test_of_many_signals_a_picture_has_those_that_matter(tmp_path):
     run = many(1000)
     figure = plot.plot_signals(run)
     drawn = {line.get_label() for axes in figure.axes for line in axes.lines}
@@ -96,7 +91,7 @@ def test_of_many_signals_a_picture_has_those_that_matter(tmp_path: Path) -> None
     assert [line.get_label() for axes in figure.axes for line in axes.lines] == ["m.x[500]"]
 
 
-def test_a_page_of_many_signals_has_all_of_them_in_a_bounded_size() -> None:
+def test_a_page_of_many_signals_has_all_of_them_in_a_bounded_size():
     html = page_html(many(2000))
     assert html.count("data-signal=") == 2000
     assert len(html) < 30e6

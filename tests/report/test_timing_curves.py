@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from grasp_cosim.realtime.timing import Histogram, Spread, Timing
+from grasp_cosim.realtime.timing import Histogram, Spread
 from grasp_cosim.report.timing import curves, decades, looks
 from report.timings import PERIOD, paced
 
 
-def of_times(times: list[float], edges: list[float]) -> Timing:
+def of_times(times, edges):
     """A timing whose only part took these times."""
     counts = np.histogram(times, edges)[0]
     assert counts.sum() == len(times)
@@ -22,7 +22,7 @@ def of_times(times: list[float], edges: list[float]) -> Timing:
     )
 
 
-def test_a_curve_is_the_share_that_took_at_least_as_long() -> None:
+def test_a_curve_is_the_share_that_took_at_least_as_long():
     times = [1e-6, 2e-6, 2e-6, 3e-6, 90e-6]
     (curve,) = curves(of_times(times, [1e-6, 1.5e-6, 2.5e-6, 4e-6, 50e-6, 100e-6]))
     assert curve.points == (
@@ -37,7 +37,7 @@ def test_a_curve_is_the_share_that_took_at_least_as_long() -> None:
     assert curve.marks == {"median": (2e-6, 0.5), "worst": (90e-6, 0.2)}
 
 
-def test_curves_fall_from_all_steps_to_the_worst_one_through_the_quantiles() -> None:
+def test_curves_fall_from_all_steps_to_the_worst_one_through_the_quantiles():
     timing = paced()
     drawn = curves(timing)
     assert drawn[-1].part == "step"
@@ -62,14 +62,12 @@ def test_curves_fall_from_all_steps_to_the_worst_one_through_the_quantiles() -> 
         (1, ["worst"]),
     ],
 )
-def test_a_quantile_that_is_the_worst_step_is_no_mark_of_its_own(
-    steps: int, marks: list[str]
-) -> None:
+def test_a_quantile_that_is_the_worst_step_is_no_mark_of_its_own(steps, marks):
     timing = of_times([1e-6] * (steps - 1) + [2e-6], [1e-6, 1.5e-6, 3e-6])
     assert list(curves(timing)[0].marks) == marks
 
 
-def test_every_part_and_culprit_looks_different() -> None:
+def test_every_part_and_culprit_looks_different():
     timing = paced(components={f"c{k}": 1e-6 for k in range(20)}, hiccups=0)
     timing = replace(timing, culprits={"backlog": 1, "slow": 2})
     look = looks(timing)
@@ -77,14 +75,14 @@ def test_every_part_and_culprit_looks_different() -> None:
     assert len(set(look.values())) == len(look)
 
 
-def test_an_axis_holds_its_times_in_whole_decades() -> None:
+def test_an_axis_holds_its_times_in_whole_decades():
     assert decades([3e-7, PERIOD]) == pytest.approx((1e-7, 1e-2))
     assert decades([PERIOD]) == pytest.approx((1e-3, 1e-2))
     assert decades([0.0, 2e-3, 30.0]) == pytest.approx((1e-3, 100.0))
     assert decades([2e-5, 4.96e-3]) == pytest.approx((1e-5, 1e-2))
 
 
-def test_an_axis_begins_where_the_clock_is_exact_and_has_a_decade_at_least() -> None:
+def test_an_axis_begins_where_the_clock_is_exact_and_has_a_decade_at_least():
     assert decades([2e-9, 3e-9, PERIOD]) == pytest.approx((1e-7, 1e-2))
     assert decades([1e-9]) == pytest.approx((1e-7, 1e-6))
     assert decades([0.0]) == decades([]) == pytest.approx((1e-7, 1e-6))

@@ -7,35 +7,33 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim.realtime.timing import Overrun, Timing
+from grasp_cosim.realtime.timing import Overrun
 from grasp_cosim.report import timing as drawn
 from grasp_cosim.report.caption import Caption
 from grasp_cosim.report.plot import RED
 from grasp_cosim.report.timing import draw_timing, looks, timing_svg
 from matplotlib.colors import same_color
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from report.timings import PERIOD, paced
 from support.slow import slow
 
 SAID = Caption("a run", "from 2026")
 
 
-def figure_of(timing: Timing, monkeypatch: pytest.MonkeyPatch) -> Figure:
+def figure_of(timing, monkeypatch):
     """What would be saved of a run of 3 s."""
-    figures: list[Figure] = []
+    figures = []
     monkeypatch.setattr(drawn, "save", lambda figure, path: figures.append(figure))
     draw_timing(timing, 3.0, Path(), SAID)
     return figures[0]
 
 
-def points(line: Line2D) -> list[list[float]]:
+def points(line):
     """The points of a line."""
     x, y = (np.asarray(data, float).tolist() for data in line.get_data())
     return [list(point) for point in zip(x, y, strict=True)]
 
 
-def broken_off() -> Timing:
+def broken_off():
     """Of a run that was interrupted in its first step."""
     return replace(paced(steps=10, hiccups=0), steps=0, parts={}, histograms={})
 
@@ -50,7 +48,7 @@ def broken_off() -> Timing:
     ],
     ids=["none", "unlisted", "many", "nothing"],
 )
-def test_any_timing_can_be_drawn(timing: Timing, tmp_path: Path) -> None:
+def test_any_timing_can_be_drawn(timing, tmp_path):
     draw_timing(timing, 3.0, tmp_path / "timing.png", SAID)
     assert [p.name for p in tmp_path.iterdir()] == ["timing.png"]
     head = (tmp_path / "timing.png").read_bytes()[:24]
@@ -58,9 +56,7 @@ def test_any_timing_can_be_drawn(timing: Timing, tmp_path: Path) -> None:
     assert int.from_bytes(head[16:20]) == 1560
 
 
-def test_every_part_has_a_curve_and_the_period_is_a_red_line(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_every_part_has_a_curve_and_the_period_is_a_red_line(monkeypatch):
     timing = paced(steps=3000)
     above = figure_of(timing, monkeypatch).axes[0]
     lines = {str(line.get_label()): line for line in above.lines}
@@ -72,7 +68,7 @@ def test_every_part_has_a_curve_and_the_period_is_a_red_line(
     assert above.get_xlim()[1] > PERIOD
 
 
-def test_the_legend_is_a_table_of_the_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_legend_is_a_table_of_the_parts(monkeypatch):
     timing = paced(steps=3000)
     legend = figure_of(timing, monkeypatch).axes[0].get_legend()
     assert legend is not None
@@ -83,7 +79,7 @@ def test_the_legend_is_a_table_of_the_parts(monkeypatch: pytest.MonkeyPatch) -> 
     assert len({len(row) for row in rows}) == 1
 
 
-def test_overruns_are_in_the_colours_of_their_culprits(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_overruns_are_in_the_colours_of_their_culprits(monkeypatch):
     moments = {"plant": (0.5, 3e-4), "start": (1.5, 2e-3), "backlog": (2.5, 1e-3)}
     timing = replace(
         paced(steps=3000, hiccups=0),
@@ -101,20 +97,18 @@ def test_overruns_are_in_the_colours_of_their_culprits(monkeypatch: pytest.Monke
     assert below.get_title(loc="right") == "grey: 2 more, counted only"
 
 
-def test_the_axes_hold_all_curves_and_the_period(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_axes_hold_all_curves_and_the_period(monkeypatch):
     above = figure_of(paced(), monkeypatch).axes[0]
     assert above.get_xlim() == pytest.approx((1e-7, 1e-2))
     assert above.get_ylim() == pytest.approx((1e-5, 1.5))
 
 
-def test_without_overruns_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_overruns_it_says_so(monkeypatch):
     below = figure_of(paced(steps=3000, hiccups=0), monkeypatch).axes[1]
     assert [text.get_text() for text in below.texts] == ["no overruns"]
 
 
-def test_as_svg_it_has_every_name_and_is_an_element_for_a_page(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_as_svg_it_has_every_name_and_is_an_element_for_a_page(monkeypatch):
     timing = paced(steps=3000, components={"<b>--!>": 1e-6, "$x_1$": 1e-6})
     svg = timing_svg(timing, 3.0)
     assert svg == timing_svg(timing, 3.0)
@@ -131,7 +125,7 @@ def test_as_svg_it_has_every_name_and_is_an_element_for_a_page(
 
 
 @pytest.mark.slow
-def test_the_same_timing_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_the_same_timing_gives_the_same_bytes(tmp_path):
     for name in ("one.png", "two.png"):
         draw_timing(paced(steps=3000), 3.0, tmp_path / name, SAID)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()

@@ -13,7 +13,7 @@ from report.test_page import Elements
 from report.timings import paced
 
 
-def rows(html: str) -> list[list[str]]:
+def rows(html):
     """The texts of the cells of all rows of tables."""
     return [
         [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row)]
@@ -22,13 +22,13 @@ def rows(html: str) -> list[list[str]]:
 
 
 @pytest.fixture
-def no_chart(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_chart(monkeypatch):
     """What is beside the chart, which takes a quarter of a second."""
     monkeypatch.setattr("grasp_cosim.report.timing_html._chart", lambda *_: "")
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_only_a_paced_run_has_the_section() -> None:
+def test_only_a_paced_run_has_the_section():
     run = grasp_run()
     plain, timed = (Elements(page_html(r)) for r in (run, replace(run, timing=paced())))
     assert "timing" not in plain.ids()
@@ -38,14 +38,14 @@ def test_only_a_paced_run_has_the_section() -> None:
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_the_entry_of_the_timing_is_no_metric() -> None:
+def test_the_entry_of_the_timing_is_no_metric():
     run = ring_run(["a"])
     timing = paced(steps=50)
     assert "There are no metrics" in Elements(page_html(replace(run, timing=timing))).visible
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked() -> None:
+def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked():
     timing = paced(steps=3000, hiccups=0)
     plant = Spread(24.04e-6, 31e-6, 90e-6, 1.2345678e-3, 0.125)
     late = Overrun(125, 0.125, 3e-4, "plant", 1.2345678e-3)
@@ -69,7 +69,7 @@ def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked() -> None:
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_a_culprit_that_is_no_part_has_a_row_too() -> None:
+def test_a_culprit_that_is_no_part_has_a_row_too():
     late = Overrun(125, 0.125, 3e-4, "backlog", 2e-3)
     timing = replace(
         paced(steps=3000, hiccups=0), overruns=1, listed=(late,), culprits={"backlog": 1}
@@ -87,7 +87,7 @@ def test_a_culprit_that_is_no_part_has_a_row_too() -> None:
         (70, 10, "The first 10 of 70 overruns", 10),
     ],
 )
-def test_the_first_overruns_are_listed(hiccups: int, listed: int, title: str, shown: int) -> None:
+def test_the_first_overruns_are_listed(hiccups, listed, title, shown):
     timing = paced(steps=3000, hiccups=hiccups, listed=listed)
     html = timing_html(timing, 3.0)
     assert f"<summary>{title}</summary>" in html
@@ -95,15 +95,13 @@ def test_the_first_overruns_are_listed(hiccups: int, listed: int, title: str, sh
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_without_overruns_there_is_no_list_of_them() -> None:
+def test_without_overruns_there_is_no_list_of_them():
     html = timing_html(paced(steps=3000, hiccups=0), 3.0)
     assert "<summary>" not in html
     assert 'class="warn"' not in html
 
 
-def test_without_matplotlib_a_line_says_what_the_chart_needs(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_matplotlib_a_line_says_what_the_chart_needs(monkeypatch):
     timing = paced(steps=3000)
     drawn = timing_html(timing, 3.0)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
@@ -116,7 +114,7 @@ def test_without_matplotlib_a_line_says_what_the_chart_needs(
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_pace_and_what_the_machine_granted_and_refused() -> None:
+def test_pace_and_what_the_machine_granted_and_refused():
     text = Elements(timing_html(paced(steps=3000), 3.0)).visible
     for expected in (
         "period1 ms",
@@ -128,12 +126,12 @@ def test_pace_and_what_the_machine_granted_and_refused() -> None:
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_a_run_that_was_broken_off_in_its_first_step() -> None:
+def test_a_run_that_was_broken_off_in_its_first_step():
     timing = replace(paced(steps=10, hiccups=0), steps=0, parts={}, histograms={})
     assert "All 0 steps" in Elements(timing_html(timing, 0.0)).visible
 
 
-def test_names_stay_text() -> None:
+def test_names_stay_text():
     wicked = ["<b>", "</script><i>", "\"&'", "<!--"]
     timing = replace(
         paced(steps=3000, hiccups=60, components=dict.fromkeys(wicked, 1e-6)),

@@ -22,11 +22,11 @@ from report.timings import PERIOD, paced
         (10.0**-5, "10 µs"),
     ],
 )
-def test_durations(seconds: float, text: str) -> None:
+def test_durations(seconds, text):
     assert duration(seconds) == text
 
 
-def test_in_words() -> None:
+def test_in_words():
     assert kept(paced(steps=2000, hiccups=0)) == (
         "All 2\N{NARROW NO-BREAK SPACE}000 steps ended within their period of 1 ms."
     )

@@ -1,7 +1,6 @@
 """The timing of a paced run, made up from drawn samples."""
 
 from collections import Counter
-from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -17,17 +16,11 @@ BULK = {"plant": 24e-6, "sensor_1": 6e-6, "sensor_2": 6e-6, "controller": 14e-6}
 Times = npt.NDArray[np.float64]
 
 
-def paced(
-    steps: int = 60_000,
-    hiccups: int = 12,
-    seed: int = 1,
-    components: Mapping[str, float] = BULK,
-    listed: int = LISTED,
-) -> Timing:
+def paced(steps=60_000, hiccups=12, seed=1, components=BULK, listed=LISTED):
     """Steps of which so many were made late by one part each."""
     rng = np.random.default_rng(seed)
 
-    def drawn(median: float, spread: float = 0.12) -> Times:
+    def drawn(median, spread=0.12):
         values = median * np.exp(spread * rng.standard_normal(steps))
         return values * np.where(rng.random(steps) < 0.004, rng.uniform(1.0, 8.0, steps), 1.0)
 
@@ -61,14 +54,14 @@ def paced(
     )
 
 
-def _spread(times: Times) -> Spread:
+def _spread(times):
     """Each quantile is a time that occurred."""
     median, p99, p999 = np.quantile(times, (0.5, 0.99, 0.999), method="inverted_cdf").tolist()
     worst = int(times.argmax())
     return Spread(median, p99, p999, float(times[worst]), worst * PERIOD)
 
 
-def _histogram(times: Times) -> Histogram:
+def _histogram(times):
     """No empty bins at the ends."""
     counts = np.histogram(times, EDGES)[0]
     first, *_, last = np.flatnonzero(counts).tolist()

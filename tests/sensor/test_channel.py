@@ -4,13 +4,11 @@ from dataclasses import replace
 from itertools import pairwise
 from math import floor, sin
 from random import Random
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from proximity_sensor import (
     ambient_light,
     channel,
@@ -23,9 +21,9 @@ from proximity_sensor import (
     sliding_median,
     stripes,
 )
-from proximity_sensor.channel import Inputs, Params, State
+from proximity_sensor.channel import Inputs, Params
 from scipy import signal
-from support.declared import Parameter, parameters
+from support.declared import parameters
 from support.examples import examples
 
 QUICK = examples(60)
@@ -41,7 +39,7 @@ ON = Params(
 )
 """Everything but the stripes."""
 
-STAGES: dict[str, Any] = {
+STAGES = {
     "ambient": ambient_light.Params(True, drift=0.02),
     "noise": gaussian_noise.Params(True),
     "adc": converter.Params(True, 8, (0.0, 1.0)),
@@ -50,15 +48,15 @@ STAGES: dict[str, Any] = {
 }
 
 
-def only(stage: str, **others: Any) -> Params:
+def only(stage, **others):
     return Params(**{stage: STAGES[stage]}, **others)
 
 
-def without(p: Params, *stages: str) -> Params:
+def without(p, *stages):
     return replace(p, **{stage: type(getattr(p, stage))() for stage in stages})
 
 
-def run(p: Params, gaps: list[float], h: float) -> list[float]:
+def run(p, gaps, h):
     """The output at each of the gaps, h seconds apart, before the next step."""
     x = channel.initial_state(p, Inputs(gaps[0]))
     seen = []
@@ -68,7 +66,7 @@ def run(p: Params, gaps: list[float], h: float) -> list[float]:
     return seen
 
 
-def light(gaps: list[float], p: Params) -> NDArray[np.float64]:
+def light(gaps, p):
     """Eq. (9)."""
     return p.gain * p.reflectance / (np.array(gaps) + p.offset_distance) ** p.diffusion_exponent
 
@@ -92,7 +90,7 @@ APPROACH = [0.06 + 0.055 * sin(0.02 * k) for k in range(600)]
     st.floats(-1.0, 10.0),
     GAPS,
 )
-def test_off_it_is_the_optics(eye: optics.Params, gap: float, before: float) -> None:
+def test_off_it_is_the_optics(eye, gap, before):
     """Bit for bit, and whatever was before."""
     p = Params(eye.reflectance, eye.gain, eye.diffusion_exponent, eye.offset_distance)
     x = channel.initial_state(p, Inputs(before))
@@ -100,7 +98,7 @@ def test_off_it_is_the_optics(eye: optics.Params, gap: float, before: float) -> 
     assert channel.outputs(p, x, Inputs(gap)) == optics.outputs(eye, Inputs(gap))
 
 
-def test_parameters_of_a_stage_that_is_off_do_nothing() -> None:
+def test_parameters_of_a_stage_that_is_off_do_nothing():
     p = Params(
         pattern=stripes.Params(ratio=0.1),
         ambient=ambient_light.Params(offset=1.0, drift=1.0),
@@ -112,7 +110,7 @@ def test_parameters_of_a_stage_that_is_off_do_nothing() -> None:
     assert run(p, APPROACH, 1e-4) == run(Params(), APPROACH, 1e-4)
 
 
-def test_stripes_alone_need_no_sampling() -> None:
+def test_stripes_alone_need_no_sampling():
     p = Params(pattern=stripes.Params(True))
     factors = [stripes.factor(p.pattern, gap) for gap in APPROACH]
     expected = light(APPROACH, p) * factors
@@ -123,7 +121,7 @@ def test_stripes_alone_need_no_sampling() -> None:
 # ------------------------------------------------------------------- the chain, with numpy
 
 
-def uniforms(seed: int, count: int) -> list[float]:
+def uniforms(seed, count):
     """MRG32k3a once more, in whole numbers, from the start of the stream."""
     x_1, x_2, x_3, y_1, y_2, y_3 = map(int, mrg32k3a.stream(float(seed)))
     m_1, m_2 = 2**32 - 209, 2**32 - 22853
@@ -135,7 +133,7 @@ def uniforms(seed: int, count: int) -> list[float]:
     return numbers
 
 
-def conditioned(p: Params, gaps: list[float]) -> NDArray[np.float64]:
+def conditioned(p, gaps):
     """The whole chain over a sample per gap, and 100 samples of the first gap before them."""
     before = 100
     xi = light([gaps[0]] * before + gaps, p)
@@ -152,7 +150,7 @@ def conditioned(p: Params, gaps: list[float]) -> NDArray[np.float64]:
         low, high = p.adc.range
         scale = 2**p.adc.bits / (high - low)
 
-        def rounded(v: Any) -> Any:
+        def rounded(v):
             return np.clip(np.floor((v - low) * scale + 0.5), 0, 2**p.adc.bits - 1) / scale + low
 
         xi, steady = rounded(xi), rounded(steady)
@@ -181,18 +179,18 @@ def conditioned(p: Params, gaps: list[float]) -> NDArray[np.float64]:
     ],
     ids=lambda p: "+".join(stage for stage in STAGES if getattr(p, stage).enabled),
 )
-def test_the_chain_is_numpys(p: Params) -> None:
+def test_the_chain_is_numpys(p):
     values = run(p, APPROACH, 1.0 / p.sampling.rate)
     np.testing.assert_allclose(values, conditioned(p, APPROACH), rtol=0.0, atol=2e-13)
 
 
-def test_the_drift_is_not_compensated() -> None:
+def test_the_drift_is_not_compensated():
     values = run(only("ambient"), [0.05] * 101, 1e-3)
     assert values[0] == pytest.approx(light([0.05], ON)[0], abs=1e-15)
     assert values[100] - values[0] == pytest.approx(0.02 * 0.1, abs=1e-15)
 
 
-def test_the_chain_takes_the_noise_down_to_a_third() -> None:
+def test_the_chain_takes_the_noise_down_to_a_third():
     """500 Hz of 5 kHz, and a median of ten samples, which hang together."""
     p = replace(ON, ambient=ambient_light.Params(True))
     values = np.array(run(p, [0.05] * 20_000, 1e-4))
@@ -205,7 +203,7 @@ def test_the_chain_takes_the_noise_down_to_a_third() -> None:
 
 @QUICK
 @given(GAPS, st.sampled_from([*STAGES, "all"]))
-def test_it_starts_settled(gap: float, stage: str) -> None:
+def test_it_starts_settled(gap, stage):
     """No transient: the first millisecond is as the first value, noise and drift apart."""
     p = without(ON if stage == "all" else only(stage), "noise", "ambient")
     values = run(p, [gap] * 10, 1e-4)
@@ -217,7 +215,7 @@ def test_it_starts_settled(gap: float, stage: str) -> None:
         assert abs(values[0] - expected) < 1.01 * (p.adc.range[1] - p.adc.range[0]) / 2**p.adc.bits
 
 
-def test_the_noise_is_there_from_the_start() -> None:
+def test_the_noise_is_there_from_the_start():
     """Over the seeds, the first value is scattered as much as a late one."""
     first, late = [], []
     for seed in range(150):
@@ -232,7 +230,7 @@ def test_the_noise_is_there_from_the_start() -> None:
 # ---------------------------------------------------------------------------- the sampling
 
 
-def chains(p: Params, gaps: list[float], steps: list[list[float]]) -> list[State]:
+def chains(p, gaps, steps):
     """The state after each of the gaps, which is held over steps that add up to its time."""
     x = channel.initial_state(p, Inputs(gaps[0]))
     states = []
@@ -243,7 +241,7 @@ def chains(p: Params, gaps: list[float], steps: list[list[float]]) -> list[State
     return states
 
 
-def split(rng: Random, start: float, end: float) -> list[float]:
+def split(rng, start, end):
     times = [start, *sorted(rng.uniform(start, end) for _ in range(rng.randrange(6))), end]
     return [b - a for a, b in pairwise(times) if b > a]
 
@@ -254,9 +252,7 @@ def split(rng: Random, start: float, end: float) -> list[float]:
     st.integers(0, 2**32),
     st.sampled_from([1e4, 3e3, 44_100.0, 999.7]),
 )
-def test_any_split_of_the_same_time_gives_the_same_bits(
-    gaps: list[float], seed: int, rate: float
-) -> None:
+def test_any_split_of_the_same_time_gives_the_same_bits(gaps, seed, rate):
     p = replace(ON, filter=low_pass.Params(True, 0.2 * rate), sampling=clock.Params(rate))
     rng, h = Random(seed), 1.3e-3
     pieces = [split(rng, k * h, (k + 1) * h) for k in range(len(gaps))]
@@ -267,7 +263,7 @@ def test_any_split_of_the_same_time_gives_the_same_bits(
 
 
 @pytest.mark.parametrize("every", [1, 2, 5, 10, 25])
-def test_the_communication_step_does_not_change_what_is_seen(every: int) -> None:
+def test_the_communication_step_does_not_change_what_is_seen(every):
     """The gap changes every 5 ms; what is seen at those points is the same to the bit."""
     gaps = [0.01 + 0.01 * k for k in range(8) for _ in range(50 // every)]
     points = slice(None, None, 50 // every)
@@ -276,7 +272,7 @@ def test_the_communication_step_does_not_change_what_is_seen(every: int) -> None
 
 
 @pytest.mark.parametrize("rate", [1e4, 3e3, 777.7])
-def test_between_its_samples_it_holds(rate: float) -> None:
+def test_between_its_samples_it_holds(rate):
     """The last instant's sample, of the gap that was held at that instant."""
     p = only("adc", sampling=clock.Params(rate))
     gaps, h = [0.002 + 1e-4 * k for k in range(400)], 1e-5
@@ -286,7 +282,7 @@ def test_between_its_samples_it_holds(rate: float) -> None:
         assert value == converter.converted(p.adc, float(xi[0]))
 
 
-def test_a_sample_that_is_due_sees_the_gap_of_its_moment() -> None:
+def test_a_sample_that_is_due_sees_the_gap_of_its_moment():
     p = only("adc")
     x = channel.initial_state(p, Inputs(0.05))
     near, far = (channel.outputs(p, x, Inputs(gap)).intensity for gap in (0.001, 0.1))
@@ -296,7 +292,7 @@ def test_a_sample_that_is_due_sees_the_gap_of_its_moment() -> None:
     assert near == far
 
 
-def test_asking_changes_nothing() -> None:
+def test_asking_changes_nothing():
     x = channel.initial_state(ON, Inputs(0.05))
     first = channel.outputs(ON, x, Inputs(0.05))
     channel.outputs(ON, x, Inputs(0.001))
@@ -304,7 +300,7 @@ def test_asking_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_the_seed_alone_decides_on_the_noise(stage: str) -> None:
+def test_the_seed_alone_decides_on_the_noise(stage):
     """Not the step, and not what the other stages do."""
     p = replace(only(stage), noise=gaussian_noise.Params(True, seed=3))
     for steps in (20, 40):
@@ -334,7 +330,7 @@ PARAMETERS = [
 
 
 @pytest.mark.parametrize(("stage", "parameter"), PARAMETERS)
-def test_a_value_outside_its_range_is_refused(stage: str, parameter: Parameter) -> None:
+def test_a_value_outside_its_range_is_refused(stage, parameter):
     block = type(getattr(Params(), stage))
     unit = f" {parameter.unit}" if parameter.unit else ""
     for number, value in parameter.invalid():
@@ -346,7 +342,7 @@ def test_a_value_outside_its_range_is_refused(stage: str, parameter: Parameter) 
 
 
 @pytest.mark.parametrize(("stage", "parameter"), PARAMETERS)
-def test_both_ends_of_a_range_are_accepted(stage: str, parameter: Parameter) -> None:
+def test_both_ends_of_a_range_are_accepted(stage, parameter):
     block = type(getattr(Params(), stage))
     if parameter.name == "range":
         assert block(range=(parameter.low, parameter.high)).range == (-1e3, 1e3)
@@ -355,7 +351,7 @@ def test_both_ends_of_a_range_are_accepted(stage: str, parameter: Parameter) -> 
         assert getattr(block(**{parameter.name: end}), parameter.name) == end
 
 
-def test_the_filter_must_fit_the_sampling() -> None:
+def test_the_filter_must_fit_the_sampling():
     for cutoff in (500.0, 5e4):
         with pytest.raises(ValueError, match=r"below half of sampling\.rate") as caught:
             Params(filter=low_pass.Params(True, cutoff), sampling=clock.Params(1000.0))
@@ -365,7 +361,7 @@ def test_the_filter_must_fit_the_sampling() -> None:
     assert Params(filter=low_pass.Params(True, 499.0), sampling=clock.Params(1000.0)).sampled
 
 
-def test_the_optics_check_their_parameters_here_too() -> None:
+def test_the_optics_check_their_parameters_here_too():
     with pytest.raises(
         ValueError, match=r"^gain = -1\.0 V\.m\^n: must be from 0 to 1e\+06 V\.m\^n$"
     ):

@@ -15,7 +15,7 @@ from support.examples import examples
 QUICK = examples(100)
 
 
-def counted(p: Params, steps: list[float]) -> tuple[int, float]:
+def counted(p, steps):
     """Samples within the steps, from an instant on, and the wait at their end."""
     total, wait = 0, 0.0
     for h in steps:
@@ -29,7 +29,7 @@ def counted(p: Params, steps: list[float]) -> tuple[int, float]:
     [(1e-4, 1e4), (1e-3, 1e4), (1e-5, 1e4), (3e-4, 1e4), (1 / 3e4, 1e4), (1e-3, 44_100.0),
      (1e-4, 3333.0), (1 / 256, 1e4), (2.5e-5, 1e4), (7e-4, 1e3), (1e-6, 1e6)],
 )  # fmt: skip
-def test_equal_steps_miss_none_and_add_none(step: float, rate: float) -> None:
+def test_equal_steps_miss_none_and_add_none(step, rate):
     """The step and the rate as decimals or fractions: what they are meant to be."""
     periods = Fraction(step).limit_denominator(10**7) * Fraction(rate)
     p, total, wait = Params(rate), 0, 0.0
@@ -42,7 +42,7 @@ def test_equal_steps_miss_none_and_add_none(step: float, rate: float) -> None:
 
 @QUICK
 @given(st.lists(st.integers(1, 5_000_000), min_size=1, max_size=40), st.floats(1.0, 1e6))
-def test_any_steps_of_whole_nanoseconds(nanoseconds: list[int], rate: float) -> None:
+def test_any_steps_of_whole_nanoseconds(nanoseconds, rate):
     """Unless an instant is so near that rounding decides; then it counts as reached."""
     periods = Fraction(sum(nanoseconds), 10**9) * Fraction(rate)
     total, wait = counted(Params(rate), [n * 1e-9 for n in nanoseconds])
@@ -54,7 +54,7 @@ def test_any_steps_of_whole_nanoseconds(nanoseconds: list[int], rate: float) -> 
 
 @QUICK
 @given(st.integers(1, 30), st.integers(0, 2**32), st.floats(1.0, 1e5))
-def test_any_split_of_a_time_has_the_same_samples(parts: int, seed: int, rate: float) -> None:
+def test_any_split_of_a_time_has_the_same_samples(parts, seed, rate):
     """Masters give steps as differences of rounded times, here of no particular size."""
     rng = Random(seed)
     times = [0.0, *sorted(rng.uniform(0.0, 0.1) for _ in range(parts - 1)), 0.1]
@@ -65,14 +65,14 @@ def test_any_split_of_a_time_has_the_same_samples(parts: int, seed: int, rate: f
     assert wait_split == pytest.approx(wait, abs=1e-9)
 
 
-def test_an_instant_at_the_end_of_a_step_is_left_to_the_next() -> None:
+def test_an_instant_at_the_end_of_a_step_is_left_to_the_next():
     p = Params(1e4)
     assert clock.samples(p, 0.0, 1e-4) == (1, 0.0)
     assert clock.samples(p, 0.5, 0.5e-4) == (0, 0.0)
     assert clock.due(0.0)
 
 
-def test_rounding_does_not_move_an_instant() -> None:
+def test_rounding_does_not_move_an_instant():
     for off in (1e-9, -1e-9):
         assert clock.due(off)
         n, wait = clock.samples(Params(1e4), off, 1e-4)
@@ -81,13 +81,13 @@ def test_rounding_does_not_move_an_instant() -> None:
     assert not clock.due(1e-5)
 
 
-def test_steps_too_short_to_matter_add_up() -> None:
+def test_steps_too_short_to_matter_add_up():
     """A step of a tenth of the tolerance: the sample is taken, once."""
     total, wait = counted(Params(1e4), [1e-11] * 1000)
     assert total == 1
     assert wait == pytest.approx(1.0 - 1e-4, abs=1e-12)
 
 
-def test_a_state_that_was_damaged_has_no_endless_step() -> None:
+def test_a_state_that_was_damaged_has_no_endless_step():
     """Bytes of a state are guarded by no check sum: what waits since ever would be due for ever."""
     assert clock.samples(Params(1000.0), -1e12, 1e-3)[0] == 2

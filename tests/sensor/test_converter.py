@@ -18,7 +18,7 @@ CONVERTERS = st.builds(
 )
 
 
-def levels(p: Params) -> tuple[float, float, float]:
+def levels(p):
     """Lowest and highest level, and the step between them."""
     low, high = p.range
     step = (high - low) / 2.0**p.bits
@@ -27,7 +27,7 @@ def levels(p: Params) -> tuple[float, float, float]:
 
 @QUICK
 @given(CONVERTERS, st.floats(0.0, 1.0))
-def test_within_the_range_it_is_half_a_step_off_at_most(p: Params, part: float) -> None:
+def test_within_the_range_it_is_half_a_step_off_at_most(p, part):
     lowest, highest, step = levels(p)
     v = lowest + part * (highest - lowest)
     assert abs(converter.converted(p, v) - v) <= 0.5 * step * (1.0 + 1e-6)
@@ -35,7 +35,7 @@ def test_within_the_range_it_is_half_a_step_off_at_most(p: Params, part: float) 
 
 @QUICK
 @given(CONVERTERS, st.floats(-50.0, 50.0))
-def test_it_gives_one_of_its_levels(p: Params, v: float) -> None:
+def test_it_gives_one_of_its_levels(p, v):
     lowest, _, step = levels(p)
     code = (converter.converted(p, v) - lowest) / step
     assert code == pytest.approx(round(code), abs=1e-6)
@@ -44,20 +44,20 @@ def test_it_gives_one_of_its_levels(p: Params, v: float) -> None:
 
 @QUICK
 @given(CONVERTERS, st.floats(0.0, 1e6))
-def test_it_saturates(p: Params, beyond: float) -> None:
+def test_it_saturates(p, beyond):
     lowest, highest, step = levels(p)
     assert converter.converted(p, lowest - beyond) == lowest
     assert converter.converted(p, highest + 0.5 * step + beyond) == pytest.approx(highest, abs=1e-9)
 
 
-def test_twelve_bits_of_five_volts() -> None:
+def test_twelve_bits_of_five_volts():
     p = Params(True, 12, (0.0, 5.0))
     v = np.random.default_rng(1).uniform(-1.0, 6.0, 2000)
     codes = np.clip(np.floor(v / 5.0 * 4096 + 0.5), 0, 4095)
     assert [converter.converted(p, float(x)) for x in v] == (codes * 5.0 / 4096).tolist()
 
 
-def test_its_error_is_that_of_rounding() -> None:
+def test_its_error_is_that_of_rounding():
     """Even, of variance step^2/12."""
     p = Params(True, 8, (0.0, 2.0))
     _, _, step = levels(p)
@@ -67,12 +67,12 @@ def test_its_error_is_that_of_rounding() -> None:
     assert error.var() == pytest.approx(step**2 / 12.0, rel=0.03)
 
 
-def test_sixteen_bits_have_a_level_at_zero() -> None:
+def test_sixteen_bits_have_a_level_at_zero():
     assert converter.converted(Params(True), 1e-6) == 0.0
 
 
 @pytest.mark.parametrize("ends", [(5.0, 5.0), (5.0, -5.0)])
-def test_a_range_without_an_inside_is_refused(ends: tuple[float, float]) -> None:
+def test_a_range_without_an_inside_is_refused(ends):
     with pytest.raises(ValueError, match="the second must be above the first") as caught:
         Params(range=ends)
     assert str(caught.value).startswith(f"adc.range = {ends[0]}, {ends[1]} V: ")

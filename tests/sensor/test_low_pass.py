@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import low_pass
-from proximity_sensor.low_pass import Coefficients
 from scipy import signal
 from support.examples import examples
 
@@ -19,7 +18,7 @@ CUTOFFS = st.floats(1e-3, 0.49)
 """As a fraction of the sampling rate."""
 
 
-def polynomials(c: Coefficients) -> tuple[list[float], list[float]]:
+def polynomials(c):
     """Numerator and denominator, multiplied out."""
     b, a, *sections = c
     above, below = np.array([b, b]), np.array([1.0, a])
@@ -29,7 +28,7 @@ def polynomials(c: Coefficients) -> tuple[list[float], list[float]]:
     return above.tolist(), below.tolist()
 
 
-def run(c: Coefficients, samples: list[float], start: float) -> list[float]:
+def run(c, samples, start):
     z = low_pass.settled(c, start)
     results = []
     for v in samples:
@@ -38,7 +37,7 @@ def run(c: Coefficients, samples: list[float], start: float) -> list[float]:
     return results
 
 
-def test_the_published_filter_is_scipys() -> None:
+def test_the_published_filter_is_scipys():
     b, a = signal.butter(5, 500, fs=10_000)
     above, below = polynomials(PUBLISHED)
     np.testing.assert_allclose(above, b, rtol=1e-12, atol=0.0)
@@ -46,7 +45,7 @@ def test_the_published_filter_is_scipys() -> None:
 
 
 @pytest.mark.parametrize("cutoff", [50.0, 137.0, 500.0, 1000.0, 2500.0, 4000.0, 4900.0])
-def test_other_filters_are_scipys_too(cutoff: float) -> None:
+def test_other_filters_are_scipys_too(cutoff):
     """scipy goes through the poles, which costs it digits where they are close together."""
     b, a = signal.butter(5, cutoff, fs=10_000)
     above, below = polynomials(low_pass.coefficients(cutoff, 10_000.0))
@@ -56,7 +55,7 @@ def test_other_filters_are_scipys_too(cutoff: float) -> None:
 
 @QUICK
 @given(CUTOFFS)
-def test_the_magnitude_is_butterworths(part: float) -> None:
+def test_the_magnitude_is_butterworths(part):
     """1 / sqrt(1 + (tan(pi·f) / tan(pi·part))^10): 1 at rest, -3 dB at the cutoff, then down."""
     b, a, *sections = low_pass.coefficients(part, 1.0)
     for f in (0.0, 0.5 * part, part, 0.5 * (part + 0.5)):
@@ -70,7 +69,7 @@ def test_the_magnitude_is_butterworths(part: float) -> None:
 
 @QUICK
 @given(CUTOFFS)
-def test_it_is_stable(part: float) -> None:
+def test_it_is_stable(part):
     _, a, *sections = low_pass.coefficients(part, 1.0)
     assert abs(a) < 1.0
     for _, a_1, a_2 in sections:
@@ -78,7 +77,7 @@ def test_it_is_stable(part: float) -> None:
         assert abs(a_1) < 1.0 + a_2
 
 
-def test_the_samples_are_scipys() -> None:
+def test_the_samples_are_scipys():
     samples = np.random.default_rng(3).normal(size=1000)
     sections = signal.butter(5, 500, fs=10_000, output="sos")
     expected, _ = signal.sosfilt(sections, samples, zi=0.7 * signal.sosfilt_zi(sections))
@@ -87,12 +86,12 @@ def test_the_samples_are_scipys() -> None:
 
 @QUICK
 @given(CUTOFFS, st.floats(-100.0, 100.0))
-def test_it_starts_settled(part: float, v: float) -> None:
+def test_it_starts_settled(part, v):
     values = run(low_pass.coefficients(part, 1.0), [v] * 50, v)
     assert values == pytest.approx([v] * 50, rel=1e-9)
 
 
-def test_a_ramp_comes_a_millisecond_late() -> None:
+def test_a_ramp_comes_a_millisecond_late():
     """The sum of the sections' delays: (1 + 2·cos(pi/5) + 2·cos(2·pi/5)) / 2k periods."""
     values = run(PUBLISHED, [float(k) for k in range(500)], 0.0)
     late = (1.0 + 5.0**0.5) / (2.0 * tan(0.05 * pi))
@@ -100,7 +99,7 @@ def test_a_ramp_comes_a_millisecond_late() -> None:
     assert late == pytest.approx(10.2, abs=0.05)
 
 
-def test_it_settles_on_a_step_and_overshoots_as_it_should() -> None:
+def test_it_settles_on_a_step_and_overshoots_as_it_should():
     """12.8 % for a Butterworth filter of 5th order."""
     values = run(PUBLISHED, [1.0] * 300, 0.0)
     assert values[0] == pytest.approx(signal.butter(5, 500, fs=10_000)[0][0], rel=1e-12)

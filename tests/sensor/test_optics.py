@@ -7,7 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from proximity_sensor import channel, optics
 from proximity_sensor.optics import Inputs, Params
-from support.declared import Parameter, parameters
+from support.declared import parameters
 from support.examples import examples
 
 PARAMETERS = parameters(Params)
@@ -25,13 +25,13 @@ SENSORS = st.builds(
 )
 
 
-def intensity(p: Params, gap: float) -> float:
+def intensity(p, gap):
     return optics.outputs(p, Inputs(gap)).intensity
 
 
 @QUICK
 @given(SENSORS, GAPS)
-def test_the_intensity_is_eq_9(p: Params, gap: float) -> None:
+def test_the_intensity_is_eq_9(p, gap):
     """The logarithm is at most 14 and n at most 10: the exponential costs 140 roundings."""
     distance = gap + p.offset_distance
     expected = exp(-p.diffusion_exponent * log(distance)) * p.gain * p.reflectance
@@ -41,14 +41,14 @@ def test_the_intensity_is_eq_9(p: Params, gap: float) -> None:
 @pytest.mark.parametrize(
     ("gap", "volts"), [(0.0, 1.066047005857), (0.005, 0.4801879325166), (0.045, 0.07536615422703)]
 )
-def test_the_published_sensor(gap: float, volts: float) -> None:
+def test_the_published_sensor(gap, volts):
     """0.0024 / (l + 0.005)^1.1506, worked out in decimal."""
     assert intensity(Params(), gap) == pytest.approx(volts, rel=1e-11)
 
 
 @QUICK
 @given(SENSORS, GAPS, GAPS)
-def test_nearer_is_brighter(p: Params, a: float, b: float) -> None:
+def test_nearer_is_brighter(p, a, b):
     near, far = sorted((a, b))
     assume(far + p.offset_distance > (near + p.offset_distance) * (1.0 + 1e-12))
     assert intensity(p, near) > intensity(p, far) > 0.0
@@ -56,9 +56,7 @@ def test_nearer_is_brighter(p: Params, a: float, b: float) -> None:
 
 @QUICK
 @given(GAPS, st.floats(0.01, 1.0), st.floats(1.0, 1e6))
-def test_the_intensity_is_proportional_to_reflectance_and_gain(
-    gap: float, reflectance: float, gain: float
-) -> None:
+def test_the_intensity_is_proportional_to_reflectance_and_gain(gap, reflectance, gain):
     one = intensity(Params(reflectance=1.0, gain=1.0), gap)
     dark = intensity(Params(reflectance=reflectance, gain=1.0), gap)
     loud = intensity(Params(reflectance=1.0, gain=gain), gap)
@@ -67,21 +65,21 @@ def test_the_intensity_is_proportional_to_reflectance_and_gain(
 
 
 @pytest.mark.parametrize("change", [{"reflectance": 0.0}, {"gain": 0.0}])
-def test_a_surface_that_reflects_nothing_is_not_seen(change: dict[str, float]) -> None:
+def test_a_surface_that_reflects_nothing_is_not_seen(change):
     assert intensity(Params(**change), 0.0) == 0.0
 
 
 @QUICK
 @given(SENSORS, st.floats(-10.0, 0.0))
-def test_a_gap_below_zero_reads_as_zero(p: Params, gap: float) -> None:
+def test_a_gap_below_zero_reads_as_zero(p, gap):
     assert intensity(p, gap) == intensity(p, 0.0)
 
 
-def test_a_gap_that_is_no_number_is_not_taken_for_contact() -> None:
+def test_a_gap_that_is_no_number_is_not_taken_for_contact():
     assert isnan(intensity(Params(), nan))
 
 
-def test_the_optics_have_no_memory() -> None:
+def test_the_optics_have_no_memory():
     p = channel.Params()
     x = channel.initial_state(p, Inputs(0.1))
     x = channel.step(p, x, Inputs(0.001), 1e-3)
@@ -89,7 +87,7 @@ def test_the_optics_have_no_memory() -> None:
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
-def test_every_range_is_enforced(parameter: Parameter) -> None:
+def test_every_range_is_enforced(parameter):
     for number, value in parameter.invalid():
         with pytest.raises(ValueError, match=r"^\w+ = ") as caught:
             Params(**{parameter.name: value})
@@ -100,6 +98,6 @@ def test_every_range_is_enforced(parameter: Parameter) -> None:
         assert getattr(Params(**{parameter.name: bound}), parameter.name) == bound
 
 
-def test_every_number_has_a_range() -> None:
+def test_every_number_has_a_range():
     names = {"reflectance", "gain", "diffusion_exponent", "offset_distance"}
     assert {p.name for p in PARAMETERS} == names

@@ -1,8 +1,6 @@
 """SSP archives as others make them, by hand, with FMUs that have an interface and no code."""
 
 import zipfile
-from collections.abc import Callable, Mapping
-from pathlib import Path
 
 NAMESPACES = " ".join(
     f'xmlns:{prefix}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
@@ -23,7 +21,7 @@ UNITS = """
 """
 
 
-def fmu(*variables: str, step: str = "0.001") -> bytes:
+def fmu(*variables, step="0.001"):
     """The modelDescription.xml of an FMU with variables like 'input Real u 0.0 m'.
 
     These are causality, type, name, start or -, unit if any. It declares the units above, and
@@ -49,9 +47,7 @@ def fmu(*variables: str, step: str = "0.001") -> bytes:
 </fmiModelDescription>""".encode()
 
 
-def _variable(
-    index: int, causality: str, kind: str, name: str, start: str = "-", unit: str = ""
-) -> str:
+def _variable(index, causality, kind, name, start="-", unit=""):
     variability = {
         "parameter": "fixed",
         "calculatedParameter": "fixed",
@@ -65,7 +61,7 @@ def _variable(
     )
 
 
-def component(name: str, connectors: str = "", bindings: str = "", **attributes: str) -> str:
+def component(name, connectors="", bindings="", **attributes):
     """An element Component whose FMU is resources/NAME.fmu; connectors like 'input u Real'."""
     given = {"source": f"resources/{name}.fmu", **attributes}
     listed = " ".join(f'{key}="{value}"' for key, value in given.items())
@@ -75,9 +71,7 @@ def component(name: str, connectors: str = "", bindings: str = "", **attributes:
     )
 
 
-def system(
-    name: str, elements: str, connections: str = "", connectors: str = "", bindings: str = ""
-) -> str:
+def system(name, elements, connections="", connectors="", bindings=""):
     """An element System."""
     connected = f"<ssd:Connections>{connections}</ssd:Connections>" if connections else ""
     return (
@@ -86,26 +80,26 @@ def system(
     )
 
 
-def connector_list(text: str) -> str:
+def connector_list(text):
     """Connectors from 'kind name [type [unit]]; ...'."""
     if not text:
         return ""
     return f"<ssd:Connectors>{''.join(map(_connector, text.split(';')))}</ssd:Connectors>"
 
 
-def _connector(text: str) -> str:
+def _connector(text):
     kind, name, *more = text.split()
     unit = f' unit="{more[1]}"' if len(more) > 1 else ""
     content = f"<ssc:{more[0]}{unit}/>" if more else ""
     return f'<ssd:Connector name="{name}" kind="{kind}">{content}</ssd:Connector>'
 
 
-def binding_list(bindings: str) -> str:
+def binding_list(bindings):
     """The element ParameterBindings around the bindings."""
     return f"<ssd:ParameterBindings>{bindings}</ssd:ParameterBindings>" if bindings else ""
 
 
-def connect(start: str, end: str, content: str = "", **attributes: str) -> str:
+def connect(start, end, content="", **attributes):
     """A connection between 'element/connector' or 'connector' of the system itself."""
     ends = []
     for side, text in (("start", start), ("end", end)):
@@ -116,12 +110,12 @@ def connect(start: str, end: str, content: str = "", **attributes: str) -> str:
     return f"<ssd:Connection {''.join(ends)}{more}>{content}</ssd:Connection>"
 
 
-def linear(factor: float = 1.0, offset: float = 0.0) -> str:
+def linear(factor=1.0, offset=0.0):
     """A linear transformation."""
     return f'<ssc:LinearTransformation factor="{factor}" offset="{offset}"/>'
 
 
-def parameter_set(parameters: str, units: str = UNITS) -> str:
+def parameter_set(parameters, units=UNITS):
     """A ParameterSet from 'name Type value [unit]; ...'."""
     listed = "".join(map(_parameter, filter(None, parameters.split(";"))))
     known = f"<ssv:Units>{units}</ssv:Units>" if units else ""
@@ -131,13 +125,13 @@ def parameter_set(parameters: str, units: str = UNITS) -> str:
     )
 
 
-def _parameter(text: str) -> str:
+def _parameter(text):
     name, kind, value, *unit = text.split()
     more = f' unit="{unit[0]}"' if unit else ""
     return f'<ssv:Parameter name="{name}"><ssv:{kind} value="{value}"{more}/></ssv:Parameter>'
 
 
-def mapping(*entries: tuple[str, str, str], suppress: bool = False) -> str:
+def mapping(*entries, suppress=False):
     """A ParameterMapping of (source, target, transformation)."""
     more = ' suppressUnitConversion="true"' if suppress else ""
     listed = "".join(
@@ -147,7 +141,7 @@ def mapping(*entries: tuple[str, str, str], suppress: bool = False) -> str:
     return f'<ssm:ParameterMapping version="1.0" {NAMESPACES}>{listed}</ssm:ParameterMapping>'
 
 
-def bind(inline: str, mapped: str = "", **attributes: str) -> str:
+def bind(inline, mapped="", **attributes):
     """A binding with its parameter set and mapping inline."""
     more = " ".join(f'{key}="{value}"' for key, value in attributes.items())
     content = f"<ssd:ParameterMapping>{mapped}</ssd:ParameterMapping>" if mapped else ""
@@ -158,11 +152,11 @@ def bind(inline: str, mapped: str = "", **attributes: str) -> str:
 
 
 def structure(
-    top: str,
-    experiment: str = '<ssd:DefaultExperiment startTime="0" stopTime="1"/>',
-    annotations: str = "",
-    version: str = "1.0",
-) -> str:
+    top,
+    experiment='<ssd:DefaultExperiment startTime="0" stopTime="1"/>',
+    annotations="",
+    version="1.0",
+):
     """An SSD around the top system."""
     return (
         f'<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -172,12 +166,7 @@ def structure(
     )
 
 
-def archive(
-    folder: Path,
-    ssd: str,
-    fmus: Mapping[str, bytes],
-    files: Mapping[str, str | bytes] | None = None,
-) -> Path:
+def archive(folder, ssd, fmus, files=None):
     """The archive hand.ssp in a folder: its SSD, FMUs by name, further files by entry."""
     path = folder / "hand.ssp"
     with zipfile.ZipFile(path, "w") as file:
@@ -192,7 +181,7 @@ def archive(
     return path
 
 
-def changed(path: Path, edit: Callable[[bytes], bytes]) -> None:
+def changed(path, edit):
     """Rewrite an archive with its SystemStructure.ssd edited."""
     with zipfile.ZipFile(path) as file:
         entries = {name: file.read(name) for name in file.namelist()}

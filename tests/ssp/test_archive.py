@@ -4,7 +4,6 @@ import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -28,7 +27,7 @@ ELEMENT = component("a", "output y Real; input u Real")
 TOP = system("top", ELEMENT)
 
 
-def message_of(path: Path) -> str:
+def message_of(path):
     """The error at loading the archive, without what holds on to its files."""
     try:
         System.load(path)
@@ -37,7 +36,7 @@ def message_of(path: Path) -> str:
     pytest.fail(f"{path} loads")
 
 
-def refused(folder: Path, ssd: str, **more: bytes) -> str:
+def refused(folder, ssd, **more):
     text = message_of(archive(folder, ssd, {"a": A, **more}))
     assert "\n" not in text
     assert text.startswith("hand.ssp")
@@ -148,56 +147,56 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("ssd", "message"), REFUSED)
-def test_what_is_refused(tmp_path: Path, ssd: str, message: str) -> None:
+def test_what_is_refused(tmp_path, ssd, message):
     assert message in refused(tmp_path, ssd)
 
 
-def test_an_error_names_the_line(tmp_path: Path) -> None:
+def test_an_error_names_the_line(tmp_path):
     text = structure(TOP).replace("<ssd:Component", "\n\n<ssd:Component").replace("kind=", "kid=")
     assert "SystemStructure.ssd:4: against the schema: Element 'ssd:Connector'" in refused(
         tmp_path, text
     )
 
 
-def test_an_fmu_that_is_none(tmp_path: Path) -> None:
+def test_an_fmu_that_is_none(tmp_path):
     text = refused(tmp_path, structure(TOP), a=b"<x/>")
     assert "component 'a': resources/a.fmu: not a readable FMU: " in text
 
 
-def test_a_model_exchange_fmu_is_integrated(tmp_path: Path) -> None:
+def test_a_model_exchange_fmu_is_integrated(tmp_path):
     exchange = A.replace(b"CoSimulation", b"ModelExchange")
     (part,) = System.load(archive(tmp_path, structure(TOP), {"a": exchange})).components
     assert part.integrated
 
 
-def test_an_fmu_of_no_kind_of_its_version(tmp_path: Path) -> None:
+def test_an_fmu_of_no_kind_of_its_version(tmp_path):
     scheduled = A.replace(b"CoSimulation", b"ScheduledExecution")
     assert "resources/a.fmu: declares no kind of FMU; ask" in refused(
         tmp_path, structure(TOP), a=scheduled
     )
 
 
-def truncated(path: Path) -> None:
+def truncated(path):
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
 
 
-def not_a_zip(path: Path) -> None:
+def not_a_zip(path):
     path.write_text("[experiment]")
 
 
-def without_structure(path: Path) -> None:
+def without_structure(path):
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("resources/a.fmu", b"")
 
 
-def damaged(path: Path) -> None:
+def damaged(path):
     data = bytearray(path.read_bytes())
     data[data.index(b"ssd:System ")] ^= 1  # inside the content, which is stored as it is
     path.write_bytes(data)
 
 
-def encrypted(path: Path) -> None:
+def encrypted(path):
     """Say of each entry, in both of its headers, that it is."""
     data = bytearray(path.read_bytes())
     for header, flags in ((b"PK\3\4", 6), (b"PK\1\2", 8)):
@@ -206,11 +205,11 @@ def encrypted(path: Path) -> None:
     path.write_bytes(data)
 
 
-def missing(path: Path) -> None:
+def missing(path):
     path.unlink()
 
 
-def folder(path: Path) -> None:
+def folder(path):
     path.unlink()
     path.mkdir()
 
@@ -227,7 +226,7 @@ def folder(path: Path) -> None:
         (folder, "is a folder; must be a system, a .toml or .ssp file"),
     ],
 )
-def test_wrong_files(tmp_path: Path, spoil: Callable[[Path], None], message: str) -> None:
+def test_wrong_files(tmp_path, spoil, message):
     path = archive(tmp_path, structure(TOP), {"a": A})
     spoil(path)
     text = message_of(path)
@@ -235,13 +234,13 @@ def test_wrong_files(tmp_path: Path, spoil: Callable[[Path], None], message: str
     assert message in text
 
 
-def test_an_archive_has_its_own_fmus(grasp: System, fmus: Path, tmp_path: Path) -> None:
+def test_an_archive_has_its_own_fmus(grasp, fmus, tmp_path):
     write_ssp(grasp, tmp_path / "grasp.ssp")
     with pytest.raises(InputError, match="has its own FMUs"):
         System.load(tmp_path / "grasp.ssp", fmus)
 
 
-def test_an_entity_is_not_followed(tmp_path: Path) -> None:
+def test_an_entity_is_not_followed(tmp_path):
     secret = tmp_path / "secret"
     secret.write_text("told")
     entity = f'<!DOCTYPE x [<!ENTITY e SYSTEM "{secret.as_uri()}">]>'
@@ -249,13 +248,13 @@ def test_an_entity_is_not_followed(tmp_path: Path) -> None:
     assert "told" not in refused(tmp_path, text)
 
 
-def test_an_entry_that_leads_out_of_the_archive_is_not_written(tmp_path: Path) -> None:
+def test_an_entry_that_leads_out_of_the_archive_is_not_written(tmp_path):
     path = archive(tmp_path, structure(TOP), {"a": A}, {"../evil": "x", "/tmp/evil": "x"})
     assert System.load(path).components[0].fmu.name == "a.fmu"
     assert not (tmp_path.parent / "evil").exists()
 
 
-def test_extracted_fmus_are_gone_when_the_process_ends(grasp: System, tmp_path: Path) -> None:
+def test_extracted_fmus_are_gone_when_the_process_ends(grasp, tmp_path):
     write_ssp(grasp, tmp_path / "grasp.ssp")
     program = (
         "import sys; from grasp_cosim import System; "
@@ -273,7 +272,7 @@ def test_extracted_fmus_are_gone_when_the_process_ends(grasp: System, tmp_path: 
     assert not Path(path).parents[1].exists()
 
 
-def test_a_forked_process_leaves_the_fmus_of_its_parent(grasp: System, tmp_path: Path) -> None:
+def test_a_forked_process_leaves_the_fmus_of_its_parent(grasp, tmp_path):
     write_ssp(grasp, tmp_path / "grasp.ssp")
     program = (
         "import os, sys; from grasp_cosim import System; "
@@ -286,21 +285,21 @@ def test_a_forked_process_leaves_the_fmus_of_its_parent(grasp: System, tmp_path:
     assert done.stdout == "True\n"
 
 
-def test_all_may_read_what_is_unpacked_from_an_archive(grasp: System, tmp_path: Path) -> None:
+def test_all_may_read_what_is_unpacked_from_an_archive(grasp, tmp_path):
     write_ssp(grasp, tmp_path / "grasp.ssp")
     with zipfile.ZipFile(tmp_path / "grasp.ssp") as file:
         modes = {(entry.create_system, entry.external_attr >> 16) for entry in file.infolist()}
     assert modes == {(3, 0o644)}
 
 
-def test_comments_and_processing_instructions_are_passed_over(tmp_path: Path) -> None:
+def test_comments_and_processing_instructions_are_passed_over(tmp_path):
     plain = System.load(archive(tmp_path, structure(TOP), {"a": A}))
     for noise in ("<?tool of another maker?>", "<!-- by hand -->"):
         noisy = structure(TOP.replace("<ssd:Component", f"{noise}<ssd:Component"))
         assert System.load(archive(tmp_path, noisy, {"a": A})) == plain
 
 
-def step_of(folder: Path, *steps: str, stop: str = "1") -> int:
+def step_of(folder, *steps, stop="1"):
     names = "abc"[: len(steps)]
     fmus = {n: fmu("parameter Real p 1.0", step=s) for n, s in zip(names, steps, strict=True)}
     experiment = f'<ssd:DefaultExperiment stopTime="{stop}"/>'
@@ -308,7 +307,7 @@ def step_of(folder: Path, *steps: str, stop: str = "1") -> int:
     return System.load(archive(folder, ssd, fmus)).step_ns
 
 
-def test_the_step_is_the_smallest_of_the_fmus_that_divides_the_stop(tmp_path: Path) -> None:
+def test_the_step_is_the_smallest_of_the_fmus_that_divides_the_stop(tmp_path):
     assert step_of(tmp_path, "0.01", "0.001", "") == 1_000_000
     assert step_of(tmp_path, "0.01", "0.0003") == 10_000_000
     assert step_of(tmp_path, "0.01", "0.0003", stop="0.9") == 300_000
@@ -316,7 +315,7 @@ def test_the_step_is_the_smallest_of_the_fmus_that_divides_the_stop(tmp_path: Pa
     assert step_of(tmp_path, "1.4e-9", "0.5") == 500_000_000  # no whole nanosecond
 
 
-def test_a_step_and_a_stop_can_be_given(tmp_path: Path) -> None:
+def test_a_step_and_a_stop_can_be_given(tmp_path):
     path = archive(
         tmp_path, structure(TOP, ""), {"a": fmu("output Real y -", "input Real u 0.0", step="")}
     )
@@ -324,7 +323,7 @@ def test_a_step_and_a_stop_can_be_given(tmp_path: Path) -> None:
     assert (loaded.step_ns, loaded.stop_ns) == (250_000_000, 2_000_000_000)
 
 
-def test_execution_follows_the_flow_of_the_data(tmp_path: Path) -> None:
+def test_execution_follows_the_flow_of_the_data(tmp_path):
     elements = "".join(component(n, "input u; output y") for n in ("sink", "twin", "mid", "source"))
     links = connect("source/y", "mid/u") + connect("mid/y", "twin/u") + connect("twin/y", "sink/u")
     fmus = dict.fromkeys(("sink", "twin", "mid", "source"), A)
@@ -333,7 +332,7 @@ def test_execution_follows_the_flow_of_the_data(tmp_path: Path) -> None:
     assert "order of execution: source, mid, twin, sink" in loaded.notes
 
 
-def test_in_a_loop_the_order_of_the_file_holds(tmp_path: Path) -> None:
+def test_in_a_loop_the_order_of_the_file_holds(tmp_path):
     names = ("after", "x", "y", "before")
     elements = "".join(component(n, "input u; output y") for n in names)
     links = connect("before/y", "after/u") + connect("x/y", "y/u") + connect("y/y", "x/u")
@@ -343,7 +342,7 @@ def test_in_a_loop_the_order_of_the_file_holds(tmp_path: Path) -> None:
     assert [c.name for c in loaded.components] == ["x", "y", "before", "after"]
 
 
-def test_what_has_no_bearing_is_said(tmp_path: Path) -> None:
+def test_what_has_no_bearing_is_said(tmp_path):
     annotation = '<ssd:Annotations><ssc:Annotation type="com.maker"/></ssd:Annotations>'
     ssd = structure(TOP, annotations=annotation)
     notes = System.load(archive(tmp_path, ssd, {"a": A}, {"VariantB.ssd": ssd})).notes
@@ -351,7 +350,7 @@ def test_what_has_no_bearing_is_said(tmp_path: Path) -> None:
     assert "annotations of type 'com.maker' are not used (1)" in notes
 
 
-def test_notes_are_no_part_of_what_a_system_is(tmp_path: Path) -> None:
+def test_notes_are_no_part_of_what_a_system_is(tmp_path):
     quiet = archive(tmp_path, structure(TOP), {"a": A})
     first = System.load(quiet)
     loud = bind(parameter_set("none Real 1"))
@@ -373,12 +372,10 @@ ANNOTATED = [
 
 
 @pytest.mark.parametrize(("before", "after", "message"), ANNOTATED)
-def test_a_spoilt_annotation(
-    grasp: System, tmp_path: Path, before: str, after: str, message: str
-) -> None:
+def test_a_spoilt_annotation(grasp, tmp_path, before, after, message):
     write_ssp(grasp, tmp_path / "grasp.ssp")
 
-    def spoil(ssd: bytes) -> bytes:
+    def spoil(ssd):
         assert before.encode() in ssd
         return ssd.replace(before.encode(), after.encode(), 1)
 
@@ -388,9 +385,7 @@ def test_a_spoilt_annotation(
     assert "\n" not in text
 
 
-def test_an_archive_of_which_more_would_be_unpacked_than_there_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_archive_of_which_more_would_be_unpacked_than_there_is(tmp_path, monkeypatch):
     path = archive(tmp_path, structure(TOP), {"a": A})
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as file:
         file.writestr("resources/zeros", bytes(1_000_000))
@@ -400,7 +395,7 @@ def test_an_archive_of_which_more_would_be_unpacked_than_there_is(
     assert len(message.splitlines()) == 1
 
 
-def test_an_archive_whose_names_are_no_text(tmp_path: Path) -> None:
+def test_an_archive_whose_names_are_no_text(tmp_path):
     path = archive(tmp_path, structure(TOP), {"a": A})
     with zipfile.ZipFile(path, "a") as file:
         file.writestr("grün", b"")
@@ -415,11 +410,11 @@ def test_an_archive_whose_names_are_no_text(tmp_path: Path) -> None:
         structure(TOP.replace("<ssd:Elements>", "<ssd:Elements>" + "<a>" * 20_000)),
     ],
 )
-def test_what_the_parser_does_not_take_is_one_line(tmp_path: Path, ssd: str) -> None:
+def test_what_the_parser_does_not_take_is_one_line(tmp_path, ssd):
     assert "SystemStructure.ssd: not readable as XML: " in refused(tmp_path, ssd)
 
 
-def test_an_annotation_deeper_than_the_stack(tmp_path: Path) -> None:
+def test_an_annotation_deeper_than_the_stack(tmp_path):
     text = f'<g:System xmlns:g="grasp-cosim:system">{"[" * 100_000}</g:System>'
     entry = f'<ssc:Annotation type="grasp-cosim">{text}</ssc:Annotation>'
     end = "</ssd:SystemStructureDescription>"
@@ -428,7 +423,7 @@ def test_an_annotation_deeper_than_the_stack(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("value", ["p Real 1e999", f"k Integer {'9' * 5000}", "p Real NaN"])
-def test_a_number_that_none_is(tmp_path: Path, value: str) -> None:
+def test_a_number_that_none_is(tmp_path, value):
     numbers = fmu("output Real y - m", "parameter Real p 1.0", "parameter Integer k 1")
     ssd = structure(system("top", component("a", bindings=bind(parameter_set(value)))))
     text = message_of(archive(tmp_path, ssd, {"a": numbers}))

@@ -2,9 +2,7 @@
 
 import re
 import zipfile
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from random import Random
 from tempfile import TemporaryDirectory
 
 import pytest
@@ -33,16 +31,16 @@ TOP = system("top", PARTS, connect("a/y", "b/u"))
 Y_TO_U = (Connection(Port("a", "y"), Port("b", "u")),)
 
 
-def load(folder: Path, ssd: str | bytes, files: Mapping[str, str | bytes] | None = None) -> System:
+def load(folder, ssd, files=None):
     path = archive(folder, structure(TOP), {"a": FMU, "b": FMU}, files)
     return rewritten(path, lambda name, data: (name, of_bytes(ssd) if ".ssd" in name else data))
 
 
-def of_bytes(text: str | bytes) -> bytes:
+def of_bytes(text):
     return text if isinstance(text, bytes) else text.encode()
 
 
-def rewritten(path: Path, edit: Callable[[str, bytes], tuple[str, bytes]]) -> System:
+def rewritten(path, edit):
     """The archive loaded with its entries edited, names and content."""
     with zipfile.ZipFile(path) as file:
         entries = dict(edit(name, file.read(name)) for name in file.namelist())
@@ -52,11 +50,11 @@ def rewritten(path: Path, edit: Callable[[str, bytes], tuple[str, bytes]]) -> Sy
     return System.load(path)
 
 
-def other_prefixes(text: str) -> str:
+def other_prefixes(text):
     return text.replace("ssd:", "ns0:").replace("xmlns:ssd", "xmlns:ns0").replace("ssc:", "q:")
 
 
-DOCUMENTS: dict[str, Callable[[str], str | bytes]] = {
+DOCUMENTS = {
     "BOM": lambda text: b"\xef\xbb\xbf" + text.encode(),
     "CRLF": lambda text: text.replace(">", ">\r\n"),
     "UTF-16": lambda text: text.replace("UTF-8", "UTF-16").encode("utf-16"),
@@ -72,14 +70,14 @@ DOCUMENTS: dict[str, Callable[[str], str | bytes]] = {
 
 
 @pytest.mark.parametrize("form", DOCUMENTS)
-def test_forms_of_xml(tmp_path: Path, form: str) -> None:
+def test_forms_of_xml(tmp_path, form):
     loaded = load(tmp_path, DOCUMENTS[form](structure(TOP)))
     assert loaded.connections == Y_TO_U
     assert loaded.stop_ns == 1_000_000_000
     assert loaded.notes == load(tmp_path, structure(TOP)).notes
 
 
-def test_a_prefix_in_an_annotation_that_is_for_no_namespace_is_said(tmp_path: Path) -> None:
+def test_a_prefix_in_an_annotation_that_is_for_no_namespace_is_said(tmp_path):
     """As early archives for libcosim have it."""
     foreign = '<osp:Master stepSize="1e-4"/>'
     noted = f'<ssc:Annotation type="org.open-simulation-platform">{foreign}</ssc:Annotation>'
@@ -98,7 +96,7 @@ def test_a_prefix_in_an_annotation_that_is_for_no_namespace_is_said(tmp_path: Pa
 
 
 @pytest.mark.parametrize("declared", ["", ' xmlns:ssv="http://ssp-standard.org/SSP1/Values"'])
-def test_a_parameter_set_of_a_wrong_namespace_is_said(tmp_path: Path, declared: str) -> None:
+def test_a_parameter_set_of_a_wrong_namespace_is_said(tmp_path, declared):
     """As ecos' quarter truck has none."""
     text = re.sub(r' xmlns:ss[a-z]="[^"]*"', "", parameter_set("k Real 2.5 m"))
     text = text.replace("<ssv:ParameterSet", f"<ssv:ParameterSet{declared}")
@@ -109,14 +107,14 @@ def test_a_parameter_set_of_a_wrong_namespace_is_said(tmp_path: Path, declared: 
     assert any("a.ssv: taken, although " in note for note in loaded.notes)
 
 
-def test_a_parameter_set_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_parameter_set_that_is_none_is_refused(tmp_path):
     bound = '<ssd:ParameterBinding source="a.ssv"/>'
     parts = component("a", "output y Real", bound) + component("b", "input u Real")
     with pytest.raises(InputError, match=r"a\.ssv:1: Values: must be ssv:ParameterSet$"):
         load(tmp_path, structure(system("top", parts)), {"a.ssv": "<Values/>"})
 
 
-def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> None:
+def test_elements_in_another_order_and_empty_lists_are_said(tmp_path):
     """As OMSimulator's own test archives have them."""
     annotations = '<ssd:Annotations><ssc:Annotation type="x"/></ssd:Annotations><ssd:Connectors/>'
     ssd = structure(TOP.replace('name="top">', f'name="top">{annotations}'))
@@ -129,14 +127,14 @@ def test_elements_in_another_order_and_empty_lists_are_said(tmp_path: Path) -> N
     assert "\n" not in said
 
 
-def test_parts_of_2_in_an_archive_of_1(tmp_path: Path) -> None:
+def test_parts_of_2_in_an_archive_of_1(tmp_path):
     """They are as in SSP 2.0, and refused as there."""
     assert load(tmp_path, structure(TOP.replace("ssc:Real", "ssc:Float64"))).connections == Y_TO_U
     with pytest.raises(InputError, match="'y': Dimension: arrays of SSP 2"):
         load(tmp_path, structure(TOP.replace("<ssc:Real/>", "<ssc:Real/><ssc:Dimension/>", 1)))
 
 
-def test_an_enumeration_without_a_name_is_that_of_the_fmu(tmp_path: Path) -> None:
+def test_an_enumeration_without_a_name_is_that_of_the_fmu(tmp_path):
     modes = fmu("output Enumeration y -", "input Enumeration u 1")
     top = TOP.replace("<ssc:Real/>", "<ssc:Enumeration/>")
     loaded = System.load(archive(tmp_path, structure(top), {"a": modes, "b": modes}))
@@ -157,7 +155,7 @@ FULL = structure(
 
 @examples(20)
 @given(st.randoms(use_true_random=False))
-def test_any_order_of_elements_means_the_same(chance: Random) -> None:
+def test_any_order_of_elements_means_the_same(chance):
     """But for the order in a list, which counts."""
     root = etree.fromstring(FULL.encode())
     for element in root.iter("{*}SystemStructureDescription", "{*}System", "{*}Component"):
@@ -171,14 +169,14 @@ def test_any_order_of_elements_means_the_same(chance: Random) -> None:
     assert values == {"a": {"k": 2.0, "u": 0.5}, "b": {"k": 0.003}}
 
 
-def test_two_lists_where_there_may_be_one_are_refused(tmp_path: Path) -> None:
+def test_two_lists_where_there_may_be_one_are_refused(tmp_path):
     two = bind(parameter_set("b.k Real 1"))
     lists = f"<ssd:ParameterBindings>{two}</ssd:ParameterBindings>" * 2
     with pytest.raises(InputError, match="against the schema: Element 'ssd:ParameterBindings'"):
         load(tmp_path, structure(TOP.replace("<ssd:Elements>", f"{lists}<ssd:Elements>", 1)))
 
 
-def test_a_connection_to_a_variable_without_a_connector(tmp_path: Path) -> None:
+def test_a_connection_to_a_variable_without_a_connector(tmp_path):
     """As OSP's test archives have it."""
     parts = component("a") + component("b")
     loaded = load(tmp_path, structure(system("top", parts, connect("a/y", "b/u"))))
@@ -189,7 +187,7 @@ def test_a_connection_to_a_variable_without_a_connector(tmp_path: Path) -> None:
     )
 
 
-def test_names_that_are_not_ascii(tmp_path: Path) -> None:
+def test_names_that_are_not_ascii(tmp_path):
     parts = PARTS.replace('"a"', '"Größe 1"').replace("resources/a.fmu", "resources/gr%C3%B6.fmu")
     path = archive(
         tmp_path,
@@ -199,7 +197,7 @@ def test_names_that_are_not_ascii(tmp_path: Path) -> None:
     assert System.load(path).connections == (Connection(Port("Größe 1", "y"), Port("b", "u")),)
 
 
-def test_no_stop_time_is_the_longest_of_the_fmus(tmp_path: Path) -> None:
+def test_no_stop_time_is_the_longest_of_the_fmus(tmp_path):
     ssd = structure(TOP, "")
     longer = FMU.replace(b"<DefaultExperiment ", b'<DefaultExperiment stopTime="2.5" ')
     shorter = FMU.replace(b"<DefaultExperiment ", b'<DefaultExperiment stopTime="1.5" ')
@@ -208,11 +206,11 @@ def test_no_stop_time_is_the_longest_of_the_fmus(tmp_path: Path) -> None:
     assert "stop = 2.5 s, the longest that its FMUs name; the archive names none" in loaded.notes
 
 
-def in_folder(name: str) -> str:
+def in_folder(name):
     return f"My system/{name}"
 
 
-ARCHIVES: dict[str, tuple[Callable[[str], str], str]] = {
+ARCHIVES = {
     "folder": (in_folder, "all of it is in My system/, which is read as the top"),
     "backslashes": (
         lambda name: name.replace("/", "\\"),
@@ -226,7 +224,7 @@ ARCHIVES: dict[str, tuple[Callable[[str], str], str]] = {
 
 
 @pytest.mark.parametrize("form", ARCHIVES)
-def test_forms_of_archives(tmp_path: Path, form: str) -> None:
+def test_forms_of_archives(tmp_path, form):
     rename, said = ARCHIVES[form]
     files = {"extra/org.other/a.xml": "<a/>", "documentation/index.html": "<p>"}
     path = archive(tmp_path, structure(TOP), {"a": FMU, "b": FMU}, files)
@@ -235,13 +233,13 @@ def test_forms_of_archives(tmp_path: Path, form: str) -> None:
     assert f"hand.ssp: {said}" in loaded.notes
 
 
-def test_two_folders_with_a_structure_are_no_archive(tmp_path: Path) -> None:
+def test_two_folders_with_a_structure_are_no_archive(tmp_path):
     path = archive(tmp_path, structure(TOP), {"a": FMU, "b": FMU}, {"x/SystemStructure.ssd": ""})
     with pytest.raises(InputError, match=r"no SystemStructure.ssd in it; must be an SSP archive"):
         rewritten(path, lambda name, data: (name if "/" in name else f"y/{name}", data))
 
 
-def test_sources_in_folders_and_above_are_of_the_archive(tmp_path: Path) -> None:
+def test_sources_in_folders_and_above_are_of_the_archive(tmp_path):
     parts = component("a", source="fmus/x y.fmu") + component("b", source="c.fmu")
     files = {"fmus/x y.fmu": "", "c.fmu": ""}
     path = archive(tmp_path, structure(system("top", parts)), {"a": FMU}, files)
@@ -251,14 +249,12 @@ def test_sources_in_folders_and_above_are_of_the_archive(tmp_path: Path) -> None
     assert [c.fmu.name for c in loaded.components] == ["x y.fmu", "c.fmu"]
 
 
-def test_the_grasp_in_all_these_forms_runs_the_same_to_the_bit(
-    grasp: System, tmp_path: Path
-) -> None:
+def test_the_grasp_in_all_these_forms_runs_the_same_to_the_bit(grasp, tmp_path):
     short = grasp.with_experiment(1e-3, 0.05)
     path = tmp_path / "grasp.ssp"
     write_ssp(short, path)
 
-    def spoiled(name: str, data: bytes) -> tuple[str, bytes]:
+    def spoiled(name, data):
         if name.endswith(".ssd"):
             text = data.decode().replace('version="1.0"', 'version="2.0"', 1)
             text = text.replace("<ssc:Real ", "<ssc:Float64 ").replace("ssd:", "ns0:")

@@ -9,13 +9,10 @@ import json
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
 from ctypes.util import find_library
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
@@ -61,9 +58,7 @@ json.dump(rows, open(sys.argv[4], "w"))
 
 
 @pytest.fixture(scope="module", params=["python", interop("native"), interop("native proxy")])
-def jacobi(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[System]:
+def jacobi(request, tmp_path_factory):
     """A grasp that needs its values of all types and a transformation on a connection.
 
     Case 1, the object elsewhere, one side darker, the other sensor 1 mm behind its place.
@@ -91,7 +86,7 @@ def jacobi(
         yield system.swap("plant", build_proxy(fmu, target, server.address[1]))
 
 
-def gaps(program: str, path: Path, system: System) -> npt.NDArray[np.float64]:
+def gaps(program, path, system):
     """The two gaps at the steps after t = 0."""
     steps = system.stop_ns // system.step_ns
     found = path.parent / "gaps.json"
@@ -101,13 +96,13 @@ def gaps(program: str, path: Path, system: System) -> npt.NDArray[np.float64]:
     return np.array(json.loads(found.read_text("utf-8")))
 
 
-def first_contacts(rows: npt.NDArray[np.float64]) -> list[int]:
+def first_contacts(rows):
     """For each finger the first step that ends with its gap closed."""
     assert (rows <= 0.0).any(axis=0).all()
     return [int(k) for k in (rows <= 0.0).argmax(axis=0)]
 
 
-def check(theirs: npt.NDArray[np.float64], system: System) -> None:
+def check(theirs, system):
     result = simulate(system, engine="python")  # a peer may be a thread of this process
     ours = np.column_stack([result[name] for name in GAPS])[1:]
     assert ours.shape == theirs.shape
@@ -119,13 +114,13 @@ def check(theirs: npt.NDArray[np.float64], system: System) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("ecospy"), reason="ecospy is not installed")
 @pytest.mark.skipif(not find_library("tbb"), reason="libtbb12, which ecospy needs, is missing")
-def test_ecos_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
+def test_ecos_finds_the_same_contacts(jacobi, tmp_path):
     path = tmp_path / "grasp.ssp"
     write_ssp(jacobi, path)
     check(gaps(ECOS, path, jacobi), jacobi)
 
 
-def unpacked(system: System, folder: Path) -> Path:
+def unpacked(system, folder):
     """The archive as libcosim takes it."""
     write_ssp(system, folder / "grasp.ssp")
     with zipfile.ZipFile(folder / "grasp.ssp") as file:
@@ -140,14 +135,14 @@ needs_libcosim = pytest.mark.skipif(
 
 @pytest.mark.interop
 @needs_libcosim
-def test_libcosim_finds_the_same_contacts(jacobi: System, tmp_path: Path) -> None:
+def test_libcosim_finds_the_same_contacts(jacobi, tmp_path):
     """In the step that our archive names for it."""
     check(gaps(COSIM, unpacked(jacobi, tmp_path), jacobi), jacobi)
 
 
 @pytest.mark.interop
 @needs_libcosim
-def test_libcosim_takes_the_step_of_a_component(fmus: Path, tmp_path: Path) -> None:
+def test_libcosim_takes_the_step_of_a_component(fmus, tmp_path):
     grasp = System.load(SYSTEM, fmus).with_experiment(STEP, 2.5, scheme="jacobi")
     parts = (
         replace(c, step_ns=5_000_000) if c.name == "controller" else c for c in grasp.components

@@ -1,7 +1,5 @@
 """Components that are archives or structures themselves: as if their top system stood there."""
 
-from pathlib import Path
-
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.system.parts import Connection, Port
@@ -21,7 +19,7 @@ GIVES, TAKES = fmu("output Real y - m"), fmu("input Real u 0.5 m", "parameter Re
 PACKAGE, DEFINITION = "application/x-ssp-package", "application/x-ssp-definition"
 
 
-def inner(unit: str = "", bindings: str = "") -> str:
+def inner(unit="", bindings=""):
     """An SSD with an input and what takes it, twice as much."""
     connectors = f"input in Real {unit}" if unit else "input in"
     connections = connect("in", "b/u", linear(2.0))
@@ -29,30 +27,28 @@ def inner(unit: str = "", bindings: str = "") -> str:
     return structure(top, '<ssd:DefaultExperiment startTime="5" stopTime="9"/>')
 
 
-def packed(folder: Path, ssd: str) -> bytes:
+def packed(folder, ssd):
     (folder / "inner").mkdir()
     other = ssd.replace("inside", "other")
     return archive(folder / "inner", ssd, {"b": TAKES}, {"Other.ssd": other}).read_bytes()
 
 
-def load(
-    folder: Path, sub: str, files: dict[str, str | bytes], bindings: str = "", unit: str = ""
-) -> System:
+def load(folder, sub, files, bindings="", unit=""):
     kind = PACKAGE if ".ssp" in sub else DEFINITION
     given = component("sub", f"input in Real {unit}", bindings, source=sub, type=kind)
     top = system("top", component("a", "output y Real") + given, connect("a/y", "sub/in"))
     return System.load(archive(folder, structure(top), {"a": GIVES}, files))
 
 
-def test_an_archive_in_an_archive(tmp_path: Path) -> None:
+def test_an_archive_in_an_archive(tmp_path):
     loaded = load(tmp_path, "resources/sub.ssp", {"resources/sub.ssp": packed(tmp_path, inner())})
     assert [c.name for c in loaded.components] == ["a", "sub_b"]
     assert loaded.connections == (Connection(Port("a", "y"), Port("sub_b", "u"), 2.0, 0.0),)
     assert loaded.stop_ns == 1_000_000_000  # the experiment of what is nested has no meaning
 
 
-def test_a_variant_of_it(tmp_path: Path) -> None:
-    files: dict[str, str | bytes] = {"resources/sub.ssp": packed(tmp_path, inner())}
+def test_a_variant_of_it(tmp_path):
+    files = {"resources/sub.ssp": packed(tmp_path, inner())}
     assert load(tmp_path, "resources/sub.ssp#Other.ssd", files).components[1].name == "sub_b"
     with pytest.raises(
         InputError, match=r"source 'None.ssd': not in the archive; did you mean Oth"
@@ -60,7 +56,7 @@ def test_a_variant_of_it(tmp_path: Path) -> None:
         load(tmp_path, "resources/sub.ssp#None.ssd", files)
 
 
-def test_a_structure_of_the_same_archive_has_sources_relative_to_it(tmp_path: Path) -> None:
+def test_a_structure_of_the_same_archive_has_sources_relative_to_it(tmp_path):
     text = inner().replace('source="resources/b.fmu"', 'source="../a.fmu"')
     top = component("a", "output y Real") + component("sub", type=DEFINITION, source="x/sub.ssd")
     files = {"x/sub.ssd": text.replace("../a.fmu", "../resources/b.fmu")}
@@ -70,10 +66,8 @@ def test_a_structure_of_the_same_archive_has_sources_relative_to_it(tmp_path: Pa
     assert [c.name for c in loaded.components] == ["a", "sub_b"]
 
 
-def test_its_own_bindings_are_beaten_by_those_of_the_component_then_of_the_system(
-    tmp_path: Path,
-) -> None:
-    files: dict[str, str | bytes] = {}
+def test_its_own_bindings_are_beaten_by_those_of_the_component_then_of_the_system(tmp_path):
+    files = {}
     own = bind(parameter_set("b.k Real 1; b.u Real 2"))
     files["resources/sub.ssp"] = packed(tmp_path, inner(bindings=own))
     given = bind(parameter_set("b.k Real 3 mm"))
@@ -81,24 +75,22 @@ def test_its_own_bindings_are_beaten_by_those_of_the_component_then_of_the_syste
     assert load(tmp_path, "resources/sub.ssp", files, given).components[1].values["k"] == 0.003
 
 
-def test_a_unit_that_only_the_component_names_is_that_of_its_connector(tmp_path: Path) -> None:
-    files: dict[str, str | bytes] = {"resources/sub.ssp": packed(tmp_path, inner())}
+def test_a_unit_that_only_the_component_names_is_that_of_its_connector(tmp_path):
+    files = {"resources/sub.ssp": packed(tmp_path, inner())}
     loaded = load(tmp_path, "resources/sub.ssp", files, unit="mm")
     (connection,) = loaded.connections
     # y m are 1000 y mm at the connector, again y m at u, then doubled
     assert (connection.factor, connection.offset) == (2.0, 0.0)
 
 
-def test_units_that_contradict_are_refused(tmp_path: Path) -> None:
-    files: dict[str, str | bytes] = {"resources/sub.ssp": packed(tmp_path, inner("m"))}
+def test_units_that_contradict_are_refused(tmp_path):
+    files = {"resources/sub.ssp": packed(tmp_path, inner("m"))}
     with pytest.raises(InputError, match=r"'in': unit mm is not that of resources/sub.ssp, m; mus"):
         load(tmp_path, "resources/sub.ssp", files, unit="mm")
 
 
-def test_errors_name_the_way_to_the_place(tmp_path: Path) -> None:
-    files: dict[str, str | bytes] = {
-        "resources/sub.ssp": packed(tmp_path, inner().replace('kind="input"', 'kind="up"'))
-    }
+def test_errors_name_the_way_to_the_place(tmp_path):
+    files = {"resources/sub.ssp": packed(tmp_path, inner().replace('kind="input"', 'kind="up"'))}
     with pytest.raises(InputError) as error:
         load(tmp_path, "resources/sub.ssp", files)
     assert str(error.value).startswith(
@@ -106,13 +98,13 @@ def test_errors_name_the_way_to_the_place(tmp_path: Path) -> None:
     )
 
 
-def test_what_contains_itself_is_refused(tmp_path: Path) -> None:
+def test_what_contains_itself_is_refused(tmp_path):
     loop = structure(system("s", component("b", type=DEFINITION, source="x.ssd")))
     with pytest.raises(InputError, match=r"^hand\.ssp: resources/x\.ssd: contains itself, which"):
         load(tmp_path, "resources/x.ssd", {"resources/x.ssd": loop.replace("input in", "")})
 
 
-def again(inside: str = "") -> str:
+def again(inside=""):
     """A system with the id S, and a component that is another one like it."""
     shared = system("first", component("b", "input u") + inside, connect("in", "b/u"), "input in")
     shared = shared.replace('name="first"', 'name="first" id="S"')
@@ -120,7 +112,7 @@ def again(inside: str = "") -> str:
     return system("top", component("a", "output y") + shared + more, connect("a/y", "second/in"))
 
 
-def test_a_system_of_the_same_document_by_its_id(tmp_path: Path) -> None:
+def test_a_system_of_the_same_document_by_its_id(tmp_path):
     loaded = System.load(archive(tmp_path, structure(again()), {"a": GIVES, "b": TAKES}))
     assert [c.name for c in loaded.components] == ["a", "first_b", "second_b"]
     assert loaded.connections == (Connection(Port("a", "y"), Port("second_b", "u")),)
@@ -137,7 +129,7 @@ def test_a_system_of_the_same_document_by_its_id(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_ids_that_are_refused(tmp_path: Path, inside: str, source: str, message: str) -> None:
+def test_ids_that_are_refused(tmp_path, inside, source, message):
     ssd = structure(again(inside).replace('"#S"', f'"{source}"'))
     with pytest.raises(InputError, match=r"^hand\.ssp: ") as error:
         System.load(archive(tmp_path, ssd, {"a": GIVES, "b": TAKES}))

@@ -1,7 +1,5 @@
 """The grasp as another tool may pack it: nested, its units not those of the FMUs, values on top."""
 
-from pathlib import Path
-
 import numpy as np
 from grasp_cosim import System, simulate
 from ssp.hand_made import (
@@ -18,7 +16,7 @@ from ssp.hand_made import (
 STOP = '<ssd:DefaultExperiment stopTime="2.5"/>'
 
 
-def sensors() -> str:
+def sensors():
     """A system of both sensors; gaps come in mm, and one of the sensors is told twice the gap."""
     elements = "".join(
         component(f"s{j}", "input gap Real; output intensity Real", source=SENSOR) for j in (1, 2)
@@ -36,7 +34,7 @@ def sensors() -> str:
 SENSOR = "resources/ProximitySensor.fmu"
 
 
-def nested() -> str:
+def nested():
     """The whole grasp; the controller comes first, against the flow."""
     two = (1, 2)
     controller = component(
@@ -69,7 +67,7 @@ def nested() -> str:
     return structure(system("top", controller + plant + sensors(), connections, "", place), STOP)
 
 
-def test_it_runs_as_the_flat_system_does(grasp: System, fmus: Path, tmp_path: Path) -> None:
+def test_it_runs_as_the_flat_system_does(grasp, fmus, tmp_path):
     files = {f"resources/{f.name}": f.read_bytes() for f in fmus.glob("*.fmu")}
     loaded = System.load(archive(tmp_path, nested(), {}, files), step=1e-3)
     assert [c.name for c in loaded.components] == [

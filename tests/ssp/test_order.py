@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 
-def ordered(names: str, connections: list[str]) -> str:
+def ordered(names, connections):
     """Of components of one letter, and connections like "ab"."""
     parts = [SimpleNamespace(name=name) for name in names]
     ends = [[SimpleNamespace(component=name) for name in pair] for pair in connections]
@@ -29,12 +29,12 @@ def ordered(names: str, connections: list[str]) -> str:
         ("abcd", ["da", "db", "bc", "ca", "bd"], "bdca"),
     ],
 )
-def test_orders(names: str, connections: list[str], order: str) -> None:
+def test_orders(names, connections, order):
     assert ordered(names, connections) == order
 
 
 @given(st.permutations("abcdefg"), st.lists(st.tuples(*2 * [st.sampled_from("abcdefg")])))
-def test_none_waits_for_a_later_one_but_in_a_loop(names: list[str], pairs: list[str]) -> None:
+def test_none_waits_for_a_later_one_but_in_a_loop(names, pairs):
     reached = {name: {t for s, t in pairs if s == name} for name in names}
     for between in names:
         for behind in reached.values():
@@ -52,7 +52,7 @@ def test_none_waits_for_a_later_one_but_in_a_loop(names: list[str], pairs: list[
         assert name == free[0]
 
 
-def test_a_thousand_are_ordered_at_once() -> None:
+def test_a_thousand_are_ordered_at_once():
     names = [chr(0x4E00 + i) for i in range(5000)]
     chain = [f"{later}{earlier}" for earlier, later in pairwise(names)]
     assert ordered("".join(names), chain) == "".join(reversed(names))

@@ -1,12 +1,9 @@
 """Parameter sets and mappings: which value holds, in which unit, and what is refused."""
 
 import zipfile
-from collections.abc import Mapping
-from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.interface.interface import Value
 from ssp.hand_made import (
     archive,
     bind,
@@ -32,28 +29,21 @@ FMU = fmu(
 )
 
 
-def load(
-    folder: Path,
-    inner: str = "",
-    outer: str = "",
-    files: Mapping[str, str] | None = None,
-    connectors: str = "",
-    connections: str = "",
-) -> System:
+def load(folder, inner="", outer="", files=None, connectors="", connections=""):
     top = system("top", component("a", "input u; output y", inner), connections, connectors, outer)
     return System.load(archive(folder, structure(top), {"a": FMU}, files))
 
 
-def values(folder: Path, inner: str = "", outer: str = "", **more: str) -> Mapping[str, Value]:
+def values(folder, inner="", outer="", **more):
     return load(folder, inner, outer, **more).components[0].values  # type: ignore[arg-type]
 
 
-def given(parameters: str, mapped: str = "", units: str | None = None, **attributes: str) -> str:
+def given(parameters, mapped="", units=None, **attributes):
     chosen = parameter_set(parameters) if units is None else parameter_set(parameters, units)
     return bind(chosen, mapped, **attributes)
 
 
-def test_every_type(tmp_path: Path) -> None:
+def test_every_type(tmp_path):
     found = values(
         tmp_path,
         given(
@@ -71,24 +61,24 @@ def test_every_type(tmp_path: Path) -> None:
     }
 
 
-def test_an_integer_is_taken_for_a_real_and_an_enumeration(tmp_path: Path) -> None:
+def test_an_integer_is_taken_for_a_real_and_an_enumeration(tmp_path):
     found = values(tmp_path, given("length Integer 2; mode Integer 2"))
     assert (found["length"], found["mode"]) == (2.0, 2)
 
 
-def test_a_unit_is_converted_to_that_of_the_variable(tmp_path: Path) -> None:
+def test_a_unit_is_converted_to_that_of_the_variable(tmp_path):
     assert values(tmp_path, given("length Real 250.0 mm"))["length"] == 0.25
 
 
-def test_the_same_unit_leaves_every_bit(tmp_path: Path) -> None:
+def test_the_same_unit_leaves_every_bit(tmp_path):
     assert values(tmp_path, given("length Real 0.1 m"))["length"] == 0.1
 
 
-def test_an_inline_set_may_name_the_units_of_the_structure(tmp_path: Path) -> None:
+def test_an_inline_set_may_name_the_units_of_the_structure(tmp_path):
     assert values(tmp_path, given("length Real 250.0 mm", units=""))["length"] == 0.25
 
 
-def test_a_set_and_a_mapping_in_files(tmp_path: Path) -> None:
+def test_a_set_and_a_mapping_in_files(tmp_path):
     binding = (
         '<ssd:ParameterBinding source="resources/some%20set.ssv">'
         '<ssd:ParameterMapping source="./resources/map.ssm"/></ssd:ParameterBinding>'
@@ -101,7 +91,7 @@ def test_a_set_and_a_mapping_in_files(tmp_path: Path) -> None:
     assert load(tmp_path, binding, files=files).components[0].values["length"] == 1.5
 
 
-def test_a_set_in_the_fmu_of_the_component(tmp_path: Path) -> None:
+def test_a_set_in_the_fmu_of_the_component(tmp_path):
     binding = (
         '<ssd:ParameterBinding source="resources/own.ssv" sourceBase="component">'
         '<ssd:ParameterMapping source="resources/map.ssm"/></ssd:ParameterBinding>'
@@ -111,7 +101,7 @@ def test_a_set_in_the_fmu_of_the_component(tmp_path: Path) -> None:
         file.writestr("modelDescription.xml", FMU)
         file.writestr("resources/own.ssv", parameter_set("L Real 250.0 mm"))
     top = system("top", component("a", "input u", binding))
-    files: dict[str, str | bytes] = {
+    files = {
         "resources/a.fmu": inner.read_bytes(),
         "resources/map.ssm": mapping(("L", "length", "")),
     }
@@ -119,31 +109,31 @@ def test_a_set_in_the_fmu_of_the_component(tmp_path: Path) -> None:
     assert loaded.components[0].values["length"] == 0.25
 
 
-def test_a_system_has_no_files_of_its_own(tmp_path: Path) -> None:
+def test_a_system_has_no_files_of_its_own(tmp_path):
     binding = '<ssd:ParameterBinding source="resources/own.ssv" sourceBase="component"/>'
     with pytest.raises(InputError, match="'top': sourceBase 'component': must be at a component"):
         load(tmp_path, outer=binding)
 
 
-def test_a_later_binding_goes_before_an_earlier_one(tmp_path: Path) -> None:
+def test_a_later_binding_goes_before_an_earlier_one(tmp_path):
     assert values(tmp_path, given("length Real 2") + given("length Real 3"))["length"] == 3.0
 
 
-def test_the_system_goes_before_the_component(tmp_path: Path) -> None:
+def test_the_system_goes_before_the_component(tmp_path):
     outer = given("a.length Real 7")
     assert values(tmp_path, given("length Real 2"), outer)["length"] == 7.0
 
 
-def test_a_prefix_is_put_before_the_names(tmp_path: Path) -> None:
+def test_a_prefix_is_put_before_the_names(tmp_path):
     assert values(tmp_path, outer=given("length Real 7", prefix="a."))["length"] == 7.0
 
 
-def test_a_mapping_sees_the_names_with_the_prefix(tmp_path: Path) -> None:
+def test_a_mapping_sees_the_names_with_the_prefix(tmp_path):
     outer = given("L Real 7", mapping(("p_L", "a.length", "")), prefix="p_")
     assert values(tmp_path, outer=outer)["length"] == 7.0
 
 
-def test_with_a_mapping_only_what_is_mapped_is_applied(tmp_path: Path) -> None:
+def test_with_a_mapping_only_what_is_mapped_is_applied(tmp_path):
     mapped = mapping(("L", "length", ""), ("L", "ratio", ""), ("none", "count", ""))
     loaded = load(tmp_path, given("L Real 3; active Boolean true", mapped))
     assert dict(loaded.components[0].values) == {"length": 3.0, "ratio": 3.0, "u": 0.5}
@@ -151,7 +141,7 @@ def test_with_a_mapping_only_what_is_mapped_is_applied(tmp_path: Path) -> None:
     assert any("no parameter 'none'; not used" in n for n in loaded.notes)
 
 
-def test_a_mapping_without_units(tmp_path: Path) -> None:
+def test_a_mapping_without_units(tmp_path):
     mapped = mapping(("L", "length", linear(0.5)), suppress=True)
     assert values(tmp_path, given("L Real 250 mm", mapped))["length"] == 125.0
 
@@ -164,21 +154,14 @@ TABLES = [
 
 
 @pytest.mark.parametrize(("target", "parameter", "kind", "table", "expected"), TABLES)
-def test_mappings_by_table(
-    tmp_path: Path,
-    target: str,
-    parameter: str,
-    kind: str,
-    table: Mapping[str, str],
-    expected: Value,
-) -> None:
+def test_mappings_by_table(tmp_path, target, parameter, kind, table, expected):
     entries = "".join(f'<ssc:MapEntry source="{s}" target="{t}"/>' for s, t in table.items())
     change = f"<ssc:{kind}MappingTransformation>{entries}</ssc:{kind}MappingTransformation>"
     mapped = mapping(("x", target, change))
     assert values(tmp_path, given(parameter, mapped))[target] == expected
 
 
-def test_a_value_at_a_connector_of_the_system_follows_the_connections(tmp_path: Path) -> None:
+def test_a_value_at_a_connector_of_the_system_follows_the_connections(tmp_path):
     # 3 mm at the connector are 0.003 m at the variable, then doubled
     found = values(
         tmp_path,
@@ -189,7 +172,7 @@ def test_a_value_at_a_connector_of_the_system_follows_the_connections(tmp_path: 
     assert found["u"] == pytest.approx(0.006, rel=1e-15)
 
 
-def test_a_parameter_of_the_system_is_passed_on_to_its_component(tmp_path: Path) -> None:
+def test_a_parameter_of_the_system_is_passed_on_to_its_component(tmp_path):
     top = system(
         "top",
         component("a", "parameter active"),
@@ -201,31 +184,31 @@ def test_a_parameter_of_the_system_is_passed_on_to_its_component(tmp_path: Path)
     assert loaded.components[0].values["active"] is True
 
 
-def test_names_in_nested_systems(tmp_path: Path) -> None:
+def test_names_in_nested_systems(tmp_path):
     inner = system("sub", component("a"), bindings=given("a.length Real 2; a.ratio Real 3"))
     top = system("top", inner, bindings=given("sub.a.length Real 5"))
     found = System.load(archive(tmp_path, structure(top), {"a": FMU})).components[0].values
     assert (found["length"], found["ratio"]) == (5.0, 3.0)
 
 
-def test_what_fits_nothing_is_said(tmp_path: Path) -> None:
+def test_what_fits_nothing_is_said(tmp_path):
     loaded = load(tmp_path, given("lenght Real 2"))
     assert any("parameter 'lenght': nothing of that name to give it to" in n for n in loaded.notes)
 
 
-def test_a_start_value_of_a_connected_input_is_not_used_and_said(tmp_path: Path) -> None:
+def test_a_start_value_of_a_connected_input_is_not_used_and_said(tmp_path):
     loaded = load(tmp_path, given("u Real 9"), connections=connect("a/y", "a/u"))
     assert "u" not in loaded.components[0].values
     assert any("parameter 'u': a.u is connected to a.y; not used" in n for n in loaded.notes)
 
 
-def test_an_input_that_is_not_connected_keeps_its_start_value(tmp_path: Path) -> None:
+def test_an_input_that_is_not_connected_keeps_its_start_value(tmp_path):
     loaded = load(tmp_path)
     assert dict(loaded.components[0].values) == {"u": 0.5}
     assert "input a.u is not connected; keeps its start value 0.5" in loaded.notes
 
 
-def passed_on(folder: Path, outer: str, inner: str, unit: str = "") -> System:
+def passed_on(folder, outer, inner, unit=""):
     """Of the component a, `length` is twice the system's parameter p, by a connection."""
     top = system(
         "top",
@@ -246,9 +229,7 @@ def passed_on(folder: Path, outer: str, inner: str, unit: str = "") -> System:
         (given("p Real 3000 mm"), given("length Real 7")),
     ],
 )
-def test_a_value_by_a_connection_goes_before_all_bindings(
-    tmp_path: Path, outer: str, inner: str
-) -> None:
+def test_a_value_by_a_connection_goes_before_all_bindings(tmp_path, outer, inner):
     """SSP 1.0.1, 5.3.2: the data flow decides; 5.2.3 ranks bindings among each other only."""
     loaded = passed_on(tmp_path, outer, inner, "m")
     assert loaded.components[0].values["length"] == 6.0
@@ -256,13 +237,13 @@ def test_a_value_by_a_connection_goes_before_all_bindings(
     assert sum(said in note for note in loaded.notes) == 1
 
 
-def test_a_connection_that_brings_no_value_leaves_the_own(tmp_path: Path) -> None:
+def test_a_connection_that_brings_no_value_leaves_the_own(tmp_path):
     loaded = passed_on(tmp_path, "", given("length Real 7"))
     assert loaded.components[0].values["length"] == 7.0
     assert not any("connection" in note for note in loaded.notes)
 
 
-def test_the_first_value_on_the_way_through_systems_holds(tmp_path: Path) -> None:
+def test_the_first_value_on_the_way_through_systems_holds(tmp_path):
     sub = system(
         "sub",
         component("a", "parameter length", given("length Real 7")),
@@ -276,14 +257,14 @@ def test_the_first_value_on_the_way_through_systems_holds(tmp_path: Path) -> Non
         assert loaded.components[0].values["length"] == expected
 
 
-def test_a_name_that_is_given_twice_matters_only_where_it_is_used(tmp_path: Path) -> None:
+def test_a_name_that_is_given_twice_matters_only_where_it_is_used(tmp_path):
     mapped = mapping(("L", "length", ""))
     found = values(tmp_path, given("L Real 3; x Real 1; x Real 2", mapped))
     assert found["length"] == 3.0
     assert values(tmp_path, given("length Real 3; length Real 3"))["length"] == 3.0
 
 
-def test_many_mappings_from_nothing_are_one_note(tmp_path: Path) -> None:
+def test_many_mappings_from_nothing_are_one_note(tmp_path):
     mapped = mapping(("L", "length", ""), ("", "ratio", ""), ("", "count", ""), ("", "count", ""))
     notes = load(tmp_path, given("L Real 3", mapped)).notes
     assert sum("no parameter ''; not used (2 such)" in note for note in notes) == 1
@@ -351,7 +332,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("binding", "message"), REFUSED)
-def test_what_is_refused(tmp_path: Path, binding: str, message: str) -> None:
+def test_what_is_refused(tmp_path, binding, message):
     wrong = '<ssd:Wrong xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"/>'
     with pytest.raises(InputError, match=r"hand\.ssp") as error:
         load(tmp_path, binding, files={"resources/y.ssv": wrong})

@@ -3,13 +3,11 @@
 import json
 import zipfile
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.interface.interface import Value
 from grasp_cosim.ssp.document import parse
 from grasp_cosim.ssp.remarks import Notes
 from grasp_cosim.ssp.to_archive import SET, write_ssp
@@ -40,7 +38,7 @@ from support.state_space import state_space
 from support.stimuli import driven
 
 
-def round_trip(original: System, folder: Path) -> System:
+def round_trip(original, folder):
     """The system as it comes back, with the paths and the name of the original."""
     path = folder / "again.ssp"
     write_ssp(original, path)
@@ -53,11 +51,11 @@ def round_trip(original: System, folder: Path) -> System:
     return replace(loaded, name=original.name, components=components)
 
 
-def test_the_grasp_comes_back_as_it_was(grasp: System, tmp_path: Path) -> None:
+def test_the_grasp_comes_back_as_it_was(grasp, tmp_path):
     assert round_trip(grasp, tmp_path) == grasp
 
 
-def test_the_grasp_runs_the_same_to_the_bit(grasp: System, tmp_path: Path) -> None:
+def test_the_grasp_runs_the_same_to_the_bit(grasp, tmp_path):
     changed = grasp.with_values({"plant.initial_object_position": 0.02}).with_experiment(1e-3)
     path = tmp_path / "grasp.ssp"
     write_ssp(changed, path)
@@ -69,7 +67,7 @@ def test_the_grasp_runs_the_same_to_the_bit(grasp: System, tmp_path: Path) -> No
 
 
 @needs_gcc
-def test_what_drives_inputs_comes_back_with_its_values(tmp_path: Path) -> None:
+def test_what_drives_inputs_comes_back_with_its_values(tmp_path):
     text = "time,a.u_Real [kN],a.u_Enumeration\n0,0,one\n0.3,1e-3,two\n\n0.3,0.1,two\n"
     original = System.load(driven(tmp_path, text, more='[input]\nfile = "drive.csv"\n'))
     (tmp_path / "drive.csv").unlink()
@@ -95,9 +93,7 @@ def test_what_drives_inputs_comes_back_with_its_values(tmp_path: Path) -> None:
         ('"lines": [2, 3, 5]', '"lines": [2, 3]'),
     ],
 )
-def test_values_that_no_file_could_have_are_refused(
-    before: str, after: str, tmp_path: Path
-) -> None:
+def test_values_that_no_file_could_have_are_refused(before, after, tmp_path):
     text = "time,a.u_Real [kN],a.u_Enumeration\n0,0,one\n0.3,1e-3,two\n\n0.3,0.1,two\n"
     system = System.load(driven(tmp_path, text, more='[input]\nfile = "drive.csv"\n'))
     write_ssp(system, tmp_path / "a.ssp")
@@ -114,7 +110,7 @@ def test_values_that_no_file_could_have_are_refused(
         System.load(tmp_path / "b.ssp")
 
 
-def test_units_that_the_system_names_come_back(grasp: System, tmp_path: Path) -> None:
+def test_units_that_the_system_names_come_back(grasp, tmp_path):
     """One that the FMU declares otherwise too, and under the system's name of a variable."""
     plant, *others = grasp.components
     renamed = {"centre": "object_position"}
@@ -131,7 +127,7 @@ def test_units_that_the_system_names_come_back(grasp: System, tmp_path: Path) ->
     assert '<ssc:Unit name="cm">' in ssd
 
 
-def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> None:
+def test_what_ssp_has_no_form_for_comes_back(grasp, tmp_path):
     plant, *others = grasp.components
     gap, contact = Port("plant", "gap[1]"), Port("plant", "contact[1]")
     full = replace(
@@ -157,7 +153,7 @@ def test_what_ssp_has_no_form_for_comes_back(grasp: System, tmp_path: Path) -> N
     assert round_trip(full, tmp_path) == full
 
 
-def test_roles_and_presets_of_a_system_file_come_back(fmus: Path, tmp_path: Path) -> None:
+def test_roles_and_presets_of_a_system_file_come_back(fmus, tmp_path):
     text = SYSTEM.read_text(encoding="utf-8") + '[roles]\nplant = "plant"\n'
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
     original = System.load(tmp_path / "mine.toml", fmus)
@@ -168,7 +164,7 @@ def test_roles_and_presets_of_a_system_file_come_back(fmus: Path, tmp_path: Path
     assert again.with_presets("bench") == original.with_presets("bench")
 
 
-def test_a_preset_of_a_whole_array_comes_back(tmp_path: Path) -> None:
+def test_a_preset_of_a_whole_array_comes_back(tmp_path):
     state_space(tmp_path, types=False)
     (tmp_path / "s.toml").write_text(
         "connections = []\n[experiment]\nstep = 0.1\nstop = 1.0\n"
@@ -183,11 +179,11 @@ def test_a_preset_of_a_whole_array_comes_back(tmp_path: Path) -> None:
     assert again.components[0].values == original.with_presets("fast").components[0].values
 
 
-def test_an_archive_of_before_roles_and_presets(grasp: System, tmp_path: Path) -> None:
+def test_an_archive_of_before_roles_and_presets(grasp, tmp_path):
     path = tmp_path / "grasp.ssp"
     write_ssp(grasp, path)
 
-    def older(ssd: bytes) -> bytes:
+    def older(ssd):
         root = etree.fromstring(ssd)
         (ours,) = root.iter("{grasp-cosim:system}System")
         kept = {k: v for k, v in json.loads(ours.text).items() if k not in ("roles", "presets")}
@@ -200,7 +196,7 @@ def test_an_archive_of_before_roles_and_presets(grasp: System, tmp_path: Path) -
     assert loaded.step_ns == grasp.step_ns
 
 
-def hand(folder: Path, *connections: Connection, rename: bool = False) -> System:
+def hand(folder, *connections, rename=False):
     """Two FMUs with an output y in m and an input u in mm, beside other variables."""
     variables = (
         "output Real y - m",
@@ -217,7 +213,7 @@ def hand(folder: Path, *connections: Connection, rename: bool = False) -> System
         file.writestr("modelDescription.xml", fmu(*variables))
     names = {"in put": "u", "out": "y", "text": "label"} if rename else {}
     label = "text" if rename else "label"
-    values: dict[str, Value] = {
+    values = {
         "n": -4,
         "start": 2,
         "active": True,
@@ -241,22 +237,18 @@ def hand(folder: Path, *connections: Connection, rename: bool = False) -> System
         ((None, None), (1000.0, 0.0)),  # m to mm, said for masters that know no units
     ],
 )
-def test_connections_with_a_factor(
-    tmp_path: Path,
-    given: tuple[float | None, float | None],
-    expected: tuple[float, float],
-) -> None:
+def test_connections_with_a_factor(tmp_path, given, expected):
     connection = Connection(Port("a", "y"), Port("b", "u"), *given)
     (again,) = round_trip(hand(tmp_path, connection), tmp_path).connections
     assert again == Connection(connection.source, connection.target, *expected)
 
 
-def test_values_of_every_type(tmp_path: Path) -> None:
+def test_values_of_every_type(tmp_path):
     original = hand(tmp_path)
     assert round_trip(original, tmp_path) == original
 
 
-def test_an_enumeration_is_written_by_name(tmp_path: Path) -> None:
+def test_an_enumeration_is_written_by_name(tmp_path):
     write_ssp(hand(tmp_path), tmp_path / "hand.ssp")
     with zipfile.ZipFile(tmp_path / "hand.ssp") as file:
         text = file.read("resources/a.ssv").decode()
@@ -267,7 +259,7 @@ def test_an_enumeration_is_written_by_name(tmp_path: Path) -> None:
     assert len(connector) == 0  # the type is that of the FMU
 
 
-def test_renamed_variables_have_the_names_of_the_fmu_in_the_archive(tmp_path: Path) -> None:
+def test_renamed_variables_have_the_names_of_the_fmu_in_the_archive(tmp_path):
     connection = Connection(Port("a", "out"), Port("b", "in put"), 2.0, 0.0)
     original = hand(tmp_path, connection, rename=True)
     assert round_trip(original, tmp_path) == original
@@ -276,14 +268,14 @@ def test_renamed_variables_have_the_names_of_the_fmu_in_the_archive(tmp_path: Pa
     assert 'name="in put"' not in text
 
 
-def test_the_same_system_gives_the_same_bytes(grasp: System, tmp_path: Path) -> None:
+def test_the_same_system_gives_the_same_bytes(grasp, tmp_path):
     first, second = tmp_path / "a.ssp", tmp_path / "b.ssp"
     write_ssp(grasp, first)
     write_ssp(grasp, second)
     assert first.read_bytes() == second.read_bytes()
 
 
-def test_what_is_in_the_archive(grasp: System, tmp_path: Path) -> None:
+def test_what_is_in_the_archive(grasp, tmp_path):
     path = tmp_path / "grasp.ssp"
     written = write_ssp(grasp.with_values({"sensor_2.reflectance": 0.8}), path)
     with zipfile.ZipFile(path) as file:
@@ -316,7 +308,7 @@ def test_what_is_in_the_archive(grasp: System, tmp_path: Path) -> None:
     assert dict(experiment.attrib) == {"startTime": "0.0", "stopTime": "3.0"}
 
 
-def test_fmus_of_the_same_name_do_not_collide(grasp: System, tmp_path: Path) -> None:
+def test_fmus_of_the_same_name_do_not_collide(grasp, tmp_path):
     other = tmp_path / "GripperPlant.fmu"
     other.write_bytes(grasp.components[1].fmu.read_bytes())  # a sensor under the plant's name
     mixed = replace(
@@ -328,7 +320,7 @@ def test_fmus_of_the_same_name_do_not_collide(grasp: System, tmp_path: Path) -> 
     assert round_trip(mixed, tmp_path) == mixed
 
 
-def test_one_name_for_two_units_is_written_for_the_first_only(tmp_path: Path) -> None:
+def test_one_name_for_two_units_is_written_for_the_first_only(tmp_path):
     original = hand(tmp_path)
     path = tmp_path / "feet.fmu"
     description = fmu("output Real y - mm", "input Real u 0.0 mm").replace(b'"0.001"', b'"0.3048"')
@@ -339,7 +331,7 @@ def test_one_name_for_two_units_is_written_for_the_first_only(tmp_path: Path) ->
     assert round_trip(mixed, tmp_path) == mixed
 
 
-def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path: Path) -> None:
+def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path):
     path = tmp_path / "wide.fmu"
     description = b"""<fmiModelDescription fmiVersion="3.0" modelName="w" instantiationToken="{}">
       <CoSimulation modelIdentifier="w"/><ModelVariables><Int64 name="n" valueReference="1"
@@ -359,7 +351,7 @@ def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path: Path) -> Non
     assert notes[-1] == "c.b is of type Binary: it has no connector"
 
 
-def filters(folder: Path) -> Path:
+def filters(folder):
     """An FMU of FMI 3.0 with arrays of n = 2 elements or more, in m, and a matrix."""
     path = folder / "filters.fmu"
     description = b"""<fmiModelDescription fmiVersion="3.0" modelName="f" instantiationToken="{}">
@@ -380,7 +372,7 @@ def filters(folder: Path) -> Path:
     return path
 
 
-def test_arrays_of_a_given_size_come_back(tmp_path: Path) -> None:
+def test_arrays_of_a_given_size_come_back(tmp_path):
     """Under other names, whole or by elements, with units, values and connections of elements."""
     path = filters(tmp_path)
     first = Component(
@@ -412,7 +404,7 @@ def test_arrays_of_a_given_size_come_back(tmp_path: Path) -> None:
     assert 'startConnector="Outs[3]" endElement="b" endConnector="Ins[3]"' in text
 
 
-def test_an_archive_of_others_says_how_many_elements_there_are(tmp_path: Path) -> None:
+def test_an_archive_of_others_says_how_many_elements_there_are(tmp_path):
     inner = filters(tmp_path)
     with zipfile.ZipFile(inner) as file:
         description = file.read("modelDescription.xml")
@@ -429,14 +421,14 @@ def test_an_archive_of_others_says_how_many_elements_there_are(tmp_path: Path) -
     assert loaded.connections[0].target == Port("b", "Ins[3]")
 
 
-def test_only_an_ssp_file_is_written(grasp: System, tmp_path: Path) -> None:
+def test_only_an_ssp_file_is_written(grasp, tmp_path):
     for path in (tmp_path / "grasp.zip", tmp_path / "folder.ssp"):
         (tmp_path / "folder.ssp").mkdir(exist_ok=True)
         with pytest.raises(InputError, match=r"must be a file named like system\.ssp"):
             write_ssp(grasp, path)
 
 
-def test_an_archive_of_others_comes_back(tmp_path: Path) -> None:
+def test_an_archive_of_others_comes_back(tmp_path):
     top = system(
         "top",
         component("a", "output y Real m") + component("b", "input u Real"),

@@ -2,7 +2,6 @@
 
 import json
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ PACKAGE = "application/x-ssp-package"
 RATE = 0.5  # 1/s
 
 
-def inner() -> str:
+def inner():
     """A decay integrated here, whose rate is a parameter of the system."""
     parts = component(
         "decay", "parameter k; output x", source=DECAY, implementation="ModelExchange"
@@ -38,7 +37,7 @@ def inner() -> str:
     return structure(system("inside", parts, drawn, "parameter rate; output out"), "")
 
 
-def outer() -> str:
+def outer():
     """It, and one that steps by itself and passes the other's output on, doubled, plus 1."""
     elements = component("sub", "output out Float64", source="resources/sub.ssp", type=PACKAGE)
     given = bind(parameter_set("d Real 1", units=""))
@@ -49,14 +48,14 @@ def outer() -> str:
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     fmu = build_model("dahlquist", tmp_path).read_bytes()
     (tmp_path / "inner").mkdir()
     sub = archive(tmp_path / "inner", inner(), {}, {DECAY: fmu}).read_bytes()
     return archive(tmp_path, outer(), {}, {DECAY: fmu, "resources/sub.ssp": sub})
 
 
-def test_it_follows_the_solution(path: Path) -> None:
+def test_it_follows_the_solution(path):
     result = simulate(System.load(path, step=0.01))
     expected = np.exp(-RATE * result.time)
     np.testing.assert_allclose(result["sub_decay.x"], expected, rtol=1e-6)
@@ -64,7 +63,7 @@ def test_it_follows_the_solution(path: Path) -> None:
     np.testing.assert_allclose(passed[1:], 2.0 * expected[1:] + 1.0, rtol=1e-6)
 
 
-def test_our_archive_of_it_runs_the_same(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_our_archive_of_it_runs_the_same(path, capsys):
     own = path.with_name("own.ssp")
     assert main(["ssp", str(path), "-o", str(own), "--set", "experiment.step=0.01"]) == 0
     with zipfile.ZipFile(own) as file:

@@ -1,7 +1,5 @@
 """Signal dictionaries: who is connected to an entry gives it its value, or takes it."""
 
-from pathlib import Path
-
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.system.parts import Connection, Port
@@ -27,14 +25,14 @@ DICTIONARY = (
 )
 
 
-def reference(name: str, connectors: str, dictionary: str = "bus") -> str:
+def reference(name, connectors, dictionary="bus"):
     return (
         f'<ssd:SignalDictionaryReference name="{name}" dictionary="{dictionary}">'
         f"{connector_list(connectors)}</ssd:SignalDictionaryReference>"
     )
 
 
-def load(folder: Path, first: str, second: str, inline: bool = False, drawn: str = "") -> System:
+def load(folder, first, second, inline=False, drawn=""):
     """The output through the bus, by one reference in and by another, in a system, out."""
     sub = system(
         "sub", component("b", "input u") + reference("out", second), connect("out/gap", "b/u")
@@ -57,9 +55,7 @@ def load(folder: Path, first: str, second: str, inline: bool = False, drawn: str
     ("first", "second"),
     [("input gap", "output gap"), ("inout gap Real", "inout gap; inout on Boolean")],
 )
-def test_a_value_goes_through_the_bus(
-    tmp_path: Path, first: str, second: str, inline: bool
-) -> None:
+def test_a_value_goes_through_the_bus(tmp_path, first, second, inline):
     loaded = load(tmp_path, first, second, inline)
     # m to mm and back to m
     assert loaded.connections == (Connection(Port("a", "y"), Port("sub_b", "u")),)
@@ -84,7 +80,7 @@ def test_a_value_goes_through_the_bus(
         ),
     ],
 )
-def test_what_is_refused(tmp_path: Path, first: str, second: str, drawn: str, message: str) -> None:
+def test_what_is_refused(tmp_path, first, second, drawn, message):
     with pytest.raises(InputError, match=r"^hand\.ssp: SystemStructure.ssd:2: ") as error:
         load(tmp_path, first, second, drawn=drawn)
     assert message in str(error.value)

@@ -1,7 +1,6 @@
 """The command ssp, and run on an archive."""
 
 import json
-from pathlib import Path
 
 import pytest
 from grasp_cosim.cli import main
@@ -10,7 +9,7 @@ from ssp.hand_made import archive, component, fmu, structure, system
 
 
 @pytest.fixture
-def toml(fmus: Path, tmp_path: Path) -> Path:
+def toml(fmus, tmp_path):
     """The grasp as a system file beside links to its FMUs."""
     path = tmp_path / "mine.toml"
     path.write_text(SYSTEM.read_text("utf-8"), encoding="utf-8")
@@ -19,14 +18,12 @@ def toml(fmus: Path, tmp_path: Path) -> Path:
     return path
 
 
-def metrics(text: str) -> dict[str, object]:
-    report: dict[str, object] = json.loads(text)
+def metrics(text):
+    report = json.loads(text)
     return {k: v for k, v in report.items() if k not in ("wall_time", "real_time_factor")}
 
 
-def test_a_system_file_becomes_an_archive_that_runs_the_same(
-    toml: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_system_file_becomes_an_archive_that_runs_the_same(toml, capsys):
     path = toml.with_suffix(".ssp")
     assert main(["ssp", str(toml), "-o", str(path)]) == 0
     said = capsys.readouterr()
@@ -39,7 +36,7 @@ def test_a_system_file_becomes_an_archive_that_runs_the_same(
     assert runs[0] == runs[1]
 
 
-def test_json(toml: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json(toml, capsys):
     path = toml.with_suffix(".ssp")
     assert main(["ssp", str(toml), "-o", str(path), "--json"]) == 0
     said = capsys.readouterr()
@@ -55,7 +52,7 @@ def test_json(toml: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ]
 
 
-def test_a_wrong_name_is_one_line(toml: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_name_is_one_line(toml, capsys):
     assert main(["ssp", str(toml), "-o", str(toml.with_suffix(".zip"))]) == 2
     said = capsys.readouterr()
     assert said.out == ""
@@ -63,9 +60,7 @@ def test_a_wrong_name_is_one_line(toml: Path, capsys: pytest.CaptureFixture[str]
     assert "must be a file named like system.ssp" in said.err
 
 
-def test_an_archive_without_a_step_says_how_to_give_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_archive_without_a_step_says_how_to_give_one(tmp_path, capsys):
     ssd = structure(system("top", component("a", "output y")))
     path = archive(tmp_path, ssd, {"a": fmu("output Real y -", step="")})
     assert main(["run", str(path)]) == 2

@@ -1,7 +1,5 @@
 """SSP 2.0: what it shares with 1.0 is read, what it adds is left out or refused by name."""
 
-from pathlib import Path
-
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.system.parts import Connection, Port
@@ -27,16 +25,16 @@ FMU = fmu(
 ELEMENT = component("a", "input u Float64 m; output y Float32; structuralParameter count Int32")
 
 
-def load(folder: Path, top: str, **more: str) -> System:
+def load(folder, top, **more):
     return System.load(archive(folder, structure(top, version="2.0", **more), {"a": FMU, "b": FMU}))
 
 
-def values(parameters: str) -> str:
+def values(parameters):
     """Its units may be those of the structure."""
     return bind(parameter_set(parameters, units="").replace('version="1.0"', 'version="2.0"'))
 
 
-def test_connections_units_and_transformations_are_those_of_1(tmp_path: Path) -> None:
+def test_connections_units_and_transformations_are_those_of_1(tmp_path):
     parts = ELEMENT + component("b", "input u Float64 mm".replace(" mm", " m"))
     loaded = load(tmp_path, system("top", parts, connect("a/y", "b/u", linear(2.0, 1.0))))
     assert loaded.connections == (Connection(Port("a", "y"), Port("b", "u"), 2.0, 1.0),)
@@ -45,13 +43,13 @@ def test_connections_units_and_transformations_are_those_of_1(tmp_path: Path) ->
     )
 
 
-def test_types_with_a_width_are_those_of_1(tmp_path: Path) -> None:
+def test_types_with_a_width_are_those_of_1(tmp_path):
     given = values("length Float64 250 mm; count UInt16 3")
     found = load(tmp_path, system("top", component("a", bindings=given))).components[0].values
     assert (found["length"], found["count"]) == (0.25, 3)
 
 
-def test_one_value_of_a_list_is_the_value(tmp_path: Path) -> None:
+def test_one_value_of_a_list_is_the_value(tmp_path):
     text = values("label String x").replace(
         '<ssv:String value="x"/>', '<ssv:String><ssv:Value value="two words"/></ssv:String>'
     )
@@ -59,7 +57,7 @@ def test_one_value_of_a_list_is_the_value(tmp_path: Path) -> None:
     assert loaded.components[0].values["label"] == "two words"
 
 
-def test_what_has_no_meaning_for_a_run_is_left_out_and_said(tmp_path: Path) -> None:
+def test_what_has_no_meaning_for_a_run_is_left_out_and_said(tmp_path):
     top = system("top", component("a", "input u; local state Float64; unspecified flange"))
     top = top.replace(
         'name="u" kind="input">',
@@ -119,7 +117,7 @@ def test_what_has_no_meaning_for_a_run_is_left_out_and_said(tmp_path: Path) -> N
         ),
     ],
 )
-def test_what_is_refused(tmp_path: Path, top: str, message: str) -> None:
+def test_what_is_refused(tmp_path, top, message):
     with pytest.raises(InputError, match=r"^hand\.ssp: SystemStructure.ssd:\d+: ") as error:
         load(tmp_path, top)
     assert message in str(error.value)

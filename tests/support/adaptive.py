@@ -1,29 +1,18 @@
 """The grasp with the adaptive controller, of native FMUs: a run in milliseconds."""
 
-from collections.abc import Mapping
-from pathlib import Path
-
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.interface.interface import Value
-from grasp_cosim.recording.result import Result
 
 Pair = tuple[float, float]
 
 
-def adaptive_grasp(natives: Path) -> System:
+def adaptive_grasp(natives):
     """The built-in system, native, its controller swapped."""
     grasp = System.load(SYSTEM, natives)
     return grasp.swap("controller", natives / "GraspControllerAdaptive.fmu")
 
 
-def values_of(
-    reflectance: Pair = (1.0, 1.0),
-    x_m: float = 0.03,
-    width: float = 0.07,
-    mass: Pair = (0.5, 0.5),
-    stiffness: float = 98.0,
-) -> dict[str, Value]:
+def values_of(reflectance=(1.0, 1.0), x_m=0.03, width=0.07, mass=(0.5, 0.5), stiffness=98.0):
     """The values of a grasp that is the published one but for what is given, in SI units."""
     return {
         "sensor_1.reflectance": reflectance[0],
@@ -36,11 +25,11 @@ def values_of(
     }
 
 
-def run(grasp: System, values: Mapping[str, Value], step: float, stop: float) -> Result:
+def run(grasp, values, step, stop):
     """A run with these values; step and stop in s."""
     return simulate(grasp.with_values(values), step=step, stop=stop)
 
 
-def last(result: Result, name: str) -> Pair:
+def last(result, name):
     """The last values of a variable that each finger has."""
     return float(result[f"{name}[1]"][-1]), float(result[f"{name}[2]"][-1])

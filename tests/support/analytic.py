@@ -6,9 +6,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 
-def bouncing_ball(
-    time: Floats, e: float = 0.7, v_min: float = 0.1, h: float = 1.0, g: float = 9.81
-) -> tuple[Floats, Floats]:
+def bouncing_ball(time, e=0.7, v_min=0.1, h=1.0, g=9.81):
     """Height and speed, flight by flight."""
     begin, up = -float(np.sqrt(2.0 * h / g)), float(np.sqrt(2.0 * h * g))
     height, speed = np.zeros_like(time), np.zeros_like(time)
@@ -21,7 +19,7 @@ def bouncing_ball(
     return height, speed
 
 
-def held_input(k: float, step: float, inputs: Floats, start: float) -> Floats:
+def held_input(k, step, inputs, start):
     """The states of x' = -k x + u at the communication points, where u is held over each step."""
     states = [start]
     for u in inputs[:-1]:

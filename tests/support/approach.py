@@ -1,11 +1,9 @@
 """Samples of the adaptive controller: any, and those of an approach by Eq. (9)."""
 
-from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 from grasp_controller import adaptive, series
-from grasp_controller.adaptive import Inputs, Outputs, Params, State
+from grasp_controller.adaptive import Inputs
 from hypothesis import strategies as st
 
 Pair = tuple[float, float]
@@ -18,14 +16,12 @@ H = 1e-2
 """s, the step of an approach."""
 
 
-def intensity(gap: float, alpha: float, n: float = N) -> float:
+def intensity(gap, alpha, n=N):
     """Eq. (9), V; K is the same at 100 mm for every n."""
     return float(alpha * K * 0.1 ** (n - N) / (gap + L_0) ** n)
 
 
-def approach(
-    alpha: Pair, gaps: Pair = (0.08, 0.08), end: float = 5e-3, count: int = 100, n: float = N
-) -> list[Inputs]:
+def approach(alpha, gaps=(0.08, 0.08), end=5e-3, count=100, n=N):
     """Both fingers from their gaps in m to the gap `end`, evenly in steps of H; faces at 35 mm."""
     v_1, v_2 = ((gap - end) / (count * H) for gap in gaps)
     samples = []
@@ -36,13 +32,13 @@ def approach(
     return samples
 
 
-def relit(u: Inputs, right: Callable[[float], float], left: Callable[[float], float]) -> Inputs:
+def relit(u, right, left):
     """A sample with other intensities."""
     xi_1, xi_2 = u.intensity
     return u._replace(intensity=(right(xi_1), left(xi_2)))
 
 
-def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Outputs]]:
+def run(p, samples, h=H):
     """From the first sample on, the state and outputs at each."""
     x = adaptive.initial_state(p, samples[0])
     trace = [(x, adaptive.outputs(p, x, samples[0]))]
@@ -52,7 +48,7 @@ def run(p: Params, samples: list[Inputs], h: float = H) -> list[tuple[State, Out
     return trace
 
 
-def published(p: Params, samples: list[Inputs], h: float = H) -> list[series.Outputs]:
+def published(p, samples, h=H):
     """The outputs at each sample of the published law with the same layers."""
     three = series.Params(p.simultaneous_contact, p.impact_reduction, p.contact_force)
     x = series.initial_state(three, samples[0])
@@ -63,18 +59,18 @@ def published(p: Params, samples: list[Inputs], h: float = H) -> list[series.Out
     return trace
 
 
-def swapped(pair: Pair) -> Pair:
+def swapped(pair):
     """A signal of both fingers, seen from behind the gripper."""
     first, second = pair
     return -second, -first
 
 
-def mirrored(u: Inputs) -> Inputs:
+def mirrored(u):
     """What is measured from behind the gripper."""
     return Inputs(swapped(u.position), swapped(u.velocity), u.intensity[::-1])
 
 
-def assert_mirrored(y: series.Outputs | Outputs, z: series.Outputs | Outputs) -> None:
+def assert_mirrored(y, z):
     """The one is exactly the other from behind the gripper, in all that both laws put out."""
     assert z.force == swapped(y.force)
     assert z.target_position == -y.target_position
@@ -83,14 +79,14 @@ def assert_mirrored(y: series.Outputs | Outputs, z: series.Outputs | Outputs) ->
     assert z.impact_reduction_force == swapped(y.impact_reduction_force)
 
 
-def numbers(values: Any) -> list[float]:
+def numbers(values):
     """All numbers of samples or of outputs."""
     if isinstance(values, tuple):
         return [x for value in values for x in numbers(value)]
     return [values]
 
 
-def pairs(low: float, high: float) -> st.SearchStrategy[Pair]:
+def pairs(low, high):
     """Two numbers of a range."""
     return st.tuples(st.floats(low, high), st.floats(low, high))
 

@@ -6,7 +6,6 @@ a fresh clone, where what is kept is built; a machine twice as slow keeps the li
 """
 
 import os
-from collections.abc import Iterator
 
 import pytest
 from _pytest.runner import runtestprotocol
@@ -19,7 +18,7 @@ LONGER = {"slow", "platforms", "interop"}
 
 
 @pytest.hookimpl(trylast=True)  # when the profile is chosen
-def pytest_configure(config: pytest.Config) -> None:
+def pytest_configure(config):
     """Count where CI is set, unless a property is tried on more examples than usual."""
     if "CI" in os.environ and settings.get_current_profile_name() == "usual":
         config.pluginmanager.register(_Budget(hasattr(config, "workerinput")))
@@ -28,14 +27,14 @@ def pytest_configure(config: pytest.Config) -> None:
 class _Budget:
     """What the tests took; with pytest-xdist, whose main process waits for the others."""
 
-    def __init__(self, other: bool) -> None:
+    def __init__(self, other):
         self._other = other
         self._quick = True
         self._last = 0.0
         self._over = ""
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_call(self) -> Iterator[None]:
+    def pytest_runtest_call(self):
         before = _used()
         try:
             return (yield)
@@ -43,9 +42,7 @@ class _Budget:
             self._last = _used() - before
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(
-        self, item: pytest.Item, nextitem: pytest.Item | None
-    ) -> Iterator[None]:
+    def pytest_runtest_protocol(self, item, nextitem):
         """One that takes long may have built what is kept: if so, not a second time."""
         self._last = 0.0
         done = yield
@@ -57,21 +54,21 @@ class _Budget:
                 item.ihook.pytest_runtest_logreport(report=report)
         return done
 
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+    def pytest_runtest_logreport(self, report):
         self._quick = self._quick and not LONGER & set(report.keywords)
 
     @pytest.hookimpl(trylast=True)  # when the others have ended
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+    def pytest_sessionfinish(self, session):
         if self._quick and not self._other and (time := _used()) > ALL:
             self._over = f"{time:.0f} s of processor time; the quick tests: at most {ALL:g} s"
             if session.exitstatus == pytest.ExitCode.OK:
                 session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
-    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+    def pytest_terminal_summary(self, terminalreporter):
         if self._over:
             terminalreporter.write_line(self._over, red=True)
 
 
-def _used() -> float:
+def _used():
     """Processor time in s of this process and of those that it has waited for."""
     return sum(os.times()[:4])

@@ -4,10 +4,10 @@ import os
 import struct
 import subprocess
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
@@ -34,7 +34,7 @@ CONNECTIONS = [
 ]
 """Of the grasp: FMUs by component; source, output, target, input."""
 
-BENCH: dict[str, Any] = {
+BENCH = {
     **GRASP["presets"]["bench"],
     "sensor_1.pattern.enabled": True,
     "sensor_2.surface": 4,
@@ -60,16 +60,16 @@ class Unpacked:
     """real, boolean or integer, by the name of a variable; the references are their positions."""
     causalities: Mapping[str, str]
 
-    def reference(self, name: str) -> int:
+    def reference(self, name):
         return list(self.kinds).index(name)
 
-    def outputs(self) -> list[str]:
+    def outputs(self):
         return [name for name, causality in self.causalities.items() if causality == "output"]
 
-    def sources(self) -> dict[str, bytes]:
+    def sources(self):
         return {path.name: path.read_bytes() for path in (self.folder / "sources").iterdir()}
 
-    def binary(self, place: str = "") -> Path:
+    def binary(self, place=""):
         """The library of a folder in binaries/, by default that of this machine."""
         place = place or (here().folder if self.fmi == 2 else here().tuple)
         (found,) = (self.folder / "binaries" / place).iterdir()
@@ -82,7 +82,7 @@ KINDS = {
 }  # fmt: skip
 
 
-def unpacked(path: Path, folder: Path) -> Unpacked:
+def unpacked(path, folder):
     """Unpack an FMU, and read what a host needs to know."""
     with ZipFile(path) as archive:
         archive.extractall(folder)
@@ -105,12 +105,12 @@ def unpacked(path: Path, folder: Path) -> Unpacked:
 # The host
 
 
-def bits(value: float) -> str:
+def bits(value):
     """A number as the host reads it."""
     return struct.pack(">d", value).hex()
 
 
-def number(word: str) -> float:
+def number(word):
     """A number that the host wrote."""
     return float(struct.unpack(">d", bytes.fromhex(word))[0])
 
@@ -133,7 +133,7 @@ class Host:
     wrapper: tuple[str, ...] = ()
     environment: Mapping[str, str] = field(default_factory=dict)
 
-    def run(self, *scripts: "Script", folder: Path, **environment: str) -> list[list[Answer]]:
+    def run(self, *scripts, folder, **environment):
         """Follow scripts in as many threads; the answers to each. The host must end well."""
         words = []
         for i, script in enumerate(scripts):
@@ -157,7 +157,7 @@ RAW = ("utf-8", "surrogateescape")
 """Names of instances need not be text."""
 
 
-def _answers(text: str) -> Iterator[Answer]:
+def _answers(text):
     said = []
     for line in text.splitlines():
         words = line.split("\t")
@@ -173,10 +173,10 @@ def _answers(text: str) -> Iterator[Answer]:
 class Script:
     """Commands for the host, in their order."""
 
-    def __init__(self) -> None:
-        self.lines: list[str] = []
+    def __init__(self):
+        self.lines = []
 
-    def add(self, *words: object) -> "Script":
+    def add(self, *words: object):
         self.lines.append("\t".join("-" if word is None else str(word) for word in words))
         return self
 
@@ -195,27 +195,21 @@ class Grasp:
     `plant` and `controller` are the FMUs of these; values are by COMPONENT.VARIABLE.
     """
 
-    def __init__(
-        self,
-        parts: Mapping[str, Part],
-        values: Mapping[str, Any] | None = None,
-        plant: str = "GripperPlant",
-        controller: str = "GraspController",
-    ) -> None:
+    def __init__(self, parts, values=None, plant="GripperPlant", controller="GraspController"):
         names = {**COMPONENTS, "plant": plant, "controller": controller}
         self.parts = {component: parts[name] for component, name in names.items()}
         self.values = values or {}
         self.index = {component: i for i, component in enumerate(self.parts)}
 
-    def load(self, script: Script) -> None:
+    def load(self, script):
         for component, part in self.parts.items():
             script.add("load", self.index[component], part.fmu.fmi, part.library)
 
-    def unload(self, script: Script) -> None:
+    def unload(self, script):
         for i in self.index.values():
             script.add("unload", i)
 
-    def make(self, script: Script, callbacks: str = "full", resources: str | None = None) -> None:
+    def make(self, script, callbacks="full", resources=None):
         """Make the instances, connect them, and say what is recorded."""
         for component, part in self.parts.items():
             i, fmu = self.index[component], part.fmu
@@ -227,7 +221,7 @@ class Grasp:
                 from_.reference(output),
             )  # fmt: skip
 
-    def initialise(self, script: Script) -> None:
+    def initialise(self, script):
         for name, value in self.values.items():
             component, _, variable = name.partition(".")
             fmu = self.parts[component].fmu
@@ -241,7 +235,7 @@ class Grasp:
         for i in self.index.values():
             script.add("leave", i)
 
-    def record(self, script: Script, rows: Path) -> None:
+    def record(self, script, rows):
         """Record from now on; first of all the outputs of now."""
         for component, part in self.parts.items():
             for name in part.fmu.outputs():
@@ -250,16 +244,16 @@ class Grasp:
                 )
         script.add("rows", rows).add("row")
 
-    def end(self, script: Script) -> None:
+    def end(self, script):
         for i in self.index.values():
             script.add("terminate", i).add("free", i)
 
-    def all_of(self, script: Script, command: str, *words: object) -> None:
+    def all_of(self, script, command, *words):
         """A command for each instance, whose number is its first word, and a state's the second."""
         for i in self.index.values():
             script.add(command, i, i, *words)
 
-    def whole(self, rows: Path, steps: int, h: float) -> Script:
+    def whole(self, rows, steps, h):
         """A whole run, from load to unload."""
         script = Script()
         self.load(script)
@@ -271,16 +265,16 @@ class Grasp:
         self.unload(script)
         return script
 
-    def read(self, rows: Path) -> Rows:
+    def read(self, rows):
         """What was recorded, one row for each communication point."""
         return np.fromfile(rows).reshape(-1, len(self.columns()))
 
-    def columns(self) -> list[str]:
+    def columns(self):
         """The outputs in a row, as COMPONENT.VARIABLE."""
         return [f"{c}.{name}" for c, part in self.parts.items() for name in part.fmu.outputs()]
 
 
-def good(answers: Iterable[Answer]) -> None:
+def good(answers):
     """Every command was answered with OK, and nothing was logged."""
     assert [answer for answer in answers if answer.status or answer.said] == []
 
@@ -289,7 +283,7 @@ def good(answers: Iterable[Answer]) -> None:
 
 
 class _Block:
-    def __init__(self, name: str, values: Mapping[str, Any]) -> None:
+    def __init__(self, name, values):
         self.block = blocks()[name]
         fields = declared(self.block)
         self.names = {v.name: i for i, v in enumerate(variables(fields))}
@@ -299,29 +293,23 @@ class _Block:
         self.params = build_params(self.block, fields, self.values)
         self.pack, self.unpack = packer(self.block.Inputs, fields), unpacker(fields)
         self.first_output = sum(len(f.names) for f in fields if f.causality == "input")
-        self.x: Any = None
+        self.x = None
 
-    def advance(self, h: float) -> None:
+    def advance(self, h):
         """A step of h seconds; without one, the initial state."""
         u = self.pack(self.values)
         if h:
             self.x = self.block.step(self.params, self.x, u, h)
         else:
             self.x = self.block.initial_state(self.params, u)
-        self.outputs: Sequence[float] = self.unpack(self.block.outputs(self.params, self.x, u))
+        self.outputs = self.unpack(self.block.outputs(self.params, self.x, u))
         end = self.first_output + len(self.outputs)
         self.values[self.first_output : end] = self.outputs
 
 
-def rows_in_python(
-    values: Mapping[str, Any],
-    steps: int,
-    h: float,
-    plant: str = "GripperPlant",
-    controller: str = "GraspController",
-) -> Rows:
+def rows_in_python(values, steps, h, plant="GripperPlant", controller="GraspController"):
     """The outputs that the blocks have at each communication point, in a plain loop in Python."""
-    own: dict[str, dict[str, Any]] = {component: {} for component in COMPONENTS}
+    own = {component: {} for component in COMPONENTS}
     for name, value in values.items():
         component, _, variable = name.partition(".")
         own[component][variable] = value

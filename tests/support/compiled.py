@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -15,7 +14,7 @@ import fmpy
 HEADERS = Path(fmpy.__file__).with_name("c-code")
 
 
-def compile_c(command: Sequence[str | Path], out: Path) -> Path:
+def compile_c(command, out):
     """What the compiler makes of C files at out, unless it has made it before, then that again.
 
     It must say nothing. The same are the same options and, after the preprocessor, the same text.
@@ -39,9 +38,7 @@ def compile_c(command: Sequence[str | Path], out: Path) -> Path:
 
 
 @cache
-def shared_library(
-    *sources: Path, code: str = "", options: tuple[str, ...] = ("-lm",), asked: type | None = None
-) -> bytes:
+def shared_library(*sources, code="", options=("-lm",), asked=None):
     """The library of these sources, and of more code; options come behind them.
 
     With asked, a class of FMPy, it has all functions that this looks for: what the sources lack
@@ -58,7 +55,7 @@ def shared_library(
         return compile_c(command, out).read_bytes()
 
 
-def pack(path: Path, version: str, name: str, description: str, library: bytes) -> Path:
+def pack(path, version, name, description, library):
     """The FMU at path, with a library of that name for this machine unless that is empty."""
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
@@ -68,7 +65,7 @@ def pack(path: Path, version: str, name: str, description: str, library: bytes) 
     return path
 
 
-def binary(version: str, name: str) -> str:
+def binary(version, name):
     """Where an FMU of that version of FMI has its library for this machine."""
     platform = fmpy.platform if version == "2.0" else fmpy.platform_tuple
     return f"binaries/{platform}/{name}{fmpy.sharedLibraryExtension}"

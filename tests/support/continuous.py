@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import exp, tanh
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from scipy.integrate import solve_ivp
 
@@ -94,15 +94,15 @@ class Motion(NamedTuple):
     a: float
 
 
-def solve(p: Grasp, stop: float, *, to_the_end: bool = False) -> Solution:
+def solve(p, stop, *, to_the_end=False):
     """The grasp up to stop in s; unless to_the_end, only until both fingers have touched."""
     x_1, x_2 = p.x_init
-    y: State = [x_1, 0.0, x_2, 0.0, x_1, 0.0, x_2, 0.0, 0.5 * (x_1 + x_2), 0.0]
+    y = [x_1, 0.0, x_2, 0.0, x_1, 0.0, x_2, 0.0, 0.5 * (x_1 + x_2), 0.0]
     learning = _learning(p)
     y = [*y, *learning.start()] if learning else y
     t, touching = 0.0, (False, False)
-    times: list[float | None] = [None, None]
-    speeds: list[float | None] = [None, None]
+    times = [None, None]
+    speeds = [None, None]
     while t < stop and (to_the_end or None in times):
         t, y, touching = _run_to_event(p, t, y, touching, stop)
         for j in (0, 1):
@@ -114,9 +114,7 @@ def solve(p: Grasp, stop: float, *, to_the_end: bool = False) -> Solution:
     return Solution((times[0], times[1]), (speeds[0], speeds[1]), (f_1, f_2), target.x, beta)
 
 
-def _run_to_event(
-    p: Grasp, t: float, y: State, touching: tuple[bool, bool], stop: float
-) -> tuple[float, State, tuple[bool, bool]]:
+def _run_to_event(p, t, y, touching, stop):
     """Integrate until a finger touches or leaves, or until stop; and who touches from there on."""
     events = [_event(p, j, touching[j]) for j in (0, 1)]
     solution = solve_ivp(
@@ -136,19 +134,19 @@ def _run_to_event(
     return t, end, (touching[0] != changed[0], touching[1] != changed[1])
 
 
-def _event(p: Grasp, j: int, touching: bool) -> Event:
+def _event(p, j, touching):
     """A function that falls through zero where the finger leaves or touches."""
 
-    def room(t: float, y: State) -> float:
+    def room(t, y):
         gap, _ = _gap(p, y, j)
         return REBOUND - gap if touching else gap
 
-    event: Any = room
+    event = room
     event.terminal, event.direction = True, -1.0
     return room
 
 
-def _slope(p: Grasp, y: State, touching: tuple[bool, bool]) -> list[float]:
+def _slope(p, y, touching):
     """The derivative of the state."""
     target, (virtual_1, virtual_2) = _targets(p, y, touching)
     a_1 = _acceleration(p, y, 0, virtual_1, touching[0])
@@ -159,7 +157,7 @@ def _slope(p: Grasp, y: State, touching: tuple[bool, bool]) -> list[float]:
 
 
 @cache
-def _learning(p: Grasp) -> Learning | None:
+def _learning(p):
     """What is learnt from the fingers' first positions on."""
     if p.adaptive is None:
         return None
@@ -167,22 +165,22 @@ def _learning(p: Grasp) -> Learning | None:
     return Learning(p.adaptive, (_intensity(p, y, 0), _intensity(p, y, 1)), (x_1, -x_2))
 
 
-def _learning_rates(p: Grasp, learning: Learning, y: State) -> list[float]:
+def _learning_rates(p, learning, y):
     ways, seen = (y[0], -y[2]), (_intensity(p, y, 0), _intensity(p, y, 1))
     return learning.rates(y[LEARNT], ways, seen, y[1] - y[3], _hold(p, learning, y))
 
 
-def _hold(p: Grasp, learning: Learning, y: State) -> float:
+def _hold(p, learning, y):
     return learning.hold(y[LEARNT], (_command(p, y, 0), _command(p, y, 1)))
 
 
-def _command(p: Grasp, y: State, j: int) -> float:
+def _command(p, y, j):
     """Eq. (7)."""
     x, v, virtual, virtual_rate = y[2 * j], y[2 * j + 1], y[4 + 2 * j], y[5 + 2 * j]
     return -p.D_i * (v - virtual_rate) - p.K_i * (x - virtual)
 
 
-def _virtual_force(p: Grasp, y: State) -> float:
+def _virtual_force(p, y):
     """f_s of Eq. (2), or of Eq. (2')."""
     xi_1, xi_2 = (_intensity(p, y, j) for j in (0, 1))
     learning = _learning(p)
@@ -193,7 +191,7 @@ def _virtual_force(p: Grasp, y: State) -> float:
     return (1.0 - _hold(p, learning, y)) * p.K_s * tanh((xi_1 - xi_2) / (xi_1 + xi_2))
 
 
-def _targets(p: Grasp, y: State, touching: tuple[bool, bool]) -> tuple[Motion, list[Motion]]:
+def _targets(p, y, touching):
     """x_v2 of Eqs. (2) to (4), and from it x_vj1 of Eqs. (5) and (6).
 
     Case 1 puts x_d in the place of x_v2, Case 0 in that of x_vj1; x_d' = x_d'' = 0 by definition.
@@ -214,32 +212,31 @@ def _targets(p: Grasp, y: State, touching: tuple[bool, bool]) -> tuple[Motion, l
     return target, virtual
 
 
-def _gap(p: Grasp, y: State, j: int) -> Pair:
+def _gap(p, y, j):
     """l_j and its rate: from the surface at x_m +- W/2 outwards."""
     opening = OPENING[j]
     return opening * (y[2 * j] - p.x_m) - 0.5 * p.W, opening * y[2 * j + 1]
 
 
-def _intensity(p: Grasp, y: State, j: int) -> float:
+def _intensity(p, y, j):
     """Eq. (9); no gap is less than none."""
     gap, _ = _gap(p, y, j)
-    intensity: float = p.K * p.reflectance[j] / (max(gap, 0.0) + p.l_0) ** p.n
-    return intensity
+    return p.K * p.reflectance[j] / (max(gap, 0.0) + p.l_0) ** p.n
 
 
-def _relative_intensity_rate(p: Grasp, y: State, j: int) -> float:
+def _relative_intensity_rate(p, y, j):
     """xi'/xi, where xi' is the derivative of Eq. (9) along the motion of a free finger."""
     gap, rate = _gap(p, y, j)
     return -p.n * rate / (gap + p.l_0)
 
 
-def _actuator_force(p: Grasp, y: State, j: int, virtual: Motion) -> float:
+def _actuator_force(p, y, j, virtual):
     """Eq. (7), less viscous friction."""
     x, v = y[2 * j], y[2 * j + 1]
     return -p.D_i * (v - virtual.v) - p.K_i * (x - virtual.x) - p.B[j] * v
 
 
-def _contact_force(p: Grasp, y: State, j: int, virtual: Motion, touching: bool) -> float:
+def _contact_force(p, y, j, virtual, touching):
     """What makes the gap obey g'' + 2 alpha g' + beta^2 g = 0, along x; never a pull.
 
     Where it reaches zero within the surface the slope has a kink, not a jump: the solver's error
@@ -253,7 +250,7 @@ def _contact_force(p: Grasp, y: State, j: int, virtual: Motion, touching: bool) 
     return OPENING[j] * max(0.0, p.m[j] * wanted - actuator)
 
 
-def _acceleration(p: Grasp, y: State, j: int, virtual: Motion, touching: bool) -> float:
+def _acceleration(p, y, j, virtual, touching):
     """Eq. (1)."""
     force = _actuator_force(p, y, j, virtual) + _contact_force(p, y, j, virtual, touching)
     return force / p.m[j]

@@ -5,7 +5,6 @@ those of the moment. A finger's line is counted from where it starts, in millime
 first intensity, so that the solver's tolerances mean the same in the dark: no unit is left in it.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log, sqrt
 from typing import NamedTuple
@@ -65,18 +64,18 @@ class Learning:
     xi_0: Pair
     s_0: Pair
 
-    def start(self) -> list[float]:
+    def start(self):
         """Nothing learnt, both fingers at rest."""
         line = [1.0, 0.0, *[0.0] * (SIZE - 2)]
         return [*line, *line, 0.0]
 
-    def hold(self, z: Sequence[float], u: Pair) -> float:
+    def hold(self, z, u):
         """h, from the forces u in N."""
         squeeze, w = max(0.0, 0.5 * (u[1] - u[0])), z[-1]
         pressed = squeeze**2 / (squeeze**2 + self.p.P_0**2)
         return pressed * self.p.w_0**2 / (self.p.w_0**2 + w**2)
 
-    def beta(self, z: Sequence[float]) -> Pair:
+    def beta(self, z):
         """Return ln(alpha_1/alpha_2) as learnt, and its standard deviation."""
         line_1, line_2 = _lines(z)
         kappa_1, kappa_2 = _fit(line_1), _fit(line_2)
@@ -89,15 +88,15 @@ class Learning:
         gain = prior / (prior + variance)
         return gain * min(max(fitted, -most), most), self.p.sigma_b * sqrt(1.0 - gain)
 
-    def rates(self, z: Sequence[float], s: Pair, xi: Pair, closing: float, h: float) -> list[float]:
+    def rates(self, z, s, xi, closing, h):
         """The derivative of the state, at ways s in m and intensities xi in V."""
-        rates: list[float] = []
+        rates = []
         for j, line in enumerate(_lines(z)):
             way = (s[j] - self.s_0[j]) / MILLIMETRE
             rates += self._line_rates(line, way, xi[j] / self.xi_0[j], 1.0 - h)
         return [*rates, (closing - z[-1]) / self.p.T_w]
 
-    def _line_rates(self, line: Line, s: float, xi: float, believed: float) -> list[float]:
+    def _line_rates(self, line, s, xi, believed):
         n, T_f = self.p.n, self.p.T_f
         xi_rate, s_rate = (xi - line.xi) / T_f, (s - line.s) / T_f
         y = line.xi ** (-1.0 / n)
@@ -112,7 +111,7 @@ class Learning:
         sums = [w, w * at, w * y, w * at * at, w * at * y]
         return [xi_rate, s_rate, *sums, noise, noise * at, noise * at * at]
 
-    def _variance(self, line: Line, kappa: float, xi_0: float) -> float:
+    def _variance(self, line, kappa, xi_0):
         """V_j: white noise of the density 2·T_f·sigma^2 in what the slope is made of."""
         mean = line.sum_s / line.weight
         q = line.noise_ss - 2.0 * mean * line.noise_s + mean**2 * line.noise
@@ -120,16 +119,16 @@ class Learning:
         return 2.0 * self.p.T_f * relative**2 * q
 
 
-def _lines(z: Sequence[float]) -> tuple[Line, Line]:
+def _lines(z):
     return Line(*z[:SIZE]), Line(*z[SIZE : 2 * SIZE])
 
 
-def _spread(line: Line) -> float:
+def _spread(line):
     """C_ss."""
     return line.sum_ss - line.sum_s**2 / line.weight if line.weight > 0.0 else 0.0
 
 
-def _fit(line: Line) -> float | None:
+def _fit(line):
     """kappa = C_sy/C_ss, in the finger's own units; None as long as there is no line."""
     spread = _spread(line)
     if spread < NOTHING_YET:

@@ -16,25 +16,25 @@ class Parameter:
     default: Any
 
     @property
-    def valid(self) -> str:
+    def valid(self):
         """The end of the message about another number."""
         in_unit = f" {self.unit}" if self.unit else ""
         return f"must be from {self.low:g} to {self.high:g}{in_unit}"
 
-    def variants(self, value: float) -> list[Any]:
+    def variants(self, value):
         """The default with value in place of the number, or of either number of the pair."""
         if isinstance(self.default, tuple):
             first, second = self.default
             return [(value, second), (first, value)]
         return [value]
 
-    def invalid(self) -> list[tuple[float, Any]]:
+    def invalid(self):
         """Numbers that are not in the range, each with the parameter values that contain it."""
         outside = (nextafter(self.low, -inf), nextafter(self.high, inf), nan, inf, -inf)
         return [(number, value) for number in outside for value in self.variants(number)]
 
 
-def parameters(block: type[Any]) -> list[Parameter]:
+def parameters(block):
     """The parameters of a block, or of a part of one, that are numbers; not those of its parts."""
     default = block()
     found = []

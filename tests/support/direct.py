@@ -20,15 +20,7 @@ Row = tuple[rigid.Outputs, tuple[optics.Outputs, optics.Outputs], series.Outputs
 """All outputs of one communication point."""
 
 
-def closed_loop(
-    plant: rigid.Params,
-    sensors: Sensors,
-    controller: series.Params,
-    step: float,
-    steps: int,
-    *,
-    until_contact: bool = False,
-) -> Signals:
+def closed_loop(plant, sensors, controller, step, steps, *, until_contact=False):
     """Every output at every communication point, steps of step s; until_contact stops as soon as
     both fingers have touched. step must be a whole number of nanoseconds.
     """
@@ -38,7 +30,7 @@ def closed_loop(
     u_c = _samples(y_p, y_s)
     x_c = series.initial_state(controller, u_c)
     y_c = series.outputs(controller, x_c, u_c)
-    rows: list[Row] = [(y_p, y_s, y_c)]
+    rows = [(y_p, y_s, y_c)]
     touched_1, touched_2 = y_p.contact
     for _ in range(steps):
         if until_contact and touched_1 and touched_2:
@@ -56,7 +48,7 @@ def closed_loop(
     return {"time": np.arange(len(rows)) * round(step * 1e9) / 1e9, **_signals(rows)}
 
 
-def _sense(sensors: Sensors, y: rigid.Outputs) -> tuple[optics.Outputs, optics.Outputs]:
+def _sense(sensors, y):
     """The optics have no memory, so their outputs are all there is to them."""
     p_1, p_2 = sensors
     gap_1, gap_2 = y.gap
@@ -66,12 +58,12 @@ def _sense(sensors: Sensors, y: rigid.Outputs) -> tuple[optics.Outputs, optics.O
     )
 
 
-def _samples(y_p: rigid.Outputs, y_s: tuple[optics.Outputs, optics.Outputs]) -> series.Inputs:
+def _samples(y_p, y_s):
     y_1, y_2 = y_s
     return series.Inputs(y_p.position, y_p.velocity, (y_1.intensity, y_2.intensity))
 
 
-def _signals(rows: list[Row]) -> Signals:
+def _signals(rows):
     """The rows as columns under the names of the FMUs' outputs."""
     plants, sensed, controllers = zip(*rows, strict=True)
     first, second = zip(*sensed, strict=True)
@@ -83,8 +75,8 @@ def _signals(rows: list[Row]) -> Signals:
     }
 
 
-def _columns(component: str, outputs: tuple[Any, ...]) -> Signals:
-    columns: Signals = {}
+def _columns(component, outputs):
+    columns = {}
     for name in outputs[0]._fields:
         values = np.array([getattr(y, name) for y in outputs])
         if values.ndim == 1:

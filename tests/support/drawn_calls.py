@@ -2,7 +2,6 @@
 
 import ctypes
 from dataclasses import dataclass, field
-from typing import Any
 
 from hypothesis import strategies as st
 
@@ -36,49 +35,48 @@ class Drawn:
     time: float = 0.0
     states: list[State] = field(default_factory=list)
 
-    def call(self, action: str, *drawn: Any) -> int:
+    def call(self, action, *drawn):
         """One drawn call; returns its status."""
-        status: int = getattr(self, f"_{action}")(*drawn)
-        return status
+        return getattr(self, f"_{action}")(*drawn)
 
-    def _setup(self, start: float) -> int:
+    def _setup(self, start):
         status = self.instance.setup(start)
         self.time = start if status == OK else self.time
         return status
 
-    def _enter(self) -> int:
+    def _enter(self):
         return self.instance.enter()
 
-    def _exit(self) -> int:
+    def _exit(self):
         return self.instance.exit()
 
-    def _terminate(self) -> int:
+    def _terminate(self):
         return self.instance.call("Terminate")
 
-    def _reset(self) -> int:
+    def _reset(self):
         self.time = 0.0
         return self.instance.call("Reset")
 
-    def _step(self, time: float, size: float) -> int:
+    def _step(self, time, size):
         return self.instance.step(time, size)
 
-    def _next(self, size: float) -> int:
+    def _next(self, size):
         status = self.instance.step(self.time, size)
         self.time += size if status == OK else 0.0
         return status
 
-    def _set(self, references: list[int], values: list[float]) -> int:
+    def _set(self, references, values):
         known = self._known(references)
         return self.instance.set_real(known, values[: len(known)])
 
-    def _input(self, value: float) -> int:
+    def _input(self, value):
         return self.instance.set({self.instance.fmu.names("input")[0]: value})
 
-    def _known(self, references: list[int]) -> list[int]:
+    def _known(self, references):
         """Without that of the time, which is a variable in FMI 3.0 alone."""
         return [vr for vr in references if vr != len(self.instance.fmu.references)]
 
-    def _assign(self, which: int, value: float) -> int:
+    def _assign(self, which, value):
         """Any variable, in its own type."""
         names = list(self.instance.fmu.references)
         name = names[which % len(names)]
@@ -86,46 +84,46 @@ class Drawn:
             value = min(max(value, -2e9), 2e9) if value == value else 0.0
         return self.instance.assign({name: value})
 
-    def _get(self, references: list[int]) -> int:
+    def _get(self, references):
         return self.instance.get_real(self._known(references))[0]
 
-    def _get_boolean(self, references: list[int]) -> int:
+    def _get_boolean(self, references):
         return self.instance.get_boolean(self._known(references))[0]
 
-    def _set_boolean(self, references: list[int]) -> int:
+    def _set_boolean(self, references):
         known = self._known(references)
         return self.instance.set_boolean(known, [True] * len(known))
 
-    def _get_integer(self, references: list[int]) -> int:
+    def _get_integer(self, references):
         return self._array("GetInteger", ctypes.c_int, references)
 
-    def _get_string(self, references: list[int]) -> int:
+    def _get_string(self, references):
         return self._array("GetString", ctypes.c_char_p, references)
 
-    def _array(self, function: str, kind: Any, references: list[int]) -> int:
+    def _array(self, function, kind, references):
         references = self._known(references)
         n = len(references)
         vector = (ctypes.c_uint * n)(*references)
         return self.instance.call(function, vector, ctypes.c_size_t(n), (kind * n)())
 
-    def _save(self) -> int:
+    def _save(self):
         self.states.append(self.instance.state())
         return OK
 
-    def _restore(self) -> int:
+    def _restore(self):
         return self.instance.restore(self.states[-1]) if self.states else OK
 
-    def _bytes(self) -> int:
+    def _bytes(self):
         if not self.states:
             return OK
         status, state = self.instance.from_bytes(self.states[-1].to_bytes())
         self.states.append(state)
         return status
 
-    def _damage(self, data: bytes) -> int:
+    def _damage(self, data):
         status = self.instance.from_bytes(data)[0]
         assert status == self.instance.fmu.refused
         return status
 
-    def _logging(self, on: bool) -> int:
+    def _logging(self, on):
         return self.instance.call("SetDebugLogging", on, ctypes.c_size_t(0), None)

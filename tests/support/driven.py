@@ -2,13 +2,13 @@
 
 from math import sin
 
-from .fmi2 import OK, Instance
+from .fmi2 import OK
 
 H = 1e-3
 """A step in s."""
 
 
-def drive(instance: Instance, first: int, last: int, h: float = H) -> list[float]:
+def drive(instance, first, last, h=H):
     """Steps from first to last with inputs that change; returns all outputs."""
     seen = []
     for k in range(first, last):

@@ -2,20 +2,19 @@
 
 import socket
 import threading
-from types import TracebackType
 
 
 class EchoPeer:
     """Echoes in a thread until the with statement ends; received holds (sender's port, data)."""
 
-    def __init__(self, port: int = 0) -> None:
+    def __init__(self, port=0):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", port))
-        self.address: tuple[str, int] = self.socket.getsockname()
-        self.received: list[tuple[int, bytes]] = []
+        self.address = self.socket.getsockname()
+        self.received = []
         self._thread = threading.Thread(target=self._echo)
 
-    def _echo(self) -> None:
+    def _echo(self):
         while True:
             data, sender = self.socket.recvfrom(65_535)
             if sender == self.address:
@@ -23,19 +22,17 @@ class EchoPeer:
             self.received.append((sender[1], data))
             self.socket.sendto(data, sender)
 
-    def __enter__(self) -> "EchoPeer":
+    def __enter__(self):
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: object, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind, error, trace):
         self.socket.sendto(b"", self.address)
         self._thread.join()
         self.socket.close()
 
 
-def client() -> socket.socket:
+def client():
     """A socket on loopback whose recv() gives up in the end."""
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     made.bind(("127.0.0.1", 0))

@@ -4,10 +4,10 @@ from decimal import Decimal, localcontext
 
 Rows = tuple[Decimal, Decimal, Decimal, Decimal]
 
-IDENTITY: Rows = (Decimal(1), Decimal(0), Decimal(0), Decimal(1))
+IDENTITY = (Decimal(1), Decimal(0), Decimal(0), Decimal(1))
 
 
-def oscillator(m: float, d: float, k: float, h: float) -> tuple[float, float, float, float]:
+def oscillator(m, d, k, h):
     """What m·e'' + d·e' + k·e = 0 does to (e, e') in h seconds, row by row."""
     with localcontext() as context:
         context.prec = 120
@@ -16,7 +16,7 @@ def oscillator(m: float, d: float, k: float, h: float) -> tuple[float, float, fl
         return float(a[0]), float(a[1]), float(a[2]), float(a[3])
 
 
-def _exponential(a: Rows) -> Rows:
+def _exponential(a):
     """Taylor's series of the matrix scaled down to nearly nothing, squared up again."""
     squarings = 0
     while max(abs(entry) for entry in a) > Decimal("1e-6"):
@@ -30,15 +30,15 @@ def _exponential(a: Rows) -> Rows:
     return result
 
 
-def _times(a: Rows, factor: Decimal) -> Rows:
+def _times(a, factor):
     return a[0] * factor, a[1] * factor, a[2] * factor, a[3] * factor
 
 
-def _sum(a: Rows, b: Rows) -> Rows:
+def _sum(a, b):
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]
 
 
-def _product(a: Rows, b: Rows) -> Rows:
+def _product(a, b):
     return (
         a[0] * b[0] + a[1] * b[2],
         a[0] * b[1] + a[1] * b[3],

@@ -3,10 +3,8 @@
 import ctypes
 import platform
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
@@ -48,7 +46,7 @@ class Logged(NamedTuple):
     text: str
 
 
-def read_members(fmu: Path) -> dict[str, bytes]:
+def read_members(fmu):
     """The files in an FMU by name."""
     with ZipFile(fmu) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
@@ -57,7 +55,7 @@ def read_members(fmu: Path) -> dict[str, bytes]:
 class Fmu:
     """An FMU, extracted into a folder and loaded."""
 
-    def __init__(self, path: Path, folder: Path) -> None:
+    def __init__(self, path, folder):
         with ZipFile(path) as archive:
             archive.extractall(folder)
         self.folder = folder
@@ -87,7 +85,7 @@ class Fmu:
         if self.fmi == 2:
             self.library.fmi2Instantiate.restype = c_void_p
 
-    def names(self, causality: str) -> list[str]:
+    def names(self, causality):
         """The variables of a causality."""
         return [name for name, c in self.causalities.items() if c == causality]
 
@@ -95,15 +93,7 @@ class Fmu:
 class _Calls:
     """The functions of one instance for FMI 2.0."""
 
-    def __init__(
-        self,
-        library: Any,
-        guid: str,
-        resources: bytes,
-        name: bytes,
-        logging: bool,
-        log: Callable[[bytes, int, bytes, bytes], None] | None,
-    ) -> None:
+    def __init__(self, library, guid, resources, name, logging, log):
         self._library = library
         logger = _LOGGER() if log is None else _LOGGER(lambda _, *said: log(*said))
         self._callbacks = _Callbacks(logger, _ALLOCATE(), _FREE(), None, None)
@@ -113,7 +103,7 @@ class _Calls:
             )
         )
 
-    def __call__(self, function: str, *arguments: Any) -> int:
+    def __call__(self, function, *arguments):
         return int(getattr(self._library, f"fmi2{function}")(self.component, *arguments))
 
 
@@ -123,14 +113,11 @@ class Instance:
     Debug logging is on where a reason needs it: in an FMU that Python runs.
     """
 
-    def __init__(
-        self, fmu: Fmu, name: str = "instance", logging: bool | None = None, logger: bool = True
-    ) -> None:
+    def __init__(self, fmu, name="instance", logging=None, logger=True):
         self.fmu = fmu
         logging = fmu.python and logger if logging is None else logging
-        self.log: list[Logged] = []
+        self.log = []
         resources, called = fmu.folder / "resources", name.encode()
-        self._calls: _Calls | fmi3.Calls
         if fmu.fmi == 2:
             uri = resources.as_uri().encode()
             self._calls = _Calls(
@@ -145,7 +132,7 @@ class Instance:
         self._component = self._calls.component
         assert self._component
 
-    def _logged(self, instance: bytes, status: int, category: bytes, text: bytes) -> None:
+    def _logged(self, instance, status, category, text):
         self.log.append(
             Logged(
                 instance.decode(),
@@ -155,39 +142,39 @@ class Instance:
             )
         )
 
-    def __enter__(self) -> "Instance":
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_: object):
         self.call("FreeInstance")
 
-    def call(self, function: str, *arguments: Any) -> int:
+    def call(self, function, *arguments):
         """Any function, by its name without fmi2; one of FMI 3.0 where that is its counterpart."""
         return self._calls(function, *arguments)
 
-    def setup(self, start: float = 0.0) -> int:
+    def setup(self, start=0.0):
         return self.call("SetupExperiment", 0, c_double(0), c_double(start), 0, c_double(0))
 
-    def enter(self) -> int:
+    def enter(self):
         return self.call("EnterInitializationMode")
 
-    def exit(self) -> int:
+    def exit(self):
         return self.call("ExitInitializationMode")
 
-    def initialise(self, **values: float) -> "Instance":
+    def initialise(self, **values: float):
         """Set values and go through initialisation."""
         assert self.setup() == OK
         assert self.assign(values) == OK
         assert (self.enter(), self.exit()) == (OK, OK)
         return self
 
-    def step(self, time: float, size: float) -> int:
+    def step(self, time, size):
         return self.call("DoStep", c_double(time), c_double(size), 1)
 
-    def set(self, values: dict[str, float]) -> int:
+    def set(self, values):
         return self.set_real([self.fmu.references[name] for name in values], values.values())
 
-    def assign(self, values: Mapping[str, float]) -> int:
+    def assign(self, values):
         """Set variables of any type but String, type by type; the first status that is not OK."""
         for kind in ("Real", "Boolean", "Integer"):
             chosen = {n: v for n, v in values.items() if self.fmu.kinds[n] == kind}
@@ -197,52 +184,52 @@ class Instance:
                 return int(status)
         return OK
 
-    def set_real(self, references: Sequence[int], values: Iterable[float]) -> int:
+    def set_real(self, references, values):
         n = len(references)
         return self.call("SetReal", (c_uint * n)(*references), c_size_t(n), (c_double * n)(*values))
 
-    def set_boolean(self, references: Sequence[int], values: Iterable[float]) -> int:
+    def set_boolean(self, references, values):
         return self._set_whole("SetBoolean", references, values)
 
-    def set_integer(self, references: Sequence[int], values: Iterable[float]) -> int:
+    def set_integer(self, references, values):
         return self._set_whole("SetInteger", references, values)
 
-    def _set_whole(self, function: str, references: Sequence[int], values: Iterable[float]) -> int:
+    def _set_whole(self, function, references, values):
         n = len(references)
         numbers = (c_int * n)(*map(int, values))
         return self.call(function, (c_uint * n)(*references), c_size_t(n), numbers)
 
-    def get_real(self, references: Sequence[int]) -> tuple[int, list[float]]:
+    def get_real(self, references):
         n = len(references)
         values = (c_double * n)()
         return self.call("GetReal", (c_uint * n)(*references), c_size_t(n), values), list(values)
 
-    def get_boolean(self, references: Sequence[int]) -> tuple[int, list[bool]]:
+    def get_boolean(self, references):
         n = len(references)
         values = (c_int * n)()
         status = self.call("GetBoolean", (c_uint * n)(*references), c_size_t(n), values)
         return status, [bool(value) for value in values]
 
-    def get(self, *names: str) -> list[float]:
+    def get(self, *names: str):
         """Values of real variables, which must be had."""
         status, values = self.get_real([self.fmu.references[name] for name in names])
         assert status == OK
         return values
 
-    def outputs(self) -> list[float]:
+    def outputs(self):
         """All real outputs."""
         return self.get(*(n for n in self.fmu.names("output") if n not in self.fmu.booleans))
 
-    def state(self) -> "State":
+    def state(self):
         """The state of now."""
         pointer = c_void_p()
         assert self.call("GetFMUstate", byref(pointer)) == OK
         return State(self, pointer)
 
-    def restore(self, state: "State") -> int:
+    def restore(self, state):
         return self.call("SetFMUstate", state.pointer)
 
-    def from_bytes(self, data: bytes) -> "tuple[int, State]":
+    def from_bytes(self, data):
         """The state that bytes hold."""
         pointer = c_void_p()
         buffer = (ctypes.c_char * len(data)).from_buffer_copy(data)
@@ -253,16 +240,16 @@ class Instance:
 class State:
     """An FMU state; it belongs to the instance that made it, which must free it."""
 
-    def __init__(self, owner: Instance, pointer: c_void_p) -> None:
+    def __init__(self, owner, pointer):
         self.owner = owner
         self.pointer = pointer
 
-    def to_bytes(self) -> bytes:
+    def to_bytes(self):
         size = c_size_t()
         assert self.owner.call("SerializedFMUstateSize", self.pointer, byref(size)) == OK
         buffer = (ctypes.c_char * size.value)()
         assert self.owner.call("SerializeFMUstate", self.pointer, buffer, size) == OK
         return bytes(buffer.raw)
 
-    def free(self) -> None:
+    def free(self):
         assert self.owner.call("FreeFMUstate", byref(self.pointer)) == OK

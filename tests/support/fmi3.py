@@ -4,9 +4,8 @@ What it logs is put as FMI 2.0 has it, so that one test serves both: names of fu
 """
 
 import ctypes
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_void_p
-from pathlib import Path
 from typing import Any
 
 OK, DISCARD, ERROR = 0, 2, 3
@@ -34,7 +33,7 @@ SAID = {
 """What FMI 3.0 says, and what FMI 2.0 says; its logger is a printf."""
 
 
-def as_fmi2(text: bytes) -> bytes:
+def as_fmi2(text):
     for ours, theirs in SAID.items():
         text = text.replace(ours, theirs)
     return text
@@ -43,20 +42,12 @@ def as_fmi2(text: bytes) -> bytes:
 class Calls:
     """One instance; called with the name of a function without fmi2, and its arguments."""
 
-    def __init__(
-        self,
-        library: Any,
-        token: str,
-        resources: Path,
-        name: bytes | None,
-        on: bool,
-        log: Log | None,
-    ) -> None:
+    def __init__(self, library, token, resources, name, on, log):
         self._library = library
         self._log = LOGGER() if log is None else LOGGER(lambda _, s, c, t: log(s, c, as_fmi2(t)))
-        self._experiment: tuple[Any, ...] = (False, 0.0, 0.0, False, 0.0)
+        self._experiment = (False, 0.0, 0.0, False, 0.0)
         self._ends = c_bool()
-        self.enumerations: Collection[int] = ()
+        self.enumerations = ()
         library.fmi3InstantiateCoSimulation.restype = c_void_p
         self.component = c_void_p(
             library.fmi3InstantiateCoSimulation(
@@ -65,7 +56,7 @@ class Calls:
             )
         )  # fmt: skip
 
-    def __call__(self, function: str, *arguments: Any) -> int:
+    def __call__(self, function, *arguments):
         if function[3:] in ("Real", "Integer", "Boolean", "String"):
             return self._values(function, *arguments)
         own = getattr(self, f"_{function}", None)
@@ -73,26 +64,26 @@ class Calls:
             own(*arguments) if own else self._fmi3(RENAMED.get(function, function), *arguments)
         )
 
-    def _fmi3(self, function: str, *arguments: Any) -> int:
+    def _fmi3(self, function, *arguments):
         return int(getattr(self._library, f"fmi3{function}")(self.component, *arguments))
 
-    def _SetupExperiment(self, *arguments: Any) -> int:
+    def _SetupExperiment(self, *arguments: Any):
         """Part of fmi3EnterInitializationMode."""
         self._experiment = arguments
         return OK
 
-    def _Reset(self) -> int:
+    def _Reset(self):
         self._experiment = (False, 0.0, 0.0, False, 0.0)
         return self._fmi3("Reset")
 
-    def _EnterInitializationMode(self) -> int:
+    def _EnterInitializationMode(self):
         limited, tolerance, start, ends, stop = (getattr(a, "value", a) for a in self._experiment)
         return self._fmi3(
             "EnterInitializationMode", c_bool(limited), c_double(tolerance), c_double(start),
             c_bool(ends), c_double(stop),
         )  # fmt: skip
 
-    def _DoStep(self, time: c_double, size: c_double, final: int) -> int:
+    def _DoStep(self, time, size, final):
         event, early, last = c_bool(True), c_bool(True), c_double()
         self._ends = c_bool(True)
         status = self._fmi3(
@@ -102,15 +93,15 @@ class Calls:
         assert [event.value, early.value] == [False, False]
         return status
 
-    def _GetBooleanStatus(self, _: int, value: Any) -> int:
+    def _GetBooleanStatus(self, _, value):
         """Whether the last step ended the simulation."""
         value._obj.value = self._ends.value
         return OK
 
-    def _SetDebugLogging(self, on: int, n: Any, categories: Any) -> int:
+    def _SetDebugLogging(self, on, n, categories):
         return self._fmi3("SetDebugLogging", c_bool(bool(on)), n, categories)
 
-    def _values(self, function: str, references: Any, n: c_size_t, values: Any) -> int:
+    def _values(self, function, references, n, values):
         """Get or set, in the type that FMI 3.0 has for it."""
         access, name = function[:3], function[3:]
         whole = references and set(references) <= set(self.enumerations)
@@ -126,12 +117,8 @@ class Calls:
             values[:] = list(own)
         return status
 
-    def _GetDirectionalDerivative(
-        self, unknowns: Any, n: c_size_t, knowns: Any, m: c_size_t, seed: Any, found: Any
-    ) -> int:
+    def _GetDirectionalDerivative(self, unknowns, n, knowns, m, seed, found):
         return self._fmi3("GetDirectionalDerivative", unknowns, n, knowns, m, seed, m, found, n)
 
-    def _GetRealOutputDerivatives(
-        self, references: Any, n: c_size_t, orders: Any, values: Any
-    ) -> int:
+    def _GetRealOutputDerivatives(self, references, n, orders, values):
         return self._fmi3("GetOutputDerivatives", references, n, orders, values, n)

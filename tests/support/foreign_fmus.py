@@ -3,7 +3,6 @@
 import json
 import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from fmpy import read_model_description, simulate_fmu
@@ -12,7 +11,7 @@ from grasp_cosim import System, simulate
 REALS = ("Real", "Float64", "Float32")
 
 
-def deviations_from_fmpy(fmu: Path) -> dict[str, float]:
+def deviations_from_fmpy(fmu):
     """By interface, the largest difference of an output over 100 steps of its default experiment.
 
     Model exchange is integrated with a relative tolerance of 1e-10 by both. Without what FMPy does
@@ -30,7 +29,7 @@ def deviations_from_fmpy(fmu: Path) -> dict[str, float]:
     return {name: deviation for name, deviation in compared.items() if deviation is not None}
 
 
-def _deviation(fmu: Path, description: Any, interface: str) -> float | None:
+def _deviation(fmu, description, interface):
     default = description.defaultExperiment
     stop = float(default.stopTime) if default and default.stopTime else 1.0
     step = float(default.stepSize) if default and default.stepSize else stop / 100.0
@@ -55,7 +54,7 @@ def _deviation(fmu: Path, description: Any, interface: str) -> float | None:
     return max(float(np.abs(a.astype(float) - b.astype(float)).max()) for a, b in numbers)
 
 
-def _system(fmu: Path, description: Any, interface: str, step: float, stop: float) -> str:
+def _system(fmu, description, interface, step, stop):
     values = {
         v.name: _start(v)
         for v in description.modelVariables
@@ -70,7 +69,7 @@ def _system(fmu: Path, description: Any, interface: str, step: float, stop: floa
     )
 
 
-def _start(variable: Any) -> float | int | bool | str:
+def _start(variable):
     start = variable.start
     if variable.type == "Boolean":
         return start in ("true", "1", True)

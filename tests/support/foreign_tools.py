@@ -8,10 +8,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -112,14 +110,14 @@ json.dump(found, open(sys.argv[2], "w"))
 
 
 @cache
-def _version(python: str, distribution: str) -> str | None:
+def _version(python, distribution):
     code = "import sys, importlib.metadata as m; print(m.version(sys.argv[1]))"
     command = [python, "-c", code, distribution]
     done = subprocess.run(command, capture_output=True, text=True)
     return None if done.returncode else done.stdout.strip()
 
 
-def python_with(distribution: str, version: str, *needed: str) -> str:
+def python_with(distribution, version, *needed):
     """The Python that has it in this version and what else is needed; else the test is skipped."""
     pythons = [sys.executable, *filter(None, os.environ.get("GRASP_COSIM_TOOLS", "").split(":"))]
     there = [p for p in pythons if _version(p, distribution)]
@@ -133,7 +131,7 @@ def python_with(distribution: str, version: str, *needed: str) -> str:
     pytest.skip(f"{distribution} is {has}; the page tells of {version}{needs}")
 
 
-def run_in(python: str, program: str, folder: Path, given: dict[str, Any]) -> Any:
+def run_in(python, program, folder, given):
     """What the program found with what it was given."""
     asked, answer = folder / "given.json", folder / "found.json"
     asked.write_text(json.dumps(given), "utf-8")
@@ -141,13 +139,13 @@ def run_in(python: str, program: str, folder: Path, given: dict[str, Any]) -> An
     return json.loads(answer.read_text("utf-8"))
 
 
-def call(command: Sequence[str | Path], folder: Path) -> str:
+def call(command, folder):
     """What a command prints that must end well, in the folder."""
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout + done.stderr
 
 
-def script_of(python: str, name: str) -> Path:
+def script_of(python, name):
     """A command that was installed with a Python's packages."""
     return Path(python).parent / name

@@ -1,20 +1,18 @@
 """What the tests of all plants share: the gripper from behind, its parameters' ranges."""
 
 from math import inf
-from typing import Any
 
 import pytest
-from gripper_plant.fingers import Pair
 from support.declared import parameters
 
 
-def swapped(pair: Pair) -> Pair:
+def swapped(pair):
     """What is on the right, seen from behind."""
     first, second = pair
     return -second, -first
 
 
-def assert_ranges_are_checked(part: type[Any], prefix: str = "", but: tuple[str, ...] = ()) -> None:
+def assert_ranges_are_checked(part, prefix="", but=()):
     """Every number outside its range is refused by name; but names what depends on others."""
     checked = [p for p in parameters(part) if p.name not in but]
     assert checked

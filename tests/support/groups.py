@@ -3,14 +3,12 @@
 import sys
 from types import SimpleNamespace
 
-import pytest
-from grasp_cosim import Metric
 from grasp_cosim.metrics import metric
 from grasp_cosim.recording.view import OF_ANY
 from grasp_cosim.system import description
 
 
-def bring_group(monkeypatch: pytest.MonkeyPatch, name: str, *metrics: Metric) -> None:
+def bring_group(monkeypatch, name, *metrics):
     for module in (description, metric):
         monkeypatch.setattr(module, "groups", lambda: ("grasp", name))
     has = {"metrics": SimpleNamespace(METRICS=metrics), "view": SimpleNamespace(VIEW=OF_ANY)}

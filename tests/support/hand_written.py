@@ -3,11 +3,10 @@
 import importlib.util
 import platform
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 
 from grasp_fmus.contract import declared, variables
-from grasp_fmus.description import Description, Version, model_description
+from grasp_fmus.description import Description, model_description
 from grasp_fmus.native.sources import native_sources
 
 from .compiled import compile_c
@@ -20,7 +19,7 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC",
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 
 
-def write_sources(folder: Path, fmi: Version = 2) -> None:
+def write_sources(folder, fmi=2):
     """The C sources, in a folder that is made."""
     folder.mkdir(parents=True)
     text = PYTHON.with_suffix(".h").read_text("utf-8")
@@ -28,15 +27,13 @@ def write_sources(folder: Path, fmi: Version = 2) -> None:
         (folder / file).write_bytes(data)
 
 
-def compile_in(
-    folder: Path, fmi: Version = 2, options: Sequence[str] = (), cc: str = "gcc"
-) -> Path:
+def compile_in(folder, fmi=2, options=(), cc="gcc"):
     """The shared library of sources in a folder; without warnings."""
     plain = (f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", *options, str(folder / f"{NAME}.c"), "-lm")
     return compile_c([cc, *FLAGS, *STRICT, *plain], folder / f"{NAME}.so")
 
 
-def native_fmu(folder: Path, fmi: Version = 2, options: Sequence[str] = ()) -> Path:
+def native_fmu(folder, fmi=2, options=()):
     """A native FMU for this machine, without what only a reader needs."""
     write_sources(folder / "sources", fmi)
     library = compile_in(folder / "sources", fmi, options)

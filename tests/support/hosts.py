@@ -1,15 +1,12 @@
 """Fixtures of the tests with hosts in C: the native FMUs, unpacked, and the hosts."""
 
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
-from grasp_fmus.native.targets import Target, here
+from grasp_fmus.native.targets import here
 
-from .c_host import Host, Part, unpacked
-from .kinds import Kind
-from .platforms import Platform, host_of
+from .c_host import Part, unpacked
+from .platforms import host_of
 from .slow import slow
 
 Parts = dict[str, Part]
@@ -17,13 +14,11 @@ Parts = dict[str, Part]
 
 
 @pytest.fixture(scope="session")
-def parts_of(
-    folder_of: Callable[[Kind], Path], tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[int], Parts]:
+def parts_of(folder_of, tmp_path_factory):
     """The native FMUs for a version of FMI, unpacked once per test process."""
-    known: dict[int, Parts] = {}
+    known = {}
 
-    def parts(fmi: int) -> Parts:
+    def parts(fmi):
         if fmi not in known:
             folder = folder_of("native" if fmi == 2 else "native FMI 3")
             fmus = [
@@ -37,17 +32,17 @@ def parts_of(
 
 
 @pytest.fixture(params=[2, slow(3)], ids=["FMI 2", "FMI 3"])
-def parts(request: pytest.FixtureRequest, parts_of: Callable[[int], Parts]) -> Parts:
+def parts(request, parts_of):
     """The native FMUs, of each version of FMI in turn."""
     return parts_of(request.param)
 
 
 @pytest.fixture(scope="session")
-def host_for(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Target], Host]:
+def host_for(tmp_path_factory):
     """The host for a platform, compiled once per test process."""
-    known: dict[Target, Host] = {}
+    known = {}
 
-    def host(target: Target) -> Host:
+    def host(target):
         if target not in known:
             known[target] = host_of(target, tmp_path_factory.mktemp("host"))
         return known[target]
@@ -56,7 +51,7 @@ def host_for(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Target], Hos
 
 
 @pytest.fixture
-def host(host_for: Callable[[Target], Host]) -> Host:
+def host(host_for):
     """The host for this machine."""
     if not shutil.which("gcc"):
         pytest.skip("NO gcc")
@@ -64,13 +59,11 @@ def host(host_for: Callable[[Target], Host]) -> Host:
 
 
 @pytest.fixture(scope="session")
-def parts_on(
-    parts_of: Callable[[int], Parts], tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[Platform, int], Parts]:
+def parts_on(parts_of, tmp_path_factory):
     """The same FMUs for a platform and a version of FMI, compiled once per test process."""
-    known: dict[tuple[str, int], Parts] = {}
+    known = {}
 
-    def parts(platform: Platform, fmi: int) -> Parts:
+    def parts(platform, fmi):
         if (platform.name, fmi) not in known:
             folder = tmp_path_factory.mktemp("compiled")
             known[platform.name, fmi] = {

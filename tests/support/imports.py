@@ -5,9 +5,8 @@ up; a room may import from its own floor and from those below, as far as nothing
 """
 
 import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 Graph = Mapping[str, Sequence[str]]
@@ -22,7 +21,7 @@ class Import(NamedTuple):
     target: str
 
 
-def read_modules(package: Path) -> dict[str, str]:
+def read_modules(package):
     """The source text of every module of a package, by full name."""
     found = {}
     for file in sorted(package.rglob("*.py")):
@@ -31,13 +30,13 @@ def read_modules(package: Path) -> dict[str, str]:
     return found
 
 
-def packages(names: Sequence[str]) -> set[str]:
+def packages(names):
     """Those of the modules that have others in them."""
     return {name for name in names if any(other.startswith(f"{name}.") for other in names)}
 
 
 @cache
-def parsed(text: str) -> tuple[list[ast.Import | ast.ImportFrom], set[str]]:
+def parsed(text):
     """The imports of a source, and the names by which it calls functions."""
     nodes = [*ast.walk(ast.parse(text))]
     called = (node.func for node in nodes if isinstance(node, ast.Call))
@@ -45,7 +44,7 @@ def parsed(text: str) -> tuple[list[ast.Import | ast.ImportFrom], set[str]]:
     return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)], names
 
 
-def read_imports(sources: Mapping[str, str]) -> list[Import]:
+def read_imports(sources):
     """Every import among these modules: in functions and under TYPE_CHECKING, too."""
     folders = packages(list(sources))
     found = {
@@ -57,9 +56,7 @@ def read_imports(sources: Mapping[str, str]) -> list[Import]:
     return sorted(found)
 
 
-def _imports(
-    name: str, text: str, folder: bool, known: Mapping[str, str]
-) -> Iterator[tuple[int, str]]:
+def _imports(name, text, folder, known):
     for node in parsed(text)[0]:
         if isinstance(node, ast.Import):
             wanted = [alias.name for alias in node.names]
@@ -75,17 +72,17 @@ def _imports(
                 yield node.lineno, module
 
 
-def calls(sources: Mapping[str, str], names: frozenset[str]) -> set[str]:
+def calls(sources, names):
     """The modules that call a function by one of these names."""
     return {module for module, text in sources.items() if parsed(text)[1] & names}
 
 
-def room(module: str) -> str:
+def room(module):
     """The room of a module; that of the package itself is "__init__"."""
     return [*module.split("."), "__init__"][1]
 
 
-def upward(imports: Sequence[Import], floors: Sequence[Sequence[str]]) -> list[str]:
+def upward(imports, floors):
     """A line for each import from a higher floor, and for each room that is on none."""
     floor = {name: i for i, names in enumerate(floors) for name in names}
     rooms = {room(module) for i in imports for module in (i.source, i.target)}
@@ -97,9 +94,9 @@ def upward(imports: Sequence[Import], floors: Sequence[Sequence[str]]) -> list[s
     ]
 
 
-def graph(imports: Sequence[Import], of_rooms: bool = False) -> dict[str, list[str]]:
+def graph(imports, of_rooms=False):
     """Who imports whom; among rooms without what a room imports from itself."""
-    found: dict[str, set[str]] = {}
+    found = {}
     for i in imports:
         source, target = (room(i.source), room(i.target)) if of_rooms else (i.source, i.target)
         found.setdefault(source, set())
@@ -108,7 +105,7 @@ def graph(imports: Sequence[Import], of_rooms: bool = False) -> dict[str, list[s
     return {name: sorted(targets) for name, targets in found.items()}
 
 
-def circles(imports: Graph) -> list[str]:
+def circles(imports):
     """The shortest circle through each name that is in one, each once, like "a -> b -> a"."""
     found = set()
     for name in imports:
@@ -119,9 +116,9 @@ def circles(imports: Graph) -> list[str]:
     return sorted(found)
 
 
-def _way_back(name: str, imports: Graph) -> list[str]:
+def _way_back(name, imports):
     """The names on the shortest way from a name to itself; none where there is no way."""
-    before: dict[str, str] = {}
+    before = {}
     edge = [name]
     while edge:
         following = []

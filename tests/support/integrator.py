@@ -1,7 +1,5 @@
 """A system of one native FMU: a.x is the integral of gain·u, and it fails when it is told."""
 
-from pathlib import Path
-
 from grasp_cosim import System
 from grasp_cosim.interface.read import read_interface
 from support.native_fmus import build
@@ -23,7 +21,7 @@ def half(run):
 '''
 
 
-def write_integrator(folder: Path) -> Path:
+def write_integrator(folder):
     """The FMU a.fmu, system.toml and mine.py in folder; returns the folder."""
     fmu = build(folder, "a", "2.0")
     inputs = [v.name for v in read_interface(fmu).of("input")]
@@ -36,5 +34,5 @@ def write_integrator(folder: Path) -> Path:
     return folder
 
 
-def integrator(folder: Path) -> System:
+def integrator(folder):
     return System.load(write_integrator(folder) / "system.toml")

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
-from grasp_fmus.build import Plan, build_block, build_model, planned
-from grasp_fmus.native.targets import Version
+from grasp_fmus.build import build_block, build_model, planned
 from grasp_fmus.package import shipped_model
 from grasp_fmus.shipped import SHIPPED
 
@@ -16,7 +15,7 @@ from .slow import platforms, slow
 
 Kind = Literal["python", "native", "native FMI 3"]
 
-NATIVE: dict[Kind, Version] = {"native": 2, "native FMI 3": 3}
+NATIVE = {"native": 2, "native FMI 3": 3}
 
 all_kinds = pytest.mark.kinds("python", "native", "native FMI 3")
 native_slowly = pytest.mark.parametrize(
@@ -39,7 +38,7 @@ QUICK = "ProximitySensor"
 """It has variables of every type, and sub-steps."""
 
 
-def tier(name: str, kind: Kind, compiles: bool) -> Literal["quick", "slow", "platforms"]:
+def tier(name, kind, compiles):
     """Where it is tested: of FMI 2.0 one in the quick tests, unless it is altered, and all in the
     slow ones; of FMI 3.0 one in the slow ones, and all before a release.
     """
@@ -49,7 +48,7 @@ def tier(name: str, kind: Kind, compiles: bool) -> Literal["quick", "slow", "pla
     return "slow" if kind == "native" and others else "quick"
 
 
-def plan(kind: Kind) -> Plan:
+def plan(kind):
     """How it is compiled; the test is skipped where there is no compiler."""
     try:
         return planned(fmi=NATIVE[kind])
@@ -57,11 +56,11 @@ def plan(kind: Kind) -> Plan:
         pytest.skip(f"NO compiler: {error}")
 
 
-def build_shipped(name: str, kind: Kind, out: Path) -> Path:
+def build_shipped(name, kind, out):
     """Build one of those that come with the package."""
     return build_model(shipped_model(name), out, None if kind == "python" else plan(kind)).path
 
 
-def build_own(name: str, kind: Kind, out: Path) -> Path:
+def build_own(name, kind, out):
     """Build the FMU of one of OWN."""
     return build_block(OWN[name], out, None if kind == "python" else plan(kind)).path

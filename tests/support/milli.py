@@ -2,8 +2,6 @@
 
 import re
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
 from typing import Literal
 
 from grasp_fmus.build import build_block
@@ -82,14 +80,14 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 '''
 
 
-def milli_plant(folder: Path, units: Units = "defined") -> Path:
+def milli_plant(folder, units="defined"):
     """Build the plant into a folder, as MilliPlant.fmu."""
     folder.mkdir(parents=True, exist_ok=True)
     block = folder / "milli_plant.py"
     block.write_text(BLOCK, "utf-8")
     path = build_block(block, folder).path
 
-    def described(text: str) -> str:
+    def described(text):
         if units == "none":
             text = re.sub(r"<UnitDefinitions>.*</UnitDefinitions>", "", text, flags=re.DOTALL)
             return re.sub(r' (?:unit|displayUnit)="[^"]*"', "", text)
@@ -100,7 +98,7 @@ def milli_plant(folder: Path, units: Units = "defined") -> Path:
     return redescribed(path, described)
 
 
-def redescribed(path: Path, change: Callable[[str], str]) -> Path:
+def redescribed(path, change):
     """Rewrite the model description of an FMU in place."""
     with zipfile.ZipFile(path) as archive:
         entries = {info: archive.read(info) for info in archive.infolist()}

@@ -1,22 +1,16 @@
 """Components without any binary: input u, output y, tunable p; they do what they are told."""
 
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
 
-import numpy as np
-import numpy.typing as npt
 from grasp_cosim import SimulationError, System
 from grasp_cosim.base.calls import Call
 from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.fmi.instance import DISCARD
-from grasp_cosim.interface.interface import Interface, Value, Variable
 from grasp_cosim.interface.read import read_interface
-from grasp_cosim.master.engine import Engine
 from grasp_cosim.master.master import Master
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.system.parts import Component, Connection
+from grasp_cosim.system.parts import Component
 
 Function = Callable[[float, float], float]
 
@@ -47,24 +41,16 @@ class Mock:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        name: str,
-        output: Function,
-        kind: str = "Real",
-        direct: bool | None = True,
-        vary: bool = True,
-        nominal: float | None = None,
-        rejects: Callable[[float, float], float] | None = None,
-    ) -> None:
+        self, folder, name, output, kind="Real", direct=True, vary=True, nominal=None, rejects=None
+    ):
         self.name = name
         self.output = output
         self.rejects = rejects
-        self.u: Any = {"Integer": 0, "Boolean": False, "String": ""}.get(kind, 0.0)
+        self.u = {"Integer": 0, "Boolean": False, "String": ""}.get(kind, 0.0)
         self.p = 1.0
         self.time = 0.0
-        self.ended: float | None = None
-        self.calls: list[str] = []
+        self.ended = None
+        self.calls = []
         self.statuses = {"send": 0, "step": 0, "receive": 0}
         self.path = folder / f"{name}.fmu"
         depends = {True: ' dependencies="1"', False: ' dependencies=""', None: ""}[direct]
@@ -78,45 +64,43 @@ class Mock:
             archive.writestr("modelDescription.xml", text)
 
     @property
-    def interface(self) -> Interface:
+    def interface(self):
         return read_interface(self.path)
 
-    def enter_initialization(
-        self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
-    ) -> None:
+    def enter_initialization(self, values, stop, start=0.0):
         self.calls.append("enter")
         self.u = values.get("u", self.u)
 
-    def exit_initialization(self) -> None:
+    def exit_initialization(self):
         self.calls.append("exit")
 
-    def get(self, variables: Sequence[Variable]) -> list[Value]:
+    def get(self, variables):
         self.calls.append("receive")
         if self.statuses["receive"] > 1:
             raise self.failure(self.statuses["receive"], self.time)
         values = {"u": self.u, "p": self.p, "y": self.output(self.u, self.time)}
         return [values[v.name] for v in variables]
 
-    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+    def set(self, variables, values):
         self.calls.append("send")
         for v, value in zip(variables, values, strict=True):
             setattr(self, v.name, value if v.kind == "String" else float(value))
 
-    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        def send() -> int:
+    def transfer(self, action, variables, data):
+        def send():
             self.calls.append("send")
             self.u = float(data[0])
             return self.statuses["send"]
 
-        def receive() -> int:
+        def receive():
             self.calls.append("receive")
             data[0] = self.output(self.u, self.time)
             return self.statuses["receive"]
 
         return Call(send if action == "set" else receive)
 
-    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        def advance() -> int:
+    def stepper(self, clock, step):
+        def advance():
             begin = float(clock[0])
             self.calls.append(f"step {begin!r} {step!r}")
             self.time = begin + step
@@ -127,26 +111,20 @@ class Mock:
 
         return Call(advance)
 
-    def last_successful_time(self) -> float | None:
+    def last_successful_time(self):
         return self.time
 
-    def the_end(self) -> float | None:
+    def the_end(self):
         return self.ended
 
-    def failure(self, status: int, time: float) -> SimulationError:
+    def failure(self, status, time):
         return SimulationError(f"{self.name}: status {status} at {time!r}")
 
-    def close(self) -> None:
+    def close(self):
         self.calls.append("close")
 
 
-def make_system(
-    mocks: Sequence[Mock],
-    connections: Sequence[Connection],
-    steps: int = 4,
-    step_ns: int = 100_000_000,
-    **more: Any,
-) -> System:
+def make_system(mocks, connections, steps=4, step_ns=100_000_000, **more):
     """A system of mocks; more are other fields of System, and `own`: steps by name.
 
     An input without a connection is given what the mock has there.
@@ -166,17 +144,17 @@ def make_system(
 class Run:
     """A master over mocks and what it recorded."""
 
-    def __init__(self, system: System, mocks: Sequence[Mock], engine: Engine = "python") -> None:
+    def __init__(self, system, mocks, engine="python"):
         self.memory = MemoryListener()
         self.master = Master(system, mocks, lambda *rows: self.dispatch(*rows), engine)
         self.dispatch = Dispatcher(
             system, self.master.slots, [self.memory], texts=self.master.texts
         )
 
-    def to_the_end(self) -> dict[str, list[float]]:
+    def to_the_end(self):
         self.master.initialise()
         self.master.advance(self.master.total_steps)
         return self.signals()
 
-    def signals(self) -> dict[str, list[float]]:
+    def signals(self):
         return {name: column.tolist() for name, column in self.memory.columns()[1].items()}

@@ -52,20 +52,20 @@ class Model:
     step: float = 0.01
     names: dict[str, int] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         self.names.update({v.name: place for place, v in enumerate(self.variables, 1)})
 
 
-def _state(name: str, start: float) -> tuple[Variable, Variable]:
+def _state(name, start):
     state = Variable(name, causality="output", start=start)
     return state, Variable(f"der({name})", derivative=name)
 
 
-def _parameter(name: str, start: float, tunable: bool = False, type_: str = "Float64") -> Variable:
+def _parameter(name, start, tunable=False, type_="Float64"):
     return Variable(name, type_, "parameter", "tunable" if tunable else "fixed", start)
 
 
-def _pair(name: str, type_: str, start: float | str | bool, discrete: bool) -> tuple[Variable, ...]:
+def _pair(name, type_, start, discrete):
     varies = "discrete" if discrete else "continuous"
     return (
         Variable(f"u_{name}", type_, "input", varies, start),
@@ -149,9 +149,7 @@ MODELS = {
 """By the name of their C file; the feedthrough has u_T and y_T for each type T of its version."""
 
 
-def build_model(
-    name: str, folder: Path, version: str = "2.0", kinds: Sequence[str] = KINDS, file: str = ""
-) -> Path:
+def build_model(name, folder, version="2.0", kinds=KINDS, file=""):
     """The FMU of a model, for the kinds given, as folder/FILE.fmu (by default NAME.fmu)."""
     model = MODELS[name] if name != "feedthrough" else Model(_PASSED[version])
     describe = _description_2 if version == "2.0" else _description_3
@@ -161,7 +159,7 @@ def build_model(
     )
 
 
-def _library(name: str, version: str, steps: bool) -> bytes:
+def _library(name, version, steps):
     """The binary, with all functions that FMPy asks for; only with steps it can do any."""
     fmi = f"fmi{version[0]}"
     asked = FMU3Model if version == "3.0" else FMU2Slave if steps else FMU2Model
@@ -169,21 +167,21 @@ def _library(name: str, version: str, steps: bool) -> bytes:
     return shared_library(SOURCES / f"{name}.c", options=options, asked=asked)
 
 
-def _attributes(**values: object) -> str:
+def _attributes(**values: object):
     """Those that are not None."""
     given = {key: v for key, v in values.items() if v is not None}
     lower = {key: str(v).lower() if isinstance(v, bool) else v for key, v in given.items()}
     return "".join(f' {key}="{v}"' for key, v in lower.items())
 
 
-def _initial(v: Variable) -> str | None:
+def _initial(v):
     """The attribute initial: exact for what has a start value, but for inputs, which have none."""
     if v.causality in ("input", "independent"):
         return None
     return "calculated" if v.start is None else "exact"
 
 
-def _unknowns(model: Model, element: str, listed: Sequence[Variable], key: str, first: int) -> str:
+def _unknowns(model, element, listed, key, first):
     """Elements of the ModelStructure; key and first say how they name a variable."""
     found = ""
     for v in listed:
@@ -193,7 +191,7 @@ def _unknowns(model: Model, element: str, listed: Sequence[Variable], key: str, 
     return found
 
 
-def _parts(model: Model) -> tuple[list[Variable], list[Variable], list[Variable]]:
+def _parts(model):
     """Outputs, derivatives, and what follows from others at the start."""
     outputs = [v for v in model.variables if v.causality == "output"]
     derivatives = [v for v in model.variables if v.derivative]
@@ -201,7 +199,7 @@ def _parts(model: Model) -> tuple[list[Variable], list[Variable], list[Variable]
     return outputs, derivatives, initial
 
 
-def _kinds(name: str, kinds: Sequence[str], exchange: str) -> str:
+def _kinds(name, kinds, exchange):
     own = {
         "ModelExchange": exchange,
         "CoSimulation": ' canHandleVariableCommunicationStepSize="true"',
@@ -209,12 +207,12 @@ def _kinds(name: str, kinds: Sequence[str], exchange: str) -> str:
     return "".join(f'<{k} modelIdentifier="{name}"{own[k]}/>' for k in KINDS if k in kinds)
 
 
-def _experiment(model: Model) -> str:
+def _experiment(model):
     times = _attributes(startTime=0.0, stopTime=model.stop, stepSize=model.step)
     return f"<DefaultExperiment{times}/>"
 
 
-def _description_2(name: str, model: Model, kinds: Sequence[str]) -> str:
+def _description_2(name, model, kinds):
     time = Variable("time", causality="independent")
     variables = ""
     for reference, v in enumerate((time, *model.variables)):
@@ -249,11 +247,11 @@ def _description_2(name: str, model: Model, kinds: Sequence[str]) -> str:
     )
 
 
-def _start(v: Variable) -> str:
+def _start(v):
     return "" if v.start is None else f' start="{str(v.start).lower()}"'
 
 
-def _description_3(name: str, model: Model, kinds: Sequence[str]) -> str:
+def _description_3(name, model, kinds):
     time = Variable("time", causality="independent")
     variables = ""
     for reference, v in enumerate((time, *model.variables)):

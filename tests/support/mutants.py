@@ -14,11 +14,9 @@ import sys
 import time
 import tomllib
 import zipfile
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 LIMIT, PATIENCE = 10.0, 100.0
@@ -48,7 +46,7 @@ OUTSIDE = Path("/tmp/outside")
 Random = random.Random
 
 
-def mutated_bytes(data: bytes, rng: Random) -> bytes:
+def mutated_bytes(data, rng):
     """A few bytes changed, lost, doubled or put in, or the end cut off."""
     out = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 5, 30))):
@@ -70,7 +68,7 @@ def mutated_bytes(data: bytes, rng: Random) -> bytes:
     return bytes(out)
 
 
-def mutated_lines(text: str, rng: Random) -> str:
+def mutated_lines(text, rng):
     """A few lines lost, doubled, swapped, or a word of theirs replaced."""
     lines = text.splitlines() or [""]
     for _ in range(rng.choice((1, 1, 2, 4))):
@@ -89,7 +87,7 @@ def mutated_lines(text: str, rng: Random) -> str:
     return "\n".join(lines)
 
 
-def _value(rng: Random, depth: int = 0) -> Any:
+def _value(rng, depth=0):
     kind = rng.randrange(9)
     if kind < 3:
         return rng.choice(NUMBERS)
@@ -102,7 +100,7 @@ def _value(rng: Random, depth: int = 0) -> Any:
     return {rng.choice(TEXTS): _value(rng, depth + 1) for _ in range(rng.randrange(3))}
 
 
-def _paths(node: Any) -> Iterator[tuple[Any, ...]]:
+def _paths(node):
     """Yield the keys that lead to each place of a tree but its root."""
     for key in node if isinstance(node, dict) else range(len(node)):
         yield (key,)
@@ -110,7 +108,7 @@ def _paths(node: Any) -> Iterator[tuple[Any, ...]]:
             yield from ((key, *rest) for rest in _paths(node[key]))
 
 
-def _mutate_tree(node: Any, rng: Random) -> Any:
+def _mutate_tree(node, rng):
     """One place of a tree of tables and lists changed."""
     if isinstance(node, dict | list) and rng.random() < 0.5 and node:
         path = rng.choice(list(_paths(node)))
@@ -139,7 +137,7 @@ def _mutate_tree(node: Any, rng: Random) -> Any:
     return node
 
 
-def as_toml(value: Any) -> str:
+def as_toml(value):
     """A value as TOML has it on one line."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_quoted(k)} = {as_toml(v)}" for k, v in value.items()) + "}"
@@ -150,11 +148,11 @@ def as_toml(value: Any) -> str:
     return _quoted(value) if isinstance(value, str) else repr(value)
 
 
-def _quoted(text: str) -> str:
+def _quoted(text):
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "")
 
 
-def mutated_toml(text: str, rng: Random) -> bytes:
+def mutated_toml(text, rng):
     """A system file with something wrong, or other than it was."""
     kind = rng.randrange(10)
     if kind == 0:
@@ -171,7 +169,7 @@ def mutated_toml(text: str, rng: Random) -> bytes:
     )
 
 
-def mutated_xml(data: bytes, rng: Random) -> bytes:
+def mutated_xml(data, rng):
     """A document with something wrong, or other than it was."""
     kind = rng.randrange(10)
     if kind == 0:
@@ -201,7 +199,7 @@ def mutated_xml(data: bytes, rng: Random) -> bytes:
     return text.encode(errors="replace")
 
 
-def _mutate_element(root: ElementTree.Element, rng: Random) -> None:
+def _mutate_element(root, rng):
     parents = [e for e in root.iter() if len(e)]
     elements = list(root.iter())
     parent, element = rng.choice(parents or [root]), rng.choice(elements)
@@ -229,7 +227,7 @@ def _mutate_element(root: ElementTree.Element, rng: Random) -> None:
             element.attrib[key] = value
 
 
-def mutated_zip(data: bytes, rng: Random, mutate: Callable[[str, bytes, Random], bytes]) -> bytes:
+def mutated_zip(data, rng, mutate):
     """An archive with its bytes, its entries or, as `mutate` sees fit, their content changed."""
     if rng.random() < 0.15:
         return mutated_bytes(data, rng)
@@ -269,7 +267,7 @@ def mutated_zip(data: bytes, rng: Random, mutate: Callable[[str, bytes, Random],
     return bytes(made)
 
 
-def _of_fmu(name: str, content: bytes, rng: Random) -> bytes:
+def _of_fmu(name, content, rng):
     if name == "modelDescription.xml" and rng.random() < 0.8:
         return mutated_xml(content, rng)
     if name.endswith((".py", ".txt", ".so")) and rng.random() < 0.1:
@@ -277,7 +275,7 @@ def _of_fmu(name: str, content: bytes, rng: Random) -> bytes:
     return content
 
 
-def _of_ssp(name: str, content: bytes, rng: Random) -> bytes:
+def _of_ssp(name, content, rng):
     if name.endswith((".ssd", ".ssv", ".ssm")) and rng.random() < 0.7:
         return mutated_xml(content, rng)
     return (
@@ -287,7 +285,7 @@ def _of_ssp(name: str, content: bytes, rng: Random) -> bytes:
     )
 
 
-def system_text(fmus: Path) -> str:
+def system_text(fmus):
     """A system that has all that a system file can have."""
     from grasp_cosim.grasp.presets import SYSTEM
 
@@ -326,7 +324,7 @@ Case = tuple[str, list[list[str]]]
 """The name of a file in the folder, and the command lines to try it with."""
 
 
-def make(kind: str, seed: int, fmus: Path, folder: Path, archive: bytes) -> Iterator[list[str]]:
+def make(kind, seed, fmus, folder, archive):
     """Write the mutant of a seed to the folder; yield the command lines to try."""
     rng = random.Random(f"{kind} {seed}")
     if kind == "toml":
@@ -351,7 +349,7 @@ def make(kind: str, seed: int, fmus: Path, folder: Path, archive: bytes) -> Iter
         yield ["ssp", str(path), "-o", "out/again.ssp"]
 
 
-def tree(folder: Path) -> dict[str, tuple[int, int]]:
+def tree(folder):
     """All below a folder, with sizes and times of change."""
     found = {}
     for path in folder.rglob("*"):
@@ -361,7 +359,7 @@ def tree(folder: Path) -> dict[str, tuple[int, int]]:
     return found
 
 
-def attempt(arguments: list[str], folder: Path, said: Path) -> tuple[int | None, float]:
+def attempt(arguments, folder, said):
     """Exit code of a command line, minus a signal's number or None for no end; s of processor."""
     from grasp_cosim import cli
 
@@ -393,7 +391,7 @@ def attempt(arguments: list[str], folder: Path, said: Path) -> tuple[int | None,
     return None, PATIENCE
 
 
-def complaints(code: int | None, said: str, changed: list[str]) -> list[str]:
+def complaints(code, said, changed):
     """What is wrong with how a command ended."""
     lines = said.splitlines()
     errors = [line for line in lines if line.startswith("grasp-cosim: ")]
@@ -412,7 +410,7 @@ def complaints(code: int | None, said: str, changed: list[str]) -> list[str]:
     return found + [f"wrote {name}" for name in changed]
 
 
-def main(kind: str, first: int, count: int, fmus: Path, folder: Path) -> None:
+def main(kind, first, count, fmus, folder):
     """Try seeds and print what came of it."""
     from grasp_cosim import System
     from grasp_cosim.cli.commands import inspect, run, ssp  # noqa: F401

@@ -8,7 +8,6 @@ whose number is the parameter interrupted).
 """
 
 import shutil
-from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -22,16 +21,35 @@ needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not i
 TYPES = {
     "2.0": {"Real": 0, "Integer": 6, "Boolean": 10, "Enumeration": 11, "String": 12},
     "3.0": {
-        "Float64": 0, "Float32": 1, "Int8": 2, "UInt8": 3, "Int16": 4, "UInt16": 5, "Int32": 6,
-        "UInt32": 7, "Int64": 8, "UInt64": 9, "Boolean": 10, "Enumeration": 11, "String": 12,
+        "Float64": 0,
+        "Float32": 1,
+        "Int8": 2,
+        "UInt8": 3,
+        "Int16": 4,
+        "UInt16": 5,
+        "Int32": 6,
+        "UInt32": 7,
+        "Int64": 8,
+        "UInt64": 9,
+        "Boolean": 10,
+        "Enumeration": 11,
+        "String": 12,
     },
-}  # fmt: skip
+}
 """By version, the types and what is added to 100 (u_T) or 200 (y_T) as value reference."""
 
 PARAMETERS = (
-    "crash_at", "exit_at", "hang_at", "error_at", "discard_at", "early_at", "terminate_at", "gain",
-    "interrupt_at", "interrupted",
-)  # fmt: skip
+    "crash_at",
+    "exit_at",
+    "hang_at",
+    "error_at",
+    "discard_at",
+    "early_at",
+    "terminate_at",
+    "gain",
+    "interrupt_at",
+    "interrupted",
+)
 UNITS = {
     "m": 'm="1"',
     "mm": 'm="1" factor="0.001"',
@@ -47,15 +65,15 @@ EARLY = {**CAPABLE, "mightReturnEarlyFromDoStep": "true"}
 
 
 def build(
-    folder: Path,
-    name: str = "native",
-    version: str = "3.0",
-    units: Mapping[str, str] | None = None,
-    capabilities: Mapping[str, str] | None = None,
-    token: str = "{native}",
-    complete: bool = False,
-    strings: bool = True,
-) -> Path:
+    folder,
+    name="native",
+    version="3.0",
+    units=None,
+    capabilities=None,
+    token="{native}",
+    complete=False,
+    strings=True,
+):
     """The FMU name.fmu in folder; units by variable, capabilities as attributes (else CAPABLE).
 
     It has outputs that are Strings only with strings.
@@ -70,16 +88,16 @@ def build(
     return pack(folder / f"{name}.fmu", version, "native", xml, library)
 
 
-def _attributes(values: Mapping[str, str]) -> str:
+def _attributes(values):
     return "".join(f' {key}="{value}"' for key, value in values.items())
 
 
-def _unit_definitions() -> str:
+def _unit_definitions():
     units = "".join(f'<Unit name="{n}"><BaseUnit {base}/></Unit>' for n, base in UNITS.items())
     return f'<UnitDefinitions>{units}<Unit name="bare"/></UnitDefinitions>'
 
 
-def _variables(version: str, strings: bool) -> list[tuple[str, str, int, str, str]]:
+def _variables(version, strings):
     """Name, type, value reference, causality and variability."""
     real, whole = ("Real", "Integer") if version == "2.0" else ("Float64", "UInt64")
     rows = []
@@ -95,14 +113,14 @@ def _variables(version: str, strings: bool) -> list[tuple[str, str, int, str, st
     return [row for row in rows if strings or row[1] != "String" or row[3] != "output"]
 
 
-def _start(name: str, fmi_type: str) -> str:
+def _start(name, fmi_type):
     if name.startswith("u_") or name in PARAMETERS:
         texts = {"Boolean": "false", "String": "", "Enumeration": "1"}
         return texts.get(fmi_type, "1" if name == "gain" else "1e9" if name in PARAMETERS else "0")
     return ""
 
 
-def _description_2(units: Mapping[str, str], capabilities: Mapping[str, str], strings: bool) -> str:
+def _description_2(units, capabilities, strings):
     rows = _variables("2.0", strings)
     index = {name: number for number, (name, *_) in enumerate(rows, 1)}
     variables = ""
@@ -134,7 +152,7 @@ def _description_2(units: Mapping[str, str], capabilities: Mapping[str, str], st
     )
 
 
-def _description_3(units: Mapping[str, str], capabilities: Mapping[str, str], strings: bool) -> str:
+def _description_3(units, capabilities, strings):
     rows = [
         *_variables("3.0", strings),
         ("size", "UInt64", 40, "structuralParameter", "fixed"),

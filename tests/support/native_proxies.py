@@ -5,7 +5,6 @@ import errno
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -14,11 +13,10 @@ from typing import Any
 import pytest
 from c_compilers import Compiler, compile_all
 from grasp_fmus.build import compiler_for, job
-from grasp_fmus.description import Experiment, Version
+from grasp_fmus.description import Experiment
 from grasp_fmus.native.targets import here
 from grasp_fmus.package import write_file
 from grasp_fmus.proxy import Original, proxy_members
-from grasp_fmus.variable import Variable
 
 from .fmi2 import ERROR, OK, Fmu, Instance
 from .scripted_peer import VARIABLES, Clock, ScriptedPeer
@@ -27,31 +25,31 @@ from .slow import platforms
 SHIM = Path(__file__).parents[1] / "fmus/native/proxy_shim.h"
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 NAME = "AnyProxy"
-FMI: Version = 2
+FMI = 2
 """Of the proxies that are made; a test module chooses it with on_each_version."""
 
 COUNTS = ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected")
 
 _CLOCK = ctypes.CFUNCTYPE(ctypes.c_int64)
 _SEND = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t)
-_C: dict[str, Any] = {
+_C = {
     "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
 }  # fmt: skip
-_PYTHON: dict[str, Callable[[Any], Any]] = {"Boolean": bool, "String": bytes.decode}
+_PYTHON = {"Boolean": bool, "String": bytes.decode}
 
 
 @pytest.fixture(autouse=True, params=[2, platforms(3)])
-def on_each_version(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def on_each_version(request, monkeypatch):
     """To import into a test module: its proxies are of this version of FMI."""
     monkeypatch.setattr("support.native_proxies.FMI", request.param)
 
 
-def original(variables: Sequence[Variable] = VARIABLES) -> Original:
+def original(variables=VARIABLES):
     return Original("Original.fmu", variables, {}, Experiment(), True)
 
 
-def write_sources(folder: Path, fmi: Version = 2) -> None:
+def write_sources(folder, fmi=2):
     """The sources of a proxy, into a folder that is there."""
     for file, data in proxy_members(Path(f"{NAME}.fmu"), original(), fmi).items():
         if file.startswith("sources/"):
@@ -59,7 +57,7 @@ def write_sources(folder: Path, fmi: Version = 2) -> None:
 
 
 @cache
-def _fmu(variables: tuple[Variable, ...], fmi: Version) -> Fmu:
+def _fmu(variables, fmi):
     """Built once per process, compiled once for all."""
     files = proxy_members(Path(f"{NAME}.fmu"), original(variables), fmi)
     sources = {n.removeprefix("sources/"): d for n, d in files.items() if n.startswith("sources/")}
@@ -80,14 +78,11 @@ def _fmu(variables: tuple[Variable, ...], fmi: Version) -> Fmu:
 class Host:
     """A host with one instance of a proxy; what is refused raises RefusedError."""
 
-    def __init__(
-        self, port: int, clock: Callable[[], int], variables: Sequence[Variable] = VARIABLES,
-        **settings: Any,
-    ) -> None:  # fmt: skip
+    def __init__(self, port, clock, variables=VARIABLES, **settings):
         self._fmu = _fmu(tuple(variables), FMI)
         self._outputs = [v.name for v in variables if v.causality == "output"]
         self._hooks = {"clock": _CLOCK(clock), "send": _SEND(self._sent)}
-        self.intercept: Callable[[bytes], None] = lambda datagram: None
+        self.intercept = lambda datagram: None
         """Called with what is sent; it may raise an OSError instead."""
         self._instance = Instance(self._fmu, "proxy")
         self.time = 0.0
@@ -95,82 +90,82 @@ class Host:
         settings = {"on_loss": "failsafe", **settings}
         self.set(**{f"proxy.{name}": value for name, value in settings.items()})
 
-    def _sent(self, at: int, size: int) -> int:
+    def _sent(self, at, size):
         try:
             self.intercept(ctypes.string_at(at, size))
         except OSError as error:
             return error.errno or errno.EIO
         return 0
 
-    def call(self, function: str, *arguments: Any) -> int:
+    def call(self, function, *arguments):
         """Any function of FMI 2.0, by its name without fmi2; its status."""
         for name, hook in self._hooks.items():
             place = ctypes.c_void_p.in_dll(self._fmu.library, f"shim_{name}")
             place.value = ctypes.cast(hook, ctypes.c_void_p).value
         return self._instance.call(function, *arguments)
 
-    def must(self, function: str, *arguments: Any) -> None:
+    def must(self, function, *arguments):
         status = self.call(function, *arguments)
         if status != OK:
             raise RefusedError(status)
 
-    def free(self) -> None:
+    def free(self):
         self.call("FreeInstance")
 
-    def _access(self, action: str, name: str, *given: Any) -> Any:
+    def _access(self, action, name, *given):
         kind = self._fmu.kinds[name]
         values = (_C[kind] * 1)(*given)
         reference = (ctypes.c_uint * 1)(self._fmu.references[name])
         self.must(f"{action}{kind}", reference, ctypes.c_size_t(1), values)
         return _PYTHON.get(kind, lambda value: value)(values[0])
 
-    def set(self, **values: Any) -> None:
+    def set(self, **values: Any):
         for name, value in values.items():
             self._access("Set", name, value.encode() if isinstance(value, str) else value)
 
-    def get(self, name: str) -> Any:
+    def get(self, name):
         return self._access("Get", name)
 
-    def outputs(self) -> list[Any]:
+    def outputs(self):
         return [self.get(name) for name in self._outputs]
 
-    def own(self) -> list[Any]:
+    def own(self):
         return [self.get(name) for name in self._fmu.references if name.startswith("proxy.")]
 
-    def state(self) -> int:
+    def state(self):
         return int(self.get("proxy.state"))
 
-    def counts(self) -> dict[str, int]:
+    def counts(self):
         """The counters that are not 0."""
         return {name: n for name in COUNTS if (n := self.get(f"proxy.{name}"))}
 
-    def setup(self, start: float) -> None:
+    def setup(self, start):
         real = ctypes.c_double
         self.must("SetupExperiment", 0, real(0.0), real(start), 0, real(0.0))
 
-    def enter(self) -> None:
+    def enter(self):
         self.must("EnterInitializationMode")
 
-    def initialise(self) -> "Host":
+    def initialise(self):
         self.setup(0.0)
         self.enter()
         self.must("ExitInitializationMode")
         return self
 
-    def do_step(self, time: float, size: float) -> None:
+    def do_step(self, time, size):
         self.must("DoStep", ctypes.c_double(time), ctypes.c_double(size), 1)
 
-    def step(self, size: float = 0.25) -> None:
+    def step(self, size=0.25):
         self.do_step(self.time, size)
         self.time += size
 
-    def terminate(self) -> None:
+    def terminate(self):
         self.must("Terminate")
 
-    def log(self) -> list[str]:
+    def log(self):
         return [m.text for m in self._instance.log]
 
-    def refused(self, call: Callable[..., Any], *arguments: Any) -> str:
+    def refused(self, call, *arguments):
         """The one line in the log about a call that is refused."""
         before = len(self.log())
         with pytest.raises(RefusedError) as error:
@@ -186,7 +181,7 @@ class RefusedError(Exception):
 
 
 @contextmanager
-def hosted(port: int, clock: Clock | None = None, **how: Any) -> Iterator[Host]:
+def hosted(port, clock=None, **how):
     """A host, whose instance is freed in the end."""
     host = Host(port, clock or Clock(), **how)
     try:
@@ -196,7 +191,7 @@ def hosted(port: int, clock: Clock | None = None, **how: Any) -> Iterator[Host]:
 
 
 @contextmanager
-def connected(clock: Clock | None = None, **how: Any) -> Iterator[tuple[Host, ScriptedPeer]]:
+def connected(clock=None, **how):
     """A proxy in step mode, and its peer."""
     with ScriptedPeer(clock) as peer, hosted(peer.port, peer.clock, **how) as host:
         yield host.initialise(), peer

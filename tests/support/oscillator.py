@@ -3,8 +3,6 @@
 In continuous time a.x = sin(t) and b.x = 1 - cos(t).
 """
 
-from pathlib import Path
-
 from grasp_cosim.interface.read import read_interface
 from support.native_fmus import build
 
@@ -18,7 +16,7 @@ CONNECTIONS = """connections = [
 """
 
 
-def write_oscillator(folder: Path, more: str = "", stop: float = 0.64) -> Path:
+def write_oscillator(folder, more="", stop=0.64):
     """The system file, with `more` at its end, and its FMU in folder; the file."""
     fmu = build(folder, "integrator", "2.0", {"x": "m", "now": "s"})
     inputs = [v.name for v in read_interface(fmu).of("input") if v.name != "u_Real"]

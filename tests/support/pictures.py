@@ -1,11 +1,9 @@
 """Is a picture the one that is kept in docs?"""
 
-from pathlib import Path
-
 import pytest
 
 
-def assert_same_picture(drawn: Path, kept: Path, command: str) -> None:
+def assert_same_picture(drawn, kept, command):
     """An SVG to the letter; of a PNG a few pixels may be others, as another processor rounds."""
     if drawn.suffix == ".svg":
         assert drawn.read_text("utf-8") == kept.read_text("utf-8"), f"{kept.name}: {command}"

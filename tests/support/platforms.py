@@ -5,7 +5,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from c_compilers import Compiler, compile_all
 from grasp_fmus.build import compiler_for, job
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
 
-from .c_host import HEADERS, SOURCE, Host, Unpacked
+from .c_host import HEADERS, SOURCE, Host
 from .compiled import compile_c
 from .compilers import needs_zig
 
@@ -26,7 +25,7 @@ ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 """The libc that Debian has for aarch64, in libc6-dev-arm64-cross."""
 
 
-def needs_programs(*programs: str) -> pytest.MarkDecorator:
+def needs_programs(*programs: str):
     missing = [program for program in programs if not shutil.which(program)]
     return pytest.mark.skipif(bool(missing), reason=f"NO {', '.join(missing)}")
 
@@ -43,7 +42,7 @@ class Platform:
     """Its libm is the one that Python uses."""
     mark: Any = ()
 
-    def compiled(self, fmu: Unpacked, folder: Path) -> Path:
+    def compiled(self, fmu, folder):
         """The library of an FMU in a folder, made from its sources alone."""
         library = folder / f"{fmu.name}{self.target.suffix}"
         if self.compiler == ZIG:
@@ -89,7 +88,7 @@ WIN = [
 ]
 
 
-def cases(platforms: Sequence[Platform], versions: Sequence[int] = (2, 3)) -> list[Any]:
+def cases(platforms, versions=(2, 3)):
     """Parameters of a test, each with its marks: a platform and a version of FMI."""
     return [
         pytest.param(p, fmi, id=f"{p.name}, FMI {fmi}", marks=p.mark)
@@ -98,7 +97,7 @@ def cases(platforms: Sequence[Platform], versions: Sequence[int] = (2, 3)) -> li
     ]
 
 
-def host_of(target: Target, folder: Path, options: Sequence[str] = ()) -> Host:
+def host_of(target, folder, options=()):
     """The host in C for a platform, compiled into a folder, and what runs it here."""
     strict = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", f"-I{HEADERS}", *options]
     program = folder / ("host.exe" if target == WINDOWS else "host")
@@ -115,12 +114,12 @@ def host_of(target: Target, folder: Path, options: Sequence[str] = ()) -> Host:
     return Host(program, ("qemu-aarch64", "-L", str(ARM_LIBRARIES)))
 
 
-def windows() -> dict[str, str]:
+def windows():
     """The environment of a program that wine runs."""
     return {**os.environ, "WINEPREFIX": str(_wine()), "WINEDEBUG": "-all"}
 
 
-def _wine() -> Path:
+def _wine():
     """A Windows of the tests, made once: it takes 20 s, and 700 MB beside this Python."""
     folder = Path(sys.prefix, "wine_of_the_tests")
     if not folder.exists():
@@ -132,9 +131,9 @@ def _wine() -> Path:
     return folder
 
 
-def run_in_wine(command: Sequence[str], prefix: Path) -> None:
+def run_in_wine(command, prefix):
     """Run one of wine's own programs, which say much."""
-    more: Mapping[str, str] = {
+    more = {
         "WINEPREFIX": str(prefix), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml=",
     }  # fmt: skip
     subprocess.run(command, env={**os.environ, **more}, capture_output=True, timeout=300)

@@ -2,7 +2,6 @@
 
 import os
 import socket
-from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 
@@ -11,7 +10,7 @@ LOWEST, COUNT = 20_000, 10_000
 
 
 @contextmanager
-def kept_port() -> Iterator[int]:
+def kept_port():
     """A UDP port of 127.0.0.1 that stays ours while nobody has bound it.
 
     Whoever keeps it has the TCP port of the same number.

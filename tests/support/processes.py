@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 
-def alive(pid: int) -> bool:
+def alive(pid):
     """Whether there is a process of that number that is no zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
@@ -14,7 +14,7 @@ def alive(pid: int) -> bool:
         return False
 
 
-def ends(pid: int) -> bool:
+def ends(pid):
     """Whether a process ends within 20 s, as a killed one does in its turn; else it is ended."""
     end = time.monotonic() + 20.0
     while alive(pid):

@@ -3,20 +3,15 @@
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, Self
 
 from grasp_cosim import cli
-from grasp_cosim.hil.address import Address
-from grasp_cosim.hil.network import Network
 from grasp_cosim.hil.protocol import exchanged
 from grasp_cosim.hil.relay import Relay
-from grasp_cosim.hil.served import ServedFmu, Service
+from grasp_cosim.hil.served import ServedFmu
 from grasp_cosim.hil.server import Server
-from grasp_cosim.hil.traffic import Log
 from grasp_fmus.link.message import (
     END,
     HELLO,
@@ -30,9 +25,7 @@ from grasp_fmus.link.message import (
     Codec,
     Message,
     Sealer,
-    Value,
 )
-from grasp_fmus.link.signature import Signature
 
 Ask = Callable[[bytes], bytes | None]
 """Hands a datagram over; the answer, if there is one."""
@@ -41,14 +34,14 @@ Ask = Callable[[bytes], bytes | None]
 class RefusedError(Exception):
     """What a peer says in a REFUSE: its code, and its reason."""
 
-    def __str__(self) -> str:
+    def __str__(self):
         return str(self.args[1])
 
 
 class HandProxy:
     """Does what a proxy FMU does, without an FMU and without patience."""
 
-    def __init__(self, signature: Signature, ask: Ask, key: bytes | None = None) -> None:
+    def __init__(self, signature, ask, key=None):
         self.signature = signature
         self.round = 0
         """What the header has as the time of sending."""
@@ -58,42 +51,40 @@ class HandProxy:
         self._codecs = Codec(signature.request), Codec(signature.answer)
         self._session = self._cookie = self._sequence = 0
 
-    def hello(self, session: int, **changed: Any) -> bytes:
+    def hello(self, session, **changed):
         """The HELLO that begins a session."""
         self._session, self._cookie, self._sequence = session, 0, 0
         body = self.signature.text.encode().ljust(SHORTEST_HELLO, b"\0")
         return self.pack(HELLO, **{"body": body, **changed})
 
-    def request(
-        self, kind: int, time: float, values: Sequence[Value], step: float = 0.0, /, **changed: Any
-    ) -> bytes:
+    def request(self, kind, time, values, step=0.0, /, **changed):
         """The next INITIALISE or STEP."""
         self._sequence += 1
         body = self._codecs[0].pack(*values)
         plain = {"kind": kind, "time": time, "step": step, "body": body}
         return self.pack(**{**plain, **changed})
 
-    def pack(self, kind: int, **changed: Any) -> bytes:
+    def pack(self, kind, **changed):
         """A datagram of the session."""
         state = (self.signature.hash, self._session, self._cookie, self._sequence)
         plain = Message(kind, 0, *state, 0.0, 0.0, self.round, b"")
         return self._sealer.pack(plain._replace(**changed))
 
-    def begin(self, session: int, values: Sequence[Value], time: float = 0.0) -> list[Value]:
+    def begin(self, session, values, time=0.0):
         """HELLO and INITIALISE; the outputs."""
         self.take(self._ask(self.hello(session)))
         return self.initialise(time, values)
 
-    def initialise(self, time: float, values: Sequence[Value]) -> list[Value]:
+    def initialise(self, time, values):
         return self.take(self._ask(self.request(INITIALISE, time, values)))
 
-    def step(self, time: float, step: float, values: Sequence[Value]) -> list[Value]:
+    def step(self, time, step, values):
         return self.take(self._ask(self.request(STEP, time, values, step)))
 
-    def end(self) -> None:
+    def end(self):
         assert self._ask(self.pack(END)) is None
 
-    def take(self, answer: bytes | None) -> list[Value]:
+    def take(self, answer):
         """The outputs in an answer, if any; RefusedError where it refuses."""
         assert answer is not None
         m = self._sealer.open(answer)
@@ -115,23 +106,23 @@ class HandProxy:
 class UdpAsk:
     """Over UDP on the loopback; an answer may take 30 s, the machine may be busy."""
 
-    def __init__(self, address: tuple[str, int]) -> None:
+    def __init__(self, address):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect(address)
         self._socket.settimeout(30.0)
 
-    def __call__(self, datagram: bytes) -> bytes | None:
+    def __call__(self, datagram):
         self._socket.send(datagram)
         return None if datagram[6] == 7 else self._socket.recv(LARGEST)
 
-    def __enter__(self) -> Self:
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_: object):
         self._socket.close()
 
 
-def wait_until(condition: Callable[[], bool]) -> None:
+def wait_until(condition):
     """Until it holds, at most 30 s."""
     end = time.monotonic() + 30.0
     while not condition():
@@ -140,9 +131,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 @contextmanager
-def serving(
-    fmu: Path, how: Service, address: tuple[str, int] = ("127.0.0.1", 0)
-) -> Iterator[Server]:
+def serving(fmu, how, address=("127.0.0.1", 0)):
     """A server in a thread, stopped in the end."""
     with Server(ServedFmu(exchanged(fmu), how), address) as server:
         thread = threading.Thread(target=server.serve)
@@ -156,14 +145,7 @@ def serving(
 
 
 @contextmanager
-def relaying(
-    peer: Address,
-    network: Network | None = None,
-    *,
-    host: str = "127.0.0.1",
-    port: int = 0,
-    log: Log | None = None,
-) -> Iterator[Relay]:
+def relaying(peer, network=None, *, host="127.0.0.1", port=0, log=None):
     """A relay that runs in a thread of its own; whatever ends it is raised in the end."""
     with (
         Relay(peer, network, host=host, port=port, log=log) as relay,
@@ -181,7 +163,7 @@ ANY_PORT = 5005
 """For a proxy that gets its port before a run, so that its library is compiled once."""
 
 
-def build_proxy(fmu: Path, out: Path, port: int, *options: str) -> Path:
+def build_proxy(fmu, out, port, *options):
     """The proxy of an FMU, made by the command; it waits for an answer as long as it takes."""
     made = ["proxy", str(fmu), "-o", str(out), "--port", str(port), "--timeout", "30", *options]
     assert cli.main(made) == 0

@@ -14,9 +14,9 @@ _ASK = "import sys; print('{}.{}'.format(*sys.version_info))"
 
 
 @cache
-def python(version: str) -> str:
+def python(version):
     """The program of a Python of that version; skips the test without."""
-    programs: list[Path | str | None] = [
+    programs = [
         sys.executable,
         shutil.which(f"python{version}"),
         *sorted((Path.home() / ".pyenv/versions").glob(f"{version}.*/bin/python")),

@@ -2,8 +2,6 @@
 
 import re
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
 
 import fmpy
 
@@ -19,8 +17,8 @@ double of_libm(double x) { return ceil(x) + atan2(x, 2.0) + tanh(x); }
 MISSING = "double missing(double x) { return licence_check(x); }\n"
 
 
-def _described(before: str, after: str) -> Callable[[Files], Files]:
-    def change(files: Files) -> Files:
+def _described(before, after):
+    def change(files):
         xml = files["modelDescription.xml"].decode()
         assert before in xml
         return files | {"modelDescription.xml": xml.replace(before, after).encode()}
@@ -28,25 +26,25 @@ def _described(before: str, after: str) -> Callable[[Files], Files]:
     return change
 
 
-def _moved(folder: str) -> Callable[[Files], Files]:
+def _moved(folder):
     """The binaries for another machine, or as sources."""
     to = f"binaries/{folder}/native.{'dll' if folder.startswith('win') else 'so'}"
     to = "sources/native.c" if folder == "sources" else to
     return lambda files: {re.sub("^binaries/.*", to, name): data for name, data in files.items()}
 
 
-def _without_binary(files: Files) -> Files:
+def _without_binary(files):
     return {name: data for name, data in files.items() if not name.startswith("binaries/")}
 
 
-def _one(files: Files) -> Files:
+def _one(files):
     """FMI 1.0, which has its kind in an element of its own; of ours that is enough to tell."""
     xml = files["modelDescription.xml"].decode().replace('fmiVersion="2.0"', 'fmiVersion="1.0"')
     xml = re.sub("<CoSimulation([^>]*)/>", "", xml)
     return files | {"modelDescription.xml": xml.encode()}
 
 
-def _one_stepping(files: Files) -> Files:
+def _one_stepping(files):
     xml = _one(files)["modelDescription.xml"].decode()
     tool = "<Implementation><CoSimulation_StandAlone><Capabilities/></CoSimulation_StandAlone>"
     xml = xml.replace("</fmiModelDescription>", f"{tool}</Implementation></fmiModelDescription>")
@@ -57,7 +55,7 @@ ASK = "ask the vendor for an export as FMI 2.0 or 3.0, for co-simulation"
 HERE, HERE_3 = fmpy.platform, fmpy.platform_tuple
 BINARY, BINARY_3 = (f"ask the vendor for an FMU with a binary for {p}" for p in (HERE, HERE_3))
 
-KINDS: dict[str, tuple[str, Callable[[Files], Files], str, str]] = {
+KINDS = {
     "fmi 1.0": ("2.0", _one, "is FMI 1.0, for model exchange", ASK),
     "fmi 1.0 stepping": ("2.0", _one_stepping, "is FMI 1.0, for co-simulation", ASK),
     "scheduled": (
@@ -69,7 +67,7 @@ KINDS: dict[str, tuple[str, Callable[[Files], Files], str, str]] = {
 }
 """What no machine runs: the version, the change, what is said of it, and what to ask for."""
 
-BINARIES: dict[str, tuple[str, Callable[[Files], Files], str, str]] = {
+BINARIES = {
     "windows": ("2.0", _moved("win64"), f"for win64 only; this machine: {HERE}", BINARY),
     "arm": ("3.0", _moved("aarch64-linux"), "has a binary for aarch64-linux only", BINARY_3),
     "sources": ("2.0", _moved("sources"), "is source-only, C without a binary", BINARY),
@@ -78,13 +76,13 @@ BINARIES: dict[str, tuple[str, Callable[[Files], Files], str, str]] = {
 """What this machine does not run."""
 
 
-def refused(folder: Path, name: str) -> Path:
+def refused(folder, name):
     """The FMU x.fmu of that kind in a folder."""
     version, change, *_ = (KINDS | BINARIES)[name]
     return changed(build(folder, "whole", version), folder / "x.fmu", change)
 
 
-def changed(fmu: Path, out: Path, change: Callable[[Files], Files]) -> Path:
+def changed(fmu, out, change):
     """A copy of an FMU with its files changed."""
     with zipfile.ZipFile(fmu) as archive:
         files = {n: archive.read(n) for n in archive.namelist() if not n.endswith("/")}
@@ -94,14 +92,14 @@ def changed(fmu: Path, out: Path, change: Callable[[Files], Files]) -> Path:
     return out
 
 
-def linked(folder: Path, missing: bool = False) -> Path:
+def linked(folder, missing=False):
     """An FMU whose binary leaves libm undefined, as Dymola's do; or also what is nowhere."""
     options = ("-fno-builtin", "-nostdlib", "-Wl,--unresolved-symbols=ignore-all", "-lc")
     code = CODE + MISSING if missing else CODE
     return _with_library(folder, code, SOURCES / "fmi2.c", options=options)
 
 
-def licensed(folder: Path) -> Path:
+def licensed(folder):
     """An FMU that logs that it finds no licence, with the path of its resources, and gives up."""
     text = (SOURCES / "fmi2.c").read_text("utf-8")
     found = re.search(r"fmi2Component fmi2Instantiate\((.*?)\)\s*\{", text, re.DOTALL)
@@ -118,7 +116,7 @@ def licensed(folder: Path) -> Path:
     )
 
 
-def _with_library(folder: Path, code: str, *sources: Path, options: tuple[str, ...] = ()) -> Path:
+def _with_library(folder, code, *sources, options=()):
     library = shared_library(*sources, code=code, options=options)
     whole = build(folder, "whole", "2.0")
     place = binary("2.0", "native")

@@ -6,10 +6,9 @@ then wakes the proxy with a datagram that means nothing. So nothing depends on h
 
 import socket
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from itertools import count
 from threading import Thread
-from typing import Any
 
 from grasp_fmus.link.message import (
     BUSY,
@@ -27,7 +26,6 @@ from grasp_fmus.link.message import (
     Message,
     Sealer,
 )
-from grasp_fmus.link.signature import Signature
 from grasp_fmus.proxy import shared_signature
 from grasp_fmus.variable import Variable
 
@@ -48,7 +46,7 @@ VARIABLES = (
 SIGNATURE = shared_signature(VARIABLES)
 
 
-def answers(values: Sequence[Any]) -> list[Any]:
+def answers(values):
     """The outputs to a request."""
     force, mode, armed, gain, _ = values
     return [gain * force, mode, not armed]
@@ -57,11 +55,11 @@ def answers(values: Sequence[Any]) -> list[Any]:
 class Clock:
     """A clock that stands still but for tick ns with each look at it."""
 
-    def __init__(self, tick: int = 0) -> None:
+    def __init__(self, tick=0):
         self.now = 0
         self.tick = tick
 
-    def __call__(self) -> int:
+    def __call__(self):
         self.now += self.tick
         return self.now
 
@@ -69,73 +67,65 @@ class Clock:
 class ScriptedPeer:
     """Answers requests by answers(), but for those for which something else is in the script."""
 
-    def __init__(
-        self,
-        clock: Clock | None = None,
-        signature: Signature = SIGNATURE,
-        outputs: Callable[[Sequence[Any]], list[Any]] = answers,
-        key: bytes | None = None,
-    ) -> None:
+    def __init__(self, clock=None, signature=SIGNATURE, outputs=answers, key=None):
         self.clock = clock or Clock()
         self.signature = signature
-        self.got: list[Message] = []
-        self.datagrams: list[bytes] = []
-        self.script: dict[int, deque[Act]] = {kind: deque() for kind in (HELLO, INITIALISE, STEP)}
-        self.kept: list[bytes] = []
-        self.failures: list[BaseException] = []
+        self.got = []
+        self.datagrams = []
+        self.script = {kind: deque() for kind in (HELLO, INITIALISE, STEP)}
+        self.kept = []
+        self.failures = []
         self.offset = 0.0
         """s by which the outputs belong to another time."""
         self._outputs = outputs
         self._sealer = Sealer(key)
         self._cookies = count(1000)
         self._cookie = 0
-        self._source: Any = None
+        self._source = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
-        self.port: int = self._socket.getsockname()[1]
+        self.port = self._socket.getsockname()[1]
         self._thread = Thread(target=self._run)
         self._thread.start()
 
-    def __enter__(self) -> "ScriptedPeer":
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_: object):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
             s.sendto(b"", ("127.0.0.1", self.port))
         self._thread.join()
         self._socket.close()
         assert not self.failures
 
-    def kinds(self) -> list[int]:
+    def kinds(self):
         """The kinds of the requests so far."""
         return [m.kind for m in self.got]
 
-    def values(self, m: Message) -> list[Any]:
+    def values(self, m):
         """What a request holds."""
         values = Codec(self.signature.request).unpack(m.body)
         assert values is not None
         return values
 
-    def told(self, kind: int, *acts: Act) -> None:
+    def told(self, kind, *acts):
         """Put acts into the script for the next requests of a kind."""
         self.script[kind].extend(acts)
 
-    def send(self, datagram: bytes) -> None:
+    def send(self, datagram):
         self._socket.sendto(datagram, self._source)
 
-    def pack(
-        self, m: Message, kind: int, body: bytes = b"", code: int = 0, **changed: Any
-    ) -> bytes:
+    def pack(self, m, kind, body=b"", code=0, **changed):
         """The datagram of an answer to m."""
         answer = m._replace(kind=kind, code=code, interface=self.signature.hash, body=body)
         return self._sealer.pack(answer._replace(step=0.0, **changed))
 
-    def outputs(self, m: Message) -> bytes:
+    def outputs(self, m):
         """The OUTPUTS to m."""
         body = Codec(self.signature.answer).pack(*self._outputs(self.values(m)))
         return self.pack(m, OUTPUTS, body, time=m.time + m.step - self.offset)
 
-    def _run(self) -> None:
+    def _run(self):
         while True:
             datagram, self._source = self._socket.recvfrom(LARGEST)
             if not datagram:
@@ -145,7 +135,7 @@ class ScriptedPeer:
             except BaseException as error:  # shown when the test is over
                 self.failures.append(error)
 
-    def _receive(self, datagram: bytes) -> None:
+    def _receive(self, datagram):
         m = self._sealer.open(datagram)
         assert isinstance(m, Message), m
         self.datagrams.append(datagram)
@@ -156,7 +146,7 @@ class ScriptedPeer:
         act = script.popleft() if script else welcome if m.kind == HELLO else answer
         act(self, m)
 
-    def new_cookie(self) -> int:
+    def new_cookie(self):
         """A cookie for a new session."""
         self._cookie = next(self._cookies)
         return self._cookie
@@ -165,61 +155,61 @@ class ScriptedPeer:
 # What a peer may do
 
 
-def welcome(peer: ScriptedPeer, m: Message) -> None:
+def welcome(peer, m):
     peer.send(peer.pack(m, WELCOME, cookie=peer.new_cookie()))
 
 
-def answer(peer: ScriptedPeer, m: Message) -> None:
+def answer(peer, m):
     peer.send(peer.outputs(m))
 
 
-def miss(peer: ScriptedPeer, m: Message) -> None:
+def miss(peer, m):
     """Let the deadline pass."""
     peer.clock.now += 10**12
     peer.send(peer.pack(m, WELCOME))  # again, which means nothing
 
 
-def keep(peer: ScriptedPeer, m: Message) -> None:
+def keep(peer, m):
     """Have the answer ready, but let the deadline pass."""
     peer.kept.append(peer.outputs(m))
     miss(peer, m)
 
 
-def send_kept_and_miss(peer: ScriptedPeer, m: Message) -> None:
+def send_kept_and_miss(peer, m):
     """The answers that were kept come now, the one to this step does not."""
     for datagram in peer.kept:
         peer.send(datagram)
     miss(peer, m)
 
 
-def send_kept_and_answer(peer: ScriptedPeer, m: Message) -> None:
+def send_kept_and_answer(peer, m):
     for datagram in peer.kept:
         peer.send(datagram)
     answer(peer, m)
 
 
-def fail(peer: ScriptedPeer, m: Message) -> None:
+def fail(peer, m):
     peer.send(peer.pack(m, REFUSE, b"the motor\nis hot", FAILED))
 
 
-def forget(peer: ScriptedPeer, m: Message) -> None:
+def forget(peer, m):
     """As after a new start."""
     peer.send(peer.pack(m, REFUSE, b"", UNKNOWN))
 
 
-def busy(peer: ScriptedPeer, m: Message) -> None:
+def busy(peer, m):
     peer.clock.now += 60_000_000
     peer.send(peer.pack(m, REFUSE, b"", BUSY))
 
 
-def refuse(code: int, reason: bytes = b"", **changed: Any) -> Act:
+def refuse(code, reason=b"", **changed):
     return lambda peer, m: peer.send(peer.pack(m, REFUSE, reason, code, **changed))
 
 
-def datagrams(first: Iterable[bytes], then: Act = answer) -> Act:
+def datagrams(first, then=answer):
     """Send these first."""
 
-    def act(peer: ScriptedPeer, m: Message) -> None:
+    def act(peer, m):
         for datagram in first:
             peer.send(datagram)
         then(peer, m)

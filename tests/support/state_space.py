@@ -8,23 +8,27 @@ from .compiled import pack, shared_library
 
 SOURCE = Path(__file__).parent / "models" / "state_space.c"
 TYPES = (
-    "Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64",
-    "UInt64", "Boolean", "Enumeration",
-)  # fmt: skip
+    "Float64",
+    "Float32",
+    "Int8",
+    "UInt8",
+    "Int16",
+    "UInt16",
+    "Int32",
+    "UInt32",
+    "Int64",
+    "UInt64",
+    "Boolean",
+    "Enumeration",
+)
 """The types of the arrays u_T and y_T = u_T, of 2 x k."""
 
 _UNIT = "1 0 0 0 1 0 0 0 1"
 
 
 def state_space(
-    folder: Path,
-    name: str = "ss",
-    types: bool = False,
-    more: str = "",
-    kind: str = "CoSimulation",
-    binary: bool = True,
-    complete: bool = False,
-) -> Path:
+    folder, name="ss", types=False, more="", kind="CoSimulation", binary=True, complete=False
+):
     """The FMU name.fmu in folder: m inputs u, n states x, r outputs y, 3 of each at the start.
 
     With types it has u_T and y_T for all types; more are further variables of its description. kind
@@ -37,9 +41,7 @@ def state_space(
     return pack(folder / f"{name}.fmu", "3.0", "state_space", description, library)
 
 
-def _variable(
-    kind: str, name: str, reference: int, causality: str, sizes: str, start: str = "", own: str = ""
-) -> str:
+def _variable(kind, name, reference, causality, sizes, start="", own=""):
     """sizes are references of sizes like "2 1", or "=2" for a fixed one."""
     dimensions = "".join(
         f'<Dimension start="{s[1:]}"/>' if s[0] == "=" else f'<Dimension valueReference="{s}"/>'
@@ -52,7 +54,7 @@ def _variable(
     )
 
 
-def _description(types: bool, more: str, kind: str) -> str:
+def _description(types, more, kind):
     tunable = ' variability="tunable"'
     variables = [
         '<Float64 name="time" valueReference="0" causality="independent"/>',

@@ -1,16 +1,12 @@
 """A system of one native FMU whose inputs a CSV file drives."""
 
-from pathlib import Path
-
 from .native_fmus import TYPES, build
 
 STARTS = {"Boolean": "false", "String": "''", "Enumeration": "1"}
 REALS = {"2.0": "Real", "3.0": "Float64"}
 
 
-def driven(
-    folder: Path, text: str, version: str = "2.0", more: str = "", own: str = "", step: float = 0.1
-) -> Path:
+def driven(folder, text, version="2.0", more="", own="", step=0.1):
     """The system file driven.toml in folder, of a component a; drive.csv beside it has the text.
 
     Inputs that the text does not name have values. more is in the file, own in its component.

@@ -30,7 +30,7 @@ DIMENSION = '<Dimension start="2"/>'
 UNITS = {"mm": 'm="1"', "mN": 'kg="1" m="1" s="-2"'}
 
 
-def vendor_plant(path: Path) -> Path:
+def vendor_plant(path):
     """Build it as an FMU at path, with gcc."""
     with tempfile.TemporaryDirectory() as folder:
         assert cli.main(["build", "--native", "--c-only", folder, "GripperPlant"]) == 0
@@ -39,7 +39,7 @@ def vendor_plant(path: Path) -> Path:
     return pack(path, "3.0", "vendor", description(), library)
 
 
-def description() -> str:
+def description():
     """Its model description."""
     units = "".join(
         f'<Unit name="{name}"><BaseUnit {base} factor="0.001"/></Unit>'

@@ -11,7 +11,7 @@ STEPS = st.tuples(*[st.floats(1.1, 10.0)] * 2).map(lambda r: (1.0, r[0], r[0] * 
 
 
 @given(steps=STEPS, order=st.floats(0.5, 3.5), c=st.sampled_from([-2.0, 0.3, 7.0]))
-def test_an_error_that_is_a_power_of_the_step_has_that_order(steps, order, c) -> None:
+def test_an_error_that_is_a_power_of_the_step_has_that_order(steps, order, c):
     results = [5.0 + c * h**order for h in steps]
     assert observed_order(steps, results) == pytest.approx(order, abs=1e-6)
 
@@ -19,17 +19,17 @@ def test_an_error_that_is_a_power_of_the_step_has_that_order(steps, order, c) ->
 @pytest.mark.parametrize(
     "results", [(1.0, 1.0, 2.0), (1.0, 2.0, 1.0), (None, 1.0, 2.0), (1.0, 2.0, 2.0), (0, 1, 1e3)]
 )
-def test_results_that_show_no_order(results) -> None:
+def test_results_that_show_no_order(results):
     assert observed_order((1.0, 2.0, 4.0), results) is None
 
 
-def table(steps: list[float], **metrics: list[float | None]) -> Table:
+def table(steps, **metrics):
     columns = {"index": list(range(len(steps))), "experiment.step": steps, **metrics}
     columns["error"] = [None] * len(steps)
     return Table(columns, ("experiment.step",), tuple(metrics), {"experiment.step": "s"})
 
 
-def test_a_study_in_any_order_of_the_steps() -> None:
+def test_a_study_in_any_order_of_the_steps():
     made = table([4e-4, 1e-4, 2e-4], t=[1.4, 1.1, 1.2], never=[1.0, None, None])
     assert is_study(made)
     found = convergence(made)
@@ -46,7 +46,7 @@ def test_a_study_in_any_order_of_the_steps() -> None:
     ]
 
 
-def test_what_is_no_study() -> None:
+def test_what_is_no_study():
     assert not is_study(table([1e-4]))
     assert not is_study(table([1e-4, 1e-4]))
     assert convergence(table([1e-4, 2e-4], t=[1.0, 2.0]))["t"].order is None

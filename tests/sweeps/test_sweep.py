@@ -10,7 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from grasp_cosim import InputError, SimulationError, System, sweep
+from grasp_cosim import InputError, SimulationError, sweep
 from grasp_cosim.metrics.metric import load_metrics
 from grasp_cosim.sweeps.cluster import cluster
 from grasp_cosim.sweeps.rows import grid
@@ -25,16 +25,16 @@ FAILING = grid({"a.gain": [1.0, 2.0, 3.0], "a.error_at": [1e9, 0.055]})
 
 
 @pytest.fixture
-def system(tmp_path: Path) -> System:
+def system(tmp_path):
     return integrator(tmp_path)
 
 
 @pytest.fixture
-def mine(system: System, tmp_path: Path):
+def mine(system, tmp_path):
     return load_metrics(tmp_path / "mine.py")
 
 
-def test_a_task_that_travels_is_the_same(system: System, mine) -> None:
+def test_a_task_that_travels_is_the_same(system, mine):
     task = Task(system, mine)
     here = run_row(task, 3, {"a.gain": 2.0})
     assert here.metrics == {"end": pytest.approx(0.4), "half[1]": True, "half[2]": None}
@@ -45,7 +45,7 @@ def test_a_task_that_travels_is_the_same(system: System, mine) -> None:
 
 
 @pytest.mark.slow
-def test_the_bytes_are_those_of_any_processes(system: System, mine, tmp_path: Path) -> None:
+def test_the_bytes_are_those_of_any_processes(system, mine, tmp_path):
     one, two = (
         sweep(system, FAILING, metrics=mine, workers=n, out=tmp_path / f"{n}.csv") for n in (1, 2)
     )
@@ -63,7 +63,7 @@ def test_the_bytes_are_those_of_any_processes(system: System, mine, tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_a_crash_takes_its_own_run_only(system: System, mine) -> None:
+def test_a_crash_takes_its_own_run_only(system, mine):
     rows = [{"a.crash_at": at} for at in (1e9, 0.055, 1e8, 0.035, 1e7)]
     for workers in (1, 2):
         table = sweep(system, rows, metrics=mine, workers=workers)
@@ -71,7 +71,7 @@ def test_a_crash_takes_its_own_run_only(system: System, mine) -> None:
         assert "the process of the run ended with signal" in table.errors[1]
 
 
-def test_what_is_refused_before_any_run(system: System, mine, tmp_path: Path) -> None:
+def test_what_is_refused_before_any_run(system, mine, tmp_path):
     for rows, more, said in (
         ([{"a.gian": 1.0}], {}, "did you mean gain"),
         ([{"a.gain": "x"}], {}, "gain"),
@@ -84,7 +84,7 @@ def test_what_is_refused_before_any_run(system: System, mine, tmp_path: Path) ->
         sweep(system, [{"a.gain": 1.0}])
 
 
-def test_a_row_that_does_not_fit_is_an_error_of_its_own(system: System, mine) -> None:
+def test_a_row_that_does_not_fit_is_an_error_of_its_own(system, mine):
     table = sweep(system, [{"a.gain": 1.0}, {"a.gain": "x"}], metrics=mine, workers=1)
     assert list(table.errors) == [1]
     assert "gain" in table.errors[1]
@@ -116,7 +116,7 @@ KILL = (
 )
 
 
-def sweeping(folder: Path, count: int = 0, act: str = "pass") -> tuple[int, str, str]:
+def sweeping(folder, count=0, act="pass"):
     """Exit code and output of a command that acts right after it has kept so many runs."""
     program = PROGRAM.replace("COUNT", str(count)).replace("ACT", act)
     done = subprocess.run(
@@ -126,13 +126,13 @@ def sweeping(folder: Path, count: int = 0, act: str = "pass") -> tuple[int, str,
     return done.returncode, done.stdout, done.stderr
 
 
-def kept(folder: Path) -> list[bytes]:
+def kept(folder):
     return (folder / "sweep.csv.rows").read_bytes().splitlines()
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system has no /proc")
-def test_killed_it_goes_on_and_comes_to_the_same_table(tmp_path: Path) -> None:
+def test_killed_it_goes_on_and_comes_to_the_same_table(tmp_path):
     write_integrator(tmp_path)
     code, started, _ = sweeping(tmp_path, 7, KILL)
     assert code == -signal.SIGKILL
@@ -155,7 +155,7 @@ def test_killed_it_goes_on_and_comes_to_the_same_table(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("whom", ["0", "os.getpid()"])
-def test_ctrl_c_keeps_what_is_done(tmp_path: Path, whom: str) -> None:
+def test_ctrl_c_keeps_what_is_done(tmp_path, whom):
     """It is for all processes, as from a terminal, or for the command alone."""
     write_integrator(tmp_path)
     code, out, err = sweeping(tmp_path, 5, f"os.kill({whom}, signal.SIGINT)")
@@ -165,7 +165,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, whom: str) -> None:
     assert any(one.endswith(line) for one in err.splitlines())  # behind what an FMU had begun
 
 
-def test_kept_runs_are_bound_to_what_they_are_of(system: System, mine, tmp_path: Path) -> None:
+def test_kept_runs_are_bound_to_what_they_are_of(system, mine, tmp_path):
     out = tmp_path / "t.csv"
     rows = [{"a.gain": 1.0}, {"a.gain": 2.0}]
     sweep(system, rows, metrics=mine, out=out, workers=1)
@@ -178,7 +178,7 @@ def test_kept_runs_are_bound_to_what_they_are_of(system: System, mine, tmp_path:
     assert out.read_bytes() == whole
 
 
-def test_two_at_a_time_are_refused(system: System, mine, tmp_path: Path) -> None:
+def test_two_at_a_time_are_refused(system, mine, tmp_path):
     from grasp_cosim.sweeps.store import opened
 
     with opened(tmp_path / "t.csv.rows", "x"), pytest.raises(InputError, match="another process"):
@@ -189,7 +189,7 @@ def test_two_at_a_time_are_refused(system: System, mine, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_a_dask_cluster_gives_the_same_bits(system: System, mine, tmp_path: Path) -> None:
+def test_a_dask_cluster_gives_the_same_bits(system, mine, tmp_path):
     distributed = pytest.importorskip("distributed", reason="dask is not installed")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=2, dashboard_address="127.0.0.1:0", host="127.0.0.1"
@@ -207,7 +207,7 @@ def test_a_dask_cluster_gives_the_same_bits(system: System, mine, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_run_that_kills_workers_is_a_row_of_its_own(system: System, mine) -> None:
+def test_a_run_that_kills_workers_is_a_row_of_its_own(system, mine):
     distributed = pytest.importorskip("distributed", reason="dask is not installed")
     import dask
 
@@ -223,8 +223,8 @@ def test_a_run_that_kills_workers_is_a_row_of_its_own(system: System, mine) -> N
     assert "the worker of the run died" in table.errors[1]
 
 
-def test_a_scheduler_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    def client(*_: object, **__: object) -> None:
+def test_a_scheduler_that_is_none(monkeypatch):
+    def client(*_: object, **__: object):
         raise TimeoutError
 
     for module, said in (
@@ -236,7 +236,7 @@ def test_a_scheduler_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
             pass
 
 
-def test_an_executor_that_breaks_ends_the_sweep_with_a_reason(system: System, mine) -> None:
+def test_an_executor_that_breaks_ends_the_sweep_with_a_reason(system, mine):
     class Broken(ProcessPoolExecutor):
         def submit(self, *_: object, **__: object):
             return super().submit(int, "x")

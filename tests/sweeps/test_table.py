@@ -1,7 +1,6 @@
 """The table of runs: types of its columns, units in files, and what is said of them."""
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -13,11 +12,11 @@ from grasp_cosim.sweeps.table import Table, made
 
 
 @metric("reach", unit="m", entries=("left", "right"), factor=1e3, shown_unit="mm")
-def reach(_: object) -> list[float]:
+def reach(_):
     return []
 
 
-def small() -> Table:
+def small():
     outcomes = [
         Outcome(0, {"reach[1]": 0.5, "reach[2]": None, "late": True}),
         Outcome(1, {}, "a: failed, badly"),
@@ -25,7 +24,7 @@ def small() -> Table:
     return made([{"a.p": 1.5}, {"a.p": 2}], outcomes, {"a.p": "N"}, [reach])
 
 
-def test_a_file_has_units_and_values_in_full(tmp_path: Path) -> None:
+def test_a_file_has_units_and_values_in_full(tmp_path):
     small().write(tmp_path / "t.csv")
     assert (tmp_path / "t.csv").read_text().splitlines() == [
         "index,a.p [N],reach[1] [m],reach[2] [m],late,error",
@@ -44,7 +43,7 @@ def test_a_file_has_units_and_values_in_full(tmp_path: Path) -> None:
     assert (tmp_path / "t.parquet").read_bytes() == before
 
 
-def test_columns_are_numbers_and_pandas_has_them(tmp_path: Path) -> None:
+def test_columns_are_numbers_and_pandas_has_them(tmp_path):
     table = small()
     np.testing.assert_array_equal(table["reach[1]"], [0.5, np.nan])
     np.testing.assert_array_equal(table["late"], [1.0, np.nan])
@@ -71,7 +70,7 @@ def test_columns_are_numbers_and_pandas_has_them(tmp_path: Path) -> None:
         (["jacobi", 1, None], "string"),
     ],
 )
-def test_every_column_has_a_type_that_holds_it(tmp_path: Path, column, kind: str) -> None:
+def test_every_column_has_a_type_that_holds_it(tmp_path, column, kind):
     columns = {"index": [0, 1, 2], "c": column, "error": [None] * 3}
     Table(columns, ("c",), (), {}).write(tmp_path / "t.parquet")
     found = pq.read_table(tmp_path / "t.parquet")
@@ -83,7 +82,7 @@ def test_every_column_has_a_type_that_holds_it(tmp_path: Path, column, kind: str
         assert [row["index"] for row in csv.DictReader(file)] == ["0", "1", "2"]
 
 
-def test_a_summary_is_of_what_is_finite() -> None:
+def test_a_summary_is_of_what_is_finite():
     values = [*range(101), None, float("nan"), float("inf")]
     table = Table({"index": list(range(104)), "a": values, "b": [None]}, (), ("a", "b"), {})
     found = table.summary()

@@ -1,8 +1,6 @@
 """Arrays in a system: connections, values, sizes and units, and each mistake in one line."""
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import pytest
 from grasp_cosim import InputError, System
@@ -17,11 +15,11 @@ TABLES = '[components.a]\nfmu = "ss.fmu"\n{}\n[components.b]\nfmu = "ss.fmu"\n{}
 
 
 @pytest.fixture
-def load(tmp_path: Path) -> Load:
+def load(tmp_path):
     """Two FMUs with arrays, which need no binary here."""
     state_space(tmp_path, types=True, binary=False)
 
-    def made(connections: str = "", a: str = "", b: str = "", more: str = "") -> System:
+    def made(connections="", a="", b="", more=""):
         path = tmp_path / "system.toml"
         head = f"connections = [{connections}]\n[experiment]\nstep = 0.1\nstop = 1.0\n"
         path.write_text(head + TABLES.format(a, b) + more, "utf-8")
@@ -30,7 +28,7 @@ def load(tmp_path: Path) -> Load:
     return made
 
 
-def test_a_connection_of_arrays_is_one_for_each_element(load: Load) -> None:
+def test_a_connection_of_arrays_is_one_for_each_element(load):
     system = load('"a.y -> b.u"')
     assert list(map(str, system.connections)) == [f"a.y[{i}] -> b.u[{i}]" for i in (1, 2, 3)]
     smaller = system.with_values({"a.r": 2, "b.m": 2})
@@ -38,7 +36,7 @@ def test_a_connection_of_arrays_is_one_for_each_element(load: Load) -> None:
     assert smaller.with_values({"a.r": 3, "b.m": 3}).connections == system.connections
 
 
-def test_values_decide_sizes_before_arrays_are_set(load: Load) -> None:
+def test_values_decide_sizes_before_arrays_are_set(load):
     system = load(a="values = { A = [[1, 2], [3, 4]], n = 2, u = 5.0 }")
     values = system.component("a", "").values
     expected = {"n": 2, "A[1,1]": 1.0, "A[1,2]": 2.0, "A[2,1]": 3.0, "A[2,2]": 4.0}
@@ -48,7 +46,7 @@ def test_values_decide_sizes_before_arrays_are_set(load: Load) -> None:
     assert {n: v for n, v in one.items() if n[0] == "A"} == {"A[1,1]": -1.0}
 
 
-def test_names_and_units_of_whole_arrays(load: Load) -> None:
+def test_names_and_units_of_whole_arrays(load):
     system = load(
         '"a.way -> b.u"', 'rename = { way = "y" }\nunits = { way = "mm" }', 'units = { u = "m" }'
     )
@@ -84,7 +82,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("connections", "a", "message"), MISTAKES)
-def test_a_mistake_is_one_line(load: Load, connections: str, a: str, message: str) -> None:
+def test_a_mistake_is_one_line(load, connections, a, message):
     with pytest.raises(InputError, match=message) as caught:
         load(connections, a)
     assert "\n" not in str(caught.value)
@@ -104,13 +102,13 @@ def test_a_mistake_is_one_line(load: Load, connections: str, a: str, message: st
         ('at = 0.5\nset = { "a.u_Enumeration[1,1]" = "quick" }', "must be one of slow, fast"),
     ],
 )
-def test_a_mistake_in_an_event_is_one_line(load: Load, more: str, message: str) -> None:
+def test_a_mistake_in_an_event_is_one_line(load, more, message):
     with pytest.raises(InputError, match=message) as caught:
         load(more=f"[[events]]\n{more}\n")
     assert "\n" not in str(caught.value)
 
 
-def test_a_value_that_a_smaller_array_has_no_place_for_is_named(load: Load) -> None:
+def test_a_value_that_a_smaller_array_has_no_place_for_is_named(load):
     system = load(a="values = { A = 1 }")
     with pytest.raises(
         InputError, match=r"^with_values a\.n = 2: there is then no A\[1,3\], which"
@@ -118,28 +116,28 @@ def test_a_value_that_a_smaller_array_has_no_place_for_is_named(load: Load) -> N
         system.with_values({"a.n": 2})
 
 
-def test_a_long_number_for_a_fault_is_refused(load: Load) -> None:
+def test_a_long_number_for_a_fault_is_refused(load):
     fault = '[[faults]]\nconnection = "b.u_Int64[1,2]"\nkind = "stuck"\nvalue = 9007199254740993\n'
     with pytest.raises(InputError, match=r"faults\[0\]: value = 9007199254740993: must be smaller"):
         load('"a.y_Int64 -> b.u_Int64"', more=fault)
 
 
 @pytest.mark.parametrize("name", ["fast", "it's", "two words", "1", "a == b"])
-def test_the_name_of_an_item_in_a_condition_reads_back(name: str) -> None:
+def test_the_name_of_an_item_in_a_condition_reads_back(name):
     quote = '"' if "'" in name else "'"
-    entry: Any = {"when": f"a.mode == {quote}{name}{quote}", "set": {"a.u": 1.0}}
+    entry = {"when": f"a.mode == {quote}{name}{quote}", "set": {"a.u": 1.0}}
     (event,) = read_events("here", [entry])
     assert event.when == Condition(Port("a", "mode"), "==", name)
     assert event_entry(event) == entry
 
 
-def test_inputs_without_a_source_are_said_in_one_line(load: Load) -> None:
+def test_inputs_without_a_source_are_said_in_one_line(load):
     (of_a, of_b) = remarks(load('"a.y[2] -> b.u[1]"'))
     assert of_a.startswith("a: no source for u, u_Float64, u_Float32, ")
     assert of_b.startswith("b: no source for u[2], u[3], u_Float64, ")
 
 
-def test_a_remark_on_a_connection_of_arrays_is_one_line(load: Load) -> None:
+def test_a_remark_on_a_connection_of_arrays_is_one_line(load):
     lines = remarks(load('"a.y_Float64 -> b.u_Float32"', 'units = { y_Float64 = "mm" }'))
     assert lines[:2] == (
         "a.y_Float64 -> b.u_Float32: from Float64 to Float32, rounded to 7 digits",
@@ -148,9 +146,7 @@ def test_a_remark_on_a_connection_of_arrays_is_one_line(load: Load) -> None:
     assert len(lines) == 4
 
 
-def test_inspect_shows_shapes_and_what_they_come_from(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inspect_shows_shapes_and_what_they_come_from(tmp_path, capsys):
     fmu = state_space(tmp_path, types=True, binary=False)
     assert main(["inspect", str(fmu)]) == 1  # it has no binary
     rows = {line.split()[0]: line for line in capsys.readouterr().out.splitlines() if line}

@@ -2,8 +2,6 @@
 
 import re
 import zipfile
-from pathlib import Path
-from typing import Any
 
 import pytest
 from grasp_cosim import InputError, System
@@ -15,19 +13,19 @@ from grasp_cosim.system.validity import remarks
 TEXT = SYSTEM.read_text("utf-8")
 
 
-def load(text: str, fmus: Path, folder: Path) -> System:
+def load(text, fmus, folder):
     path = folder / "system.toml"
     path.write_text(text, encoding="utf-8")
     return System.load(path, fmus)
 
 
-def test_the_built_in_grasp(grasp: System) -> None:
+def test_the_built_in_grasp(grasp):
     assert [c.name for c in grasp.components] == ["plant", "sensor_1", "sensor_2", "controller"]
     assert len(grasp.connections) == 10
     assert (grasp.step_ns, grasp.stop_ns, grasp.scheme) == (100_000, 3_000_000_000, "sequential")
 
 
-def test_every_input_is_connected(grasp: System) -> None:
+def test_every_input_is_connected(grasp):
     inputs = {Port(c.name, v.name) for c in grasp.components for v in c.interface.of("input")}
     assert {connection.target for connection in grasp.connections} == inputs
 
@@ -90,28 +88,26 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("right", "wrong", "message"), WRONG)
-def test_a_mistake_is_one_line(
-    fmus: Path, tmp_path: Path, right: str, wrong: str, message: str
-) -> None:
+def test_a_mistake_is_one_line(fmus, tmp_path, right, wrong, message):
     assert right in TEXT
     with pytest.raises(InputError, match=message) as caught:
         load(TEXT.replace(right, wrong, 1), fmus, tmp_path)
     assert "\n" not in str(caught.value)
 
 
-def test_an_unconnected_input_may_have_a_value(fmus: Path, tmp_path: Path) -> None:
+def test_an_unconnected_input_may_have_a_value(fmus, tmp_path):
     text = TEXT.replace('  "plant.gap[1] -> sensor_1.gap",\n', "")
     text = text.replace("[components.sensor_2]", "values = { gap = 0.02 }\n\n[components.sensor_2]")
     assert load(text, fmus, tmp_path).component("sensor_1", "test").values == {"gap": 0.02}
 
 
-def test_missing_system_file() -> None:
+def test_missing_system_file():
     with pytest.raises(InputError, match=r"nowhere\.toml: no such system file"):
         System.load("nowhere.toml")
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip archive"])
-def test_a_file_that_is_no_fmu(grasp: System, tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_no_fmu(grasp, tmp_path, content):
     path = tmp_path / "broken.fmu"
     path.write_bytes(content)
     with pytest.raises(InputError, match=re.escape(f"{path}: not a readable FMU")) as caught:
@@ -119,7 +115,7 @@ def test_a_file_that_is_no_fmu(grasp: System, tmp_path: Path, content: bytes) ->
     assert "\n" not in str(caught.value)
 
 
-def test_swap_wants_the_same_variables(grasp: System, fmus: Path) -> None:
+def test_swap_wants_the_same_variables(grasp, fmus):
     with pytest.raises(
         InputError, match=r"ProximitySensor.fmu has no output 'gap\[1\]', and 7 more"
     ):
@@ -128,7 +124,7 @@ def test_swap_wants_the_same_variables(grasp: System, fmus: Path) -> None:
         grasp.swap("sensor_1", fmus / "GraspController.fmu")
 
 
-def test_values_by_name(grasp: System) -> None:
+def test_values_by_name(grasp):
     changed = grasp.with_values(
         {"plant.finger_mass[1]": 0.7, "controller.impact_reduction.enabled": False}
     )
@@ -139,7 +135,7 @@ def test_values_by_name(grasp: System) -> None:
     assert changed.start("plant.finger_mass[2]") == 0.5
 
 
-def test_text_is_converted_to_the_declared_type(grasp: System) -> None:
+def test_text_is_converted_to_the_declared_type(grasp):
     changed = grasp.with_values(
         {"controller.impact_reduction.enabled": "false", "sensor_1.reflectance": "0.86"}
     )
@@ -147,21 +143,21 @@ def test_text_is_converted_to_the_declared_type(grasp: System) -> None:
     assert changed.component("sensor_1", "test").values == {"reflectance": 0.86}
 
 
-def test_an_item_of_an_enumeration_by_its_name_or_number(grasp: System) -> None:
+def test_an_item_of_an_enumeration_by_its_name_or_number(grasp):
     for given in ("brown", 4, "4"):
         changed = grasp.with_values({"sensor_1.surface": given})
         assert changed.component("sensor_1", "test").values == {"surface": 4}
 
 
 @pytest.mark.parametrize("given", ["green", "BROWN", 6, -1, 4.5, True])
-def test_no_item_of_an_enumeration(grasp: System, given: Any) -> None:
+def test_no_item_of_an_enumeration(grasp, given):
     items = "custom, white, blue, red, brown, black"
     message = f"sensor_1.surface: surface = {given!r}: must be one of {items}"
     with pytest.raises(InputError, match=re.escape(message)):
         grasp.with_values({"sensor_1.surface": given})
 
 
-def other_sensor(fmus: Path, folder: Path, **numbers: int) -> Path:
+def other_sensor(fmus, folder, **numbers):
     """A sensor whose surfaces have other numbers; one of 0 is not there."""
     path = folder / "Other.fmu"
     with zipfile.ZipFile(fmus / "ProximitySensor.fmu") as old, zipfile.ZipFile(path, "w") as new:
@@ -176,15 +172,13 @@ def other_sensor(fmus: Path, folder: Path, **numbers: int) -> Path:
     return path
 
 
-def test_a_number_between_the_items_is_none(grasp: System, fmus: Path, tmp_path: Path) -> None:
+def test_a_number_between_the_items_is_none(grasp, fmus, tmp_path):
     swapped = grasp.swap("sensor_1", other_sensor(fmus, tmp_path, red=0))
     with pytest.raises(InputError, match="surface = 3: must be one of custom, white, blue, brown"):
         swapped.with_values({"sensor_1.surface": 3})
 
 
-def test_a_swap_does_not_change_what_a_value_stands_for(
-    grasp: System, fmus: Path, tmp_path: Path
-) -> None:
+def test_a_swap_does_not_change_what_a_value_stands_for(grasp, fmus, tmp_path):
     brown = grasp.with_values({"sensor_1.surface": "brown"})
     other = other_sensor(fmus, tmp_path, brown=5, black=4)
     message = (
@@ -205,14 +199,12 @@ def test_a_swap_does_not_change_what_a_value_stands_for(
     assert found.severity == "warns"
 
 
-def test_an_output_cannot_be_set(grasp: System) -> None:
+def test_an_output_cannot_be_set(grasp):
     with pytest.raises(InputError, match=r"no input or parameter 'gap\[1\]'"):
         grasp.with_values({"plant.gap[1]": 0.1})
 
 
-def test_a_name_of_several_variables_is_left_alone_and_refused_where_it_is_wanted(
-    tmp_path: Path,
-) -> None:
+def test_a_name_of_several_variables_is_left_alone_and_refused_where_it_is_wanted(tmp_path):
     """As DPController.fmu of ecos' demo has one."""
     twice = "".join(
         f'<ScalarVariable name="{name}" valueReference="{i}" causality="parameter" '

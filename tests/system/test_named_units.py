@@ -1,7 +1,6 @@
 """Units that a system file names for variables whose FMU declares none, or a wrong one."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from comparison.made import PLANT, write_fmu
@@ -20,12 +19,7 @@ BARE = {name: text.replace(' unit="m"', "") for name, text in PLANT.items()}
 """The plant without units of length."""
 
 
-def load(
-    folder: Path,
-    plant: dict[str, str],
-    more: str = "",
-    link: str = '"plant.gap -> spring.position"',
-) -> System:
+def load(folder, plant, more="", link='"plant.gap -> spring.position"'):
     """A plant and a spring that pushes it; `more` stands under [components.plant]."""
     write_fmu(folder / "plant.fmu", plant)
     write_fmu(folder / "spring.fmu", SPRING, {"force": ["position"]})
@@ -40,14 +34,14 @@ def load(
     return System.load(path)
 
 
-def gap_to_position(system: System) -> tuple[float, float]:
+def gap_to_position(system):
     return connection_transform(system, system.connections[0])
 
 
 @pytest.mark.parametrize(
     ("unit", "factor"), [("mm", 1e-3), ("m", 1.0), ("km", 1e3), ("um", 1e-6), ("metre", 1.0)]
 )
-def test_a_connection_converts_by_the_named_unit(tmp_path: Path, unit: str, factor: float) -> None:
+def test_a_connection_converts_by_the_named_unit(tmp_path, unit, factor):
     system = load(tmp_path, BARE, f'units = {{ gap = "{unit}" }}')
     assert gap_to_position(system) == pytest.approx((factor, 0.0), rel=1e-15)
     assert system.component("plant", "").interface.by_name["gap"].unit == unit
@@ -55,7 +49,7 @@ def test_a_connection_converts_by_the_named_unit(tmp_path: Path, unit: str, fact
 
 
 @pytest.mark.parametrize("plant", [PLANT, BARE])
-def test_a_minus_before_a_unit_turns_the_sign(tmp_path: Path, plant: dict[str, str]) -> None:
+def test_a_minus_before_a_unit_turns_the_sign(tmp_path, plant):
     system = load(tmp_path, plant, 'units = { gap = "-mm", width = "-m" }')
     assert gap_to_position(system) == pytest.approx((-1e-3, 0.0), rel=1e-15)
     interface = system.component("plant", "").interface
@@ -64,11 +58,11 @@ def test_a_minus_before_a_unit_turns_the_sign(tmp_path: Path, plant: dict[str, s
         interface.in_units({"gap": "--kg"})
 
 
-def test_without_a_name_values_are_passed_as_they_are(tmp_path: Path) -> None:
+def test_without_a_name_values_are_passed_as_they_are(tmp_path):
     assert gap_to_position(load(tmp_path, BARE)) == (1.0, 0.0)
 
 
-def test_a_definition_of_the_fmu_goes_before_the_known_unit(tmp_path: Path) -> None:
+def test_a_definition_of_the_fmu_goes_before_the_known_unit(tmp_path):
     interface = read_interface(write_fmu(tmp_path / "plant.fmu", BARE))
     own = replace(interface, units={"mm": Unit("mm", (0, 1, *[0] * 6), 0.5)})
     for declares, factor in ((own, 0.5), (interface, 1e-3)):
@@ -78,7 +72,7 @@ def test_a_definition_of_the_fmu_goes_before_the_known_unit(tmp_path: Path) -> N
         assert unit.factor == factor
 
 
-def test_a_declared_unit_is_replaced_and_that_is_said(tmp_path: Path) -> None:
+def test_a_declared_unit_is_replaced_and_that_is_said(tmp_path):
     system = load(tmp_path, dict(PLANT), 'units = { gap = "mm" }')
     assert gap_to_position(system) == (1e-3, 0.0)
     said = "plant.gap is declared in m, but named in mm: taken to be in that"
@@ -99,7 +93,7 @@ def test_a_declared_unit_is_replaced_and_that_is_said(tmp_path: Path) -> None:
         ('"mm"', "units: 'mm'; must be a table"),
     ],
 )
-def test_a_name_that_is_wrong_is_one_line(tmp_path: Path, units: str, message: str) -> None:
+def test_a_name_that_is_wrong_is_one_line(tmp_path, units, message):
     with pytest.raises(InputError) as caught:
         load(tmp_path, BARE, f"units = {units}")
     assert str(caught.value).startswith(f"loop.toml: [components.plant]: {message}")
@@ -110,13 +104,13 @@ def test_a_name_that_is_wrong_is_one_line(tmp_path: Path, units: str, message: s
     ("unit", "end"),
     [("CM", "did you mean cm?"), ("-mM", "did you mean mm, Mm?"), ("DEGC", "did you mean degC?")],
 )
-def test_a_unit_in_other_capitals_is_asked_about(tmp_path: Path, unit: str, end: str) -> None:
+def test_a_unit_in_other_capitals_is_asked_about(tmp_path, unit, end):
     with pytest.raises(InputError, match=r"or that is known; ") as caught:
         load(tmp_path, BARE, f'units = {{ gap = "{unit}" }}')
     assert str(caught.value).endswith(f"; {end}")
 
 
-def test_keys_are_the_names_of_the_system(tmp_path: Path) -> None:
+def test_keys_are_the_names_of_the_system(tmp_path):
     link = '"plant.distance -> spring.position"'
     more = 'rename = { distance = "gap" }\nunits = { distance = "mm" }'
     assert gap_to_position(load(tmp_path, BARE, more, link)) == (1e-3, 0.0)
@@ -127,13 +121,13 @@ def test_keys_are_the_names_of_the_system(tmp_path: Path) -> None:
 # ------------------------------------------------------------------------- another FMU in its place
 
 
-def in_mm(folder: Path, name: str = "other.fmu") -> Path:
+def in_mm(folder, name="other.fmu"):
     plant = {n: text.replace('unit="m"', 'unit="mm"') for n, text in PLANT.items()}
     plant["width"] = plant["width"].replace('start="0.05"', 'start="50"').replace(' max="1"', "")
     return write_fmu(folder / name, plant)
 
 
-def test_values_are_converted_for_an_fmu_in_other_units(tmp_path: Path) -> None:
+def test_values_are_converted_for_an_fmu_in_other_units(tmp_path):
     system = load(tmp_path, dict(PLANT))
     swapped = system.swap("plant", in_mm(tmp_path))
     assert swapped.start("plant.width") == pytest.approx(70.0, rel=1e-15)
@@ -144,7 +138,7 @@ def test_values_are_converted_for_an_fmu_in_other_units(tmp_path: Path) -> None:
     assert revised.start("plant.width") == 60.0
 
 
-def test_a_value_in_a_unit_that_the_other_fmu_lacks_is_refused(tmp_path: Path) -> None:
+def test_a_value_in_a_unit_that_the_other_fmu_lacks_is_refused(tmp_path):
     bare = write_fmu(tmp_path / "bare.fmu", BARE)
     system = load(tmp_path, dict(PLANT))
     assert system.swap("plant", bare).start("plant.width") == 0.07  # in SI, as without units
@@ -163,7 +157,7 @@ def test_a_value_in_a_unit_that_the_other_fmu_lacks_is_refused(tmp_path: Path) -
         system.swap("plant", write_fmu(tmp_path / "volts.fmu", volts))
 
 
-def test_a_condition_in_another_unit_is_refused(tmp_path: Path) -> None:
+def test_a_condition_in_another_unit_is_refused(tmp_path):
     system = load(tmp_path, dict(PLANT))
     event = Event({Port("plant", "mass"): 0.4}, when=Condition(Port("plant", "gap"), "<", 0.01))
     with pytest.raises(
@@ -172,7 +166,7 @@ def test_a_condition_in_another_unit_is_refused(tmp_path: Path) -> None:
         replace(system, events=(event,)).swap("plant", in_mm(tmp_path))
 
 
-def test_a_named_unit_gives_way_to_what_another_fmu_declares(tmp_path: Path) -> None:
+def test_a_named_unit_gives_way_to_what_another_fmu_declares(tmp_path):
     system = load(tmp_path, BARE, 'units = { gap = "mm" }')
     same = system.swap("plant", write_fmu(tmp_path / "bare.fmu", BARE))
     assert gap_to_position(same) == (1e-3, 0.0)

@@ -3,7 +3,6 @@
 import logging
 import pickle
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,11 +14,11 @@ from support.oscillator import write_oscillator
 pytestmark = needs_compiler
 
 
-def natives(system: System) -> set[str]:
+def natives(system):
     return {c.name for c in system.components if c.native}
 
 
-def test_it_is_asked_for_anew_as_often_as_one_likes(grasp: System) -> None:
+def test_it_is_asked_for_anew_as_often_as_one_likes(grasp):
     everything = {"plant", "sensor_1", "sensor_2", "controller"}
     assert natives(grasp) == natives(grasp.natively(False)) == set()
     for native in (None, True):
@@ -28,14 +27,14 @@ def test_it_is_asked_for_anew_as_often_as_one_likes(grasp: System) -> None:
     assert grasp.natively().natively() == grasp.natively()
 
 
-def test_what_is_swapped_in_afterwards_runs_as_it_is(grasp: System) -> None:
+def test_what_is_swapped_in_afterwards_runs_as_it_is(grasp):
     adaptive = with_controller(grasp.natively(), "adaptive")
     assert natives(adaptive) == {"plant", "sensor_1", "sensor_2"}
     assert natives(adaptive.natively()) == natives(grasp.natively())
 
 
 @pytest.mark.parametrize("law", ["published", "adaptive"])
-def test_the_built_in_grasp_runs_natively(law: str) -> None:
+def test_the_built_in_grasp_runs_natively(law):
     native, python = (grasp_system(law, native) for native in (None, False))
     assert natives(native) == {c.name for c in python.components}
     assert natives(python) == set()
@@ -43,9 +42,7 @@ def test_the_built_in_grasp_runs_natively(law: str) -> None:
     assert all(np.array_equal(ours[name], theirs[name]) for name in theirs)
 
 
-def test_a_system_of_others_is_none_of_our_business(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_system_of_others_is_none_of_our_business(tmp_path, caplog):
     """Its FMUs need no Python."""
     system = System.load(write_oscillator(tmp_path))
     assert system.natively() == system == system.natively(True)
@@ -53,9 +50,7 @@ def test_a_system_of_others_is_none_of_our_business(
 
 
 @pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_they_run_in_python_unless_asked(
-    grasp: System, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_without_a_compiler_they_run_in_python_unless_asked(grasp, caplog):
     assert natives(grasp.natively()) == set()
     ((_, level, said),) = caplog.record_tuples
     assert level == logging.WARNING
@@ -64,7 +59,7 @@ def test_without_a_compiler_they_run_in_python_unless_asked(
         grasp.natively(True)
 
 
-def test_an_fmu_that_is_replaced_between_runs_is_noticed(grasp: System, tmp_path: Path) -> None:
+def test_an_fmu_that_is_replaced_between_runs_is_noticed(grasp, tmp_path):
     """A system keeps what it has read, but not for longer than the files stay as they were."""
     fmu = tmp_path / "plant.fmu"
     shutil.copy(grasp.component("plant", "test").fmu, fmu)
@@ -81,7 +76,7 @@ def test_an_fmu_that_is_replaced_between_runs_is_noticed(grasp: System, tmp_path
         simulate(system, step=1e-3, stop=0.01)
 
 
-def test_a_component_travels_without_what_it_has_read(grasp: System) -> None:
+def test_a_component_travels_without_what_it_has_read(grasp):
     (plant, *_) = grasp.components
     assert plant.interface.by_name
     again = pickle.loads(pickle.dumps(plant))

@@ -3,7 +3,6 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from grasp_cosim import InputError, Realtime, System
@@ -13,7 +12,7 @@ TEXT = SYSTEM.read_text("utf-8")
 PLANT, SENSOR = "[components.plant]\n", "[components.sensor_1]"
 
 
-def written(text: str, folder: Path, fmus: Path) -> System:
+def written(text, folder, fmus):
     (folder / "grasp.toml").write_text(text, "utf-8")
     return System.load(folder / "grasp.toml", fmus)
 
@@ -40,9 +39,7 @@ def written(text: str, folder: Path, fmus: Path) -> System:
         ),
     ],
 )
-def test_a_setting_is_as_if_the_file_said_it(
-    grasp: System, fmus: Path, tmp_path: Path, settings: dict[str, Any], was: str, now: str
-) -> None:
+def test_a_setting_is_as_if_the_file_said_it(grasp, fmus, tmp_path, settings, was, now):
     text = TEXT.replace(was, now, 1)
     assert text != TEXT
     expected = written(text, tmp_path, fmus)
@@ -51,7 +48,7 @@ def test_a_setting_is_as_if_the_file_said_it(
     assert found == replace(found), "what is not checked again stands up to a check"
 
 
-def test_stimuli_and_their_interpolation(tmp_path: Path, fmus: Path) -> None:
+def test_stimuli_and_their_interpolation(tmp_path, fmus):
     text = TEXT.replace('  "controller.force[1] -> plant.force[1]",\n', "", 1)
     (tmp_path / "push.csv").write_text("time,plant.force[1]\n0,0\n1,-2\n", "utf-8")
     entry = '[input]\nfile = "push.csv"\ninterpolation = "held"\n'
@@ -62,7 +59,7 @@ def test_stimuli_and_their_interpolation(tmp_path: Path, fmus: Path) -> None:
     assert linear.with_settings(again) == held
 
 
-def test_an_fmu_comes_with_its_names_and_units(grasp: System, fmus: Path, tmp_path: Path) -> None:
+def test_an_fmu_comes_with_its_names_and_units(grasp, fmus, tmp_path):
     other = shutil.copy(fmus / "GripperPlant.fmu", tmp_path / "other.fmu")
     found = grasp.with_settings(
         {
@@ -103,7 +100,7 @@ def test_an_fmu_comes_with_its_names_and_units(grasp: System, fmus: Path, tmp_pa
         ("input.interpolation", "held", ": there is no input file; must have input.file, too"),
     ],
 )
-def test_a_mistake_is_one_line(grasp: System, key: str, value: Any, said: str) -> None:
+def test_a_mistake_is_one_line(grasp, key, value, said):
     with pytest.raises(InputError) as caught:
         grasp.with_settings({key: value})
     message = str(caught.value)
@@ -112,19 +109,19 @@ def test_a_mistake_is_one_line(grasp: System, key: str, value: Any, said: str) -
     assert "\n" not in message
 
 
-def test_a_place_is_given_once(grasp: System) -> None:
+def test_a_place_is_given_once(grasp):
     twice = {"plant.object_width": 0.06, "components.plant.values.object_width": 0.06}
     with pytest.raises(InputError, match=r"^with_settings components.plant.* is given twice"):
         grasp.with_settings(twice)
 
 
-def test_a_section_is_no_name_of_a_component(fmus: Path, tmp_path: Path) -> None:
+def test_a_section_is_no_name_of_a_component(fmus, tmp_path):
     text = TEXT.replace("plant.", "input.").replace("[components.plant]", "[components.input]")
     with pytest.raises(InputError, match=r"^grasp.toml: component 'input': is the name of a sec"):
         written(text, tmp_path, fmus)
 
 
-def test_the_pacing_is_read_and_checked(fmus: Path, tmp_path: Path) -> None:
+def test_the_pacing_is_read_and_checked(fmus, tmp_path):
     paced = written(f'{TEXT}\n[realtime]\noverrun = "stop"\ncpu = 1\n', tmp_path, fmus)
     assert paced.realtime == Realtime(overrun="stop", cpu=1)
     with pytest.raises(InputError, match=r"^grasp.toml: \[realtime\]: factor = 0: must be"):

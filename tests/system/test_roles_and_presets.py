@@ -1,7 +1,6 @@
 """Who plays a role, and values under a name: what a system file may say, and what it may not."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
@@ -20,10 +19,10 @@ Load = Callable[[str], System]
 
 
 @pytest.fixture
-def load_with(fmus: Path, tmp_path: Path) -> Load:
+def load_with(fmus, tmp_path):
     """The system of one sensor, with more text at the end of its file."""
 
-    def load(more: str) -> System:
+    def load(more):
         path = tmp_path / "eye.toml"
         path.write_text(SENSOR.format(fmu=fmus / "ProximitySensor.fmu") + more, "utf-8")
         return System.load(path)
@@ -41,7 +40,7 @@ PRESETS = """
 """
 
 
-def test_roles_are_those_of_the_file_and_in_the_settings(load_with: Load) -> None:
+def test_roles_are_those_of_the_file_and_in_the_settings(load_with):
     system = load_with('[roles]\nsensor_1 = "eye"\nlook = "eye"\n')
     assert system.roles == {"sensor_1": "eye", "look": "eye"}
     assert settings(system)["roles"] == {"sensor_1": "eye", "look": "eye"}
@@ -76,14 +75,14 @@ def test_roles_are_those_of_the_file_and_in_the_settings(load_with: Load) -> Non
         ),
     ],
 )
-def test_a_mistake_is_one_line_that_says_where(load_with: Load, more: str, message: str) -> None:
+def test_a_mistake_is_one_line_that_says_where(load_with, more, message):
     with pytest.raises(InputError) as caught:
         load_with(more)
     assert str(caught.value).startswith(message)
     assert "\n" not in str(caught.value)
 
 
-def test_a_preset_sets_its_values_and_a_later_one_goes_first(load_with: Load) -> None:
+def test_a_preset_sets_its_values_and_a_later_one_goes_first(load_with):
     system = load_with(PRESETS)
     both = system.with_presets("dim", "bright")
     assert both.component("eye", "").values == {
@@ -94,7 +93,7 @@ def test_a_preset_sets_its_values_and_a_later_one_goes_first(load_with: Load) ->
     assert both.presets == system.presets
 
 
-def test_a_preset_that_is_not_there_names_those_that_are(load_with: Load) -> None:
+def test_a_preset_that_is_not_there_names_those_that_are(load_with):
     with pytest.raises(InputError) as caught:
         load_with(PRESETS).with_presets("dim", "dark")
     assert str(caught.value) == (
@@ -112,7 +111,7 @@ def test_a_preset_that_is_not_there_names_those_that_are(load_with: Load) -> Non
         ('"eye.intensity" = 1.0', r"\[presets.odd\] eye.intensity: .* no input or parameter"),
     ],
 )
-def test_a_preset_is_checked_where_it_is_used(load_with: Load, value: str, message: str) -> None:
+def test_a_preset_is_checked_where_it_is_used(load_with, value, message):
     """A file may have presets that only another swap or build of an FMU takes."""
     system = load_with(f"{PRESETS}[presets.odd]\n{value}\n")
     assert system.with_presets("dim").start("eye.gain") == 0.001

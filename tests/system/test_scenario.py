@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.interface.interface import Interface, Kind, Variable
+from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.system import parts
 from grasp_cosim.system.faults import FAULTS as KINDS
 from grasp_cosim.system.faults import RANDOM
@@ -56,13 +56,13 @@ high = 0.4
 """
 
 
-def load(text: str, fmus: Path, folder: Path) -> System:
+def load(text, fmus, folder):
     path = folder / "system.toml"
     path.write_text(text, encoding="utf-8")
     return System.load(path, fmus)
 
 
-def test_events_are_read(fmus: Path, tmp_path: Path) -> None:
+def test_events_are_read(fmus, tmp_path):
     assert load(GRASP + EVENTS, fmus, tmp_path).events == (
         Event({Port("sensor_1", "reflectance"): 0.6}, at_ns=500_000_000),
         Event(
@@ -72,7 +72,7 @@ def test_events_are_read(fmus: Path, tmp_path: Path) -> None:
     )
 
 
-def test_faults_are_read(fmus: Path, tmp_path: Path) -> None:
+def test_faults_are_read(fmus, tmp_path):
     assert load(GRASP + FAULTS, fmus, tmp_path).faults == (
         Fault(
             INTENSITY,
@@ -87,11 +87,11 @@ def test_faults_are_read(fmus: Path, tmp_path: Path) -> None:
     )
 
 
-def test_without_a_scenario_there_is_none(grasp: System) -> None:
+def test_without_a_scenario_there_is_none(grasp):
     assert (grasp.events, grasp.faults, grasp.initialisation) == ((), (), Initialisation())
 
 
-def test_the_options_of_the_initialisation(fmus: Path, tmp_path: Path) -> None:
+def test_the_options_of_the_initialisation(fmus, tmp_path):
     text = GRASP + '[initialisation]\nloops = "refuse"\ntolerance = 1e-6\niterations = 9\n'
     expected = Initialisation("refuse", 1e-6, 9)
     assert load(text, fmus, tmp_path).initialisation == expected
@@ -238,28 +238,22 @@ WRONG_INITIALISATION = [
 
 
 @pytest.mark.parametrize(("right", "wrong", "message"), WRONG_EVENTS)
-def test_a_mistake_in_an_event_is_one_line(
-    fmus: Path, tmp_path: Path, right: str, wrong: str, message: str
-) -> None:
+def test_a_mistake_in_an_event_is_one_line(fmus, tmp_path, right, wrong, message):
     events = EVENTS.split("\n\n")[0] if wrong.split("\n")[0] == "[events]" else EVENTS
     refused(events, right, wrong, message, fmus, tmp_path)
 
 
 @pytest.mark.parametrize(("right", "wrong", "message"), WRONG_FAULTS)
-def test_a_mistake_in_a_fault_is_one_line(
-    fmus: Path, tmp_path: Path, right: str, wrong: str, message: str
-) -> None:
+def test_a_mistake_in_a_fault_is_one_line(fmus, tmp_path, right, wrong, message):
     refused(FAULTS, right, wrong, message, fmus, tmp_path)
 
 
 @pytest.mark.parametrize(("entry", "message"), WRONG_INITIALISATION)
-def test_a_mistake_in_the_initialisation_is_one_line(
-    fmus: Path, tmp_path: Path, entry: str, message: str
-) -> None:
+def test_a_mistake_in_the_initialisation_is_one_line(fmus, tmp_path, entry, message):
     refused("[initialisation]\nX", "X", entry, message, fmus, tmp_path)
 
 
-def refused(scenario: str, right: str, wrong: str, message: str, fmus: Path, folder: Path) -> None:
+def refused(scenario, right, wrong, message, fmus, folder):
     assert right in scenario
     with pytest.raises(InputError, match=message) as caught:
         load(GRASP + scenario.replace(right, wrong, 1), fmus, folder)
@@ -267,19 +261,19 @@ def refused(scenario: str, right: str, wrong: str, message: str, fmus: Path, fol
     assert "\n" not in str(caught.value)
 
 
-def test_an_event_may_come_after_the_end(grasp: System) -> None:
+def test_an_event_may_come_after_the_end(grasp):
     """So that a shorter run of the same system is no error."""
     event = Event({Port("sensor_1", "reflectance"): 0.5}, at_ns=2_000_000_000)
     assert replace(grasp, events=(event,)).with_experiment(stop=1.0).events == (event,)
 
 
-def test_another_step_must_suit_the_delays(grasp: System) -> None:
+def test_another_step_must_suit_the_delays(grasp):
     delayed = replace(grasp, faults=(Fault(INTENSITY, "delay", {"time": 3e-4}),))
     with pytest.raises(InputError, match=r"must be a whole number of steps of 0\.0002 s"):
         delayed.with_experiment(step=2e-4)
 
 
-def test_an_input_without_a_connection_can_be_set(grasp: System) -> None:
+def test_an_input_without_a_connection_can_be_set(grasp):
     event = Event({Port("sensor_1", "gap"): 0.02}, at_ns=0)
     components = tuple(
         replace(c, values={"gap": 0.1}) if c.name == "sensor_1" else c for c in grasp.components
@@ -290,7 +284,7 @@ def test_an_input_without_a_connection_can_be_set(grasp: System) -> None:
     ).events == (event,)
 
 
-def mock_system(kind: Kind, faults: tuple[Fault, ...]) -> System:
+def mock_system(kind, faults):
     """a.y -> b.u of one kind; read_interface is replaced."""
     components = tuple(Component(name, Path(f"{kind}.fmu"), {}) for name in "ab")
     connections = (
@@ -300,14 +294,14 @@ def mock_system(kind: Kind, faults: tuple[Fault, ...]) -> System:
     return System("mock.toml", components, connections, 10**6, 10**9, "jacobi", faults=faults)
 
 
-def mock_interface(path: Path) -> Interface:
-    kind: Kind = path.stem  # type: ignore[assignment]
+def mock_interface(path):
+    kind = path.stem  # type: ignore[assignment]
     u = Variable("u", kind, "input", 0, None, "0", -math.inf, 5.0, kind)
     y = Variable("y", kind, "output", 1, None, None, -math.inf, math.inf, kind)
     return Interface(path, "", "mock", (u, y))
 
 
-ANY: dict[str, dict[str, float]] = {
+ANY = {
     "stuck": {},
     "dropout": {"probability": 0.5},
     "bias": {"value": 1.0},
@@ -318,7 +312,7 @@ ANY: dict[str, dict[str, float]] = {
 }
 
 
-def test_the_readme_has_a_row_for_each_kind_of_fault() -> None:
+def test_the_readme_has_a_row_for_each_kind_of_fault():
     """A new kind touches faults.py and that row."""
     text = (Path(__file__).parents[2] / "docs/system_files.md").read_text("utf-8")
     table = text.split("| kind | makes of a value | parameters |\n|---|---|---|\n")[1]
@@ -329,9 +323,7 @@ def test_the_readme_has_a_row_for_each_kind_of_fault() -> None:
 
 @pytest.mark.parametrize("fault", ANY)
 @pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean"])
-def test_numbers_that_are_not_real_can_be_stuck_lost_and_late(
-    monkeypatch: pytest.MonkeyPatch, kind: Kind, fault: str
-) -> None:
+def test_numbers_that_are_not_real_can_be_stuck_lost_and_late(monkeypatch, kind, fault):
     monkeypatch.setattr(parts, "read_interface", mock_interface)
     faults = (Fault(Port("b", "u"), fault, ANY[fault]),)
     if kind == "Real" or fault in ("stuck", "dropout", "delay"):
@@ -351,9 +343,7 @@ def test_numbers_that_are_not_real_can_be_stuck_lost_and_late(
         ("Integer", 5, None),
     ],
 )
-def test_a_stuck_value_is_one_that_the_input_takes(
-    monkeypatch: pytest.MonkeyPatch, kind: Kind, value: float, message: str | None
-) -> None:
+def test_a_stuck_value_is_one_that_the_input_takes(monkeypatch, kind, value, message):
     monkeypatch.setattr(parts, "read_interface", mock_interface)
     faults = (Fault(Port("b", "u"), "stuck", {"value": value}),)
     if message is None:
@@ -398,7 +388,7 @@ FAULT_LISTS = st.lists(
 
 @QUICK
 @given(EVENT_LISTS)
-def test_an_entry_of_an_event_reads_as_it_again(events: list[Event]) -> None:
+def test_an_entry_of_an_event_reads_as_it_again(events):
     entries = json.loads(json.dumps([event_entry(event) for event in events]))
     read = read_events("run.json", entries)
     assert read == tuple(events)
@@ -407,14 +397,14 @@ def test_an_entry_of_an_event_reads_as_it_again(events: list[Event]) -> None:
 
 @QUICK
 @given(FAULT_LISTS)
-def test_an_entry_of_a_fault_reads_as_it_again(faults: list[Fault]) -> None:
+def test_an_entry_of_a_fault_reads_as_it_again(faults):
     entries = json.loads(json.dumps([fault_entry(fault) for fault in faults]))
     read = read_faults("run.json", entries, ())
     assert read == tuple(faults)
     assert [fault_entry(fault) for fault in read] == entries
 
 
-def test_entries_are_those_of_the_system_file(fmus: Path, tmp_path: Path) -> None:
+def test_entries_are_those_of_the_system_file(fmus, tmp_path):
     system = load(GRASP + EVENTS + FAULTS, fmus, tmp_path)
     assert event_entry(system.events[1]) == {
         "when": "plant.gap[1] < 0.01",

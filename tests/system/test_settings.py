@@ -2,14 +2,12 @@
 
 import json
 from dataclasses import replace
-from typing import Any
 
-from grasp_cosim import System
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Port
 from grasp_cosim.system.settings import settings
 
 
-def test_the_settings_of_the_grasp(grasp: System) -> None:
+def test_the_settings_of_the_grasp(grasp):
     found = settings(grasp)
     assert found["scheme"] == "sequential"
     assert (found["step"], found["stop"]) == (1e-4, 3.0)
@@ -31,7 +29,7 @@ def test_the_settings_of_the_grasp(grasp: System) -> None:
     assert found["events"] == found["faults"] == []
 
 
-def test_what_is_special_in_a_system(grasp: System) -> None:
+def test_what_is_special_in_a_system(grasp):
     plant, *others = grasp.components
     gap = grasp.connections[0]
     system = replace(
@@ -50,7 +48,7 @@ def test_what_is_special_in_a_system(grasp: System) -> None:
             Fault(Port("controller", "intensity[2]"), "stuck", {}),
         ),
     )
-    found: dict[str, Any] = json.loads(json.dumps(settings(system)))
+    found = json.loads(json.dumps(settings(system)))
     assert found["components"]["plant"]["step"] == 2e-4
     assert found["components"]["plant"]["isolation"] == "process"
     assert (found["connections"][0]["factor"], found["connections"][0]["offset"]) == (2.0, -0.5)

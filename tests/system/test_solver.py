@@ -1,7 +1,6 @@
 """The solver of a component: in a system file, in an archive, and with another FMU."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System, simulate
@@ -15,14 +14,14 @@ pytestmark = needs_gcc
 HEAD = '[experiment]\nstep = 0.1\nstop = 1.0\n[components.x]\nfmu = "dahlquist.fmu"\n'
 
 
-def load(folder: Path, solver: str, *kinds: str) -> System:
+def load(folder, solver, *kinds):
     build_model("dahlquist", folder, "2.0", kinds or ("CoSimulation", "ModelExchange"))
     path = folder / "system.toml"
     path.write_text(f"{HEAD}values = {{ u = 0.0 }}\n{solver}\n", "utf-8")
     return System.load(path)
 
 
-def test_what_a_system_file_says(tmp_path: Path) -> None:
+def test_what_a_system_file_says(tmp_path):
     text = "solver = { relative_tolerance = 1e-6, absolute_tolerance = 1e-9, maximum_step = 0.01 }"
     system = load(tmp_path, text)
     assert system.components[0].integrated == Solver(1e-6, 1e-9, 0.01)
@@ -49,19 +48,19 @@ def test_what_a_system_file_says(tmp_path: Path) -> None:
         ("{ maximum_step = -1.0 }", "maximum_step = -1.0 s: must be a number greater than 0"),
     ],
 )
-def test_a_mistake_is_one_line(tmp_path: Path, solver: str, message: str) -> None:
+def test_a_mistake_is_one_line(tmp_path, solver, message):
     with pytest.raises(InputError, match=message) as caught:
         load(tmp_path, f"solver = {solver}")
     assert "\n" not in str(caught.value)
 
 
-def test_a_solver_for_co_simulation_alone(tmp_path: Path) -> None:
+def test_a_solver_for_co_simulation_alone(tmp_path):
     message = "x: solver: dahlquist.fmu is for co-simulation alone; must be left out"
     with pytest.raises(InputError, match=message):
         load(tmp_path, "solver = {}", "CoSimulation")
 
 
-def test_another_fmu_takes_the_solver_that_it_can(tmp_path: Path) -> None:
+def test_another_fmu_takes_the_solver_that_it_can(tmp_path):
     system = load(tmp_path, "solver = { relative_tolerance = 1e-6 }")
     for kind, solver in (("CoSimulation", None), ("ModelExchange", Solver(1e-6))):
         other = build_model("dahlquist", tmp_path, kinds=[kind], file="other")
@@ -70,7 +69,7 @@ def test_another_fmu_takes_the_solver_that_it_can(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("solver", ["solver = { relative_tolerance = 1e-6 }", ""])
 @pytest.mark.parametrize("kinds", [("ModelExchange",), ("CoSimulation", "ModelExchange")])
-def test_an_archive_keeps_it(tmp_path: Path, solver: str, kinds: tuple[str, ...]) -> None:
+def test_an_archive_keeps_it(tmp_path, solver, kinds):
     system, path = load(tmp_path, solver, *kinds), tmp_path / "system.ssp"
     write_ssp(system, path)
     again = System.load(path)

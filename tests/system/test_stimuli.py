@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.system.parts import Port
-from grasp_cosim.system.stimuli import PIECE, Stimuli, read_stimuli
+from grasp_cosim.system.stimuli import PIECE, read_stimuli
 from grasp_cosim.system.stimuli_checks import samples_of
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,12 +18,12 @@ FORCE = Port("a", "u_Real")
 INPUT = '[input]\nfile = "drive.csv"\n'
 
 
-def read(folder: Path, text: str) -> Stimuli:
+def read(folder, text):
     (folder / "drive.csv").write_text(text, "utf-8")
     return read_stimuli(folder / "drive.csv")
 
 
-def test_names_are_quoted_or_not_and_rows_may_be_apart(tmp_path: Path) -> None:
+def test_names_are_quoted_or_not_and_rows_may_be_apart(tmp_path):
     found = read(tmp_path, '\ufeff"time", "a.u[1]",b.v\r\n0,1,2\r\n\r\n 0.5 , 1e3 ,-2.5\r\n')
     assert list(found.columns) == [Port("a", "u[1]"), Port("b", "v")]
     assert found.times == array("q", [0, 500_000_000])
@@ -31,21 +31,21 @@ def test_names_are_quoted_or_not_and_rows_may_be_apart(tmp_path: Path) -> None:
     assert found.place(Port("b", "v"), 1) == "drive.csv: line 4, column 3, b.v"
 
 
-def test_a_time_may_be_in_another_unit(tmp_path: Path) -> None:
+def test_a_time_may_be_in_another_unit(tmp_path):
     assert read(tmp_path, "time [ms],a.u\n-1,0\n2.5,0\n").times == array(
         "q", [-1_000_000, 2_500_000]
     )
 
 
 @pytest.mark.parametrize("name", ["Time", "TIME [s]", "time[s]", " time  [s] "])
-def test_the_time_as_other_tools_call_it_and_rows_of_empty_cells(tmp_path: Path, name: str) -> None:
+def test_the_time_as_other_tools_call_it_and_rows_of_empty_cells(tmp_path, name):
     found = read(tmp_path, f"{name},a.u\r\n0,1\r\n , \r\n1,\u00a02\r\n,\r\n")
     assert found.times == array("q", [0, 10**9])
     assert list(found.columns[Port("a", "u")].samples) == [1.0, 2.0]
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=8))
-def test_numbers_are_read_as_they_are_written(values: list[float]) -> None:
+def test_numbers_are_read_as_they_are_written(values):
     from tempfile import TemporaryDirectory
 
     with TemporaryDirectory() as folder:
@@ -54,7 +54,7 @@ def test_numbers_are_read_as_they_are_written(values: list[float]) -> None:
     assert list(map(repr, found.columns[Port("a", "u")].samples)) == list(map(repr, values))
 
 
-def test_a_mistake_far_down_is_found(tmp_path: Path) -> None:
+def test_a_mistake_far_down_is_found(tmp_path):
     rows = [f"{i},{i}" for i in range(2 * PIECE)]
     rows[-5] = f"{2 * PIECE - 5},nan"
     with pytest.raises(InputError, match=f"drive.csv: line {2 * PIECE - 3}, column 2, a.u = nan"):
@@ -85,15 +85,13 @@ def test_a_mistake_far_down_is_found(tmp_path: Path) -> None:
         ('time,a.u\n0,"1\n', "line 2: not CSV"),
     ],
 )
-def test_a_mistake_in_the_file_is_one_line_with_its_place(
-    text: str, said: str, tmp_path: Path
-) -> None:
+def test_a_mistake_in_the_file_is_one_line_with_its_place(text, said, tmp_path):
     with pytest.raises(InputError, match=re.escape(said)) as refused:
         read(tmp_path, text)
     assert "\n" not in str(refused.value)
 
 
-def test_what_is_no_such_file_is_said(tmp_path: Path) -> None:
+def test_what_is_no_such_file_is_said(tmp_path):
     with pytest.raises(InputError, match="no such input file"):
         read_stimuli(tmp_path / "none.csv")
     with pytest.raises(InputError, match="Is a directory; must be a CSV file"):
@@ -129,28 +127,26 @@ def test_what_is_no_such_file_is_said(tmp_path: Path) -> None:
         ("time,a.u_String\n0,red\n", "is of type String; must be a Real"),
     ],
 )
-def test_a_column_that_does_not_fit_is_one_line_with_its_place(
-    text: str, said: str, tmp_path: Path
-) -> None:
+def test_a_column_that_does_not_fit_is_one_line_with_its_place(text, said, tmp_path):
     with pytest.raises(InputError, match=re.escape(said)) as refused:
         System.load(driven(tmp_path, text, more=INPUT))
     assert "\n" not in str(refused.value)
 
 
 @needs_gcc
-def test_a_whole_number_that_float64_may_not_have_is_refused(tmp_path: Path) -> None:
+def test_a_whole_number_that_float64_may_not_have_is_refused(tmp_path):
     text = "time,a.u_Int64\n0,1\n1,9007199254740993\n"
     with pytest.raises(InputError, match=r"line 3, column 2, a\.u_Int64 = .*: must be small"):
         System.load(driven(tmp_path, text, "3.0", INPUT))
 
 
-def test_numbers_before_the_first_text_are_texts_too(tmp_path: Path) -> None:
+def test_numbers_before_the_first_text_are_texts_too(tmp_path):
     mixed = read(tmp_path, "time,a.u\n0,2.0\n" + "0,1\n" * PIECE + "0,red\n")
     assert mixed.columns[Port("a", "u")].texts == ("2", "1", "red")
 
 
 @needs_gcc
-def test_an_input_has_one_source(tmp_path: Path) -> None:
+def test_an_input_has_one_source(tmp_path):
     text = "time,a.u_Real\n0,1\n"
     system = System.load(driven(tmp_path, text, more=INPUT))
     drives = simulate(system)["a.y_Real"]
@@ -166,7 +162,7 @@ def test_an_input_has_one_source(tmp_path: Path) -> None:
 
 
 @needs_gcc
-def test_words_and_numbers_stand_for_values(tmp_path: Path) -> None:
+def test_words_and_numbers_stand_for_values(tmp_path):
     text = (
         "time,a.u_Boolean,a.u_Enumeration,a.u_Integer,a.u_Real [kN]\n"
         "0,true,two,-3,1\n1,0,1,3.0,2\n2,1,two,1e3,0.5\n"
@@ -182,7 +178,7 @@ def test_words_and_numbers_stand_for_values(tmp_path: Path) -> None:
 
 
 @needs_gcc
-def test_a_file_given_goes_before_the_one_that_is_named(tmp_path: Path) -> None:
+def test_a_file_given_goes_before_the_one_that_is_named(tmp_path):
     path = driven(tmp_path, "time,a.u_Real\n0,1\n", more=INPUT)
     (tmp_path / "other.csv").write_text("time,a.u_Real\n0,7\n", "utf-8")
     assert list(samples_of(System.load(path), FORCE)) == [1.0]

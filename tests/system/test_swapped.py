@@ -1,7 +1,5 @@
 """A component with another FMU: which of its names, units and values stay, and which are given."""
 
-from pathlib import Path
-
 import pytest
 from comparison.made import PLANT, changed, write_fmu, write_system
 from grasp_cosim import InputError, System
@@ -12,20 +10,20 @@ RENAME = {"gap": "luft", "force": "kraft"}
 
 
 @pytest.fixture
-def vendor(tmp_path: Path) -> System:
+def vendor(tmp_path):
     """A spring and the plant of a vendor, whose names and unit of a mass the system gives."""
     system = write_system(tmp_path)
     fmu = write_fmu(tmp_path / "vendor.fmu", VENDOR, {})
     return system.swap("plant", fmu, rename=RENAME, units={"mass": "g"})
 
 
-def test_names_and_units_are_given(vendor: System) -> None:
+def test_names_and_units_are_given(vendor):
     plant = vendor.component("plant", "test")
     assert (plant.rename, plant.units) == (RENAME, {"mass": "g"})
     assert plant.interface.by_name["mass"].unit == "g"
 
 
-def test_names_stay_where_they_fit(vendor: System, tmp_path: Path) -> None:
+def test_names_stay_where_they_fit(vendor, tmp_path):
     next_version = write_fmu(tmp_path / "next.fmu", {**VENDOR, "kraft_2": PLANT["gap"]}, {})
     swapped = vendor.swap("plant", next_version).component("plant", "test")
     assert (swapped.rename, swapped.units) == (RENAME, {"mass": "g"})
@@ -35,7 +33,7 @@ def test_names_stay_where_they_fit(vendor: System, tmp_path: Path) -> None:
     assert vendor.swap("plant", both).component("plant", "test").rename == {"force": "kraft"}
 
 
-def test_names_that_are_given_go_before(vendor: System, tmp_path: Path) -> None:
+def test_names_that_are_given_go_before(vendor, tmp_path):
     other = {"abstand" if n == "luft" else n: text for n, text in VENDOR.items()}
     swapped = vendor.swap(
         "plant", write_fmu(tmp_path / "c.fmu", other, {}), rename={"gap": "abstand"}
@@ -45,7 +43,7 @@ def test_names_that_are_given_go_before(vendor: System, tmp_path: Path) -> None:
         vendor.swap("plant", tmp_path / "c.fmu", rename={"gap": "weg"})
 
 
-def test_crossed_names_stay(vendor: System, tmp_path: Path) -> None:
+def test_crossed_names_stay(vendor, tmp_path):
     crossed = {"gap": "spare", "spare": "gap"}
     fmu = write_fmu(tmp_path / "crossed.fmu", PLANT, {})
     swapped = vendor.swap("plant", fmu, rename=crossed)
@@ -53,17 +51,13 @@ def test_crossed_names_stay(vendor: System, tmp_path: Path) -> None:
     assert swapped.swap("plant", same).component("plant", "test").rename == crossed
 
 
-def test_a_unit_that_the_new_fmu_declares_otherwise_is_not_kept(
-    vendor: System, tmp_path: Path
-) -> None:
+def test_a_unit_that_the_new_fmu_declares_otherwise_is_not_kept(vendor, tmp_path):
     grams = {**VENDOR, "mass": PLANT["mass"] + ' unit="1"'}
     fmu = write_fmu(tmp_path / "kg.fmu", grams, {})
     assert vendor.swap("plant", fmu).component("plant", "test").units == {}
 
 
-def test_a_value_of_a_variable_that_is_not_there_is_left_out_and_said(
-    vendor: System, tmp_path: Path
-) -> None:
+def test_a_value_of_a_variable_that_is_not_there_is_left_out_and_said(vendor, tmp_path):
     heated = vendor.with_values({"plant.mass": 300.0})
     bare = {n: text for n, text in VENDOR.items() if n not in ("width", "mass")}
     swapped = heated.swap("plant", write_fmu(tmp_path / "bare.fmu", bare, {}))
@@ -76,7 +70,7 @@ def test_a_value_of_a_variable_that_is_not_there_is_left_out_and_said(
         swapped.with_values({"plant.width": 0.05})
 
 
-def test_isolation_stays(vendor: System, tmp_path: Path) -> None:
+def test_isolation_stays(vendor, tmp_path):
     alone = vendor.with_settings({"components.plant.isolation": "process"})
     assert [c.isolation for c in alone.components] == ["process", "none"]
     fmu = write_fmu(tmp_path / "c.fmu", changed("mass", '"0.5"', '"0.6"'), {})
@@ -98,7 +92,7 @@ fmu = "spring.fmu"
 """
 
 
-def test_a_file_with_something_left_to_do_is_refused_by_its_line(tmp_path: Path) -> None:
+def test_a_file_with_something_left_to_do_is_refused_by_its_line(tmp_path):
     write_system(tmp_path)
     path = tmp_path / "left.toml"
     path.write_text(TODO)
@@ -114,6 +108,6 @@ def test_a_file_with_something_left_to_do_is_refused_by_its_line(tmp_path: Path)
     assert System.load(path).start("plant.width") == 0.1
 
 
-def test_a_hash_in_quotes_begins_no_comment() -> None:
+def test_a_hash_in_quotes_begins_no_comment():
     line = """"a # 'b" = 1, 'c # "d' = "TODO: e\""""
     assert to_do(f'{line}\n"f" = 1  # "TODO"\n') == {1: line}

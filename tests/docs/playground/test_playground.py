@@ -14,12 +14,12 @@ from support.compilers import needs_zig
 DOCS = Path(__file__).parents[3] / "docs"
 
 
-def test_the_page_in_docs_is_of_the_sources_at_hand() -> None:
+def test_the_page_in_docs_is_of_the_sources_at_hand():
     """Else: make playground."""
     assert playground_html() == (DOCS / "playground.html").read_text("utf-8")
 
 
-def test_it_is_one_small_file_that_asks_for_no_other() -> None:
+def test_it_is_one_small_file_that_asks_for_no_other():
     html = playground_html()
     assert len(html) < 250_000
     asking = r"""https?:|\b(src|href)=["'](?!data:)|\bfetch\(|@import|url\((?!#)"""
@@ -27,27 +27,27 @@ def test_it_is_one_small_file_that_asks_for_no_other() -> None:
 
 
 @pytest.mark.slow
-def test_the_wasm_is_made_from_the_sources_at_hand() -> None:
+def test_the_wasm_is_made_from_the_sources_at_hand():
     """It says which it is of, so that this needs no zig. Else: make playground."""
     assert wasm.made_from(zlib.decompress(shipped())) == wasm.hash_at_hand()
 
 
 @pytest.mark.platforms
 @needs_zig
-def test_zig_makes_the_same_wasm_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_zig_makes_the_same_wasm_again(tmp_path, monkeypatch):
     """Bit for bit, of the sources at hand."""
     monkeypatch.setattr(wasm, "WASM", tmp_path / "play.wasm.z")
     wasm.main()
     assert zlib.decompress((tmp_path / "play.wasm.z").read_bytes()) == zlib.decompress(shipped())
 
 
-def test_another_zig_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_zig_is_refused(monkeypatch):
     monkeypatch.setattr(wasm, "version", lambda _: "0.13.0")
     with pytest.raises(InputError, match=r"^ziglang: 0\.13\.0; must be 0\.17\.1, .* pip install"):
         wasm.made()
 
 
-def test_each_control_is_of_a_variable_and_begins_within_its_ends() -> None:
+def test_each_control_is_of_a_variable_and_begins_within_its_ends():
     system = page_system()
     starts = {
         f"{component}.{name}": start
@@ -66,7 +66,7 @@ def test_each_control_is_of_a_variable_and_begins_within_its_ends() -> None:
         assert all(v == (-first if control.get("mirrored") else first) for v in others)
 
 
-def test_each_grasp_is_of_a_page_that_there_is() -> None:
+def test_each_grasp_is_of_a_page_that_there_is():
     presets = page_system()["presets"]
     assert {"README.md", "docs/layers.md", "docs/limits.md", "docs/colour.md", "docs/guide.md"} == {
         preset["page"] for preset in presets

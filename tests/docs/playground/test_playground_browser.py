@@ -2,8 +2,6 @@
 
 import json
 import re
-from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
 import pytest
@@ -30,18 +28,16 @@ const press = async (key, more = {}) => {
 
 
 @pytest.fixture(scope="module")
-def html() -> str:
+def html():
     return playground_html()
 
 
-def act(html: str, body: str, folder: Path, *rest: Any, **more: Any) -> Any:
+def act(html, body, folder, *rest, **more):
     return in_browser(html, HANDS + body, folder, *rest, **more)
 
 
 @pytest.mark.parametrize("plant", PLANTS)
-def test_each_slider_and_its_number_run_the_grasp_anew(
-    html: str, tmp_path: Path, plant: str
-) -> None:
+def test_each_slider_and_its_number_run_the_grasp_anew(html, tmp_path, plant):
     """Dragged, or by arrow keys, which give a range its value as well; or typed."""
     body = """
       const seen = {};
@@ -84,7 +80,7 @@ def test_each_slider_and_its_number_run_the_grasp_anew(
         assert f"{control['variables'][0]}=" in typed[2]
 
 
-def _is_of(plant: str, control: dict[str, Any]) -> bool:
+def _is_of(plant, control):
     """True if the slider is there with a plant."""
     system = page_system()
     models = {**system["components"], "plant": PLANTS[plant]}
@@ -93,7 +89,7 @@ def _is_of(plant: str, control: dict[str, Any]) -> bool:
     return variable in names and plant in control.get("plants", [plant])
 
 
-def test_choices_and_switches(html: str, tmp_path: Path) -> None:
+def test_choices_and_switches(html, tmp_path):
     body = """
       const seen = [];
       for (const [id, value] of [["case", 0], ["case", 1], ["case", 2], ["controller", "adaptive"],
@@ -137,7 +133,7 @@ def test_choices_and_switches(html: str, tmp_path: Path) -> None:
     assert seen[14] == "sensor_1.gain: much: no value for it"
 
 
-def test_each_grasp_of_the_documentation_can_be_chosen(html: str, tmp_path: Path) -> None:
+def test_each_grasp_of_the_documentation_can_be_chosen(html, tmp_path):
     """From the list, and one after the other; it is there again from its address."""
     body = """
       const chosen = [], seen = [];
@@ -169,7 +165,7 @@ def test_each_grasp_of_the_documentation_can_be_chosen(html: str, tmp_path: Path
     assert (after_last, back) == ("0", str(len(presets) - 1))
 
 
-def test_keys(html: str, tmp_path: Path) -> None:
+def test_keys(html, tmp_path):
     body = """
       const seen = [], note = () => seen.push([cursor, view.from, view.to, playing,
         find("preset").value]);
@@ -198,7 +194,7 @@ def test_keys(html: str, tmp_path: Path) -> None:
     assert seen[10][4] == str(last)  # in a field the key is the field's
 
 
-def test_the_address_keeps_all_and_mistakes_in_it_are_said(html: str, tmp_path: Path) -> None:
+def test_the_address_keeps_all_and_mistakes_in_it_are_said(html, tmp_path):
     body = """
       const seen = [location.hash, cursor, view.from, view.to, find("left").value, command()];
       await new Promise((done) => setTimeout(done, 500));
@@ -227,7 +223,7 @@ def test_the_address_keeps_all_and_mistakes_in_it_are_said(html: str, tmp_path: 
     assert seen[8] == "grasp-cosim run --set sensor_2.gain=0.002"
 
 
-def test_what_an_fmu_refuses_is_said_and_mended(html: str, tmp_path: Path) -> None:
+def test_what_an_fmu_refuses_is_said_and_mended(html, tmp_path):
     body = """
       await move("width", 140);
       await move("position", 70);
@@ -242,7 +238,7 @@ def test_what_an_fmu_refuses_is_said_and_mended(html: str, tmp_path: Path) -> No
     assert rest == ["", "", ""]
 
 
-def test_the_hand_moves_and_the_fingers_differ_without_colour(html: str, tmp_path: Path) -> None:
+def test_the_hand_moves_and_the_fingers_differ_without_colour(html, tmp_path):
     body = """
       const seen = [], hand = find("fingers").dataset;
       for (const t of [0, 0.5, 3]) {
@@ -275,7 +271,7 @@ def test_the_hand_moves_and_the_fingers_differ_without_colour(html: str, tmp_pat
     assert len(found["times"]) > 100
 
 
-def test_the_object_can_be_dragged(html: str, tmp_path: Path) -> None:
+def test_the_object_can_be_dragged(html, tmp_path):
     body = """
       const canvas = find("fingers"), seen = [];
       canvas.setPointerCapture = () => {};
@@ -298,7 +294,7 @@ def test_the_object_can_be_dragged(html: str, tmp_path: Path) -> None:
     assert act(html, body, tmp_path, "at=0&step=0.002") == ["10", "-20", "70", "70", command]
 
 
-def test_buttons_and_time(html: str, tmp_path: Path) -> None:
+def test_buttons_and_time(html, tmp_path):
     """Reset, the links to copy, the time and the speed of the hand."""
     body = """
       const seen = [], copied = [];
@@ -335,22 +331,20 @@ def test_buttons_and_time(html: str, tmp_path: Path) -> None:
     assert rest[6:] == [True, "Pause", False, True]
 
 
-def luminance(color: str) -> float:
+def luminance(color):
     """The relative luminance of a color like rgb(1, 2, 3), as WCAG 2.2 has it."""
     shares = [int(part) / 255.0 for part in re.findall(r"\d+", color)[:3]]
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in shares)
     return 0.2126 * r + 0.7152 * g + 0.0722 * b
 
 
-def contrast(one: str, other: str) -> float:
+def contrast(one, other):
     darker, lighter = sorted((luminance(one), luminance(other)))
     return (lighter + 0.05) / (darker + 0.05)
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_all_that_is_written_and_the_fingers_are_told_from_the_ground(
-    html: str, tmp_path: Path, dark: bool
-) -> None:
+def test_all_that_is_written_and_the_fingers_are_told_from_the_ground(html, tmp_path, dark):
     """4.5 to 1 for text, 3 to 1 for what is drawn: WCAG 2.2, AA."""
     body = """
       for (const details of document.querySelectorAll("details")) details.open = true;
@@ -381,9 +375,7 @@ def test_all_that_is_written_and_the_fingers_are_told_from_the_ground(
 
 
 @pytest.mark.parametrize("still", [False, True])
-def test_it_begins_to_move_unless_the_user_wants_no_motion(
-    html: str, tmp_path: Path, still: bool
-) -> None:
+def test_it_begins_to_move_unless_the_user_wants_no_motion(html, tmp_path, still):
     playing, cursor = act(html, "return [playing, cursor];", tmp_path, "step=0.002", still=still)
     assert playing is not still
     assert (cursor == 3.0) is still
@@ -397,9 +389,7 @@ FRAMED = """
 
 
 @pytest.mark.parametrize("width", [360, 768, 1280, 1900])
-def test_nothing_is_wider_than_the_window_or_without_a_name(
-    html: str, tmp_path: Path, width: int
-) -> None:
+def test_nothing_is_wider_than_the_window_or_without_a_name(html, tmp_path, width):
     text = json.dumps(html).replace("</", "<\\/")
     body = f"""
       const inner = document.querySelector("iframe");

@@ -3,9 +3,6 @@
 import json
 import random
 import shlex
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import pytest
 from grasp_cosim import cli
@@ -19,7 +16,7 @@ pytestmark = [needs_gcc, pytest.mark.slow]
 
 
 @pytest.fixture(autouse=True)
-def _built(tmp_path: Path, fmus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _built(tmp_path, fmus, monkeypatch):
     """The FMUs are where the commands of the page have them."""
     (tmp_path / "here/fmus").mkdir(parents=True)
     (tmp_path / "here/fmus/build").symlink_to(fmus)
@@ -38,16 +35,14 @@ return seen;
 """
 
 
-def visited(addresses: Sequence[str], folder: Path) -> list[dict[str, Any]]:
+def visited(addresses, folder):
     """What the page shows at these addresses."""
-    found: list[dict[str, Any]] = in_browser(
-        playground_html(), VISIT % json.dumps(addresses), folder, "at=0"
-    )
+    found = in_browser(playground_html(), VISIT % json.dumps(addresses), folder, "at=0")
     assert len(found) == len(addresses)
     return found
 
 
-def assert_equal_to_a_run(page: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+def assert_equal_to_a_run(page, capsys):
     """Run the command that the page shows, in C; each of its metrics is the page's."""
     assert page["said"] == ""
     name, *words = shlex.split(page["command"])
@@ -63,9 +58,7 @@ def assert_equal_to_a_run(page: dict[str, Any], capsys: pytest.CaptureFixture[st
             assert near or shown is expected, (page["command"], metric, shown, expected)
 
 
-def test_of_each_grasp_of_the_documentation(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_of_each_grasp_of_the_documentation(tmp_path, capsys):
     presets = page_system()["presets"]
     pages = visited([preset["at"] for preset in presets], tmp_path)
     assert [page["preset"] for page in pages] == [preset["name"] for preset in presets]
@@ -73,7 +66,7 @@ def test_of_each_grasp_of_the_documentation(
         assert_equal_to_a_run(page, capsys)
 
 
-def drawn(choose: random.Random) -> str:
+def drawn(choose):
     """An address with settings of all kinds, in steps of 1 to 5 ms."""
     system = page_system()
     plant, law = choose.choice([*PLANTS]), choose.choice([*LAWS])
@@ -99,7 +92,7 @@ def drawn(choose: random.Random) -> str:
 
 
 @pytest.mark.campaign
-def test_of_settings_drawn_at_random(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_of_settings_drawn_at_random(tmp_path, capsys):
     addresses = [drawn(random.Random(seed)) for seed in campaign.seeds(300)]
     for page in visited(addresses, tmp_path):
         assert_equal_to_a_run(page, capsys)

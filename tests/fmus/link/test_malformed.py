@@ -9,7 +9,6 @@ import shutil
 import struct
 import subprocess
 import sys
-from collections.abc import Callable
 from math import inf, nan
 from pathlib import Path
 from random import Random
@@ -25,10 +24,8 @@ from grasp_fmus.link.message import (
     VERSION,
     Codec,
     Sealer,
-    Value,
 )
 from grasp_fmus.link.peer import Peer, Request
-from grasp_fmus.link.signature import Signature
 from support import campaign
 from support.native_proxies import write_sources
 from support.proxies import HandProxy
@@ -37,7 +34,7 @@ from support.scripted_peer import SIGNATURE, answers
 SOURCE = Path(__file__).parents[1] / "native/malformed.c"
 MANY = campaign.part(1_000_000)
 KEY = b"sixteen bytes of key, and some more"
-VALUES: list[Value] = [1.5, 3, True, 2.0, 0.5]
+VALUES = [1.5, 3, True, 2.0, 0.5]
 SESSION, COOKIE = 99, 5
 
 Side = Literal["client", "peer"]
@@ -45,17 +42,17 @@ Side = Literal["client", "peer"]
 pytestmark = [pytest.mark.slow, pytest.mark.campaign]
 
 
-def malformed(side: Side, signature: Signature, key: bytes | None) -> list[bytes]:
+def malformed(side, signature, key):
     """Of any size and with any fault, most of them under the right key."""
     random = Random(campaign.first_seed)
     codec = Codec(signature.answer if side == "client" else signature.request)
     kind = OUTPUTS if side == "client" else INITIALISE
     good = bytes(codec.size)
 
-    def sealed(data: bytes) -> bytes:
+    def sealed(data):
         return data + (hmac.digest(key, data, "sha256") if key else b"")
 
-    def made(body: bytes = good, **changed: object) -> bytes:
+    def made(body=good, **changed):
         fields = {
             "magic": b"GRSP", "version": VERSION, "kind": kind, "code": 0,
             "interface": signature.hash, "session": SESSION, "cookie": COOKIE, "sequence": 1,
@@ -76,7 +73,7 @@ def malformed(side: Side, signature: Signature, key: bytes | None) -> list[bytes
     return [d for d in found if Sealer(key).open(d) in ("malformed", "forged")]
 
 
-def check_growth(step: Callable[[int], None]) -> None:
+def check_growth(step):
     """No more objects in the end than after a tenth."""
     for i in range(MANY // 10):
         step(i)
@@ -89,10 +86,10 @@ def check_growth(step: Callable[[int], None]) -> None:
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
-def test_many_at_the_peer(key: bytes | None) -> None:
+def test_many_at_the_peer(key):
     peer = Peer(SIGNATURE, key)
 
-    def ask(datagram: bytes) -> bytes | None:
+    def ask(datagram):
         done = peer.receive(datagram, 0)
         return peer.outputs(answers(VALUES), 0.0) if isinstance(done, Request) else done
 
@@ -100,7 +97,7 @@ def test_many_at_the_peer(key: bytes | None) -> None:
     proxy.begin(SESSION, VALUES)
     datagrams = malformed("peer", SIGNATURE, key)
 
-    def step(i: int) -> None:
+    def step(i):
         assert peer.receive(datagrams[i % len(datagrams)], 0) is None
         if i % 1000 == 0:
             proxy.step(0.0, 0.5, VALUES)
@@ -112,7 +109,7 @@ def test_many_at_the_peer(key: bytes | None) -> None:
 @pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 @pytest.mark.parametrize("key", [None, KEY], ids=["open", "keyed"])
 @pytest.mark.parametrize("side", ["client", "peer"])
-def test_many_in_c(tmp_path: Path, side: Side, key: bytes | None) -> None:
+def test_many_in_c(tmp_path, side, key):
     if side == "client":
         write_sources(tmp_path)
     else:

@@ -4,7 +4,6 @@ import hashlib
 import hmac
 import math
 import struct
-from pathlib import Path
 
 import pytest
 from grasp_fmus.link import message
@@ -39,7 +38,7 @@ messages = st.builds(
 )
 
 
-def test_the_bytes_are_those_of_the_card() -> None:
+def test_the_bytes_are_those_of_the_card():
     datagram = Sealer().pack(EXAMPLE)
     assert datagram[:8] == b"GRSP\x02\x00\x05\x00"
     assert datagram[8:24] == HASH
@@ -49,19 +48,19 @@ def test_the_bytes_are_those_of_the_card() -> None:
     assert datagram[80:] == b"12345678"
 
 
-def test_the_tag_is_that_of_the_standard() -> None:
+def test_the_tag_is_that_of_the_standard():
     datagram = Sealer(KEY).pack(EXAMPLE)
     assert datagram[:-32] == Sealer().pack(EXAMPLE)
     assert datagram[-32:] == hmac.new(KEY, datagram[:-32], hashlib.sha256).digest()
 
 
 @given(messages, st.sampled_from([None, KEY]))
-def test_what_is_packed_is_opened(m: Message, key: bytes | None) -> None:
+def test_what_is_packed_is_opened(m, key):
     assert Sealer(key).open(Sealer(key).pack(m)) == m
 
 
 @given(messages, st.integers(0), st.integers(1, 255))
-def test_one_changed_byte_is_noticed_with_a_key(m: Message, place: int, change: int) -> None:
+def test_one_changed_byte_is_noticed_with_a_key(m, place, change):
     datagram = bytearray(Sealer(KEY).pack(m))
     datagram[place % len(datagram)] ^= change
     assert Sealer(KEY).open(bytes(datagram)) in (message.FORGED, message.MALFORMED)
@@ -71,26 +70,26 @@ def test_one_changed_byte_is_noticed_with_a_key(m: Message, place: int, change: 
     ("place", "data"),
     [(0, b"grsp"), (6, b"\x00"), (6, b"\x08"), (72, b"\x07"), (76, b"\x01")],
 )
-def test_malformed(place: int, data: bytes) -> None:
+def test_malformed(place, data):
     datagram = bytearray(Sealer().pack(EXAMPLE))
     datagram[place : place + len(data)] = data
     assert Sealer().open(bytes(datagram)) == message.MALFORMED
 
 
 @pytest.mark.parametrize("time", [math.nan, math.inf, -math.inf])
-def test_a_time_that_is_not_finite_is_malformed(time: float) -> None:
+def test_a_time_that_is_not_finite_is_malformed(time):
     assert Sealer().open(Sealer().pack(EXAMPLE._replace(time=time))) == message.MALFORMED
     assert Sealer().open(Sealer().pack(EXAMPLE._replace(step=time))) == message.MALFORMED
 
 
 @given(st.integers(0, 88))
-def test_a_piece_of_a_datagram_is_none(size: int) -> None:
+def test_a_piece_of_a_datagram_is_none(size):
     datagram = Sealer().pack(EXAMPLE)
     assert isinstance(Sealer().open(datagram[:size]), str if size < len(datagram) else Message)
     assert Sealer().open(datagram + b"\0" * (size + 1)) == message.MALFORMED
 
 
-def test_the_largest_datagram() -> None:
+def test_the_largest_datagram():
     body = bytes(message.LARGEST - 80)
     assert len(Sealer().pack(EXAMPLE._replace(body=body))) == message.LARGEST
     with pytest.raises(ValueError, match=r"65508 bytes: must be 65507 at most"):
@@ -104,7 +103,7 @@ def test_the_largest_datagram() -> None:
     st.integers(-(2**31), 2**31 - 1),
     st.booleans(),
 )
-def test_values_there_and_back(a: float, b: int, c: bool) -> None:
+def test_values_there_and_back(a, b, c):
     codec = Codec(ALL)
     body = codec.pack(a, b, c)
     assert len(body) == codec.size == 24
@@ -124,30 +123,30 @@ def test_values_there_and_back(a: float, b: int, c: bool) -> None:
         (16, struct.pack("<Q", 2)),
     ],
 )
-def test_what_is_no_value(place: int, bad: bytes) -> None:
+def test_what_is_no_value(place, bad):
     body = bytearray(Codec(ALL).pack(1.0, 1, True))
     body[place : place + len(bad)] = bad
     assert Codec(ALL).unpack(bytes(body)) is None
 
 
-def test_the_largest_reals_are_values_though_their_sum_is_not() -> None:
+def test_the_largest_reals_are_values_though_their_sum_is_not():
     codec = Codec(ALL[:1] * 2)
     assert codec.unpack(codec.pack(1.7e308, 1.7e308)) == [1.7e308, 1.7e308]
 
 
 @pytest.mark.parametrize("size", [0, 7, 9, 23, 25])
-def test_a_body_of_another_size_holds_no_values(size: int) -> None:
+def test_a_body_of_another_size_holds_no_values(size):
     assert Codec(ALL).unpack(bytes(size)) is None
 
 
 @pytest.mark.parametrize("around", [b"\n", b"\r\n", b" ", b"\t", b"\0", b"\xff"])
-def test_every_byte_of_a_key_that_is_no_text_counts(tmp_path: Path, around: bytes) -> None:
+def test_every_byte_of_a_key_that_is_no_text_counts(tmp_path, around):
     for key in (KEY + b"\0" + around, around + b"\xe9" + KEY):
         (tmp_path / "key").write_bytes(key)
         assert read_key(tmp_path / "key") == key
 
 
-def test_spaces_of_a_key_that_is_text_count(tmp_path: Path) -> None:
+def test_spaces_of_a_key_that_is_text_count(tmp_path):
     (tmp_path / "key").write_bytes(b" a key with spaces \n")
     assert read_key(tmp_path / "key") == b" a key with spaces "
 
@@ -155,7 +154,7 @@ def test_spaces_of_a_key_that_is_text_count(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("mode", "said"), [(0o600, ""), (0o400, ""), (0o640, "640"), (0o604, "604")]
 )
-def test_a_key_that_others_can_read_is_said_to_be_so(tmp_path: Path, mode: int, said: str) -> None:
+def test_a_key_that_others_can_read_is_said_to_be_so(tmp_path, mode, said):
     path = tmp_path / "key"
     path.write_bytes(KEY)
     path.chmod(mode)
@@ -163,7 +162,7 @@ def test_a_key_that_others_can_read_is_said_to_be_so(tmp_path: Path, mode: int, 
     assert exposed(path) == (line if said else "")
 
 
-def test_a_key_is_read_without_the_line_end(tmp_path: Path) -> None:
+def test_a_key_is_read_without_the_line_end(tmp_path):
     (tmp_path / "key").write_bytes(KEY.hex().encode() + b"\n")
     assert read_key(tmp_path / "key") == KEY.hex().encode()
     (tmp_path / "key").write_bytes(b"fifteen bytes!!\n")
@@ -171,7 +170,7 @@ def test_a_key_is_read_without_the_line_end(tmp_path: Path) -> None:
         read_key(tmp_path / "key")
 
 
-def test_too_many_variables_for_a_datagram() -> None:
+def test_too_many_variables_for_a_datagram():
     many = tuple(LinkVariable(f"x{i}", "Real", "output") for i in range(8200))
     with pytest.raises(ValueError, match="an answer with 8200 variables has 65712 bytes"):
         message.check_size(Signature(many))

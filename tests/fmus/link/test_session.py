@@ -3,8 +3,6 @@
 That the peer in C does the same to the byte is in test_bench_header.py.
 """
 
-from typing import Any
-
 import pytest
 from grasp_fmus.link.message import (
     BUSY,
@@ -23,7 +21,6 @@ from grasp_fmus.link.message import (
     VERSION,
     Message,
     Sealer,
-    Value,
 )
 from grasp_fmus.link.peer import ALIVE, TOO_LONG, Peer, Request
 from grasp_fmus.link.signature import LinkVariable, Signature
@@ -36,18 +33,18 @@ P = LinkVariable("p", "Boolean", "parameter")
 Y = LinkVariable("y", "Real", "output", "N")
 SIGNATURE = Signature((U, P, Y))
 KEY = b"sixteen bytes...", b"another 16 bytes"
-VALUES: list[Value] = [0.5, True]
+VALUES = [0.5, True]
 
 
 class Bench:
     """A peer whose model puts out what comes in, and its clock."""
 
-    def __init__(self, key: bytes | None = None) -> None:
+    def __init__(self, key=None):
         self.peer = Peer(SIGNATURE, key)
-        self.done: list[Request] = []
+        self.done = []
         self.now = 5 * ALIVE
 
-    def __call__(self, datagram: bytes) -> bytes | None:
+    def __call__(self, datagram):
         action = self.peer.receive(datagram, self.now)
         if not isinstance(action, Request):
             return action
@@ -56,21 +53,21 @@ class Bench:
             return None
         return self.peer.outputs([action.values[0]], action.time + action.step)
 
-    def proxy(self, signature: Signature = SIGNATURE, key: bytes | None = None) -> HandProxy:
+    def proxy(self, signature=SIGNATURE, key=None):
         return HandProxy(signature, self, key)
 
-    def begun(self, session: int = 99) -> HandProxy:
+    def begun(self, session=99):
         """A proxy that is about to step."""
         proxy = self.proxy()
         proxy.begin(session, VALUES)
         return proxy
 
-    def counts(self) -> dict[str, int]:
+    def counts(self):
         found = {name: getattr(self.peer.counters, name) for name in self.peer.counters.__slots__}
         return {name: n for name, n in found.items() if n}
 
 
-def refused(call: Any, *arguments: Any) -> tuple[int, str]:
+def refused(call, *arguments):
     """Code and reason."""
     with pytest.raises(RefusedError) as error:
         call(*arguments)
@@ -78,7 +75,7 @@ def refused(call: Any, *arguments: Any) -> tuple[int, str]:
     return code, reason
 
 
-def test_a_session_from_hello_to_end() -> None:
+def test_a_session_from_hello_to_end():
     bench = Bench()
     proxy = bench.begun()
     proxy.initialise(0.0, [3.0, True])
@@ -94,7 +91,7 @@ def test_a_session_from_hello_to_end() -> None:
     assert bench.counts() == {"steps": 1, "initialisations": 2}
 
 
-def test_what_is_repeated_is_answered_again_and_done_once() -> None:
+def test_what_is_repeated_is_answered_again_and_done_once():
     bench = Bench()
     proxy = bench.proxy()
     hello = proxy.hello(99)
@@ -110,11 +107,15 @@ def test_what_is_repeated_is_answered_again_and_done_once() -> None:
     assert bench(proxy.pack(STEP, step=0.1, body=bytes(16))) is None
     assert bench(overtaken)
     assert bench.counts() == {
-        "initialisations": 1, "steps": 2, "repeated": 1, "duplicated": 1, "stale": 1,
-    }  # fmt: skip
+        "initialisations": 1,
+        "steps": 2,
+        "repeated": 1,
+        "duplicated": 1,
+        "stale": 1,
+    }
 
 
-def test_a_live_session_keeps_others_away_until_it_is_silent() -> None:
+def test_a_live_session_keeps_others_away_until_it_is_silent():
     bench = Bench()
     first = bench.begun(session=1)
     bench.now += ALIVE - 1
@@ -133,7 +134,7 @@ def test_a_live_session_keeps_others_away_until_it_is_silent() -> None:
     second.step(0.0, 0.1, VALUES)
 
 
-def test_of_two_that_were_greeted_the_later_one_is_greeted_anew() -> None:
+def test_of_two_that_were_greeted_the_later_one_is_greeted_anew():
     bench = Bench()
     late = bench.proxy()
     late.take(bench(late.hello(2)))
@@ -142,7 +143,7 @@ def test_of_two_that_were_greeted_the_later_one_is_greeted_anew() -> None:
     late.begin(2, VALUES)
 
 
-def test_a_recorded_session_cannot_be_played_again() -> None:
+def test_a_recorded_session_cannot_be_played_again():
     bench = Bench(KEY[0])
     proxy = bench.proxy(key=KEY[0])
     recorded = [proxy.hello(99)]
@@ -164,16 +165,14 @@ def test_a_recorded_session_cannot_be_played_again() -> None:
     ("keys", "counter"),
     [((KEY[0], KEY[1]), "forged"), ((KEY[0], None), "forged"), ((None, KEY[0]), "malformed")],
 )
-def test_without_the_key_there_is_no_answer(
-    keys: tuple[bytes | None, bytes | None], counter: str
-) -> None:
+def test_without_the_key_there_is_no_answer(keys, counter):
     bench = Bench(keys[0])
     assert bench(bench.proxy(key=keys[1]).hello(1)) is None
     assert bench.counts() == {counter: 1}
 
 
 @pytest.mark.parametrize("key", [None, KEY[0]])
-def test_another_version_or_interface_is_refused_with_its_reason(key: bytes | None) -> None:
+def test_another_version_or_interface_is_refused_with_its_reason(key):
     bench = Bench(key)
     proxy = bench.proxy(key=key)
     answer = bench(proxy.hello(1, version=VERSION + 1)) or b""
@@ -187,7 +186,7 @@ def test_another_version_or_interface_is_refused_with_its_reason(key: bytes | No
     assert bench.counts() == {"foreign": 1, "other_version": 1}
 
 
-def test_a_failure_ends_the_session_and_says_why_until_it_was_heard() -> None:
+def test_a_failure_ends_the_session_and_says_why_until_it_was_heard():
     bench = Bench()
     proxy = bench.proxy()
     proxy.take(bench(proxy.hello(1)))
@@ -205,14 +204,21 @@ def test_a_failure_ends_the_session_and_says_why_until_it_was_heard() -> None:
 @pytest.mark.parametrize(
     ("spoil", "counter"),
     [
-        ({"body": b""}, "malformed"), ({"step": 0.0}, "malformed"), ({"step": -1.0}, "malformed"),
-        ({"kind": INITIALISE}, "malformed"), ({"kind": OUTPUTS}, "malformed"),
-        ({"body": b"\xff" * 16}, "malformed"), ({"kind": HELLO}, "malformed"),
-        ({"version": 1}, "other_version"), ({"session": 1}, "foreign"), ({"cookie": 7}, "foreign"),
-        ({"interface": bytes(16)}, "foreign"), ({"kind": END, "session": 1}, "foreign"),
+        ({"body": b""}, "malformed"),
+        ({"step": 0.0}, "malformed"),
+        ({"step": -1.0}, "malformed"),
+        ({"kind": INITIALISE}, "malformed"),
+        ({"kind": OUTPUTS}, "malformed"),
+        ({"body": b"\xff" * 16}, "malformed"),
+        ({"kind": HELLO}, "malformed"),
+        ({"version": 1}, "other_version"),
+        ({"session": 1}, "foreign"),
+        ({"cookie": 7}, "foreign"),
+        ({"interface": bytes(16)}, "foreign"),
+        ({"kind": END, "session": 1}, "foreign"),
     ],
-)  # fmt: skip
-def test_a_bad_step_is_dropped_and_the_next_one_served(spoil: dict[str, Any], counter: str) -> None:
+)
+def test_a_bad_step_is_dropped_and_the_next_one_served(spoil, counter):
     bench = Bench()
     proxy = bench.begun()
     proxy.step(0.0, 0.1, VALUES)
@@ -224,7 +230,7 @@ def test_a_bad_step_is_dropped_and_the_next_one_served(spoil: dict[str, Any], co
 
 
 @pytest.mark.parametrize("step", [LONGEST_STEP * 1.001, 1e300])
-def test_a_step_that_is_too_long_is_refused_and_not_done(step: float) -> None:
+def test_a_step_that_is_too_long_is_refused_and_not_done(step):
     bench = Bench()
     assert refused(bench.begun().step, 0.0, step, VALUES) == (FAILED, TOO_LONG)
     assert not bench.peer.in_session
@@ -233,15 +239,19 @@ def test_a_step_that_is_too_long_is_refused_and_not_done(step: float) -> None:
 
 
 @given(
-    kind=st.integers(0, 8), code=st.integers(0, 255), session=st.integers(0, 3),
-    cookie=st.integers(0, 3), sequence=st.integers(0, 3), body=st.binary(max_size=200),
-    ours=st.booleans(), version=st.integers(0, 3),
-)  # fmt: skip
+    kind=st.integers(0, 8),
+    code=st.integers(0, 255),
+    session=st.integers(0, 3),
+    cookie=st.integers(0, 3),
+    sequence=st.integers(0, 3),
+    body=st.binary(max_size=200),
+    ours=st.booleans(),
+    version=st.integers(0, 3),
+)
 @pytest.mark.parametrize("key", [None, KEY[0]])
 def test_without_a_session_no_answer_is_longer_than_its_request(
-    key: bytes | None, kind: int, code: int, session: int, cookie: int, sequence: int, body: bytes,
-    ours: bool, version: int,
-) -> None:  # fmt: skip
+    key, kind, code, session, cookie, sequence, body, ours, version
+):
     bench = Bench(key)
     interface = SIGNATURE.hash if ours else bytes(16)
     m = Message(kind, code, interface, session, cookie, sequence, 0.0, 0.0, 0, body, version)

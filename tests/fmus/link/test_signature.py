@@ -11,7 +11,7 @@ OUT = LinkVariable("intensity", "Real", "output", "V")
 SENSOR = Signature((OUT, GAP, GAIN))
 
 
-def test_text_and_hash_are_those_of_the_card() -> None:
+def test_text_and_hash_are_those_of_the_card():
     assert SENSOR.text == (
         "input\tReal\tm\tgap\nparameter\tReal\t1\tgain\noutput\tReal\tV\tintensity\n"
     )
@@ -32,7 +32,7 @@ def test_text_and_hash_are_those_of_the_card() -> None:
          "the proxy has output Boolean - y, the peer no more"),
     ],
 )  # fmt: skip
-def test_the_first_difference_is_named(proxy: tuple[LinkVariable, ...], difference: str) -> None:
+def test_the_first_difference_is_named(proxy, difference):
     assert SENSOR.difference(Signature(proxy).text.encode() + bytes(9)) == difference
 
 
@@ -44,6 +44,6 @@ def test_the_first_difference_is_named(proxy: tuple[LinkVariable, ...], differen
         ((GAP._replace(unit="m\n"),), r"\[m\n\]: must be without tabs and line ends"),
     ],
 )
-def test_what_the_text_cannot_hold(variables: tuple[LinkVariable, ...], reason: str) -> None:
+def test_what_the_text_cannot_hold(variables, reason):
     with pytest.raises(ValueError, match=reason):
         Signature(variables)

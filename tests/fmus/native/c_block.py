@@ -5,11 +5,8 @@ import importlib.util
 import math
 import struct
 import sys
-from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from random import Random
-from typing import Any
 
 from c_compilers import BITS as DECIDING
 from c_compilers import LIBM
@@ -26,7 +23,7 @@ RAISED = (ArithmeticError, ValueError, TypeError)
 
 
 @contextmanager
-def loaded(file: Path, source: str) -> Iterator[Any]:
+def loaded(file, source):
     """A block from its source, among the imported modules meanwhile."""
     file.write_text(source, "utf-8")
     spec = importlib.util.spec_from_file_location(file.stem, file)
@@ -40,12 +37,12 @@ def loaded(file: Path, source: str) -> Iterator[Any]:
         del sys.modules[file.stem]
 
 
-def bits(numbers: Iterable[float]) -> list[bytes]:
+def bits(numbers):
     """One NaN is as good as another."""
     return [struct.pack("<d", math.nan if x != x else x) for x in map(float, numbers)]
 
 
-def flat(state: Any) -> list[float]:
+def flat(state):
     """All numbers of a state."""
     if not isinstance(state, tuple):
         return [float(state)]
@@ -55,14 +52,7 @@ def flat(state: Any) -> list[float]:
 class Both:
     """A block in C and in Python."""
 
-    def __init__(
-        self,
-        name: str,
-        block: Any,
-        folder: Path,
-        cc: str = "gcc",
-        options: Iterable[str] = ("-O2",),
-    ) -> None:
+    def __init__(self, name, block, folder, cc="gcc", options=("-O2",)):
         folder.mkdir(exist_ok=True)
         file = Path(block.__file__)
         (folder / "block.h").write_text(translation.translated(name, block, file), "ascii")
@@ -79,20 +69,20 @@ class Both:
         self.n_state = sizes[2]
         self.reason = ctypes.create_string_buffer(4096)
 
-    def starts(self) -> list[Any]:
+    def starts(self):
         """The start values of all variables."""
         return [v.kind(v.start or 0) for v in self.variables]
 
-    def given(self, values: list[Any]) -> Any:
+    def given(self, values):
         """Values for C."""
         return (ctypes.c_double * len(values))(*map(float, values))
 
-    def check(self, values: list[Any]) -> str:
+    def check(self, values):
         """What C says of parameters; empty where it takes them."""
         good = self.in_c.check(self.given(values), self.reason)
         return "" if good else self.reason.value.decode()
 
-    def run(self, values: list[Any], inputs: Iterable[tuple[dict[int, Any], float]]) -> int:
+    def run(self, values, inputs):
         """A run in both, whose state goes through numbers in each step; how many values agreed.
 
         `inputs` are, for each step, the values that change and how long it is. It ends where Python
@@ -123,23 +113,23 @@ class Both:
             pass
         return count
 
-    def _same(self, found: Any, expected: list[Any], what: str, values: list[Any]) -> int:
+    def _same(self, found, expected, what, values):
         assert bits([*found][: len(expected)]) == bits(expected), (what, values)
         return len(expected)
 
-    def random_run(self, random: Random, steps: int) -> int:
+    def random_run(self, random, steps):
         """A run with parameters, inputs and a step by chance."""
         h = random.choice([1e-4, 1e-3, 1e-3, 3e-3])
         inputs = [i for i, v in enumerate(self.variables) if v.causality == "input"]
 
-        def changes() -> dict[int, Any]:
+        def changes():
             return {i: drawn(self.variables[i], random) for i in inputs if random.random() < 0.5}
 
         values = [drawn(v, random) for v in self.variables]
         return self.run(values, ((changes(), h) for _ in range(steps)))
 
 
-def drawn(v: Any, random: Random) -> Any:
+def drawn(v, random):
     """A value of a variable: as declared, or by chance within its range."""
     start = float(v.start or 0.0)
     if random.random() < 0.4 or v.causality == "output":

@@ -19,7 +19,7 @@ class Params:
     fault: Annotated[int, Parameter("what goes wrong", low=0, high=3, tunable=True)] = 0
     noisy: Annotated[bool, Parameter("has noise")] = False
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         check(self)
         if self.noisy and self.seed == 0:
             raise ValueError("seed = 0: must be above 0 with noise, 100 %")

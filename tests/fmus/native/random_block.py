@@ -1,7 +1,5 @@
 """Blocks by chance, of all that the translator takes; what they calculate stays small."""
 
-from random import Random
-
 HEAD = '''"""By chance."""
 
 import math
@@ -86,7 +84,7 @@ def mixed(p: Params, x: State, u: Inputs) -> Row:
     return tuple({first}(p, x.spot, one, other) for one, other in zip(x.spot.row, u.r))
 """
 READ = ("a", "b", "p.k", "s.at", "s.reach", "p.w[1]", "s.row[-1]", "p.kept[0]", "SCALE", "GRID[2]")
-OF_ONE: tuple[str, ...] = (
+OF_ONE = (
     "tanh({})",
     "sin({})",
     "cos({})",
@@ -103,7 +101,7 @@ OF_ONE += (
     "({} + 0.5)",
     "({}) ** 2",
 )
-OF_TWO: tuple[str, ...] = (
+OF_TWO = (
     "({} + {})",
     "({} - {})",
     "{} * {}",
@@ -123,11 +121,11 @@ OF_TWO += ("max({}, {}, *p.w)", "({}, {})[1]")
 class Writer:
     """Writes one function; `reals` are the variables that have a value."""
 
-    def __init__(self, random: Random, earlier: list[str]) -> None:
+    def __init__(self, random, earlier):
         self.random, self.earlier = random, earlier
         self.reals, self.lines, self.loops = [*READ], [""], 0
 
-    def real(self, depth: int = 3) -> str:
+    def real(self, depth=3):
         r = self.random
         kind = r.random()
         if depth == 0 or kind < 0.15:
@@ -140,7 +138,7 @@ class Writer:
             return f"{r.choice(self.earlier)}(p, s, {self.real(depth - 1)}, {self.real(0)})"
         return f"({self.real(depth - 1)} if {self.test()} else {self.real(depth - 1)})"
 
-    def test(self, depth: int = 2) -> str:
+    def test(self, depth=2):
         r = self.random
         if depth and r.random() < 0.3:
             return f"({self.test(depth - 1)} {r.choice(['and', 'or'])} {self.test(depth - 1)})"
@@ -149,10 +147,10 @@ class Writer:
             return r.choice(["p.on", "s.low", "any(w > a for w in p.w)", "p.n > 2"])
         return r.choice(some).format(self.real(1), self.real(1))
 
-    def say(self, indent: int, line: str) -> None:
+    def say(self, indent, line):
         self.lines.append(f"{'    ' * indent}{line}")
 
-    def block(self, indent: int, looping: bool = False) -> None:
+    def block(self, indent, looping=False):
         before = [*self.reals]
         for _ in range(self.random.randint(1, 3)):
             self.statement(indent)
@@ -161,7 +159,7 @@ class Writer:
             self.say(indent + 1, self.random.choice(["break", "continue"]))
         self.reals = before
 
-    def statement(self, indent: int) -> None:
+    def statement(self, indent):
         r = self.random
         own = [v for v in self.reals if v[0] == "v" or v in "ab"]
         new = f"v{len(self.lines)}"
@@ -199,7 +197,7 @@ class Writer:
             self.reals.append(new)
 
 
-def random_block(random: Random) -> str:
+def random_block(random):
     """The source of a block."""
     text, names = HEAD, list[str]()
     for i in range(random.randint(2, 4)):

@@ -4,7 +4,7 @@ import ctypes
 import re
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from functools import cache
 from math import inf, nan
@@ -17,7 +17,7 @@ from grasp_fmus.contract import build_params, declared, packer, unpacker
 from grasp_fmus.cross_check import STEP_SIZE, STEPS
 from grasp_fmus.native.c_only import called_of_libm, write_c
 from grasp_fmus.own_block import own_model
-from grasp_fmus.package import Model, shipped_model
+from grasp_fmus.package import shipped_model
 from grasp_fmus.shipped import blocks
 from support.compiled import compile_c
 from support.kinds import TRANSLATED
@@ -39,7 +39,7 @@ ALLOWED = {"float.h", "math.h", "stdarg.h", "stdbool.h", "stddef.h", "stdint.h",
 
 
 @contextmanager
-def model_of(name: str) -> Iterator[Model]:
+def model_of(name):
     """The model of one of ours, or of a user's own block."""
     if name == "SpringPlant":
         with own_model(SPRING) as own:
@@ -49,11 +49,11 @@ def model_of(name: str) -> Iterator[Model]:
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+def written(tmp_path_factory):
     """The folder with the C of a block, written once."""
 
     @cache
-    def folder(name: str) -> Path:
+    def folder(name):
         folder = tmp_path_factory.mktemp(name)
         with model_of(name) as model:
             write_c(folder, model)
@@ -62,16 +62,14 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return folder
 
 
-def compiled(folder: Path, *options: str, compiler: str = "gcc") -> None:
+def compiled(folder, *options, compiler="gcc"):
     subprocess.run([compiler, *STRICT, *options], cwd=folder, check=True)
 
 
 @pytest.mark.parametrize("level", ["-O0", slow("-O3")])
 @pytest.mark.parametrize("compiler", ["gcc", platforms("clang")])
 @pytest.mark.parametrize("name", [*map(slow, TRANSLATED[1:]), TRANSLATED[0], "SpringPlant"])
-def test_compiles_without_a_warning_and_calls_what_it_lists(
-    name: str, compiler: str, level: str, written: Callable[[str], Path]
-) -> None:
+def test_compiles_without_a_warning_and_calls_what_it_lists(name, compiler, level, written):
     if not shutil.which(compiler):
         pytest.skip(f"NO {compiler}")
     folder = written(name)
@@ -89,7 +87,7 @@ def test_compiles_without_a_warning_and_calls_what_it_lists(
 
 
 @pytest.mark.parametrize("name", [*TRANSLATED, "SpringPlant"])
-def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
+def test_what_is_written(name, written):
     files = {path.name: path for path in written(name).glob("*.[ch]")}
     assert {f"{name}.h", f"{name}.c", "main.c", "block.h", "arithmetic.h"} <= files.keys()
     texts = [path.read_text("ascii") for file, path in files.items() if file != "main.c"]
@@ -101,9 +99,7 @@ def test_what_is_written(name: str, written: Callable[[str], Path]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*map(slow, TRANSLATED[1:]), TRANSLATED[0], slow("SpringPlant")])
-def test_the_example_runs_by_the_command_at_its_top(
-    name: str, written: Callable[[str], Path]
-) -> None:
+def test_the_example_runs_by_the_command_at_its_top(name, written):
     """And holds the inputs at their start values, as the block does here."""
     folder = written(name)
     command, run = re.findall(r"^ \* {5}(\S.*)$", (folder / "main.c").read_text(), re.MULTILINE)
@@ -122,7 +118,7 @@ def test_the_example_runs_by_the_command_at_its_top(
             x = block.step(p, x, u, 0.01)
 
 
-def shared(source: Path, *options: str) -> ctypes.CDLL:
+def shared(source, *options):
     command = ["gcc", *STRICT, *options, "-shared", "-fPIC"]
     return ctypes.CDLL(str(compile_c([*command, source, "-lm"], source.with_suffix(".so"))))
 
@@ -130,11 +126,11 @@ def shared(source: Path, *options: str) -> ctypes.CDLL:
 class InC:
     """The block in C, called from here; its structs are of doubles but for those of `packing`."""
 
-    def __init__(self, model: Model, folder: Path) -> None:
+    def __init__(self, model, folder):
         name = model.description.name
         write_c(folder, model)
         library = shared(folder / f"{name}.c", *BITS)
-        self.call: Callable[[str], Any] = lambda function: getattr(library, f"{name}_{function}")
+        self.call = lambda function: getattr(library, f"{name}_{function}")
         self.state = (ctypes.c_double * 64)()
         self.why = ctypes.create_string_buffer(2000)
 
@@ -144,11 +140,11 @@ Controller = Callable[[str], tuple[InC, Any]]
 
 
 @pytest.fixture(scope="module")
-def controller(tmp_path_factory: pytest.TempPathFactory) -> Controller:
+def controller(tmp_path_factory):
     """A controller, and its default parameters as its header has them; made once."""
 
     @cache
-    def made(name: str) -> tuple[InC, Any]:
+    def made(name):
         folder = tmp_path_factory.mktemp(name)
         c = InC(shipped_model(name), folder)
         (folder / "p.c").write_text(
@@ -164,9 +160,7 @@ def controller(tmp_path_factory: pytest.TempPathFactory) -> Controller:
 
 
 @pytest.mark.parametrize("name", ["GraspController", slow("GraspControllerAdaptive")])
-def test_the_same_bits_as_the_block_over_changing_inputs(
-    fmus: Path, controller: Controller, name: str
-) -> None:
+def test_the_same_bits_as_the_block_over_changing_inputs(fmus, controller, name):
     c, p = controller(name)
     block = blocks()[name]
     fields = declared(block)
@@ -200,9 +194,7 @@ def test_the_same_bits_as_the_block_over_changing_inputs(
         ([0, 0, 0, 0, 0, 0], nan, 1, "step of nan s: must be over 0 s"),
     ],
 )
-def test_what_is_refused_leaves_the_state(
-    inputs: list[float], step: float, code: int, why: str, controller: Controller
-) -> None:
+def test_what_is_refused_leaves_the_state(inputs, step, code, why, controller):
     c, p = controller("GraspController")
     zeros = CONTROLLER_INPUTS()
     assert c.call("initial_state")(p, zeros, c.state, None) == 0
@@ -215,7 +207,7 @@ def test_what_is_refused_leaves_the_state(
 
 
 @pytest.mark.slow
-def test_a_parameter_out_of_its_range_is_named(tmp_path: Path) -> None:
+def test_a_parameter_out_of_its_range_is_named(tmp_path):
     """As the FMU names it."""
     made = shipped_model("GripperPlant")
     c = InC(made, tmp_path)
@@ -228,6 +220,6 @@ def test_a_parameter_out_of_its_range_is_named(tmp_path: Path) -> None:
     assert c.why.value.decode() == "finger_mass[1] = -1.0 kg: must be from 0.001 to 1000 kg"
 
 
-def test_libm_is_what_the_block_calls() -> None:
+def test_libm_is_what_the_block_calls():
     text = "x = two(floored(x)) + exp(sqrt(x)); /* not log(x) */"
     assert called_of_libm(text) == ["exp", "floor", "sqrt"]

@@ -9,7 +9,6 @@ import struct
 from collections.abc import Callable
 from ctypes import byref, c_bool, c_double, c_float, c_int, c_int64, c_size_t, c_uint, c_void_p
 from math import inf, nan
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -46,10 +45,10 @@ CHECKS = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all
 class Fmus(dict[tuple[Any, bool], Fmu]):
     """By version of FMI, and whether the compiler checks for undefined behaviour."""
 
-    def __init__(self, folder: Callable[[str], Path]) -> None:
+    def __init__(self, folder):
         self._folder = folder
 
-    def __missing__(self, key: tuple[Any, bool]) -> Fmu:
+    def __missing__(self, key):
         folder = self._folder("native")
         path = native_fmu(folder, key[0], options=CHECKS if key[1] else ())
         self[key] = Fmu(path, folder / "unpacked")
@@ -57,23 +56,23 @@ class Fmus(dict[tuple[Any, bool], Fmu]):
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> Fmus:
+def fmus(tmp_path_factory):
     return Fmus(tmp_path_factory.mktemp)
 
 
 @pytest.fixture(params=[(2, False), (3, False), slow((2, True))], ids=["2", "3", "2, checked"])
-def fmu(request: pytest.FixtureRequest, fmus: Fmus) -> Fmu:
+def fmu(request, fmus):
     return fmus[request.param]
 
 
-def saved(instance: Instance) -> bytes:
+def saved(instance):
     state = instance.state()
     data = state.to_bytes()
     state.free()
     return data
 
 
-def begin(instance: Instance, phase: str) -> Instance:
+def begin(instance, phase):
     if phase:
         instance.initialise(force=2.0)
         assert instance.step(0.0, H) == OK
@@ -83,7 +82,7 @@ def begin(instance: Instance, phase: str) -> Instance:
 
 
 Call = Callable[[Instance], int]
-REFUSED: list[tuple[str, Call, str]] = [
+REFUSED = [
     ("", lambda i: i.step(0.0, H), "fmi2DoStep before initialisation: must be in step mode"),
     ("", lambda i: i.exit(),
      "fmi2ExitInitializationMode before initialisation: must be in initialisation mode"),
@@ -116,7 +115,7 @@ REFUSED: list[tuple[str, Call, str]] = [
 
 @pytest.mark.parametrize(("phase", "call", "text"), REFUSED, ids=[row[2] for row in REFUSED])
 @pytest.mark.parametrize("logging", [False, True])
-def test_refused(fmu: Fmu, phase: str, call: Call, text: str, logging: bool) -> None:
+def test_refused(fmu, phase, call, text, logging):
     """With one line, whether debug logging is on or not, and without effect: the host goes on."""
     with Instance(fmu, logging=logging) as instance:
         before = saved(begin(instance, phase))
@@ -136,7 +135,7 @@ def test_refused(fmu: Fmu, phase: str, call: Call, text: str, logging: bool) -> 
         (3, H, "step of 0.001 s: velocity = nan m/s: must be finite"),
     ],
 )
-def test_a_step_that_is_discarded(fmu: Fmu, fault: int, h: float, text: str) -> None:
+def test_a_step_that_is_discarded(fmu, fault, h, text):
     time, ends = c_double(7.0), c_int(7)
     with Instance(fmu) as instance:
         begin(instance, "stepping")
@@ -165,9 +164,7 @@ def test_a_step_that_is_discarded(fmu: Fmu, fault: int, h: float, text: str) -> 
         ({"fault": 2.0}, "position = nan m: must be finite"),
     ],
 )
-def test_what_does_not_go_together_is_refused_when_it_is_needed(
-    fmu: Fmu, wrong: dict[str, float], text: str
-) -> None:
+def test_what_does_not_go_together_is_refused_when_it_is_needed(fmu, wrong, text):
     with Instance(fmu) as instance:
         assert instance.assign(wrong) == OK
         assert instance.setup(5.0) == OK
@@ -179,7 +176,7 @@ def test_what_does_not_go_together_is_refused_when_it_is_needed(
         instance.initialise()
 
 
-def test_outputs_follow_a_set_at_once_and_a_reset_undoes_it(fmu: Fmu) -> None:
+def test_outputs_follow_a_set_at_once_and_a_reset_undoes_it(fmu):
     with Instance(fmu) as instance:
         assert instance.setup() == OK
         for initialising in (False, True):
@@ -204,11 +201,11 @@ def test_outputs_follow_a_set_at_once_and_a_reset_undoes_it(fmu: Fmu) -> None:
 class Memory:
     """The memory of a host: what it gave, and what came back."""
 
-    def __init__(self, most: int) -> None:
-        self.given: dict[int, Any] = {}
+    def __init__(self, most):
+        self.given = {}
         self.left = most
 
-    def allocate(self, count: int, size: int) -> int | None:
+    def allocate(self, count, size):
         self.left -= 1
         if self.left < 0:
             return None
@@ -216,20 +213,17 @@ class Memory:
         self.given[ctypes.addressof(memory)] = memory
         return ctypes.addressof(memory)
 
-    def free(self, address: int) -> None:
+    def free(self, address):
         del self.given[address]
 
 
-def callbacks(said: list[bytes], memory: Memory | None = None) -> _Callbacks:
+def callbacks(said, memory=None):
     log = _LOGGER(lambda *words: said.append(words[-1]))
     allocate = _ALLOCATE(memory.allocate) if memory else _ALLOCATE()
     return _Callbacks(log, allocate, _FREE(memory.free) if memory else _FREE(), None, None)
 
 
-def instantiate(
-    fmu: Fmu, functions: Any, name: bytes | None = b"one", guid: bytes | None = GUID.encode(),
-    kind: int = 1,
-) -> c_void_p:  # fmt: skip
+def instantiate(fmu, functions, name=b"one", guid=GUID.encode(), kind=1):  # noqa: B008
     reference = byref(functions) if functions else None
     return c_void_p(fmu.library.fmi2Instantiate(name, kind, guid, None, reference, 0, 1))
 
@@ -239,9 +233,9 @@ def instantiate(
 @example(b"%n" * 100_000)
 @example("\N{MICRO SIGN}".encode() * 1000)
 @example(b"\xff" * 300)
-def test_any_name(fmus: Fmus, name: bytes) -> None:
+def test_any_name(fmus, name):
     """Of what is too long the beginning, in whole characters."""
-    said: list[bytes] = []
+    said = []
     functions, two = callbacks(said), fmus[2, False]
     component = instantiate(two, functions, name)
     assert two.library.fmi2DoStep(component, c_double(0.0), c_double(H), 1) == ERROR
@@ -254,8 +248,8 @@ def test_any_name(fmus: Fmus, name: bytes) -> None:
         assert len(shown) % 2 == 0
 
 
-def test_what_cannot_be_instantiated(fmus: Fmus) -> None:
-    said: list[bytes] = []
+def test_what_cannot_be_instantiated(fmus):
+    said = []
     functions = callbacks(said)
     for guid in (None, b"", b"{0f1e2d3c", b"%n" * 5000):
         assert not instantiate(fmus[2, False], functions, guid=guid)
@@ -270,11 +264,11 @@ def test_what_cannot_be_instantiated(fmus: Fmus) -> None:
     fmus[2, False].library.fmi2FreeInstance(nobody)
 
 
-def test_what_cannot_be_instantiated_in_fmi_3(fmus: Fmus) -> None:
-    said: list[bytes] = []
+def test_what_cannot_be_instantiated_in_fmi_3(fmus):
+    said = []
     log = ctypes.CFUNCTYPE(None, c_void_p, c_int, ctypes.c_char_p, ctypes.c_char_p)
     logger, token = log(lambda *words: said.append(words[-1])), GUID.encode()
-    library: Any = fmus[3, False].library
+    library = fmus[3, False].library
     plain = (b"50 %", token, None, c_bool(False), c_bool(True))
     none = (None, c_size_t(0), None)
     for function, arguments in {
@@ -291,8 +285,8 @@ def test_what_cannot_be_instantiated_in_fmi_3(fmus: Fmus) -> None:
 
 
 @pytest.mark.parametrize("most", [0, 1, 2])
-def test_memory_is_the_hosts_and_only_of_the_start_and_of_states(fmus: Fmus, most: int) -> None:
-    said: list[bytes] = []
+def test_memory_is_the_hosts_and_only_of_the_start_and_of_states(fmus, most):
+    said = []
     memory, pointer, library = Memory(most), c_void_p(), fmus[2, False].library
     functions = callbacks(said, memory)
     component = instantiate(fmus[2, False], functions)
@@ -319,7 +313,7 @@ PLACES = {name: 24 + 8 * i for i, name in enumerate(
 SIZE = 24 + 8 * len(PLACES)
 
 
-def test_the_bytes_of_a_state(fmus: Fmus) -> None:
+def test_the_bytes_of_a_state(fmus):
     """The same in both versions of FMI, which go on from each other's; a state is used again."""
     with Instance(fmus[2, False]) as two, Instance(fmus[3, False]) as three:
         begin(two, "stepping")
@@ -338,7 +332,7 @@ def test_the_bytes_of_a_state(fmus: Fmus) -> None:
         state.free()
 
 
-def number(name: str, value: float) -> Callable[[bytes], bytes]:
+def number(name, value):
     at = PLACES[name]
     return lambda data: data[:at] + struct.pack("<d", value) + data[at + 8 :]
 
@@ -360,7 +354,7 @@ def number(name: str, value: float) -> Callable[[bytes], bytes]:
         (number("held", 2.0), "held = true: must be"),
     ],
 )
-def test_bytes_that_are_no_state(fmu: Fmu, change: Callable[[bytes], bytes], text: str) -> None:
+def test_bytes_that_are_no_state(fmu, change, text):
     with Instance(fmu) as instance:
         data = saved(begin(instance, "stepping"))
         status, state = instance.from_bytes(change(data))
@@ -369,7 +363,7 @@ def test_bytes_that_are_no_state(fmu: Fmu, change: Callable[[bytes], bytes], tex
         assert saved(instance) == data
 
 
-def test_states_of_others_and_memory_that_is_too_small(fmu: Fmu) -> None:
+def test_states_of_others_and_memory_that_is_too_small(fmu):
     strange = ctypes.create_string_buffer(b"graspFMUffffffffffffffff", SIZE)
     buffer = ctypes.create_string_buffer(b"\xaa" * 2 * SIZE, 2 * SIZE)
     with Instance(fmu) as instance:
@@ -400,11 +394,11 @@ HAS = {
 TYPED = r"[GS]et(U?Int\d+|Float\d+|Real|Integer|Boolean|String|Binary|Clock)"
 
 
-def test_every_function_is_there_and_survives_no_instance(fmu: Fmu) -> None:
+def test_every_function_is_there_and_survives_no_instance(fmu):
     text = (C / "headers" / f"fmi{fmu.fmi}Functions.h").read_text("utf-8")
     names = re.findall(r"^\s*FMI\d_Export fmi\d\w+TYPE\s+(fmi\d\w+);", text, re.MULTILINE)
     assert len(names) == {2: 44, 3: 75}[fmu.fmi]
-    library: Any = fmu.library
+    library = fmu.library
     with Instance(fmu) as instance:
         for name in (n for n in names if not re.fullmatch(NO_INSTANCE, n)):
             status = library[name](*[None] * 12)
@@ -422,11 +416,11 @@ def test_every_function_is_there_and_survives_no_instance(fmu: Fmu) -> None:
                 )
 
 
-def test_types_and_the_time_of_fmi_3(fmus: Fmus) -> None:
-    library: Any = fmus[3, False].library
+def test_types_and_the_time_of_fmi_3(fmus):
+    library = fmus[3, False].library
     with Instance(fmus[3, False]) as instance:
 
-        def call(name: str, reference: int, value: Any, count: int = 1) -> int:
+        def call(name, reference, value, count=1):
             n, vr = c_size_t(1), (c_uint * 1)(reference)
             return int(library[f"fmi3{name}"](instance._component, vr, n, value, c_size_t(count)))
 
@@ -469,7 +463,7 @@ size_t number(double v, int digits, char *to)
 
 
 @pytest.fixture(scope="module")
-def texts(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+def texts(tmp_path_factory):
     folder = tmp_path_factory.mktemp("texts")
     (folder / "texts.c").write_text(TEXTS, "ascii")
     command = ["gcc", "-std=c99", "-O1", "-Wall", "-Wextra", "-shared", "-fPIC", f"-I{C}"]
@@ -484,7 +478,7 @@ def texts(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 @example(99999.95, 6)
 @example(1e16, 17)
 @example(2.9535626990606368e16, 16)
-def test_numbers_in_texts_are_those_of_python(texts: ctypes.CDLL, v: float, digits: int) -> None:
+def test_numbers_in_texts_are_those_of_python(texts, v, digits):
     to = ctypes.create_string_buffer(100)
     texts.number(c_double(v), digits, to)
     assert to.value.decode() == f"{v:.{digits}g}".replace("-nan", "nan")

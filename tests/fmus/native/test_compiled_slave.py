@@ -5,11 +5,9 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from grasp_fmus.description import Version
 from support.compiled import compile_c
 from support.hand_written import GUID, NAME, compile_in, write_sources
 from support.native_fmus import needs_gcc
@@ -18,7 +16,7 @@ from support.slow import platforms, slow
 pytestmark = needs_gcc
 
 
-def compiler(name: str) -> str:
+def compiler(name):
     if not shutil.which(name):
         pytest.skip(f"NO {name}")
     return name
@@ -27,7 +25,7 @@ def compiler(name: str) -> str:
 @pytest.mark.parametrize("cc", ["gcc", "clang"])
 @pytest.mark.parametrize("level", ["-O0", platforms("-O2"), slow("-O3")])
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_no_warning(cc: str, level: str, fmi: Version, tmp_path: Path) -> None:
+def test_no_warning(cc, level, fmi, tmp_path):
     """Also where the formats of messages are checked."""
     write_sources(tmp_path / "c", fmi)
     checked = "-DTEXT_LIKE_PRINTF=__attribute__((format(printf, 2, 3)))"
@@ -46,9 +44,7 @@ def test_no_warning(cc: str, level: str, fmi: Version, tmp_path: Path) -> None:
         ((f"-D{NAME}_EXPORTS",), ""),  # CMake's, and so FMPy's elsewhere
     ],
 )
-def test_names_of_functions(
-    define: Sequence[str], prefix: str, fmi: Version, tmp_path: Path
-) -> None:
+def test_names_of_functions(define, prefix, fmi, tmp_path):
     """All else is static: any number of FMUs link into one program."""
     write_sources(tmp_path / "c", fmi)
     defined = [text.format(fmi) for text in define]
@@ -73,7 +69,7 @@ print(bool(instantiate(b"one", 1, {GUID.encode()!r}, None, callbacks, 0, 0)))
 """
 
 
-def said_of(library: Path) -> str | None:
+def said_of(library):
     """Why a library makes no instance, in a process of its own; None where it makes one."""
     command = [sys.executable, "-c", SCRIPT, str(library)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -103,9 +99,7 @@ CPU = Path("/proc/cpuinfo")
         (["-Ofast"], FAST),
     ],
 )
-def test_a_compiler_that_calculates_otherwise_makes_no_instance(
-    cc: str, options: list[str], reason: str | None, tmp_path: Path
-) -> None:
+def test_a_compiler_that_calculates_otherwise_makes_no_instance(cc, options, reason, tmp_path):
     if "-march=native" in options and not (CPU.is_file() and " fma " in CPU.read_text()):
         pytest.skip("NO fused multiply-add in this processor")
     write_sources(tmp_path / "c")
@@ -118,7 +112,7 @@ def test_a_compiler_that_calculates_otherwise_makes_no_instance(
 
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="NO x86-64")
-def test_a_processor_that_drops_small_numbers_makes_no_instance(tmp_path: Path) -> None:
+def test_a_processor_that_drops_small_numbers_makes_no_instance(tmp_path):
     """As a library that is linked with -ffast-math leaves it in the thread that loads it."""
     write_sources(tmp_path / "c")
     library = compile_in(tmp_path / "c")

@@ -2,7 +2,6 @@
 
 import math
 import textwrap
-from pathlib import Path
 from random import Random
 
 import pytest
@@ -328,7 +327,7 @@ return b
 """
 
 
-def source() -> tuple[str, list[str]]:
+def source():
     """The module of all cases, and what they are called."""
     bodies = [f"return {case}" for case in CASES.strip().splitlines()]
     bodies += [body.strip("\n") for body in BODIES.strip("\n").split("---\n")]
@@ -353,7 +352,7 @@ EXTREME += [710.0, -1e9, 2.0**53, 1e16, 1e22, math.inf, -math.inf, math.nan, 2.5
     ("option", "tries"),
     [("-O0", range(2)), pytest.param("-O2", seeds(1000), marks=pytest.mark.slow)],
 )
-def test_each_construct_gives_the_bits_of_python(tmp_path: Path, option: str, tries: range) -> None:
+def test_each_construct_gives_the_bits_of_python(tmp_path, option, tries):
     """All in one test, as they are compiled together."""
     with loaded(tmp_path / "constructs.py", SOURCE) as block:
         both = Both("constructs", block, tmp_path / "c", options=[option])

@@ -37,13 +37,13 @@ TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
 pytestmark = [pytest.mark.skipif(shutil.which(tool) is None, reason=f"NO {tool}") for tool in TOOLS]
 
 
-def replaced(text: str, words: dict[str, str]) -> str:
+def replaced(text, words):
     for old, new in words.items():
         text = text.replace(old, new)
     return text
 
 
-def run(command: str) -> str:
+def run(command):
     """What a command of the page says."""
     if command.startswith("grasp-cosim "):
         assert cli.main(shlex.split(command)[1:]) == 0
@@ -55,13 +55,13 @@ def run(command: str) -> str:
     return done.stdout
 
 
-def said(image: str) -> dict[str, int]:
+def said(image):
     return {what: int(number) for what, number in re.findall(r"^(.+): (\d+)$", image, re.MULTILINE)}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["published", "adaptive"])
-def test_the_figures_of_the_page(checkout: Path, controller: str) -> None:
+def test_the_figures_of_the_page(checkout, controller):
     words = ADAPTIVE if controller == "adaptive" else {}
     source = (ROOT / "docs/cortex_m.c").read_text("utf-8")
     (checkout / "cortex_m.c").write_text(replaced(source, words), "utf-8")
@@ -93,7 +93,7 @@ def test_the_figures_of_the_page(checkout: Path, controller: str) -> None:
 
 
 @pytest.fixture
-def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+def rows(tmp_path, monkeypatch):
     """A short record, as `cut` makes it; the current folder has the C of the controller."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs").symlink_to(ROOT / "docs")
@@ -106,7 +106,7 @@ def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     ]
 
 
-def said_of(rows: list[list[str]]) -> str:
+def said_of(rows):
     """What the M7's image says of a record; the controller in it is compiled once."""
     Path("controller_c/recorded.h").write_text("".join(f"{','.join(row)},\n" for row in rows))
     command, emulator = (replaced(command, M7) for command in (COMMANDS[3], COMMANDS[-1]))
@@ -116,7 +116,7 @@ def said_of(rows: list[list[str]]) -> str:
     return run(f"{command.replace(controller, 'controller.o')} && {emulator} || echo failed")
 
 
-def test_an_image_finds_a_difference_and_steps_that_take_too_long(rows: list[list[str]]) -> None:
+def test_an_image_finds_a_difference_and_steps_that_take_too_long(rows):
     rows[-1][-1] = repr(float(rows[-1][-1]) + 1e-9)
     found = said(said_of(rows))
     assert found["steps"] == len(rows) == 51
@@ -126,6 +126,6 @@ def test_an_image_finds_a_difference_and_steps_that_take_too_long(rows: list[lis
     assert slower["steps begun late"] > 40
 
 
-def test_an_image_ends_where_an_input_is_none(rows: list[list[str]]) -> None:
+def test_an_image_ends_where_an_input_is_none(rows):
     rows[-1][0] = "NAN"
     assert said_of(rows).splitlines() == ["position[1] = nan m: must be a finite number", "failed"]

@@ -3,17 +3,14 @@
 import os
 import shutil
 import sysconfig
-from pathlib import Path
-from typing import Any, Literal
 
 import pytest
-from conftest import Folder
 from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from grasp_fmus.build import planned
-from grasp_fmus.description import Experiment, Version
+from grasp_fmus.description import Experiment
 from grasp_fmus.proxy import Original, Settings, build_proxy
 from support.kinds import TRANSLATED
 from support.native_fmus import needs_gcc
@@ -29,15 +26,15 @@ pytestmark = needs_gcc
 
 
 @pytest.fixture
-def fmu(folder_of: Folder, name: str, fmi: Literal[2, 3]) -> Path:
+def fmu(folder_of, name, fmi):
     """A native FMU of one of the versions."""
     return folder_of("native" if fmi == 2 else "native FMI 3") / f"{name}.fmu"
 
 
-def assert_gives_the_reference(fmu: Path, folder: Path, name: str) -> None:
+def assert_gives_the_reference(fmu, folder, name):
     """Run by FMPy with the options and inputs in the folder, every output is that of the block."""
     options = read_ref_opt_file(folder / f"{name}_ref.opt")
-    result: Any = simulate_fmu(
+    result = simulate_fmu(
         fmu,
         start_time=options["StartTime"],
         stop_time=options["StopTime"],
@@ -52,12 +49,12 @@ def assert_gives_the_reference(fmu: Path, folder: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "fmi"), BOTH)
-def test_it_is_valid(fmu: Path) -> None:
+def test_it_is_valid(fmu):
     assert validate_fmu(fmu) == []
 
 
 @pytest.mark.parametrize(("name", "fmi"), BOTH)
-def test_it_gives_the_cross_check_reference(fmu: Path) -> None:
+def test_it_gives_the_cross_check_reference(fmu):
     assert_gives_the_reference(fmu, fmu.parent, fmu.stem)
 
 
@@ -68,9 +65,7 @@ def test_it_gives_the_cross_check_reference(fmu: Path) -> None:
     [(name, fmi) if (name, fmi) == ("ProximitySensor", 2) else platforms(name, fmi)
      for name in TRANSLATED for fmi in (2, 3)],
 )  # fmt: skip
-def test_fmpy_compiles_its_sources(
-    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fmpy_compiles_its_sources(fmu, tmp_path, monkeypatch):
     """Without its binary, with another made by CMake: the same bits."""
     monkeypatch.setenv("PATH", PROGRAMS)
     folder, made = tmp_path / "fmu", tmp_path / "made"
@@ -85,9 +80,7 @@ def test_fmpy_compiles_its_sources(
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("cmake", path=PROGRAMS), reason="NO cmake")
 @pytest.mark.parametrize("fmi", [2, platforms(3)])
-def test_fmpy_compiles_the_sources_of_a_proxy(
-    fmi: Version, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fmpy_compiles_the_sources_of_a_proxy(fmi, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", PROGRAMS)
     folder, made = tmp_path / "fmu", tmp_path / "made"
     made.mkdir()
@@ -98,7 +91,7 @@ def test_fmpy_compiles_the_sources_of_a_proxy(
         shutil.unpack_archive(fmu, folder, "zip")
         shutil.rmtree(folder / "binaries")
         build_platform_binary(folder, made)
-        result: Any = simulate_fmu(
+        result = simulate_fmu(
             folder, stop_time=1.0, output_interval=0.125, start_values={"force": 3.0},
             output=["doubled"],
         )  # fmt: skip

@@ -4,13 +4,12 @@ import os
 import shutil
 import struct
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from grasp_fmus.bench_header import bench_header
 from grasp_fmus.link.message import HELLO, INITIALISE, STEP, VERSION
-from grasp_fmus.link.signature import Causality, Kind, LinkVariable, Signature
+from grasp_fmus.link.signature import LinkVariable, Signature
 from support import campaign
 from support.native_proxies import write_sources
 
@@ -32,8 +31,8 @@ pytestmark = [
     pytest.mark.skipif(not shutil.which("clang"), reason="NO clang"),
 ]
 
-KINDS: tuple[Kind, ...] = ("Real", "Integer", "Boolean")
-CAUSALITIES: tuple[tuple[Causality, str], ...] = (
+KINDS = ("Real", "Integer", "Boolean")
+CAUSALITIES = (
     ("input", "u"),
     ("parameter", "p"),
     ("output", "y"),
@@ -43,7 +42,7 @@ EVERY_KIND = Signature(
 )
 
 
-def fuzzer(folder: Path, source: Path) -> Path:
+def fuzzer(folder, source):
     program = folder / source.stem
     files = ["-I", str(folder), str(source), "-o", str(program)]
     command = ["clang", *FLAGS, *files, "-lm"]
@@ -52,7 +51,7 @@ def fuzzer(folder: Path, source: Path) -> Path:
     return program
 
 
-def fuzzed(program: Path, seeds: Iterator[bytes]) -> None:
+def fuzzed(program, seeds):
     """Nothing is found, and no more memory needed, in so many runs."""
     corpus, found = program.parent / "corpus", program.parent / "found"
     for folder in (corpus, found):
@@ -72,14 +71,14 @@ def fuzzed(program: Path, seeds: Iterator[bytes]) -> None:
     assert int(runs.split()[-1]) >= RUNS
 
 
-def sized(data: bytes) -> bytes:
+def sized(data):
     return struct.pack("<H", len(data)) + data
 
 
-def test_a_proxy_whatever_its_peer_sends(tmp_path: Path) -> None:
+def test_a_proxy_whatever_its_peer_sends(tmp_path):
     write_sources(tmp_path)
 
-    def seeds() -> Iterator[bytes]:
+    def seeds():
         """Sessions that begin, and go on with answers, refusals, silence and other things."""
         welcome, outputs, silence = b"\x48\0\0\0", b"\x0a\0\0\0", b"\x10"
         for settings in range(32):
@@ -95,15 +94,15 @@ def test_a_proxy_whatever_its_peer_sends(tmp_path: Path) -> None:
     fuzzed(fuzzer(tmp_path, FUZZ / "proxy.c"), seeds())
 
 
-def test_a_peer_whatever_proxies_send(tmp_path: Path) -> None:
+def test_a_peer_whatever_proxies_send(tmp_path):
     (tmp_path / "every_kind.h").write_text(bench_header("EveryKind", EVERY_KIND), "ascii")
 
-    def datagram(kind: int, body: bytes, step: float = 0.0) -> bytes:
+    def datagram(kind, body, step=0.0):
         head = struct.pack("<4sHBB16sQQQddqII", b"GRSP", VERSION, kind, 0, EVERY_KIND.hash, 7, 0,
                            int(kind != HELLO), 0.0, step, 0, len(body), 0)  # fmt: skip
         return head + body
 
-    def seeds() -> Iterator[bytes]:
+    def seeds():
         values = bytes(2 * 3 * 8)
         for settings in (0, 1):
             tag = bytes(32 * settings)

@@ -17,20 +17,20 @@ INCLUDES = {
 COMPILER = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wno-unused-function")
 
 
-def lacks(name: str) -> bool:
+def lacks(name):
     """Whether a header, or one of those that it includes, says what must stand before it."""
     says = re.search(r"\bincluded\b", HEADERS[name].partition("*/")[0])
     return bool(says) or any(map(lacks, INCLUDES[name]))
 
 
-def test_no_headers_include_each_other_in_a_circle() -> None:
+def test_no_headers_include_each_other_in_a_circle():
     assert "slave.h" in INCLUDES["block_slave.h"]
     assert circles(INCLUDES) == []
 
 
 @needs_gcc
 @pytest.mark.parametrize("name", sorted(HEADERS))
-def test_a_header_compiles_by_itself_or_says_what_it_lacks(name: str) -> None:
+def test_a_header_compiles_by_itself_or_says_what_it_lacks(name):
     options = ["-D_POSIX_C_SOURCE=200809L", f"-I{FOLDER / 'headers'}", "-fsyntax-only"]
     source = f'#include "{FOLDER / name}"\n'
     done = subprocess.run(

@@ -4,14 +4,13 @@ import re
 import shutil
 import struct
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import fmpy
 import pytest
 from c_compilers import LIBM
 from grasp_fmus.build import build_native, planned
-from grasp_fmus.native.targets import KNOWN, LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS, Target
+from grasp_fmus.native.targets import KNOWN, LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS
 from support.compilers import needs_zig
 from support.fmi2 import read_members
 
@@ -43,7 +42,7 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def binaries(tmp_path_factory: pytest.TempPathFactory) -> dict[Target, Path]:
+def binaries(tmp_path_factory):
     """One FMU for all platforms, its binaries by target."""
     folder = tmp_path_factory.mktemp("all")
     (built,) = build_native(folder, planned(KNOWN, fmi=3), [NAME])
@@ -59,12 +58,12 @@ def binaries(tmp_path_factory: pytest.TempPathFactory) -> dict[Target, Path]:
     return files
 
 
-def said(*command: str | Path) -> str:
+def said(*command: str | Path):
     return subprocess.check_output([str(word) for word in command], text=True)
 
 
 @pytest.mark.parametrize("target", [LINUX_X86, LINUX_ARM])
-def test_on_linux(binaries: dict[Target, Path], target: Target) -> None:
+def test_on_linux(binaries, target):
     dynamic = said("readelf", "--wide", "--dynamic", binaries[target])
     assert {*re.findall(r"NEEDED.*\[(.*)\]", dynamic)} <= {"libc.so.6", "libm.so.6"}
     symbols = said("readelf", "--wide", "--dyn-syms", binaries[target])
@@ -76,7 +75,7 @@ def test_on_linux(binaries: dict[Target, Path], target: Target) -> None:
     assert {*re.findall(r" (?:DEFAULT|PROTECTED) +\d+ (\w+)", symbols)} == standard_functions(3)
 
 
-def test_on_windows(binaries: dict[Target, Path]) -> None:
+def test_on_windows(binaries):
     text = said("objdump", "-p", binaries[WINDOWS])
     libraries = re.findall(r"DLL Name: (\S+)", text)
     assert libraries
@@ -86,11 +85,11 @@ def test_on_windows(binaries: dict[Target, Path]) -> None:
 
 
 @pytest.mark.parametrize("target", [MAC_X86, MAC_ARM])
-def test_on_macos(binaries: dict[Target, Path], target: Target) -> None:
+def test_on_macos(binaries, target):
     assert [*loaded_by_mach_o(binaries[target].read_bytes())] == ["/usr/lib/libSystem.B.dylib"]
 
 
-def loaded_by_mach_o(data: bytes) -> Iterator[str]:
+def loaded_by_mach_o(data):
     """The libraries that it names in commands of the kind LC_LOAD_DYLIB."""
     magic, _, _, _, count = struct.unpack_from("<5I", data)
     assert magic == 0xFEEDFACF
@@ -103,14 +102,14 @@ def loaded_by_mach_o(data: bytes) -> Iterator[str]:
         place += size
 
 
-def standard_functions(fmi: int) -> set[str]:
+def standard_functions(fmi):
     """Those that the standard's header declares."""
     headers = Path(fmpy.__file__).parent / "c-code"
     text = (headers / f"fmi{fmi}FunctionTypes.h").read_text()
     return {*re.findall(rf"\b(fmi{fmi}\w+)TYPE\b", text)}
 
 
-def test_one_dylib_serves_both_processors_in_fmi_2(tmp_path: Path) -> None:
+def test_one_dylib_serves_both_processors_in_fmi_2(tmp_path):
     (built,) = build_native(tmp_path, planned([MAC_X86, MAC_ARM]), [NAME])
     data = read_members(built.path)[f"binaries/darwin64/{NAME}.dylib"]
     magic, count = struct.unpack_from(">II", data)

@@ -3,14 +3,11 @@
 import ctypes
 import shutil
 import subprocess
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from grasp_fmus.build import planned
-from grasp_fmus.description import Version
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.proxy import Settings, build_proxy
 from support.fmi2 import OK, WARNING, Fmu, Instance
@@ -28,9 +25,7 @@ pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
     ("compiler", "libraries"),
     [("gcc", ""), ("clang", ""), platforms("x86_64-w64-mingw32-gcc", "-lws2_32")],
 )
-def test_the_sources_compile_without_a_warning(
-    tmp_path: Path, compiler: str, libraries: str, level: str, fmi: Version
-) -> None:
+def test_the_sources_compile_without_a_warning(tmp_path, compiler, libraries, level, fmi):
     if not shutil.which(compiler):
         pytest.skip(f"NO {compiler}")
     write_sources(tmp_path, fmi)
@@ -43,7 +38,7 @@ def test_the_sources_compile_without_a_warning(
 
 
 @pytest.mark.slow
-def test_two_of_them_link_into_one_program(tmp_path: Path) -> None:
+def test_two_of_them_link_into_one_program(tmp_path):
     """All but the functions of FMI is static, and those have the name of the FMU before them."""
     write_sources(tmp_path)
     text = (tmp_path / "AnyProxy.c").read_text()
@@ -57,7 +52,7 @@ def test_two_of_them_link_into_one_program(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def path(tmp_path_factory):
     """One that was built for users."""
     target = tmp_path_factory.mktemp("proxy") / "TheProxy.fmu"
     return build_proxy(
@@ -66,18 +61,18 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def fmu(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Fmu:
+def fmu(path, tmp_path_factory):
     return Fmu(path, tmp_path_factory.mktemp("unpacked"))
 
 
-def initialised(instance: Instance, port: int, timeout: float = 60.0) -> Instance:
+def initialised(instance, port, timeout=60.0):
     reference = (ctypes.c_uint * 1)(instance.fmu.references["proxy.on_loss"])
     text = (ctypes.c_char_p * 1)(b"failsafe")
     assert instance.call("SetString", reference, ctypes.c_size_t(1), text) == OK
     return instance.initialise(**{"proxy.port": port, "proxy.timeout": timeout})
 
 
-def test_reset_ends_the_session_and_another_begins(fmu: Fmu) -> None:
+def test_reset_ends_the_session_and_another_begins(fmu):
     with ScriptedPeer() as peer, Instance(fmu, "bench") as instance:
         for _ in range(5):
             initialised(instance, peer.port)
@@ -91,7 +86,7 @@ def test_reset_ends_the_session_and_another_begins(fmu: Fmu) -> None:
     assert len({m.session for m in peer.got}) == 5
 
 
-def test_a_loss_is_a_warning_in_the_log(fmu: Fmu) -> None:
+def test_a_loss_is_a_warning_in_the_log(fmu):
     with ScriptedPeer() as peer, Instance(fmu, "bench") as instance:
         initialised(instance, peer.port)
         peer.told(STEP, fail)
@@ -104,7 +99,7 @@ def test_a_loss_is_a_warning_in_the_log(fmu: Fmu) -> None:
         )
 
 
-def test_a_silent_peer_by_the_real_clock(fmu: Fmu) -> None:
+def test_a_silent_peer_by_the_real_clock(fmu):
     with ScriptedPeer() as peer, Instance(fmu, "bench") as instance:
         initialised(instance, peer.port, 1e-3)
         peer.told(STEP, *[lambda p, m: None] * 10)
@@ -115,7 +110,7 @@ def test_a_silent_peer_by_the_real_clock(fmu: Fmu) -> None:
     assert peer.kinds().count(STEP) == 4
 
 
-def test_many_instances_side_by_side(fmu: Fmu) -> None:
+def test_many_instances_side_by_side(fmu):
     peers = [ScriptedPeer() for _ in range(8)]
     instances = [Instance(fmu, f"bench {k}") for k in range(len(peers))]
     try:
@@ -133,10 +128,10 @@ def test_many_instances_side_by_side(fmu: Fmu) -> None:
             peer.__exit__()
 
 
-def test_plain_fmpy_simulates_it(path: Path) -> None:
+def test_plain_fmpy_simulates_it(path):
     with ScriptedPeer() as peer:
         force = np.array([(0.0, 1.0), (1.0, 2.0)], [("time", "f8"), ("force", "f8")])
-        result: Any = simulate_fmu(
+        result = simulate_fmu(
             str(path), validate=True, stop_time=1.0, step_size=0.125, output_interval=0.125,
             start_values={"proxy.port": peer.port, "gain": 4.0}, input=force,
             output=["doubled", "passed", "proxy.state", "proxy.missed"],

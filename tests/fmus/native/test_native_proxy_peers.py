@@ -2,15 +2,13 @@
 
 import shutil
 import subprocess
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import System, cli, simulate
+from grasp_cosim import cli, simulate
 from grasp_cosim.hil.served import Service
-from grasp_cosim.interface.interface import Value
 from support.proxies import build_proxy, serving, wait_until
 
 KEY = b"sixteen bytes of key, and some more"
@@ -20,7 +18,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not shutil.which("gcc"), reas
 
 
 @pytest.fixture(scope="module")
-def target(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def target(fmus, tmp_path_factory):
     """The controller on a target, as docs/handoff.md makes it."""
     folder = tmp_path_factory.mktemp("target")
     assert cli.main(["build", "--native", "--c-only", str(folder), "GraspController"]) == 0
@@ -35,7 +33,7 @@ def target(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @contextmanager
-def running(target: Path, key: Path | None) -> Iterator[int]:
+def running(target, key):
     """The target, until the end; its port."""
     words = [str(key)] if key else []
     with subprocess.Popen([target, "0", *words], stdout=subprocess.PIPE, text=True) as process:
@@ -48,11 +46,9 @@ def running(target: Path, key: Path | None) -> Iterator[int]:
 
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 @pytest.mark.parametrize("with_key", [False, True])
-def test_with_the_peer_in_c(
-    grasp: System, target: Path, tmp_path: Path, with_key: bool, scheme: str
-) -> None:
+def test_with_the_peer_in_c(grasp, target, tmp_path, with_key, scheme):
     key = tmp_path / "key" if with_key else None
-    values: dict[str, Value] = {"controller.proxy.key_file": str(key or "")}
+    values = {"controller.proxy.key_file": str(key or "")}
     if key:
         key.write_bytes(KEY)
         key.chmod(0o600)
@@ -70,16 +66,14 @@ def test_with_the_peer_in_c(
 @pytest.mark.parametrize(
     ("ours", "theirs"), [(KEY, KEY), (KEY, None), (None, KEY), (KEY, b"another key of 24 bytes.")]
 )
-def test_keys_of_both_sides(
-    grasp: System, tmp_path: Path, ours: bytes | None, theirs: bytes | None
-) -> None:
+def test_keys_of_both_sides(grasp, tmp_path, ours, theirs):
     """Only with the same key is there an answer."""
     system = grasp.with_experiment(step=STEP, stop=0.1)
     fmu = system.component("plant", "test").fmu
     key = tmp_path / "key"
     key.write_bytes(ours or b"")
     key.chmod(0o600)
-    values: dict[str, Value] = {
+    values = {
         "plant.proxy.key_file": str(key) if ours else "",
         "plant.proxy.connect_timeout": 60.0 if ours == theirs else 0.3,
     }

@@ -1,7 +1,6 @@
 """What is not in the subset is refused in one line, with file, line, and what to write instead."""
 
 import textwrap
-from pathlib import Path
 
 import pytest
 from fmus.native.c_block import loaded
@@ -110,7 +109,7 @@ CASES = {f"return {e}": (1, said) for e, said in EXPRESSIONS.items()} | BODIES
 
 
 @pytest.mark.parametrize("body", CASES)
-def test_it_is_refused_with_its_line_and_what_to_write_instead(body: str, tmp_path: Path) -> None:
+def test_it_is_refused_with_its_line_and_what_to_write_instead(body, tmp_path):
     line, said = CASES[body]
     head = HEAD.lstrip("\n") + MORE
     source = head + textwrap.indent(body, "    ") + "\n" + STEP

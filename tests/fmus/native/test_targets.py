@@ -14,7 +14,7 @@ MAC = ("darwin", "arm64")
 BOTH = [MAC_X86, MAC_ARM]
 
 
-def on(machine: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+def on(machine, monkeypatch):
     monkeypatch.setattr(sys, "platform", machine[0])
     monkeypatch.setattr(platform, "machine", lambda: machine[1])
 
@@ -31,9 +31,7 @@ def on(machine: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
         (("win32", "ARM64"), Target("aarch64-windows", "win64", ""), ".dll"),
     ],
 )
-def test_this_machine(
-    machine: tuple[str, str], target: Target, suffix: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_this_machine(machine, target, suffix, monkeypatch):
     on(machine, monkeypatch)
     assert (here(), here().suffix) == (target, suffix)
 
@@ -47,12 +45,12 @@ def test_this_machine(
         ([], []),
     ],
 )
-def test_targets_have_the_names_of_both_versions(names: list[str], found: list[Target]) -> None:
+def test_targets_have_the_names_of_both_versions(names, found):
     assert targets(names) == found
 
 
 @pytest.mark.parametrize("name", ["", "LINUX64", " linux64"])
-def test_an_unknown_target_is_refused(name: str) -> None:
+def test_an_unknown_target_is_refused(name):
     with pytest.raises(ValueError, match=f"^--target '{name}': must be of {', '.join(NAMES)}, "):
         targets(["win64", name])
 
@@ -72,12 +70,8 @@ def test_an_unknown_target_is_refused(name: str) -> None:
     ],
 )  # fmt: skip
 def test_fmi_2_has_a_folder_for_each_system_and_fmi_3_one_for_each_platform(
-    machine: tuple[str, str],
-    asked: list[Target],
-    expected: dict[Target, str],
-    said: str,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    machine, asked, expected, said, monkeypatch
+):
     on(machine, monkeypatch)
     places, note = folders(asked, 2)
     assert places == expected
@@ -86,7 +80,7 @@ def test_fmi_2_has_a_folder_for_each_system_and_fmi_3_one_for_each_platform(
     assert folders(asked, 3) == ({t: t.tuple for t in (here(), *asked)}, "")
 
 
-def test_one_library_for_both_processors_of_macos() -> None:
+def test_one_library_for_both_processors_of_macos():
     """Mach-O files are told apart by their processor; each begins on a page."""
     thin = [struct.pack("<III", 0xFEEDFACF, cpu, sub) + bytes(n) for cpu, sub, n in
             ((0x01000007, 3, 5), (0x0100000C, 0, 20_000))]  # fmt: skip

@@ -3,11 +3,9 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from random import Random
-from typing import Any
 
 import pytest
 from fmus.native.c_block import Both, loaded
@@ -30,7 +28,7 @@ NAMES = [*TRANSLATED, *OWN]
 
 
 @contextmanager
-def block_of(name: str, folder: Path) -> Iterator[Any]:
+def block_of(name, folder):
     """A block by its name."""
     if name in OWN:
         with loaded(folder / f"{name}.py", OWN[name].read_text("utf-8")) as own:
@@ -40,14 +38,14 @@ def block_of(name: str, folder: Path) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("name", [*TRANSLATED, *map(slow, OWN)])
-def test_c_gives_the_bits_of_python(name: str, tmp_path: Path) -> None:
+def test_c_gives_the_bits_of_python(name, tmp_path):
     with block_of(name, tmp_path) as block:
         both = Both(name, block, tmp_path / "c", options=["-O0"])
         assert sum(both.random_run(Random(seed), 10) for seed in range(15)) > 100
 
 
 @pytest.mark.parametrize("fingers", [2, *map(slow, (3, 4, 5))])
-def test_a_hand_of_n_fingers(fingers: int, tmp_path: Path) -> None:
+def test_a_hand_of_n_fingers(fingers, tmp_path):
     source = HAND.read_text("utf-8").replace("N = 3", f"N = {fingers}")
     with loaded(tmp_path / "hand.py", source) as block:
         both = Both(f"hand{fingers}", block, tmp_path / "c")
@@ -55,7 +53,7 @@ def test_a_hand_of_n_fingers(fingers: int, tmp_path: Path) -> None:
         assert sum(both.random_run(Random(seed), 20) for seed in range(20)) > 1_000
 
 
-def test_a_block_by_chance(tmp_path: Path) -> None:
+def test_a_block_by_chance(tmp_path):
     with loaded(tmp_path / "chance.py", random_block(Random(1))) as block:
         both = Both("chance", block, tmp_path / "c", options=["-O0", "-w"])
         assert sum(both.random_run(Random(seed), 10) for seed in range(20)) > 100
@@ -63,7 +61,7 @@ def test_a_block_by_chance(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_ten_million_values(tmp_path: Path) -> None:
+def test_ten_million_values(tmp_path):
     """Half of them of shipped blocks, those of docs/ and the hand, half of blocks by chance."""
     whole = part(10_000_000)
     for name in NAMES:
@@ -89,16 +87,14 @@ def test_ten_million_values(tmp_path: Path) -> None:
     [("clang", "-O2"), ("gcc", "-O3"), platforms("gcc", "-O0"), platforms("clang", "-O0")],
 )
 @pytest.mark.parametrize("name", NAMES)
-def test_any_compiler_gives_the_bits_of_python(
-    name: str, cc: str, option: str, tmp_path: Path
-) -> None:
+def test_any_compiler_gives_the_bits_of_python(name, cc, option, tmp_path):
     with block_of(name, tmp_path) as block:
         both = Both(name, block, tmp_path / "c", cc, [option])
         assert sum(both.random_run(Random(seed), 30) for seed in range(20)) > 500
 
 
 @pytest.mark.slow
-def test_the_same_sources_give_the_same_bytes() -> None:
+def test_the_same_sources_give_the_same_bytes():
     code = (
         "from grasp_fmus.native.blocks import translated\n"
         "from grasp_fmus.shipped import blocks\n"

@@ -1,6 +1,5 @@
 """Blocks that users write: any state, any names, annotations or not, checks of their own."""
 
-from pathlib import Path
 from random import Random
 
 import pytest
@@ -123,7 +122,7 @@ def outputs(p, x, u): return Outputs(x.int, (x.double > 0.0, x.why))
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_a_block_gives_the_bits_of_python(name: str, tmp_path: Path) -> None:
+def test_a_block_gives_the_bits_of_python(name, tmp_path):
     imports, body = BLOCKS[name]
     future = "from __future__ import annotations" if name == "future" else ""
     source = HEAD.format(future=future, imports=imports) + PARAMS + body

@@ -2,10 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 
 import pytest
-from grasp_cosim import InputError, System
+from grasp_cosim import InputError
 from grasp_cosim.grasp.identification.contact_times import (
     RATIO,
     STEP,
@@ -19,7 +18,6 @@ from grasp_cosim.grasp.identification.contact_times import (
     read_contacts,
     scatter,
 )
-from grasp_cosim.grasp.identification.fit import Fit
 from grasp_cosim.grasp.identification.identification import GROUPS, chosen
 from grasp_cosim.grasp.published.tables import Setting
 from support import continuous
@@ -29,18 +27,18 @@ X_M = 0.02
 Place = tuple[float, int]
 """x_m in m, and the case."""
 
-GRASPS: Sequence[Place] = ((X_M, 1), (X_M, 2))
+GRASPS = ((X_M, 1), (X_M, 2))
 
 Simulator = Callable[[Sequence[Grasp]], Iterable[Sequence[float]]]
 
 
-def simulator(system: System, step: float) -> Simulator:
+def simulator(system, step):
     """Through the FMUs, in this process."""
     stepped = system.with_experiment(step=step, stop=STOP)
     return lambda grasps: [contact_times((stepped, g)) for g in grasps]
 
 
-def contacts(times: Iterable[Sequence[float]], grasps: Sequence[Place] = GRASPS) -> list[Contact]:
+def contacts(times, grasps=GRASPS):
     return [
         Contact("", Setting(x_m), case, finger, time)
         for (x_m, case), both in zip(grasps, times, strict=True)
@@ -48,12 +46,12 @@ def contacts(times: Iterable[Sequence[float]], grasps: Sequence[Place] = GRASPS)
     ]
 
 
-def fitted(simulate: Simulator, measured: Sequence[Contact], group: str) -> Fit:
+def fitted(simulate, measured, group):
     return fit_contacts(measured, chosen([group], tuple(GROUPS), "test"), simulate)
 
 
 @pytest.mark.slow
-def test_our_own_friction_comes_back(grasp: System) -> None:
+def test_our_own_friction_comes_back(grasp):
     """In Case 0, which is the quickest: the plant takes many small steps where surfaces rub."""
     grasps = ((X_M, 0), (0.05, 0))
     simulated = simulator(grasp, 5e-3)
@@ -64,7 +62,7 @@ def test_our_own_friction_comes_back(grasp: System) -> None:
 
 
 @pytest.mark.slow
-def test_the_friction_of_a_solution_in_continuous_time_comes_back(grasp: System) -> None:
+def test_the_friction_of_a_solution_in_continuous_time_comes_back(grasp):
     friction = tuple(TRUE.values())
     solved = [
         continuous.solve(continuous.Grasp(case=case, x_m=x_m, B=(friction[0], friction[1])), STOP)
@@ -78,10 +76,10 @@ def test_the_friction_of_a_solution_in_continuous_time_comes_back(grasp: System)
     assert found.rms < 2e-3  # s, which a contact time at STEP is off by
 
 
-def test_equal_grasps_run_once() -> None:
-    asked: list[Grasp] = []
+def test_equal_grasps_run_once():
+    asked = []
 
-    def simulate(grasps: Sequence[Grasp]) -> list[list[float]]:
+    def simulate(grasps):
         asked.extend(grasps)
         return [[1.0 + dict(g.parameters)[RATIO] * g.ratio, 2.0] for g in grasps]
 
@@ -92,17 +90,17 @@ def test_equal_grasps_run_once() -> None:
     assert {g.ratio for g in asked} == {1.0, 0.86}
 
 
-def test_a_finger_that_does_not_touch_counts_at_the_end(grasp: System) -> None:
+def test_a_finger_that_does_not_touch_counts_at_the_end(grasp):
     short = grasp.with_experiment(step=1e-3, stop=0.2)
     assert contact_times((short, Grasp(0.03, 1.0, 1, ()))) == [STOP, STOP]
 
 
-def test_a_grasp_that_is_refused_says_which(grasp: System) -> None:
+def test_a_grasp_that_is_refused_says_which(grasp):
     with pytest.raises(InputError, match=r"^x_m = 5 m, Case 1: plant: .*must fit between"):
         contact_times((grasp, Grasp(5.0, 1.0, 1, ())))
 
 
-def test_the_published_contacts_are_40_and_none_is_there_twice() -> None:
+def test_the_published_contacts_are_40_and_none_is_there_twice():
     found = published_contacts()
     assert len(found) == 40
     assert len({(c.label, c.case, c.finger) for c in found}) == 40
@@ -112,7 +110,7 @@ def test_the_published_contacts_are_40_and_none_is_there_twice() -> None:
     assert not any("white" in c.label for c in found)
 
 
-def test_a_table_of_contact_times_is_read(tmp_path: Path) -> None:
+def test_a_table_of_contact_times_is_read(tmp_path):
     path = tmp_path / "times.csv"
     path.write_text("\ufeffx_m, case,finger,time,alpha_1,alpha_2\n0.03,1,2,3.1, 1,0.86\n", "utf-8")
     assert read_contacts(path) == [Contact("x_m = 0.03 m", Setting(0.03, 1.0, 0.86), 1, 2, 3.1)]
@@ -135,7 +133,7 @@ def test_a_table_of_contact_times_is_read(tmp_path: Path) -> None:
         ("x_m,case,finger,time\n0,1,1,-1\n", "time = -1 s, .*: must be finite, the time greater"),
     ],
 )
-def test_a_wrong_table_is_one_line(tmp_path: Path, text: str, message: str) -> None:
+def test_a_wrong_table_is_one_line(tmp_path, text, message):
     path = tmp_path / "times.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=message) as caught:
@@ -144,7 +142,7 @@ def test_a_wrong_table_is_one_line(tmp_path: Path, text: str, message: str) -> N
 
 
 @pytest.mark.slow
-def test_processes_give_the_same_fit(grasp: System) -> None:
+def test_processes_give_the_same_fit(grasp):
     measured = contacts([[1.5, 3.2], [2.3, 2.5]])
     parameters = chosen(["stribeck"], tuple(GROUPS), "test")
     parallel = identify_from_times(grasp, measured, parameters, progress=False)
@@ -154,7 +152,7 @@ def test_processes_give_the_same_fit(grasp: System) -> None:
     assert parallel.estimates[0].remark == "the data do not determine it"  # without friction
 
 
-def test_the_scatter_is_that_of_equal_grasps() -> None:
+def test_the_scatter_is_that_of_equal_grasps():
     """Two settings were repeated: three times with a variance of 0.04, twice with 0.02."""
     white, brown, mixed = Setting(0.03), Setting(0.03, 0.86, 0.86), Setting(0.03, 0.86, 1.0)
     contacts = [
@@ -167,7 +165,7 @@ def test_the_scatter_is_that_of_equal_grasps() -> None:
     assert scatter(contacts[-2:]) is None
 
 
-def test_the_published_experiments_scatter() -> None:
+def test_the_published_experiments_scatter():
     """Of the five equal colours, from the paper's table by hand: 0.036, 0.196, 0.140, 0.150 s."""
     by_hand = math.sqrt((0.036**2 + 0.196**2 + 0.140**2 + 0.150**2) / 4)
     assert scatter(published_contacts()) == pytest.approx(by_hand, abs=5e-4)

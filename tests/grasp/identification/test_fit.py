@@ -1,37 +1,34 @@
 """The fit itself: estimates, intervals, what the data do not say."""
 
-from collections.abc import Sequence
-
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, SimulationError
-from grasp_cosim.grasp.identification.fit import Fit, Parameter, Vector, fit
+from grasp_cosim.grasp.identification.fit import Parameter, fit
 
 X = np.linspace(0.0, 2.0, 40)
 SIGMA = 0.05
 
 
-def parameter(name: str, start: float = 1.0, neutral: float | None = None) -> Parameter:
+def parameter(name, start=1.0, neutral=None):
     return Parameter(name, "N", start, 0.0, 10.0, 1.0, neutral)
 
 
-def decay(a: float, b: float) -> npt.NDArray[np.float64]:
+def decay(a, b):
     return np.asarray(a * np.exp(-b * X))
 
 
-def fitted(measured: Vector, parameters: Sequence[Parameter] = ()) -> Fit:
+def fitted(measured, parameters=()):
     chosen = parameters or [parameter("a"), parameter("b")]
     return fit(lambda points: [decay(x[0], x[1]) - measured for x in points], chosen, "test")
 
 
-def test_exact_data_give_the_parameters_back() -> None:
+def test_exact_data_give_the_parameters_back():
     found = fitted(decay(3.0, 0.7))
     assert [e.value for e in found.estimates] == pytest.approx([3.0, 0.7], abs=1e-5)
     assert found.rms < 1e-5
 
 
-def test_the_intervals_hold_the_truth_as_often_as_they_say() -> None:
+def test_the_intervals_hold_the_truth_as_often_as_they_say():
     noise = np.random.default_rng(1).normal(0.0, SIGMA, (120, len(X)))
     held = np.zeros(2)
     for row in noise:
@@ -43,7 +40,7 @@ def test_the_intervals_hold_the_truth_as_often_as_they_say() -> None:
     assert held / len(noise) == pytest.approx([0.95, 0.95], abs=0.06)  # 3 sigma of 120 draws
 
 
-def test_the_intervals_are_those_of_scipy_curve_fit() -> None:
+def test_the_intervals_are_those_of_scipy_curve_fit():
     from scipy.optimize import curve_fit
     from scipy.stats import t
 
@@ -54,14 +51,14 @@ def test_the_intervals_are_those_of_scipy_curve_fit() -> None:
     assert [0.5 * (i[1] - i[0]) for i in ours if i] == pytest.approx(half.tolist(), rel=0.02)
 
 
-def test_a_parameter_at_its_bound_is_held_there_and_said_to_be() -> None:
+def test_a_parameter_at_its_bound_is_held_there_and_said_to_be():
     first, second = fitted(decay(3.0, -0.2)).estimates
     assert (second.value, second.interval) == (0.0, None)
     assert second.remark == "at its lower bound, held there"
     assert first.interval is not None
 
 
-def test_what_the_data_do_not_determine_has_no_interval() -> None:
+def test_what_the_data_do_not_determine_has_no_interval():
     measured = decay(3.0, 0.7)
     parameters = [parameter("a"), parameter("b"), parameter("nothing")]
     *known, nothing = fitted(measured, parameters).estimates
@@ -70,27 +67,27 @@ def test_what_the_data_do_not_determine_has_no_interval() -> None:
     assert all(e.interval for e in known)
 
 
-def test_of_two_that_act_alike_neither_is_determined() -> None:
-    def residuals(points: Sequence[Vector]) -> list[Vector]:
+def test_of_two_that_act_alike_neither_is_determined():
+    def residuals(points):
         return [(x[0] + x[1]) * X - 3.0 * X for x in points]
 
     found = fit(residuals, [parameter("a"), parameter("b")], "test")
     assert [e.interval for e in found.estimates] == [None, None]
 
 
-def test_a_parameter_that_cannot_be_told_from_doing_nothing_is_said_to_be() -> None:
+def test_a_parameter_that_cannot_be_told_from_doing_nothing_is_said_to_be():
     measured = decay(3.0, 0.02) + np.random.default_rng(3).normal(0.0, 1.0, len(X))
     found = fitted(measured, [parameter("a"), parameter("b", 1.0, 0.02)])
     assert found.estimates[1].remark == "cannot be told from 0.02, where it does nothing"
 
 
-def test_too_few_figures_are_refused() -> None:
+def test_too_few_figures_are_refused():
     with pytest.raises(InputError, match=r"^test: 2 figures for 2 parameters; must be more$"):
         fit(lambda points: [np.zeros(2) for _ in points], [parameter("a"), parameter("b")], "test")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_residuals_that_are_not_finite_are_refused(value: float) -> None:
+def test_residuals_that_are_not_finite_are_refused(value):
     measured = decay(3.0, 0.7)
     measured[7] = value
     with pytest.raises(InputError, match=r"^test: the residuals are not finite; must be") as caught:
@@ -98,7 +95,7 @@ def test_residuals_that_are_not_finite_are_refused(value: float) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_fit_that_does_not_come_to_rest_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fit_that_does_not_come_to_rest_says_so(monkeypatch):
     monkeypatch.setattr("grasp_cosim.grasp.identification.fit.MOST", 1)
     with pytest.raises(SimulationError, match="has not come to rest after 1 steps"):
         fitted(decay(3.0, 0.7))

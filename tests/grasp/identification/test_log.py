@@ -2,13 +2,11 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim import InputError, System, simulate
-from grasp_cosim.grasp.identification.fit import Fit
+from grasp_cosim import InputError, simulate
 from grasp_cosim.grasp.identification.identification import OF_A_LOG, chosen
 from grasp_cosim.grasp.identification.log import identify_from_log
 from grasp_cosim.metrics.metric import Signals
@@ -30,14 +28,14 @@ Array = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
-def recorded(grasp: System) -> Signals:
+def recorded(grasp):
     """A grasp of ours with friction, without noise."""
     values = {**TRUE, "controller.impact_reduction.enabled": True}
     result = simulate(grasp.with_values(values), step=1e-3, stop=2.5)
     return Signals(result.time, dict(result.signals))
 
 
-def noisy(log: Signals, seed: int) -> Signals:
+def noisy(log, seed):
     random = np.random.default_rng(seed)
     return replace(
         log,
@@ -48,22 +46,20 @@ def noisy(log: Signals, seed: int) -> Signals:
     )
 
 
-def identified(grasp: System, log: Signals, *groups: str) -> Fit:
+def identified(grasp, log, *groups):
     parameters = chosen(groups or ("coulomb", "viscous"), OF_A_LOG, "test")
     return identify_from_log(grasp, log, parameters, "test")[1]
 
 
-def scipy_log(friction: dict[str, float], static: float, v_s: float) -> Signals:
+def scipy_log(friction, static, v_s):
     """Both fingers pushed to and fro by a force of their own, one way at a time."""
     time = np.arange(0.0, 4.0, 1e-4)
-    signals: dict[str, Array] = {}
+    signals = {}
     for j, way in ((1, -1.0), (2, 1.0)):
         c, b = (friction[f"plant.friction.{n}[{j}]"] for n in ("coulomb", "viscous"))
         force = c + static + 1.5 + 0.9 * np.sin(3.0 * time) + 0.4 * np.sin(7.0 * time)
 
-        def slope(
-            t: float, v: Array, c: float = c, b: float = b, force: Array = force
-        ) -> list[float]:
+        def slope(t, v, c=c, b=b, force=force):
             u = float(np.interp(t, time, force))
             rub = c + static * float(np.exp(-((v[0] / v_s) ** 2)) + 0.0) + b * v[0]
             return [(u - rub) / MASS]
@@ -75,21 +71,19 @@ def scipy_log(friction: dict[str, float], static: float, v_s: float) -> Signals:
     return Signals(time, signals)
 
 
-def held(found: Fit, true: dict[str, float]) -> int:
+def held(found, true):
     """How many intervals hold the truth; all of them must be there."""
     intervals = {e.name: e.interval for e in found.estimates}
     return sum(i[0] <= true[name] <= i[1] for name, i in intervals.items() if i is not None)
 
 
-def test_without_noise_the_friction_of_our_simulation_comes_back(
-    grasp: System, recorded: Signals
-) -> None:
+def test_without_noise_the_friction_of_our_simulation_comes_back(grasp, recorded):
     found = identified(grasp, recorded)
     for e in found.estimates:
         assert e.value == pytest.approx(TRUE[e.name], rel=2e-3, abs=2e-3), e.name
 
 
-def test_with_noise_the_intervals_hold_it(grasp: System, recorded: Signals) -> None:
+def test_with_noise_the_intervals_hold_it(grasp, recorded):
     counts = [held(identified(grasp, noisy(recorded, seed)), TRUE) for seed in range(20)]
     assert sum(counts) / (20 * len(TRUE)) >= 0.88  # 95 % less 3 sigma of 80 intervals
     found = identified(grasp, noisy(recorded, 0))
@@ -98,7 +92,7 @@ def test_with_noise_the_intervals_hold_it(grasp: System, recorded: Signals) -> N
 
 
 @pytest.mark.slow
-def test_friction_of_a_model_that_scipy_integrates_comes_back(grasp: System) -> None:
+def test_friction_of_a_model_that_scipy_integrates_comes_back(grasp):
     log = scipy_log(TRUE, 0.0, 0.01)
     for e in identified(grasp, log).estimates:
         assert e.value == pytest.approx(TRUE[e.name], rel=2e-3), e.name
@@ -106,29 +100,27 @@ def test_friction_of_a_model_that_scipy_integrates_comes_back(grasp: System) -> 
     assert sum(counts) / (20 * len(TRUE)) >= 0.88
 
 
-def test_what_is_not_fitted_is_that_of_the_system(grasp: System) -> None:
+def test_what_is_not_fitted_is_that_of_the_system(grasp):
     known = grasp.with_values({k: v for k, v in TRUE.items() if "viscous" in k})
     found = identified(known, scipy_log(TRUE, 0.0, 0.01), "coulomb")
     assert [e.value for e in found.estimates] == pytest.approx([0.6, 1.3], rel=2e-3)
 
 
-def test_stribeck_friction_comes_back(grasp: System) -> None:
+def test_stribeck_friction_comes_back(grasp):
     log = scipy_log({**TRUE, "plant.friction.viscous[2]": 8.0}, 0.4, 0.04)
     found = {e.name: e.value for e in identified(grasp, log, *OF_A_LOG).estimates}
     assert found["plant.friction.static[1]"] == pytest.approx(1.0, rel=0.02)
     assert found["plant.friction.stribeck_velocity"] == pytest.approx(0.04, rel=0.02)
 
 
-def test_static_friction_that_is_never_seen_is_not_determined(
-    grasp: System, recorded: Signals
-) -> None:
+def test_static_friction_that_is_never_seen_is_not_determined(grasp, recorded):
     log = scipy_log(TRUE, 0.0, 0.01)
     found = {e.name: e for e in identified(grasp, log, "coulomb", "static").estimates}
     assert found["plant.friction.static[1]"].interval is None
 
 
 @pytest.mark.parametrize("kind", ["signals.csv", "signals.mf4"])
-def test_a_log_is_read_from_both_kinds_of_file(grasp: System, tmp_path: Path, kind: str) -> None:
+def test_a_log_is_read_from_both_kinds_of_file(grasp, tmp_path, kind):
     if kind.endswith("mf4"):
         pytest.importorskip("asammdf")
     result = simulate(grasp, step=1e-3, stop=0.05)
@@ -139,7 +131,7 @@ def test_a_log_is_read_from_both_kinds_of_file(grasp: System, tmp_path: Path, ki
     assert log.by_name["plant.velocity[1]"].tolist() == result["plant.velocity[1]"].tolist()
 
 
-def test_a_signal_that_is_missing_is_named(grasp: System, recorded: Signals) -> None:
+def test_a_signal_that_is_missing_is_named(grasp, recorded):
     signals = {k: v for k, v in recorded.items() if k != "controller.force[2]"}
     with pytest.raises(
         InputError, match=r"^test: no signal 'controller.force\[2\]'; did you mean con"
@@ -147,14 +139,14 @@ def test_a_signal_that_is_missing_is_named(grasp: System, recorded: Signals) -> 
         identified(grasp, replace(recorded, by_name=signals))
 
 
-def test_a_log_in_which_a_finger_rests_is_refused(grasp: System, recorded: Signals) -> None:
+def test_a_log_in_which_a_finger_rests_is_refused(grasp, recorded):
     rest = np.zeros(len(recorded.time))
     signals = {**recorded.by_name, "plant.velocity[1]": rest}
     with pytest.raises(InputError, match=r"^test: finger 1 does not move freely for 0.02 s"):
         identified(grasp, replace(recorded, by_name=signals))
 
 
-def test_a_log_that_is_too_coarse_is_refused(grasp: System, recorded: Signals) -> None:
+def test_a_log_that_is_too_coarse_is_refused(grasp, recorded):
     coarse = Signals(recorded.time[::20], {k: v[::20] for k, v in recorded.items()})
     with pytest.raises(InputError, match=r"^test: a sample every 0.02 s; must be at most every"):
         identified(grasp, coarse)
@@ -162,9 +154,7 @@ def test_a_log_that_is_too_coarse_is_refused(grasp: System, recorded: Signals) -
 
 @pytest.mark.parametrize("name", ["plant.velocity[1]", "controller.force[2]"])
 @pytest.mark.parametrize("value", [np.nan, -np.inf])
-def test_a_sample_that_is_no_number_is_named(
-    grasp: System, recorded: Signals, name: str, value: float
-) -> None:
+def test_a_sample_that_is_no_number_is_named(grasp, recorded, name, value):
     spoilt = recorded.by_name[name].copy()
     spoilt[[40, 41]] = value
     log = replace(recorded, by_name={**recorded.by_name, name: spoilt})
@@ -176,23 +166,21 @@ def test_a_sample_that_is_no_number_is_named(
 
 
 @pytest.mark.parametrize(("size", "said"), [(0, "0 samples"), (1, "1 sample")])
-def test_a_log_of_a_sample_is_refused(
-    grasp: System, recorded: Signals, size: int, said: str
-) -> None:
+def test_a_log_of_a_sample_is_refused(grasp, recorded, size, said):
     log = Signals(recorded.time[:size], {k: v[:size] for k, v in recorded.items()})
     with pytest.raises(InputError, match=rf"^test: {said}; must be at least two"):
         identified(grasp, log)
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
-def test_time_that_does_not_grow_is_refused(grasp: System, recorded: Signals, value: float) -> None:
+def test_time_that_does_not_grow_is_refused(grasp, recorded, value):
     time = recorded.time.copy()
     time[50] = value
     with pytest.raises(InputError, match=r"^test: the time must be finite and grow from sample to"):
         identified(grasp, replace(recorded, time=time))
 
 
-def test_a_window_with_a_sample_missing_does_not_count(grasp: System, recorded: Signals) -> None:
+def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
     """Rows left out while a finger turned round would else look like one way throughout."""
     kept = np.ones(len(recorded.time), dtype=bool)
     kept[100:400] = False
@@ -206,10 +194,8 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp: System, recorded: 
 
 
 @pytest.mark.parametrize("error", [IndexError("list\nindex"), KeyError((0, 1))])
-def test_whatever_asammdf_stumbles_over_is_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception
-) -> None:
-    def stumble(path: Path) -> None:
+def test_whatever_asammdf_stumbles_over_is_one_line(tmp_path, monkeypatch, error):
+    def stumble(path):
         raise error
 
     monkeypatch.setattr(pytest.importorskip("asammdf"), "MDF", stumble)
@@ -231,9 +217,7 @@ def test_whatever_asammdf_stumbles_over_is_one_line(
         ("log.mf4", b"not an MDF file at all", "is damaged, not an MDF file"),
     ],
 )
-def test_a_file_that_is_no_log_is_refused(
-    tmp_path: Path, name: str, content: bytes | None, message: str
-) -> None:
+def test_a_file_that_is_no_log_is_refused(tmp_path, name, content, message):
     if name.endswith("mf4"):
         pytest.importorskip("asammdf")
     if content is not None:

@@ -3,14 +3,12 @@
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import pytest
-from grasp_cosim import System
 from grasp_cosim.grasp.published.claims import Evidence, check_claims
 from grasp_cosim.grasp.published.compared import bench_rms, simulation_rms
-from grasp_cosim.grasp.published.grasps import Run, Runs
-from grasp_cosim.grasp.published.tables import Row, Setting, published_rows
+from grasp_cosim.grasp.published.grasps import Run
+from grasp_cosim.grasp.published.tables import Setting, published_rows
 
 Judge = Callable[..., list[int]]
 
@@ -20,9 +18,9 @@ BLACK = Setting(0.03, 0.57, 0.57)
 
 
 @pytest.fixture
-def runs() -> Runs:
+def runs():
     """The experiments as published, the colours alike; with what the tables do not tell."""
-    times: dict[tuple[Setting, int], list[float]] = {}
+    times = {}
     for row in PUBLISHED:
         if row.finger and row.case:
             times.setdefault((row.setting, row.case), []).append(row.published)
@@ -36,11 +34,11 @@ def runs() -> Runs:
     return made
 
 
-def _coloured(s: Setting) -> bool:
+def _coloured(s):
     return s.x_m == 0.03 and s.alpha_1 == s.alpha_2
 
 
-def _run(setting: Setting, case: int, times: list[float]) -> Run:
+def _run(setting, case, times):
     metrics = {
         "time_to_contact": times,
         "target_position": setting.x_m,
@@ -49,16 +47,16 @@ def _run(setting: Setting, case: int, times: list[float]) -> Run:
     return Run(setting, case, metrics, (0.0, 0.0), 0.005, touch, None)
 
 
-def changed(runs: Runs, setting: Setting, case: int, **metrics: Any) -> Runs:
+def changed(runs, setting, case, **metrics):
     run = runs[setting, case]
     return {**runs, (setting, case): replace(run, metrics={**run.metrics, **metrics})}
 
 
 @pytest.fixture
-def judge(grasp: System) -> Judge:
+def judge(grasp):
     """The numbers of the claims that fail."""
 
-    def failing(runs: Runs, contact_times: float = 0.2) -> list[int]:
+    def failing(runs, contact_times=0.2):
         evidence = Evidence(runs, PUBLISHED, (), {"contact_times": contact_times}, grasp)
         claims = check_claims("experiment", evidence)
         assert len(claims) == 7
@@ -67,24 +65,24 @@ def judge(grasp: System) -> Judge:
     return failing
 
 
-def test_the_published_figures_hold_every_claim(judge: Judge, runs: Runs) -> None:
+def test_the_published_figures_hold_every_claim(judge, runs):
     assert judge(runs) == []
 
 
-def test_contact_times_that_are_far_from_the_published_ones_fail(judge: Judge, runs: Runs) -> None:
+def test_contact_times_that_are_far_from_the_published_ones_fail(judge, runs):
     assert judge(runs, 0.3499) == []
     assert judge(runs, 0.3501) == [0]
 
 
-def test_one_row_that_is_not_closer_together_fails(judge: Judge, runs: Runs) -> None:
+def test_one_row_that_is_not_closer_together_fails(judge, runs):
     assert judge(changed(runs, Setting(0.0), 2, time_to_contact=[2.0, 2.5])) == [1]
 
 
-def test_a_nearer_finger_that_does_not_wait_fails(judge: Judge, runs: Runs) -> None:
+def test_a_nearer_finger_that_does_not_wait_fails(judge, runs):
     assert judge(changed(runs, Setting(0.05), 2, time_to_contact=[1.30, 1.40])) == [2]
 
 
-def test_a_contact_time_that_depends_on_the_colour_fails(judge: Judge, runs: Runs) -> None:
+def test_a_contact_time_that_depends_on_the_colour_fails(judge, runs):
     """By a tenth of the mean of all colours, of either finger in either case."""
     for case, finger in product((1, 2), (0, 1)):
         times = runs[BLACK, case].times
@@ -96,13 +94,13 @@ def test_a_contact_time_that_depends_on_the_colour_fails(judge: Judge, runs: Run
             assert judge(changed(runs, BLACK, case, time_to_contact=later)) == failing
 
 
-def test_brown_and_white_far_apart_fails(judge: Judge, runs: Runs) -> None:
+def test_brown_and_white_far_apart_fails(judge, runs):
     assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.389])) == []
     assert judge(changed(runs, BROWN_WHITE, 2, time_to_contact=[2.0, 2.391])) == [4]
 
 
 @pytest.mark.parametrize("case", [0, 1, 2])
-def test_an_impact_in_the_wrong_case_fails(judge: Judge, runs: Runs, case: int) -> None:
+def test_an_impact_in_the_wrong_case_fails(judge, runs, case):
     """The settled force, K_i·W/2 = 3.43 N, is between the two."""
     key = Setting(0.01), case
     wrong, right = (3.42, 3.44) if case == 0 else (3.44, 3.42)
@@ -110,25 +108,25 @@ def test_an_impact_in_the_wrong_case_fails(judge: Judge, runs: Runs, case: int) 
         assert judge({**runs, key: replace(runs[key], touch_forces=forces)}) == failing
 
 
-def test_a_target_that_stays_beside_the_centre_fails(judge: Judge, runs: Runs) -> None:
+def test_a_target_that_stays_beside_the_centre_fails(judge, runs):
     for way in (1.0, -1.0):
         assert judge(changed(runs, Setting(0.04), 2, target_position=0.04 + 0.99e-4 * way)) == []
         assert judge(changed(runs, Setting(0.04), 2, target_position=0.04 + 1.01e-4 * way)) == [6]
 
 
-def test_a_target_that_does_not_overshoot_fails(judge: Judge, runs: Runs) -> None:
+def test_a_target_that_does_not_overshoot_fails(judge, runs):
     for overshoot, failing in ((1.01e-4, []), (0.99e-4, [6])):
         made = {**runs, (BLACK, 2): replace(runs[BLACK, 2], overshoot=overshoot)}
         assert judge(made) == failing
 
 
-def test_where_colours_differ_the_target_may_stay_beside(judge: Judge, runs: Runs) -> None:
+def test_where_colours_differ_the_target_may_stay_beside(judge, runs):
     assert judge(changed(runs, BROWN_WHITE, 2, target_position=0.025)) == []
 
 
-def test_the_root_mean_squares_are_by_table_and_count_white_once(runs: Runs) -> None:
-    def rms(off: dict[tuple[float | str, int, int | None], float]) -> dict[str, float]:
-        published: list[Row] = PUBLISHED
+def test_the_root_mean_squares_are_by_table_and_count_white_once(runs):
+    def rms(off):
+        published = PUBLISHED
         exact = [{"difference": off.get((r.condition, r.case, r.finger), 0.0)} for r in published]
         return bench_rms(published, exact)
 
@@ -146,7 +144,7 @@ def test_the_root_mean_squares_are_by_table_and_count_white_once(runs: Runs) -> 
     assert rms({(0.02, 1, None): 0.8})["time_differences"] == pytest.approx(0.8 / 26**0.5)
 
 
-def test_the_root_mean_squares_are_the_same_in_every_order() -> None:
+def test_the_root_mean_squares_are_the_same_in_every_order():
     """Correctly rounded sums: sum() of 3.12 and later is not that of 3.11."""
     rows = [
         {"finger": finger, "difference": 0.1 * i, "difference_at_0.37_mm": 0.7 * i}

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grasp_cosim import System
 from grasp_cosim.grasp.published import compared as module
 from grasp_cosim.grasp.published.evaluation import as_report
-from grasp_cosim.grasp.published.grasps import Run, Runs, as_run
+from grasp_cosim.grasp.published.grasps import Run, as_run
 from grasp_cosim.grasp.published.tables import Setting, published_rows
 from grasp_cosim.recording.result import Result
 from grasp_cosim.system.settings import settings
@@ -29,9 +28,9 @@ TIMES, DIFFERENCES, SIMULTANEOUS, BALANCE, IMPACT, FORCE, TARGET = range(7)
 
 
 @pytest.fixture
-def runs() -> Runs:
+def runs():
     """The grasps as published, with what the table does not tell; Case 0 hits at 0.29 m/s."""
-    times: dict[tuple[Setting, int], list[float]] = {}
+    times = {}
     for row in published_rows("simulation"):
         if row.finger:
             times.setdefault((row.setting, row.case), []).append(row.published)
@@ -39,7 +38,7 @@ def runs() -> Runs:
     return {(setting, case): _run(setting, case, both) for (setting, case), both in times.items()}
 
 
-def _run(setting: Setting, case: int, times: list[float]) -> Run:
+def _run(setting, case, times):
     metrics = {
         "time_to_contact": times,
         "impact_velocity": [0.006, 0.005] if case else [0.53, 0.29],
@@ -52,10 +51,10 @@ def _run(setting: Setting, case: int, times: list[float]) -> Run:
 
 
 @pytest.fixture
-def evaluated(grasp: System, monkeypatch: pytest.MonkeyPatch) -> Evaluated:
+def evaluated(grasp, monkeypatch):
     """The report of an evaluation of made grasps."""
 
-    def report(runs: Runs, **values: float) -> dict[str, Any]:
+    def report(runs, **values):
         monkeypatch.setattr(module, "run_all", lambda *_: iter(runs.values()))
         system = grasp.with_values({f"controller.contact_force.{k}": v for k, v in values.items()})
         return as_report(module.compared(system, "simulation", 1, progress=False), "simulation")
@@ -64,10 +63,10 @@ def evaluated(grasp: System, monkeypatch: pytest.MonkeyPatch) -> Evaluated:
 
 
 @pytest.fixture
-def judge(evaluated: Evaluated) -> Judge:
+def judge(evaluated):
     """The numbers of the claims that fail."""
 
-    def failing(runs: Runs, **values: float) -> list[int]:
+    def failing(runs, **values):
         claims = evaluated(runs, **values)["claims"]
         assert len(claims) == 7
         return [i for i, claim in enumerate(claims) if not claim["holds"]]
@@ -75,18 +74,18 @@ def judge(evaluated: Evaluated) -> Judge:
     return failing
 
 
-def changed(runs: Runs, setting: Setting, case: int, **metrics: Any) -> Runs:
+def changed(runs, setting, case, **metrics):
     run = runs[setting, case]
     return {**runs, (setting, case): replace(run, metrics={**run.metrics, **metrics})}
 
 
-def shifted(runs: Runs, case: int, first: float, second: float) -> Runs:
+def shifted(runs, case, first, second):
     """The fingers touch later in one grasp."""
     one, two = runs[FAR, case].times
     return changed(runs, FAR, case, time_to_contact=[one + first, two + second])
 
 
-def test_the_published_figures_hold_every_claim(judge: Judge, runs: Runs) -> None:
+def test_the_published_figures_hold_every_claim(judge, runs):
     assert judge(runs) == []
 
 
@@ -95,33 +94,29 @@ def test_the_published_figures_hold_every_claim(judge: Judge, runs: Runs) -> Non
 
 @pytest.mark.parametrize("case", [1, 2])
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_contact_time_may_be_a_tenth_of_a_second_off(
-    judge: Judge, runs: Runs, case: int, way: float
-) -> None:
+def test_a_contact_time_may_be_a_tenth_of_a_second_off(judge, runs, case, way):
     assert judge(shifted(runs, case, 0.0999 * way, 0.0999 * way)) == []
     assert judge(shifted(runs, case, 0.1001 * way, 0.1001 * way)) == [TIMES]
 
 
 @pytest.mark.parametrize(("first", "second"), [(0.1001, 0.0801), (0.0801, 0.1001)])
-def test_either_finger_counts(judge: Judge, runs: Runs, first: float, second: float) -> None:
+def test_either_finger_counts(judge, runs, first, second):
     assert judge(shifted(runs, 1, first, second)) == [TIMES]
 
 
 @pytest.mark.parametrize(("case", "way"), [(1, 1.0), (1, -1.0), (2, 1.0)])
-def test_a_time_difference_may_be_three_hundredths_of_a_second_off(
-    judge: Judge, runs: Runs, case: int, way: float
-) -> None:
+def test_a_time_difference_may_be_three_hundredths_of_a_second_off(judge, runs, case, way):
     assert judge(shifted(runs, case, -0.5 * 0.0299 * way, 0.5 * 0.0299 * way)) == []
     assert judge(shifted(runs, case, -0.5 * 0.0301 * way, 0.5 * 0.0301 * way)) == [DIFFERENCES]
 
 
-def test_the_largest_deviation_is_said(evaluated: Evaluated, runs: Runs) -> None:
+def test_the_largest_deviation_is_said(evaluated, runs):
     texts = [claim["text"] for claim in evaluated(shifted(runs, 1, 0.083, 0.062))["claims"]]
     assert "within 0.10 s of the published one (largest deviation 0.083 s)" in texts[TIMES]
     assert "within 0.03 s of the published one (largest deviation 0.021 s)" in texts[DIFFERENCES]
 
 
-def test_a_row_is_compared_with_its_own_grasp(evaluated: Evaluated, runs: Runs) -> None:
+def test_a_row_is_compared_with_its_own_grasp(evaluated, runs):
     rows = evaluated(changed(runs, Setting(0.04), 1, time_to_contact=[1.0, 3.0]))["rows"]
     off = {
         (r["condition"], r["case"], r["finger"]): (r["simulated"], round(r["difference"], 9))
@@ -138,30 +133,26 @@ def test_a_row_is_compared_with_its_own_grasp(evaluated: Evaluated, runs: Runs) 
 # ------------------------------------------------------------------------ in themselves
 
 
-def test_fingers_further_apart_in_case_2_fail(judge: Judge, runs: Runs) -> None:
+def test_fingers_further_apart_in_case_2_fail(judge, runs):
     """Then one of them has not been balanced either, and both are far from the table."""
     made = changed(runs, NEAREST, 2, time_to_contact=[1.55, 2.00])
     assert judge(made) == [TIMES, DIFFERENCES, SIMULTANEOUS, BALANCE]
 
 
-def test_in_the_centre_they_may_be_further_apart(judge: Judge, runs: Runs) -> None:
+def test_in_the_centre_they_may_be_further_apart(judge, runs):
     assert judge(changed(runs, CENTRE, 2, time_to_contact=[1.83, 1.85])) == []
 
 
 @pytest.mark.parametrize("times", [[1.63, 1.66], [2.04, 2.07]])
-def test_a_nearer_finger_that_is_no_later_or_a_farther_one_no_earlier_fails(
-    judge: Judge, runs: Runs, times: list[float]
-) -> None:
+def test_a_nearer_finger_that_is_no_later_or_a_farther_one_no_earlier_fails(judge, runs, times):
     """Case 1: 1.64 and 2.06 s."""
     assert judge(changed(runs, NEAREST, 2, time_to_contact=times)) == [TIMES, BALANCE]
 
 
 @pytest.mark.parametrize("case", [1, 2])
 @pytest.mark.parametrize("finger", [1, 2])
-def test_a_contact_as_fast_as_a_tenth_of_the_impact_fails(
-    judge: Judge, runs: Runs, case: int, finger: int
-) -> None:
-    def speeds(fast: float) -> Runs:
+def test_a_contact_as_fast_as_a_tenth_of_the_impact_fails(judge, runs, case, finger):
+    def speeds(fast):
         both = [fast, 0.006] if finger == 1 else [0.006, fast]
         return changed(runs, NEAR, case, impact_velocity=both)
 
@@ -170,17 +161,15 @@ def test_a_contact_as_fast_as_a_tenth_of_the_impact_fails(
 
 
 @pytest.mark.parametrize("speeds", [[0.53, 0.059], [0.059, 0.53]])
-def test_a_slow_contact_in_case_0_fails(judge: Judge, runs: Runs, speeds: list[float]) -> None:
+def test_a_slow_contact_in_case_0_fails(judge, runs, speeds):
     assert judge(changed(runs, NEAR, 0, impact_velocity=speeds)) == [IMPACT]
 
 
 @pytest.mark.parametrize("case", [0, 1, 2])
 @pytest.mark.parametrize("finger", [1, 2])
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_finger_may_settle_a_hundredth_beside_its_force(
-    judge: Judge, runs: Runs, case: int, finger: int, way: float
-) -> None:
-    def settling(share: float) -> Runs:
+def test_a_finger_may_settle_a_hundredth_beside_its_force(judge, runs, case, finger, way):
+    def settling(share):
         both = [SETTLED, SETTLED]
         both[finger - 1] *= 1.0 + way * share
         return changed(runs, FAR, case, steady_contact_force=both)
@@ -189,27 +178,23 @@ def test_a_finger_may_settle_a_hundredth_beside_its_force(
     assert judge(settling(0.0101)) == [FORCE]
 
 
-def test_the_force_is_that_of_the_system(judge: Judge, runs: Runs) -> None:
+def test_the_force_is_that_of_the_system(judge, runs):
     assert judge(runs, stiffness=98.0 * 1.02) == [FORCE]
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_target_that_ends_beside_the_centre_fails(judge: Judge, runs: Runs, way: float) -> None:
+def test_a_target_that_ends_beside_the_centre_fails(judge, runs, way):
     assert judge(changed(runs, FAR, 2, target_position=0.05 + 0.99e-4 * way)) == []
     assert judge(changed(runs, FAR, 2, target_position=0.05 + 1.01e-4 * way)) == [TARGET]
 
 
 @pytest.mark.parametrize(("overshoot", "failing"), [(1.01e-4, []), (0.99e-4, [TARGET])])
-def test_a_target_that_does_not_overshoot_fails(
-    judge: Judge, runs: Runs, overshoot: float, failing: list[int]
-) -> None:
+def test_a_target_that_does_not_overshoot_fails(judge, runs, overshoot, failing):
     assert judge({**runs, (FAR, 2): replace(runs[FAR, 2], overshoot=overshoot)}) == failing
 
 
 @pytest.mark.parametrize(("setting", "case"), [(CENTRE, 2), (FAR, 1), (FAR, 0)])
-def test_elsewhere_nothing_is_claimed_of_the_target(
-    judge: Judge, runs: Runs, setting: Setting, case: int
-) -> None:
+def test_elsewhere_nothing_is_claimed_of_the_target(judge, runs, setting, case):
     made = changed(runs, setting, case, target_position=0.02)
     assert judge({**made, (setting, case): replace(made[setting, case], overshoot=0.0)}) == []
 
@@ -217,9 +202,7 @@ def test_elsewhere_nothing_is_claimed_of_the_target(
 # --------------------------------------------------------------------- contact at 0.37 mm
 
 
-def test_the_second_column_is_earlier_by_what_the_last_gap_takes(
-    evaluated: Evaluated, runs: Runs
-) -> None:
+def test_the_second_column_is_earlier_by_what_the_last_gap_takes(evaluated, runs):
     report = evaluated(runs)
     later = 0.0
     for row in report["rows"]:
@@ -244,12 +227,12 @@ def test_the_second_column_is_earlier_by_what_the_last_gap_takes(
     )
 
 
-def test_that_gap_is_met_where_the_signal_says(grasp: System) -> None:
+def test_that_gap_is_met_where_the_signal_says(grasp):
     """Of fingers that close 65 mm in 1 s and 85 mm in 1.2 s, evenly."""
     time = np.linspace(0.0, 2.0, 2001)
     right = 0.065 * np.maximum(1.0 - time, 0.0)
     left = 0.085 * np.maximum(1.0 - time / 1.2, 0.0)
-    signals: dict[str, Any] = {
+    signals = {
         "plant.object_position": np.full_like(time, 0.01),
         "controller.target_position": 0.01 * np.minimum(2.0 * time, 1.5 - 0.25 * time),
     }

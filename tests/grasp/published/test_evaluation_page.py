@@ -3,15 +3,10 @@
 import csv
 import json
 import re
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import Run
-from grasp_cosim import System
 from grasp_cosim.grasp.published import compared, evaluation
-from grasp_cosim.grasp.published.tables import Source
 
 WRITTEN = {"evaluation.html", "evaluation.csv", "evaluation.json"}
 
@@ -23,7 +18,7 @@ FIGURES = [
 
 
 @pytest.fixture
-def coarse(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
+def coarse(grasp, monkeypatch):
     """Grasps in steps of 2 ms."""
     made = grasp.with_experiment(step=2e-3)
     monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: made)
@@ -33,8 +28,8 @@ def coarse(grasp: System, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize(("source", "rows", "where", "case", "published"), FIGURES)
 def test_the_page_has_the_published_figures_beside_ours(
-    command: Run, source: Sequence[str], rows: int, where: str, case: str, published: list[str]
-) -> None:
+    command, source, rows, where, case, published
+):
     code, out, err = command("evaluate", *source, "--json")
     report = json.loads(out)
     assert (code, err) == (int(not all(c["holds"] for c in report["claims"])), "")
@@ -57,10 +52,8 @@ def test_the_page_has_the_published_figures_beside_ours(
         assert float(simulated) == pytest.approx(float(shown) + float(difference), abs=2e-3)
 
 
-def test_ctrl_c_is_130_and_nothing_is_written(
-    command: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*_: object) -> list[Any]:
+def test_ctrl_c_is_130_and_nothing_is_written(command, monkeypatch):
+    def interrupted(*_: object):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(compared, "run_all", interrupted)
@@ -70,12 +63,10 @@ def test_ctrl_c_is_130_and_nothing_is_written(
 
 
 @pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
-def test_a_claim_that_fails_is_exit_1(
-    command: Run, monkeypatch: pytest.MonkeyPatch, holds: bool, code: int
-) -> None:
+def test_a_claim_that_fails_is_exit_1(command, monkeypatch, holds, code):
     made = {"rows": [], "rms": {"contact_times": 0.28}, "claims": [{"text": "It.", "holds": holds}]}
 
-    def evaluated(system: System, source: Source, *_: object) -> None:
+    def evaluated(system, source, *_):
         assert system.start("sensor_1.noise.enabled") == 1.0
         assert source == "experiment"
 

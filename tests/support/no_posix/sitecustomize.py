@@ -20,7 +20,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,7 @@ import platformdirs  # isort: skip
 
 MODULES = {"fcntl", "resource", "termios", "tty", "pty", "pwd", "grp", "syslog", "posix"}
 
-FUNCTIONS: dict[Any, tuple[str, ...]] = {
+FUNCTIONS = {
     os: (
         "fork", "forkpty", "killpg", "setsid", "getsid", "setpgid", "getpgid",
         "getegid", "getgid", "getgroups", "chown", "mkfifo", "mknod",
@@ -58,12 +57,12 @@ del asyncio, shutil, subprocess, tempfile, filelock, platformdirs
 class Hidden:
     """Finds nothing in the place of what Windows lacks."""
 
-    def find_spec(self, name: str, *_: object) -> None:
+    def find_spec(self, name, *_):
         if name in MODULES:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
-def is_open(path: Any) -> bool:
+def is_open(path):
     """Whether a file is open in this process, but for locks, which would be removed there."""
     try:
         place = Path(path).lstat()
@@ -80,10 +79,10 @@ def is_open(path: Any) -> bool:
     return False
 
 
-def refusing(call: Callable[..., Any]) -> Callable[..., Any]:
+def refusing(call):
     """A function that does nothing to an open file."""
 
-    def refused(*paths: Any, **options: Any) -> Any:
+    def refused(*paths: Any, **options: Any):
         for path in paths:
             if not any(options.values()) and is_open(path):
                 raise PermissionError(errno.EACCES, "the file is open", path)
@@ -92,11 +91,11 @@ def refusing(call: Callable[..., Any]) -> Callable[..., Any]:
     return refused
 
 
-def without_none(library: type[Any]) -> type[Any]:
+def without_none(library):
     """A class of libraries of which none is the whole process."""
 
     class Named(library):
-        def __init__(self, name: Any, *arguments: Any, **options: Any) -> None:
+        def __init__(self, name, *arguments, **options):
             if name is None:
                 raise TypeError("bad argument type for built-in operation")
             super().__init__(name, *arguments, **options)

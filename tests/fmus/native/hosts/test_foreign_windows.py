@@ -3,7 +3,6 @@
 import csv
 import importlib.util
 import subprocess
-from collections.abc import Mapping
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -23,14 +22,14 @@ NAMES = ("GraspController", "GripperPlant", "GripperPlantMovable", "ProximitySen
 
 
 @pytest.fixture(scope="module")
-def natives_of_windows(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def natives_of_windows(tmp_path_factory):
     """The folder of native FMUs that have a binary for Windows, too."""
     folder = tmp_path_factory.mktemp("windows")
     build_native(folder, planned([WINDOWS]), NAMES)
     return folder
 
 
-def extracted(archive: Path, folder: Path) -> Path:
+def extracted(archive, folder):
     with ZipFile(archive) as file:
         file.extractall(folder)
     return folder
@@ -48,7 +47,7 @@ SAMPLED = ("plant.", "controller.target_position", "controller.virtual_position"
 
 
 @pytest.mark.skipif(not importlib.util.find_spec("ecospy"), reason="NO ecospy")
-def test_ecos_runs_the_grasp(natives_of_windows: Path, tmp_path: Path) -> None:
+def test_ecos_runs_the_grasp(natives_of_windows, tmp_path):
     system = (
         System.load(SYSTEM, natives_of_windows)
         .with_experiment(STEP, scheme="jacobi")
@@ -82,7 +81,7 @@ def test_ecos_runs_the_grasp(natives_of_windows: Path, tmp_path: Path) -> None:
     assert theirs["plant.contact[1]"][-1] == theirs["plant.contact[2]"][-1] == 1.0
 
 
-def table(path: Path) -> Mapping[str, np.ndarray]:
+def table(path):
     """The columns of a table of ecos, by our names of variables."""
     with path.open(newline="") as file:
         head, *rows = csv.reader(file, skipinitialspace=True)

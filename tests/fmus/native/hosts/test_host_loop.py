@@ -7,13 +7,11 @@ the host leaves out.
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from grasp_fmus.native.targets import here
-from support.c_host import BENCH, Grasp, Host, Part, Rows, Script, bits, good, rows_in_python
-from support.hosts import Parts
+from support.c_host import BENCH, Grasp, Host, Part, Script, bits, good, rows_in_python
 from support.platforms import host_of
 from support.slow import platforms, slow
 
@@ -24,12 +22,12 @@ STEPS = 200
 PLANTS = ("GripperPlant", "GripperPlantCompliant", "GripperPlantMovable")
 
 
-def same_bits(found: Rows, expected: Rows) -> None:
+def same_bits(found, expected):
     assert found.shape == expected.shape
     assert np.array_equal(found.view(np.uint64), expected.view(np.uint64))
 
 
-def rows(host: Host, grasp: Grasp, script: Script, path: Path, **environment: str) -> Rows:
+def rows(host, grasp, script, path, **environment):
     """What a script that records gives; it must be all well."""
     (answers,) = host.run(script, folder=path.parent, **environment)
     good(answers)
@@ -37,18 +35,18 @@ def rows(host: Host, grasp: Grasp, script: Script, path: Path, **environment: st
 
 
 @pytest.fixture
-def grasp(parts: Parts) -> Grasp:
+def grasp(parts):
     return Grasp(parts, BENCH)
 
 
 @pytest.fixture
-def expected(grasp: Grasp, host: Host, tmp_path: Path) -> Rows:
+def expected(grasp, host, tmp_path):
     """A whole run of STEPS steps."""
     path = tmp_path / "expected"
     return rows(host, grasp, grasp.whole(path, STEPS, H), path)
 
 
-def started(grasp: Grasp, **how: Any) -> Script:
+def started(grasp, **how):
     script = Script()
     grasp.load(script)
     grasp.make(script, **how)
@@ -65,18 +63,14 @@ def started(grasp: Grasp, **how: Any) -> Script:
         slow(300, 0.01, "GripperPlantCompliant", BENCH),
     ],
 )
-def test_the_loop_is_that_of_the_blocks_to_the_bit(
-    parts: Parts, host: Host, tmp_path: Path, steps: int, h: float, plant: str, values: Any
-) -> None:
+def test_the_loop_is_that_of_the_blocks_to_the_bit(parts, host, tmp_path, steps, h, plant, values):
     grasp = Grasp(parts, values, plant)
     found = rows(host, grasp, grasp.whole(tmp_path / "rows", steps, h), tmp_path / "rows")
     same_bits(found, rows_in_python(values, steps, h, plant))
     assert len(np.unique(found[:, 0])) > 10  # it moves
 
 
-def test_back_by_a_state_and_on_again_also_in_another_process(
-    grasp: Grasp, expected: Rows, host: Host, tmp_path: Path
-) -> None:
+def test_back_by_a_state_and_on_again_also_in_another_process(grasp, expected, host, tmp_path):
     """By its bytes, in instances that were made for something else, as FMI lets them."""
     script = started(grasp)
     grasp.record(script, tmp_path / "rows")
@@ -101,9 +95,7 @@ def test_back_by_a_state_and_on_again_also_in_another_process(
     same_bits(rows(host, grasp, script, tmp_path / "second"), expected[50:])
 
 
-def test_again_by_a_reset_and_by_loading_again(
-    grasp: Grasp, expected: Rows, host: Host, tmp_path: Path
-) -> None:
+def test_again_by_a_reset_and_by_loading_again(grasp, expected, host, tmp_path):
     """As in a fast restart, in the middle of a run; then in the same process, as if new."""
     script = started(grasp)
     grasp.record(script, tmp_path / "first")
@@ -129,8 +121,8 @@ def test_again_by_a_reset_and_by_loading_again(
     ids=["own", "mute", "bare", "none"],
 )
 def test_whatever_callbacks_and_place_the_host_has(
-    callbacks: str, resources: str | None, grasp: Grasp, expected: Rows, host: Host, tmp_path: Path
-) -> None:
+    callbacks, resources, grasp, expected, host, tmp_path
+):
     """Memory of its own, which must come back to it; no logger; none at all. Refusals included."""
     script = started(grasp, callbacks=callbacks, resources=resources)
     grasp.record(script, tmp_path / "rows")
@@ -147,7 +139,7 @@ def test_whatever_callbacks_and_place_the_host_has(
     same_bits(grasp.read(tmp_path / "rows"), expected)
 
 
-def german(folder: Path) -> dict[str, str]:
+def german(folder):
     """An environment with a locale that has a decimal comma, made for the purpose."""
     if not shutil.which("localedef") or not Path("/usr/share/i18n/locales/de_DE").exists():
         pytest.skip("NO localedef, or no definition of de_DE: in the package locales")
@@ -157,9 +149,7 @@ def german(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.slow
-def test_where_a_decimal_point_is_a_comma(
-    grasp: Grasp, expected: Rows, host: Host, tmp_path: Path
-) -> None:
+def test_where_a_decimal_point_is_a_comma(grasp, expected, host, tmp_path):
     environment = german(tmp_path)
     script = Script().add("locale", "de_DE.UTF-8")
     grasp.load(script)
@@ -176,7 +166,7 @@ def test_where_a_decimal_point_is_a_comma(
     same_bits(grasp.read(tmp_path / "rows"), expected)
 
 
-def test_instances_in_threads(parts: Parts, host: Host, tmp_path: Path) -> None:
+def test_instances_in_threads(parts, host, tmp_path):
     """Of the same libraries, with other values, each a whole run."""
     values = [{**BENCH, "plant.initial_object_position": 0.01 * k} for k in range(4)]
     grasps = [Grasp(parts, v) for v in values] * 2
@@ -189,9 +179,7 @@ def test_instances_in_threads(parts: Parts, host: Host, tmp_path: Path) -> None:
         same_bits(found[i + len(values)], found[i])
 
 
-def test_memory_is_asked_for_at_the_start_and_for_states_alone(
-    grasp: Grasp, tmp_path: Path
-) -> None:
+def test_memory_is_asked_for_at_the_start_and_for_states_alone(grasp, tmp_path):
     """Counted in malloc itself: a real-time target needs it so. Refusals ask for none, either."""
     host = host_of(here(), tmp_path, ["-DCOUNT_ALLOCATIONS"])
     script = started(grasp)
@@ -225,11 +213,11 @@ SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
 @pytest.mark.slow
 @fmi_2_first
-def test_sanitizers_find_nothing(parts: Parts, tmp_path: Path) -> None:
+def test_sanitizers_find_nothing(parts, tmp_path):
     everything(_sanitized(parts, tmp_path), host_of(here(), tmp_path, SANITIZERS), tmp_path)
 
 
-def _sanitized(parts: Parts, folder: Path) -> Parts:
+def _sanitized(parts, folder):
     made = {}
     for name, part in parts.items():
         fmu, library = part.fmu, folder / f"{name}.so"
@@ -246,13 +234,13 @@ def _sanitized(parts: Parts, folder: Path) -> Parts:
 @pytest.mark.slow
 @fmi_2_first
 @pytest.mark.skipif(not shutil.which("valgrind"), reason="NO valgrind")
-def test_valgrind_finds_nothing(parts: Parts, host: Host, tmp_path: Path) -> None:
+def test_valgrind_finds_nothing(parts, host, tmp_path):
     """No error, and nothing that was not freed."""
     options = ["-q", "--leak-check=full", "--show-leak-kinds=all", "--error-exitcode=99"]
     everything(parts, Host(host.program, ("valgrind", *options)), tmp_path)
 
 
-def everything(parts: Parts, host: Host, folder: Path) -> None:
+def everything(parts, host, folder):
     """A run with refusals, discards, states and two lives."""
     for plant in PLANTS:
         grasp = Grasp(parts, BENCH, plant)

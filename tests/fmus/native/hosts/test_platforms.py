@@ -5,13 +5,11 @@ Where the libm is that of glibc, every bit is that of Python; elsewhere the loop
 
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from grasp_fmus.native.targets import Target, here
-from support.c_host import BENCH, Grasp, Host, Rows, Script, bits, good, rows_in_python
+from support.c_host import BENCH, Grasp, Host, Script, bits, good, rows_in_python
 from support.hosts import Parts
 from support.platforms import ARM, WIN, X86, Platform, cases
 
@@ -30,14 +28,14 @@ PartsOn = Callable[[Platform, int], Parts]
 HostFor = Callable[[Target], Host]
 
 
-def run(host: Host, grasp: Grasp, folder: Path, steps: int, h: float) -> Rows:
+def run(host, grasp, folder, steps, h):
     (answers,) = host.run(grasp.whole(folder / "rows", steps, h), folder=folder)
     good(answers)
     return grasp.read(folder / "rows")
 
 
 COLOURS = {"sensor_1.reflectance": 1.2, "sensor_2.reflectance": 0.3}
-LOOPS: list[tuple[str, str, dict[str, Any], int, float]] = [
+LOOPS = [
     ("GripperPlant", "GraspController", {}, 30_000, 1e-4),
     ("GripperPlant", "GraspController", BENCH, 30_000, 1e-4),
     ("GripperPlantCompliant", "GraspController", BENCH, 3000, 1e-4),
@@ -49,15 +47,13 @@ LOOPS: list[tuple[str, str, dict[str, Any], int, float]] = [
 
 
 @cache
-def in_python(loop: int) -> Rows:
+def in_python(loop):
     plant, controller, values, steps, h = LOOPS[loop]
     return rows_in_python(values, steps, h, plant, controller)
 
 
 @pytest.mark.parametrize(("platform", "fmi"), [*cases(X86, [2]), *cases([*ARM, *WIN])])
-def test_the_loop_on_other_platforms(
-    platform: Platform, fmi: int, parts_on: PartsOn, host_for: HostFor, tmp_path: Path
-) -> None:
+def test_the_loop_on_other_platforms(platform, fmi, parts_on, host_for, tmp_path):
     """Every plant, with and without electronics and friction; both controllers."""
     host, made = host_for(platform.target), parts_on(platform, fmi)
     for loop, (plant, controller, values, steps, h) in enumerate(LOOPS):
@@ -78,13 +74,8 @@ def test_the_loop_on_other_platforms(
 
 @pytest.mark.parametrize(("platform", "fmi"), cases([*ARM, *WIN]))
 def test_a_state_goes_from_machine_to_machine_and_back(
-    platform: Platform,
-    fmi: int,
-    parts_of: PartsOf,
-    parts_on: PartsOn,
-    host_for: HostFor,
-    tmp_path: Path,
-) -> None:
+    platform, fmi, parts_of, parts_on, host_for, tmp_path
+):
     """As bytes, here, there, here again; the first bytes that there are made are those of here."""
     there = Grasp(parts_on(platform, fmi), BENCH)
     ours = Grasp(parts_of(fmi), BENCH)
@@ -98,9 +89,7 @@ def test_a_state_goes_from_machine_to_machine_and_back(
     np.testing.assert_allclose(found, whole, rtol=0.0, atol=FORCES_CLOSE)
 
 
-def leg(
-    host: Host, grasp: Grasp, folder: Path, states: list[str] | None, first: int
-) -> tuple[Rows, list[str]]:
+def leg(host, grasp, folder, states, first):
     """Go on for 100 steps from the states, or begin; what was recorded, and the states then."""
     script = Script()
     grasp.load(script)

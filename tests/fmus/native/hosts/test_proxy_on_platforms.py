@@ -1,12 +1,9 @@
 """A native proxy on Windows, under wine, and on ARM, under qemu, with `serve` on the loopback."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 from grasp_cosim.hil.served import Service
-from grasp_fmus.native.targets import LINUX_ARM, WINDOWS, Target
-from support.c_host import Host, Script, bits, number, unpacked
+from grasp_fmus.native.targets import LINUX_ARM, WINDOWS
+from support.c_host import Script, bits, number, unpacked
 from support.compilers import needs_zig
 from support.fmi2 import Fmu, Instance
 from support.platforms import needs_programs
@@ -28,10 +25,7 @@ STEPS, H = 50, 1e-3
         pytest.param(LINUX_ARM, 3, LINUX_ARM.tuple, marks=ON_ARM),
     ],
 )
-def test_steps(
-    fmus: Path, host_for: Callable[[Target], Host], tmp_path: Path, target: Target, fmi: int,
-    place: str,
-) -> None:  # fmt: skip
+def test_steps(fmus, host_for, tmp_path, target, fmi, place):  # fmt: skip
     """To the bit what the FMU gives here."""
     original = fmus / "ProximitySensor.fmu"
     script = Script()
@@ -62,9 +56,7 @@ def test_steps(
 
 
 @ON_WINDOWS
-def test_a_peer_that_is_gone_on_windows(
-    fmus: Path, host_for: Callable[[Target], Host], tmp_path: Path
-) -> None:
+def test_a_peer_that_is_gone_on_windows(fmus, host_for, tmp_path):
     original = fmus / "ProximitySensor.fmu"
     with serving(original, Service(lockstep=True)) as server:
         port = server.address[1]

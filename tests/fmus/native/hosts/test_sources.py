@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_compilers import LIBM
-from support.c_host import HEADERS, Unpacked, number, rows_in_python
+from support.c_host import HEADERS, number, rows_in_python
 from support.hosts import Parts
 from support.kinds import TRANSLATED
 from support.platforms import MINGW
@@ -26,18 +26,18 @@ PartsOf = Callable[[int], Parts]
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 
 
-def sources(fmu: Unpacked) -> Path:
+def sources(fmu):
     return fmu.folder / "sources"
 
 
-def words(path: Path) -> str:
+def words(path):
     """C without its comments and texts."""
     text = re.sub(r"/\*.*?\*/", " ", path.read_text("ascii"), flags=re.DOTALL)
     return re.sub(r'"(?:\\.|[^"\\])*"', '""', text)
 
 
 @pytest.fixture
-def fmu(parts: Parts, name: str) -> Unpacked:
+def fmu(parts, name):
     return parts[name].fmu
 
 
@@ -50,9 +50,7 @@ every = pytest.mark.parametrize(
 # Linked into one program
 
 
-def program(
-    parts: Parts, folder: Path, prefixes: dict[str, str], defined: dict[str, list[str]]
-) -> Path:
+def program(parts, folder, prefixes, defined):
     """All three and a host in one program; each compiled alone, first in folders of the others."""
     objects = []
     names = []
@@ -72,9 +70,7 @@ def program(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("given", [False, True])
-def test_three_fmus_in_one_program_are_the_grasp(
-    given: bool, parts_of: PartsOf, tmp_path: Path
-) -> None:
+def test_three_fmus_in_one_program_are_the_grasp(given, parts_of, tmp_path):
     own = {role: f"{name}_" for role, name in ROLES.items()}
     mine = {role: f"rt_{role.lower()}_" for role in ROLES}
     defined = {role: [f"-DFMI2_FUNCTION_PREFIX={prefix}"] for role, prefix in mine.items()}
@@ -86,14 +82,14 @@ def test_three_fmus_in_one_program_are_the_grasp(
 
 @pytest.mark.slow
 @every
-def test_all_but_the_functions_of_fmi_is_static(fmu: Unpacked, tmp_path: Path) -> None:
+def test_all_but_the_functions_of_fmi_is_static(fmu, tmp_path):
     """Nothing to clash, and nothing that can be written: no state of the process."""
     done = tmp_path / "it.o"
     subprocess.run([*PLAIN, "-c", sources(fmu) / f"{fmu.name}.c", "-o", done], check=True)
     listed = subprocess.run(
         ["nm", "--format=posix", done], capture_output=True, text=True, check=True
     ).stdout
-    kinds: dict[str, set[str]] = {}
+    kinds = {}
     for line in listed.splitlines():
         symbol, kind, *_ = line.split()
         kinds.setdefault(kind, set()).add(symbol)
@@ -117,7 +113,7 @@ def test_all_but_the_functions_of_fmi_is_static(fmu: Unpacked, tmp_path: Path) -
 
 
 @every
-def test_one_file_to_compile_and_no_file_too_many(fmu: Unpacked) -> None:
+def test_one_file_to_compile_and_no_file_too_many(fmu):
     """All others are included by it, and none from elsewhere, but of C itself."""
     files = {path.name for path in sources(fmu).iterdir()} - {"buildDescription.xml"}
     assert {name for name in files if not name.endswith(".h")} == {f"{fmu.name}.c"}
@@ -137,7 +133,7 @@ def test_one_file_to_compile_and_no_file_too_many(fmu: Unpacked) -> None:
 
 
 @every
-def test_c_that_old_and_strict_compilers_take(fmu: Unpacked) -> None:
+def test_c_that_old_and_strict_compilers_take(fmu):
     """No `for (int`, no //, no complex, no array of variable length; GNU's for GNU alone."""
     for path in sources(fmu).glob("*.[ch]"):
         if path.name.startswith(("fmi2Func", "fmi2Types", "fmi3Func", "fmi3Platf")):
@@ -182,7 +178,7 @@ ELSEWHERE = ("mingw", "aarch64", "gcc, 32 bit")
     ],
 )
 @every
-def test_strict_compilers_say_nothing(fmu: Unpacked, options: list[str], tmp_path: Path) -> None:
+def test_strict_compilers_say_nothing(fmu, options, tmp_path):
     if not shutil.which(options[0]):
         pytest.skip(f"NO {options[0]}")
     if "-m32" in options and not Path("/usr/include/gnu/stubs-32.h").exists():
