@@ -6,6 +6,7 @@
 # make check  lint, format, types, import rules
 # make docs   the pages of the Python interface in results/api, and what the notebook in docs/ shows
 # make bench  measurements     make cards    the variable tables of the equation cards
+# make mutants ROOM=plant/gripper_plant/contact.py  which changes of a module its tests let pass
 # make pictures   those in docs/, in ten minutes; needs Chromium
 # make playground  docs/playground.html; needs zig where the C of the FMUs has changed
 
@@ -24,7 +25,7 @@ ON_ARM := tests/fmi tests/master tests/grasp tests/fmus/native
 
 SEED ?= $(shell date +%s)
 
-.PHONY: run test test-slow platforms interop explore check docs bench cards pictures playground clean
+.PHONY: run test test-slow platforms interop explore check docs bench mutants cards pictures playground clean
 
 run: .venv/run
 	$(BIN)/grasp-cosim build
@@ -66,6 +67,9 @@ bench: .venv/dev
 	$(BIN)/python -m benchmarks.masters
 	$(BIN)/python -m benchmarks.sweep
 
+mutants: .venv/mutants
+	$(BIN)/python -m benchmarks.mutants $(ROOM) $(MORE)
+
 cards: .venv/run
 	$(BIN)/python -m grasp_fmus.cards
 
@@ -88,7 +92,8 @@ playground: .venv/run
 # What cannot be installed is said, and the tests that need it are skipped, by name.
 .venv/platforms: TOOLS := ziglang
 .venv/interop: TOOLS := pyssp-standard pythonfmu3 fmu-manipulation-toolbox
-.venv/platforms .venv/interop: .venv/dev
+.venv/mutants: TOOLS := cosmic-ray
+.venv/platforms .venv/interop .venv/mutants: .venv/dev
 	@for tool in $(TOOLS); do $(PIP) $$tool || { echo "not installed: $$tool"; without=$$tool; }; done; \
 	[ -n "$$without" ] || touch $@
 
