@@ -3,7 +3,7 @@
     .venv/bin/python docs/tutorials.py     # in the folder of the checkout; a minute or two
 
 A table below a command has a row for each value of the word that is its first heading. The other
-headings say what is taken from the run: COLUMNS. Below a study, a row may be one of its variants.
+headings say what is taken from the run: COLUMNS.
 """
 
 import math
@@ -153,7 +153,8 @@ def drift(run: Result) -> float:
 def gap_by_equation_9(run: Result) -> float:
     """The gap of the second finger at the first contact where both intensities are equal, m."""
     gain = value(run, "sensor_1.gain", 0.0024) / 0.0024
-    return gap_at_equal_intensity(gain * value(run, "sensor_1.reflectance", 1.0))
+    right, left = (value(run, f"sensor_{j}.reflectance", 1.0) for j in FINGERS)
+    return gap_at_equal_intensity(gain * right / left)
 
 
 def gap_at_equal_intensity(ratio: float) -> float:
@@ -174,22 +175,6 @@ def blind_by_equation_9(run: Result) -> float:
     """The gap in m below which the sensor is at the upper end of its converter; 0 where none."""
     gain, highest = value(run, "sensor_1.gain", 0.0024), value(run, "sensor_1.adc.range[2]", 10.0)
     return max(0.0, math.pow(gain / highest, 1.0 / 1.1506) - 0.005)
-
-
-def mean_forces(run: Result) -> list[float]:
-    """f_pj on average, N."""
-    forces = (run.signals[f"controller.impact_reduction_force[{j}]"] for j in FINGERS)
-    return [float(f[1:].mean()) for f in forces]
-
-
-def quotients(run: Result) -> list[float]:
-    """f_pj on average, N, as noise leaves it in a quotient of the sampled intensities."""
-    found = []
-    for j, d_p in zip(FINGERS, (0.6, -0.6), strict=True):
-        xi = run.signals[f"sensor_{j}.intensity"]
-        r_1 = np.corrcoef(xi[1:], xi[:-1])[0, 1]
-        found.append(-d_p * (xi.std() / xi.mean()) ** 2 * (1.0 - r_1) / (run.time[1] - run.time[0]))
-    return found
 
 
 def gap_by_equation_7(run: Result) -> float:
@@ -226,8 +211,6 @@ COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float] | None]
     "formula, mm/s": (drift_by_equation_3, 1e3, 1),
     "blind below, mm": (blind_by_equation_9, 1e3, 1),
     "formula, mm": (gap_by_equation_7, 1e3, 1),
-    "f_p on average, N": (mean_forces, 1.0, 2),
-    "formula of a quotient, N": (quotients, 1.0, 2),
 }
 """What the headings of the tables mean: a metric or a function of a run, its factor, the digits."""
 
@@ -239,9 +222,17 @@ _LAYERS = {"0": "force alone", "1": "+ impact reduction", "2": "+ simultaneous c
 _STYLES = ("-", "--", "-.", ":")
 
 
-def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
-    """layers.png, the cases at a fixed object; objects.png, at a box and a cup."""
-    cases, box, tall, cup = (*tables[:3], _plain(tables[3]))
+def draw_pictures(tables: Sequence[Runs], folder: Path) -> None:
+    """All pictures of limits.md."""
+    cases, box, tall, cup, reflectances, carried, laws, _, converter, _, friction, *_ = tables
+    draw_layers(cases, folder)
+    draw_objects(*map(_plain, (box, tall, cup)), folder)
+    draw_limits(*map(_plain, (reflectances, carried, converter, friction)), folder)
+    draw_colour(_plain(laws), folder)
+
+
+def draw_layers(cases: Runs, folder: Path) -> None:
+    """layers.png, the cases at a fixed object."""
     figure = new_figure(9.0, 7.0)
     rows = figure.subplots(3, 3, sharex=True, sharey="row")
     for case, column in zip("012", rows.T, strict=True):
@@ -263,6 +254,9 @@ def draw_layers(tables: Sequence[Runs], folder: Path) -> None:
     one_legend(figure)
     _saved(figure, folder / "layers.png", "What each layer does, object fixed at 30 mm")
 
+
+def draw_objects(box: Runs, tall: Runs, cup: Runs, folder: Path) -> None:
+    """objects.png, the cases at two boxes and a cup."""
     figure = new_figure(9.0, 3.4)
     left, middle, right = figure.subplots(1, 3)
     _over_time(left, box, "plant.object_position", 1e3, "Case {}")
@@ -297,12 +291,12 @@ def _label(axes: Any, x: str, y: str, title: str = "", *, legend: bool = True) -
     finish(axes, y, legend)
 
 
-def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
+def draw_limits(
+    reflectances: Runs, carried: Runs, converter: Runs, friction: Runs, folder: Path
+) -> None:
     """limits.png: unequal reflectances, fixed and free; a converter too small; friction."""
-    reflectances, carried, converter, _, _, _, _, friction, *_ = tables
     figure = new_figure(9.0, 7.0)
     (top_left, top_right), (bottom_left, bottom_right) = figure.subplots(2, 2)
-    reflectances, converter, friction = map(_plain, (reflectances, converter, friction))
     ratios = [float(ratio) for ratio in reflectances]
     top_left.plot(ratios, [1e3 * gap_behind(r) for r in reflectances.values()], "o", color=BLUE)
     curve = np.geomspace(0.5, 2.0, 101)
@@ -340,11 +334,11 @@ def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
     _saved(figure, folder / "limits.png", "Where the method fails")
 
 
-def draw_colour(tables: Sequence[Runs], folder: Path) -> None:
+def draw_colour(laws: Runs, folder: Path) -> None:
     """colour.png: black on the right and white on the left, under both laws."""
     figure = new_figure(9.0, 4.8)
     rows = figure.subplots(2, 2, sharex=True, sharey="row")
-    for (law, run), column in zip(tables[0].items(), rows.T, strict=True):
+    for (law, run), column in zip(laws.items(), rows.T, strict=True):
         gaps, forces = column
         for j, style in DASHES.items():
             face = "black" if j == 1 else "white"
@@ -382,14 +376,12 @@ def draw_your_plant(tables: Sequence[Runs], folder: Path) -> None:
 
 
 PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
-    "colour": draw_colour,
-    "layers": draw_layers,
-    "limits": draw_limits,
+    "limits": draw_pictures,
     "your_plant": draw_your_plant,
 }
 
 
-BLOCKS = ("spring_plant.py", "quotient_controller.py", "moving_object.py")
+BLOCKS = ("spring_plant.py", "moving_object.py")
 """What the pages build before they run it."""
 
 

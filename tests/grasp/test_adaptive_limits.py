@@ -1,4 +1,4 @@
-"""What the adaptive controller must reach over Latin hypercubes of grasps: docs/colour.md.
+"""What the adaptive controller must reach over Latin hypercubes of grasps: docs/limits.md.
 
 Faces of reflectance 0.3 to 1.2 each, an object 50 mm to either side, and what a row of the table
 names besides. Other seeds draw other grasps.

@@ -1,6 +1,6 @@
 """Tolerance bands of signals and metrics: given in a file, or derived from the reference itself.
 
-How they are derived: docs/comparing.md, Qualification. A file overrides that where it names a
+How they are derived: docs/studies.md. A file overrides that where it names a
 signal or metric, in the unit of the original:
 
     [signals]

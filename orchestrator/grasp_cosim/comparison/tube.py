@@ -1,6 +1,6 @@
 """How far two curves are apart where a shift in time is allowed: a tube around each.
 
-Why so: docs/comparing.md, Qualification.
+Why so: docs/studies.md.
 """
 
 from typing import Any, NamedTuple
