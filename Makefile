@@ -4,7 +4,8 @@
 # make platforms  other machines and compilers, FMI 3.0     make interop  other makers' tools
 # make explore    whole campaigns and properties, with new seeds; to repeat one: make explore SEED=...
 # make check  lint, format, types, import rules
-# make docs   the pages of the Python interface in results/api, and what the notebook in docs/ shows
+# make docs   the site of all pages in results/site, and what the notebook in docs/ shows
+# make dist   a release in dist/: wheel, sdist, FMUs for all platforms, SSP archives, the playground
 # make bench  measurements     make cards    the variable tables of the equation cards
 # make mutants ROOM=plant/gripper_plant/contact.py  which changes of a module its tests let pass
 # make pictures   those in docs/, in ten minutes; needs Chromium
@@ -25,7 +26,7 @@ ON_ARM := tests/fmi tests/master tests/grasp tests/fmus/native
 
 SEED ?= $(shell date +%s)
 
-.PHONY: run test test-slow platforms interop explore check docs bench mutants cards pictures playground clean
+.PHONY: run test test-slow platforms interop explore check docs dist bench mutants cards pictures playground clean
 
 run: .venv/run
 	$(BIN)/grasp-cosim build
@@ -60,7 +61,7 @@ check: .venv/dev
 	$(BIN)/python -m pytest -q tests/test_import_rules.py
 
 docs: .venv/dev
-	$(BIN)/python docs/api.py
+	$(BIN)/python docs/website.py
 	$(BIN)/python docs/notebook.py
 
 bench: .venv/dev
@@ -69,6 +70,10 @@ bench: .venv/dev
 
 mutants: .venv/mutants
 	$(BIN)/python -m benchmarks.mutants $(ROOM) $(MORE)
+
+dist: .venv/dev
+	$(PIP) --editable '.[native]'
+	$(BIN)/python docs/release.py
 
 cards: .venv/run
 	$(BIN)/python -m grasp_fmus.cards

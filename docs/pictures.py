@@ -19,7 +19,6 @@ from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import colour_studies
 import tutorials
 from grasp_cosim import cli, hand_system, simulate
 from grasp_cosim.base.files import write_text
@@ -149,11 +148,10 @@ def draw_evaluation(folder: Path) -> None:
 
 
 def draw_map(folder: Path) -> None:
-    """The first example of docs/studies.md, and the map of both laws."""
+    """The first example of docs/studies.md."""
     page = (HERE / "studies.md").read_text("utf-8")
     example = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0]
     exec(example.replace('"map.png"', repr(str(folder / "reflectance_map.png"))), {})  # noqa: S102
-    colour_studies.draw_map(folder / "colour_map.png")
 
 
 def draw_page(folder: Path, name: str) -> None:
@@ -169,10 +167,11 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
     "timing": (draw_timing, ["timing.png"]),
-    "maps": (draw_map, ["reflectance_map.png", "colour_map.png"]),
-    "colour": (partial(draw_page, name="colour"), ["colour.png"]),
-    "layers": (partial(draw_page, name="layers"), ["layers.png", "objects.png"]),
-    "limits": (partial(draw_page, name="limits"), ["limits.png"]),
+    "maps": (draw_map, ["reflectance_map.png"]),
+    "limits": (
+        partial(draw_page, name="limits"),
+        ["layers.png", "objects.png", "limits.png", "colour.png"],
+    ),
     "your_plant": (partial(draw_page, name="your_plant"), ["your_plant.png"]),
 }
 """What draws into a folder, and the files there."""

@@ -6,18 +6,21 @@ compiles for all platforms, so that none of it depends on the machine.
 """
 
 import hashlib
+import re
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from string import Template
 
+from fmpy import read_model_description
 from grasp_cosim import System, grasp_system, hand_system
 from grasp_cosim.base.files import write_text
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_fmus.build import build, build_native, planned
 from grasp_fmus.native.targets import Version, targets
 from hatchling.build import build_sdist, build_wheel
+from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[1]
 
@@ -48,15 +51,21 @@ PAGE = Template("""<!doctype html>
 <style>
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; }
-td { padding: 0.3em 1em 0.3em 0; vertical-align: top; border-top: 1px solid #8886; }
-td:first-child { white-space: nowrap; }
+table { border-collapse: collapse; }
+td, th { padding: 0.3em 1em 0.3em 0; vertical-align: top; text-align: left; }
+td { border-top: 1px solid #8886; }
+pre { overflow-x: auto; }
 </style>
 <h1>grasp-cosim $version</h1>
-<p>Which block of your tool takes which file: <a
-href="https://github.com/grasp-cosim/grasp-cosim/blob/main/docs/into_your_tool.md">Into your tool</a>.</p>
 <table>
 $rows
 </table>
+<h2>The FMUs</h2>
+<table>
+$fmus
+</table>
+$more
+</html>
 """)
 
 
@@ -99,7 +108,18 @@ def page(out: Path) -> str:
         for pattern, text in WHAT.items()
         for path in sorted(out.glob(pattern))
     )
-    return PAGE.substitute(version=version, rows="\n".join(rows))
+    models = map(read_model_description, sorted((out / "fmi2").glob("*.fmu")))
+    fmus = (f"<tr><td>{model.modelName}<td>{model.description}" for model in models)
+    return PAGE.substitute(
+        version=version, rows="\n".join(rows), fmus="\n".join(fmus), more=into_your_tool()
+    )
+
+
+def into_your_tool() -> str:
+    """That page as HTML, without its links to other pages, which a release does not have."""
+    text = (ROOT / "docs/into_your_tool.md").read_text("utf-8")
+    alone = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text.replace("# Into", "## Into", 1))
+    return str(MarkdownIt().enable("table").render(alone))
 
 
 def _in(out: Path, path: Path) -> str:
@@ -107,7 +127,7 @@ def _in(out: Path, path: Path) -> str:
 
 
 if __name__ == "__main__":
-    folder = Path(*sys.argv[1:] or [ROOT / "dist"])
+    folder = Path(*sys.argv[1:]) if sys.argv[1:] else ROOT / "dist"
     if folder.exists():
         shutil.rmtree(folder)
     for written in write_release(folder):

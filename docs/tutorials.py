@@ -226,8 +226,9 @@ def draw_pictures(tables: Sequence[Runs], folder: Path) -> None:
     """All pictures of limits.md."""
     cases, box, tall, cup, reflectances, carried, laws, _, converter, _, friction, *_ = tables
     draw_layers(cases, folder)
-    draw_objects(*map(_plain, (box, tall, cup)), folder)
-    draw_limits(*map(_plain, (reflectances, carried, converter, friction)), folder)
+    draw_objects(_plain(box), _plain(tall), _plain(cup), folder)
+    each = (reflectances, carried, converter, friction)
+    draw_limits([_plain(runs) for runs in each], folder)
     draw_colour(_plain(laws), folder)
 
 
@@ -291,10 +292,9 @@ def _label(axes: Any, x: str, y: str, title: str = "", *, legend: bool = True) -
     finish(axes, y, legend)
 
 
-def draw_limits(
-    reflectances: Runs, carried: Runs, converter: Runs, friction: Runs, folder: Path
-) -> None:
+def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
     """limits.png: unequal reflectances, fixed and free; a converter too small; friction."""
+    reflectances, carried, converter, friction = tables
     figure = new_figure(9.0, 7.0)
     (top_left, top_right), (bottom_left, bottom_right) = figure.subplots(2, 2)
     ratios = [float(ratio) for ratio in reflectances]

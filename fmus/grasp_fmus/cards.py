@@ -3,7 +3,7 @@
 `make cards` writes them; the tests check that they are up to date.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from .contract import Block, Field, declared
@@ -36,20 +36,32 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
         return _table(*rows.values())
     hands = {name: own for name, own in rows.items() if name.startswith("hand")}
     others = {name: own for name, own in rows.items() if name not in hands}
-    tables = _tables("What all have", others)
+    parts = _parts("all have", others)
     if hands:
-        tables += _tables("What all of a hand of three fingers have", hands)
-    return "\n".join(tables)
+        parts |= _parts("all of a hand of three fingers have", hands)
+    return "\n".join(_tables(parts))
 
 
-def _tables(title: str, rows: Mapping[str, list[str]]) -> list[str]:
+def _parts(title: str, rows: Mapping[str, list[str]]) -> dict[str, list[str]]:
+    """What all have, and what each adds, by a title."""
     first, *others = rows.values()
     common = [row for row in first if all(row in other for other in others)]
-    tables = [f"{title}:\n\n{_table(common)}"]
-    for name, own in rows.items():
-        if added := [row for row in own if row not in common]:
-            tables.append(f"What `{name}` adds:\n\n{_table(added)}")
-    return tables
+    added = {f"`{name}` adds": [r for r in own if r not in common] for name, own in rows.items()}
+    return {title: common, **{name: own for name, own in added.items() if own}}
+
+
+def _tables(parts: Mapping[str, list[str]]) -> Iterator[str]:
+    """Each part under its title; a row that stood before is named there, and not shown again."""
+    seen: set[str] = set()
+    for title, rows in parts.items():
+        fresh = [row for row in rows if row not in seen]
+        names = (row.split("`")[1].partition("[")[0] for row in rows if row in seen)
+        groups = dict.fromkeys(
+            f"`{name.partition('.')[0]}{'.*' if '.' in name else ''}`" for name in names
+        )
+        again = f", besides {', '.join(groups)} as above" if groups else ""
+        yield f"What {title}{again}:\n\n{_table(fresh)}" if fresh else f"What {title}{again}.\n"
+        seen |= {*rows}
 
 
 def _table(rows: list[str]) -> str:

@@ -1,0 +1,108 @@
+"""The blocks that the pages have as examples obey their equations."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gripper_plant.friction import Params as Friction
+from scipy import integrate
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_an_object_that_moves_is_a_fixed_one_seen_from_it():
+    """Fingers that are pushed evenly, m·x'' = u, until the right one is stopped by the object."""
+    block = runpy.run_path(str(DOCS / "moving_object.py"))
+    p = block["Params"](initial_object_position=0.0, object_velocity=0.05)
+    u = block["Inputs"]((-0.5, 0.25))
+    x = block["initial_state"](p, u)
+    for _ in range(20):
+        x = block["step"](p, x, u, 0.01)
+    y = block["outputs"](p, x, u)
+    assert y.position == pytest.approx((0.11 - 0.5 * 0.2**2, -0.11 + 0.25 * 0.2**2), abs=1e-12)
+    assert y.velocity == pytest.approx((-0.2, 0.1), abs=1e-12)
+    assert y.object_position == pytest.approx(0.01, abs=1e-12)
+    assert y.gap == pytest.approx((0.045, 0.075), abs=1e-12)
+    for _ in range(200):
+        x = block["step"](p, x, u, 0.01)
+    y = block["outputs"](p, x, u)
+    assert y.contact[0]
+    assert y.velocity[0] == pytest.approx(0.05, abs=1e-6)
+    assert y.position[0] == pytest.approx(y.object_position + 0.035, abs=1e-4)
+    with pytest.raises(ValueError, match="friction: must be 0"):
+        block["Params"](friction=Friction(coulomb=(1.0, 0.0)))
+
+
+def test_the_spring_plant_obeys_its_equations():
+    """Against an adaptive integration, error control at the step at which a face is touched."""
+    plant = runpy.run_path(str(DOCS / "spring_plant.py"))
+    p = plant["Params"](initial_position=(0.07, -0.11))
+    u = plant["Inputs"](force=(-0.5, 0.1))
+
+    def rates(_, y):
+        x_1, x_2, x, v_1, v_2, v = y
+        into_1, into_2 = x + 0.035 - x_1, x_2 - (x - 0.035)
+        f_1 = max(0.0, 1e4 * into_1 + 20.0 * (v - v_1)) if into_1 > 0.0 else 0.0
+        f_2 = max(0.0, 1e4 * into_2 + 20.0 * (v_2 - v)) if into_2 > 0.0 else 0.0
+        spring = -100.0 * (x - 0.03) - 2.0 * v
+        return [v_1, v_2, v, (-0.5 + f_1) / 0.5, (0.1 - f_2) / 0.5, (spring - f_1 + f_2) / 0.1]
+
+    start = [0.07, -0.11, 0.03, 0.0, 0.0, 0.0]
+    exact = integrate.solve_ivp(rates, (0.0, 0.3), start, max_step=1e-3, rtol=1e-9, atol=1e-12)
+    errors = []
+    for h in (4e-5, 2e-5):  # below its own sub-steps, so that it takes just one
+        s = plant["initial_state"](p, u)
+        for _ in range(round(0.3 / h)):
+            s = plant["step"](p, s, u, h)
+        found = [*s.position, s.object_position]
+        errors.append(max(abs(a - b) for a, b in zip(found, exact.y[:3, -1], strict=True)))
+    assert errors[0] < 1e-4  # m, on a way of several mm
+    assert 1.5 < errors[0] / errors[1] < 2.5  # first order
+
+
+def test_the_spring_plant_resolves_its_spring():
+    """A damper as strong as may be, m/d = 0.1 ms: steps of 1 ms do as the exact motion does."""
+    plant = runpy.run_path(str(DOCS / "spring_plant.py"))
+    p = plant["Params"](initial_position=(0.066, -0.11), spring_damping=1000.0)
+    u = plant["Inputs"](force=(-2.0, 0.0))
+
+    def pushed(into, rate):
+        return max(0.0, 1e4 * into + 20.0 * rate) if into > 0.0 else 0.0
+
+    def rates(_, y):
+        x_1, x, v_1, v = y
+        f_1 = pushed(x + 0.035 - x_1, v - v_1)
+        return [v_1, v, (-2.0 + f_1) / 0.5, (-100.0 * (x - 0.03) - 1000.0 * v - f_1) / 0.1]
+
+    times = np.arange(1, 101) * 1e-3
+    exact = integrate.solve_ivp(
+        rates, (0.0, 0.1), [0.066, 0.03, 0.0, 0.0], "Radau", times,
+        max_step=1e-4, rtol=1e-9, atol=1e-12,
+    )  # fmt: skip
+    s = plant["initial_state"](p, u)
+    found = []
+    for _ in times:
+        s = plant["step"](p, s, u, 1e-3)
+        found.append((s.contact_force[0], s.position[0], s.object_position))
+    force, *places = np.transpose(found)
+    x_1, x, v_1, v = exact.y
+    expected = [pushed(*y) for y in zip(x + 0.035 - x_1, v - v_1, strict=True)]
+    assert max(expected) > 5.0  # N
+    assert np.abs(force - expected).max() < 0.1
+    assert np.abs(places - exact.y[:2]).max() < 1e-5
+
+
+def test_the_spring_plant_at_rest():
+    """A finger that pushes alone moves the object until the spring answers: x - x_0 = F/k."""
+    plant = runpy.run_path(str(DOCS / "spring_plant.py"))
+    p = plant["Params"](initial_position=(0.066, -0.11), spring_damping=20.0)
+    u = plant["Inputs"](force=(-0.5, 0.0))
+    s = plant["initial_state"](p, u)
+    for _ in range(3000):
+        s = plant["step"](p, s, u, 1e-3)
+    y = plant["outputs"](p, s, u)
+    assert y.object_position == pytest.approx(0.03 - 0.5 / 100.0, abs=1e-9)
+    assert y.contact_force == pytest.approx((0.5, 0.0), abs=1e-6)
+    assert y.spring_force == pytest.approx(0.5, abs=1e-6)
+    assert y.contact == (True, False)

@@ -1,0 +1,240 @@
+"""What the pages tell a user to type works, and their links lead somewhere."""
+
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from grasp_cosim import System, cli, simulate
+from grasp_cosim.base.higher import groups
+from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.hil.relay import Relay
+from grasp_cosim.hil.server import Server
+from grasp_cosim.master.compiled import has_compiler
+from grasp_cosim.ssp.to_archive import write_ssp
+from support.both_engines import needs_compiler
+from support.imports import graph, read_imports, read_modules
+from support.slow import slow
+
+ROOT = Path(__file__).parents[2]
+PAGES = {
+    page.relative_to(ROOT).as_posix(): page.read_text("utf-8")
+    for page in sorted(ROOT.rglob("*.md"))
+    if not any(part.startswith(".") for part in page.relative_to(ROOT).parts)
+}
+README, GUIDE = PAGES["README.md"], PAGES["docs/guide.md"]
+COMMANDS = sorted(
+    set(re.findall(r"^    \.venv/bin/(grasp-cosim .*?)(?:\s+#.*)?$", README + GUIDE, re.M))
+)
+LONG = ("--fmi 3", "--controller")
+"""In the commands that take more than a moment."""
+
+
+def blocks(page, kind):
+    """The fenced blocks of a kind on a page."""
+    return re.findall(rf"```{kind}\n(.*?)```", PAGES[page], re.DOTALL)
+
+
+(METRIC,) = blocks("docs/guide.md", "python")
+MAP, CUBE, SOBOL = blocks("docs/studies.md", "python")
+
+
+@pytest.fixture(scope="session")
+def recorded(grasp, tmp_path_factory):
+    """The folder of a short run."""
+    folder = tmp_path_factory.mktemp("recorded")
+    result = simulate(grasp, step=1e-3, stop=0.1)
+    result.to_csv(folder / "signals.csv")
+    result.to_json(folder / "run.json")
+    return folder
+
+
+@pytest.fixture
+def user(checkout, grasp, recorded):
+    """A checkout with a vendor's FMU, systems and runs of one's own."""
+    shutil.copy(checkout / "fmus/build/GripperPlant.fmu", checkout / "vendor.fmu")
+    text = SYSTEM.read_text("utf-8").replace('fmu = "', 'fmu = "fmus/build/')
+    (checkout / "my_system.toml").write_text(text, encoding="utf-8")
+    write_ssp(grasp, checkout / "my_system.ssp")
+    (checkout / "my_metrics.py").write_text(METRIC, encoding="utf-8")
+    for name in ("results", "other"):
+        shutil.copytree(recorded, checkout / name)
+    return checkout
+
+
+@pytest.mark.parametrize(
+    "command", [slow(c) if any(word in c for word in LONG) else c for c in COMMANDS]
+)
+def test_command(user, command, monkeypatch):
+    for kind, runs in ((Server, "serve"), (Relay, "run")):
+        monkeypatch.setattr(kind, runs, lambda *_: signal.raise_signal(signal.SIGINT))
+    arguments = shlex.split(command)[1:]
+    if "--native" in arguments and not has_compiler():
+        pytest.skip("there is no C compiler")
+    more = {"run": ["--stop", "0.01"], "qualify": ["--stop", "0.01"], "serve": ["--port", "0"]}
+    if arguments[0] == "init":
+        (user / "my_system.toml").unlink()
+    assert cli.main([*arguments, *more.get(arguments[0], [])]) == 0
+
+
+def test_there_is_something_to_try():
+    assert len(COMMANDS) == 24
+
+
+@pytest.mark.slow
+def test_the_example_of_the_readme(user, capsys):
+    (example,) = blocks("README.md", "python")
+    exec(example, {})
+    assert re.match(r"\[1\.\d+, 1\.\d+\] m\n", capsys.readouterr().out)
+    assert (user / "results/grasp.png").is_file()
+
+
+@needs_compiler
+def test_the_examples_of_a_hand_hold():
+    names = {}
+    for example in blocks("docs/hand.md", "python"):
+        exec(example, names)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("script", "fewer", "printed"),
+    [
+        (MAP, {", 25)": ", 3)", ", 17)": ", 2)", "stop=6.0": "stop=0.5"}, ""),
+        (CUBE, {"random(200)": "random(4)", "stop=6.0": "step=1e-3, stop=3.0"}, "50%"),
+        (SOBOL, {"n=64": "n=2"}, "alone"),
+    ],
+    ids=["map", "cube", "sobol"],
+)
+def test_the_scripts_of_studies(script, fewer, printed, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for text, less in fewer.items():
+        assert text in script
+        script = script.replace(text, less)
+    exec(script, {"__name__": "script"})
+    assert printed in capsys.readouterr().out
+    assert (tmp_path / "map.png").exists() == ("map.png" in script)
+
+
+@pytest.mark.slow
+def test_what_a_run_ends_with(user, capsys):
+    """All but how fast it was."""
+    (shown,) = re.findall(r"```\n(\d+ steps of .*?)```", GUIDE, re.DOTALL)
+    assert cli.main(["run"]) == 0
+    found = capsys.readouterr().out
+    first, *rest = shown.splitlines()
+    assert found.splitlines()[1:] == rest
+    assert found.startswith(first.rpartition(", ")[0])
+
+
+def test_the_tables_of_the_guide_go_into_a_system_file(user):
+    preset, scenario = blocks("docs/guide.md", "toml")
+    path = user / "my_system.toml"
+    path.write_text(path.read_text("utf-8") + preset + scenario, encoding="utf-8")
+    system = System.load(path)
+    assert system.with_presets("dark").start("sensor_2.reflectance") == 0.3
+    log = simulate(system, step=1e-3, stop=1.2).log
+    assert [line.partition(": ")[0] for line in log] == ["t = 0.5 s", "t = 0.5 s", "t = 1 s"]
+
+
+def test_the_metric_of_the_guide(user, capsys):
+    assert cli.main(["run", "--metrics", "my_metrics.py", "--step", "1e-3", "--stop", "2"]) == 0
+    (shown,) = (s for s in capsys.readouterr().out.splitlines() if s.startswith("closing time"))
+    assert 1.0 < float(shown.split()[2]) < 1.9
+
+
+@pytest.mark.slow
+def test_the_first_screen_is_the_hand_and_two_commands_of_which_one_ends_with_it_moving():
+    """Within 25 lines of the README; `make run` ends with where the page is."""
+    first = "\n".join(README.splitlines()[:25])
+    for shown in ("](docs/hand.svg)", "    make run ", "    make test ", "](docs/loop.svg)"):
+        assert shown in first
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("make is not installed")
+    command = [make, "--no-print-directory", "-n", "run"]  # which `make test` would have printed
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].endswith("docs/playground.html'")
+    assert "then open results/evaluation.html" in first
+
+
+def test_the_make_targets_are_those_of_contributing():
+    (listed,) = re.findall(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text("utf-8"), re.M)
+    named = {
+        word
+        for words in re.findall(r"`make ([a-z -]+)", PAGES["CONTRIBUTING.md"])
+        for word in words.split()
+    }
+    assert named == {*listed.split()} - {"clean"}
+
+
+# Links and words
+
+
+def headings(text):
+    """The anchors that GitHub gives the headings of a page."""
+    text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    found = (re.sub(r"[`*]", "", line).lower() for line in re.findall(r"^#+ (.*)$", text, re.M))
+    return {re.sub(r"[^\w\- ]", "", line).replace(" ", "-") for line in found}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page):
+    for link, heading in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", PAGES[page]):
+        if link.startswith("http"):
+            continue
+        target = ROOT / page if link == "" else (ROOT / page).parent / link
+        assert target.exists(), link
+        if target.suffix == ".md" and heading:
+            assert heading in headings(target.read_text("utf-8")), f"{link}#{heading}"
+
+
+def test_from_the_readme_one_comes_to_every_page():
+    reached = {"README.md"}
+    while True:
+        linked = {
+            path.resolve().relative_to(ROOT).as_posix()
+            for page in reached
+            for link in re.findall(r"\]\(([^)#\s]+\.md)", PAGES[page])
+            if (path := (ROOT / page).parent / link).resolve().is_relative_to(ROOT)
+        }
+        if linked <= reached:
+            break
+        reached |= linked
+    assert reached == PAGES.keys()
+
+
+def test_each_word_is_in_the_glossary_once():
+    rows = [row.split(" | ")[0] for row in re.findall(r"^\| (.*)", PAGES["docs/glossary.md"], re.M)]
+    words = [word for row in rows if row != "word" for word in row.split(", ")]
+    assert len(set(words)) == len(words)
+    asked = {"O-RLI", "case", "layer", "bench", "proxy", "Jacobi", "SSP", "sequential", "role"}
+    assert asked | {"preset", "native twin", "contact"} <= set(words)
+
+
+# Rooms
+
+ROOMS = sorted(p.parent.name for p in (ROOT / "orchestrator/grasp_cosim").glob("*/__init__.py"))
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_card_says_what_comes_in_what_goes_out_and_what_to_read(room):
+    card = PAGES[f"orchestrator/grasp_cosim/{room}/README.md"]
+    pattern = (
+        r"# .*\n\n.+\n\n\*\*Comes in\*\*: .+\n\n\*\*Goes out\*\*: .+\n\n\*\*Read first\*\*: `(.+?)`"
+    )
+    assert (ROOT / f"orchestrator/grasp_cosim/{room}" / re.match(pattern, card)[1]).exists()
+
+
+def test_the_map_has_all_rooms_each_below_those_that_import_it():
+    text = PAGES["orchestrator/README.md"]
+    rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
+    assert sorted(rows) == ROOMS
+    modules = read_modules(ROOT / "orchestrator/grasp_cosim")
+    imports = graph(read_imports(modules), of_rooms=True)
+    for i, row in enumerate(rows):
+        assert {*imports.get(row, ())} <= {*rows[:i]}, row
+    assert groups() == ("grasp", "hand")

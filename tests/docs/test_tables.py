@@ -1,0 +1,177 @@
+"""The tables and pictures of limits.md and your_plant.md are what their commands give."""
+
+import importlib.util
+import math
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from grasp_cosim import cli, simulate
+from grasp_cosim.recording.load import load_run
+from support.native_fmus import needs_gcc
+from support.pictures import assert_same_picture
+from support.vendor import vendor_plant
+
+DOCS = Path(__file__).parents[2] / "docs"
+BLOCKS = re.compile(r"```(console|toml|python)\n(.*?)```", re.DOTALL)
+INDENTED = re.compile(r"^    (grasp-cosim .*?)(?:\s+#.*)?$", re.MULTILINE)
+
+
+def page(name):
+    return (DOCS / f"{name}.md").read_text("utf-8")
+
+
+def checked(name, checkout):
+    """The runs of the tables of a page, whose cells and pictures must be those of the runs.
+
+    The cells must be the same to the printed digit: the runs are deterministic.
+    """
+    spec = importlib.util.spec_from_file_location("tutorials", DOCS / "tutorials.py")
+    tutorials, text = importlib.util.module_from_spec(spec), page(name)
+    spec.loader.exec_module(tutorials)
+    drawn = checkout / "drawn"
+    drawn.mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", tutorials.DATE)
+        found, tables = tutorials.worked_out(text, tutorials.recorder(checkout / "recorded"))
+        assert found == text, "run: docs/tutorials.py"
+        tutorials.PAGES[name](tables, drawn)
+    pictures = sorted(p.name for p in drawn.iterdir())
+    assert sorted(set(re.findall(r"!\[.*?\]\((.*?)\)", text))) == pictures
+    for picture in pictures:
+        assert_same_picture(drawn / picture, DOCS / picture, "docs/tutorials.py")
+    return tables
+
+
+@pytest.mark.slow
+def test_the_commands_at_the_beginnings_work(checkout):
+    commands = INDENTED.findall(page("limits") + page("your_plant"))
+    assert {command.split()[1] for command in commands} == {"build", "run"}
+    for command in commands:
+        short = ["--stop", "0.01"] if command.split()[1] == "run" else []
+        assert cli.main([*shlex.split(command)[1:], *short]) == 0, command
+    assert (checkout / "case_0/grasp.png").is_file()
+
+
+@pytest.mark.slow
+@pytest.mark.campaign
+def test_limits(checkout):
+    """And what the formulas of the page give, worked out here once more."""
+    assert cli.main(["build", "docs/moving_object.py"]) == 0
+    cases, _, _, cup, colours, carried, laws, _, converter, _, friction, loop, *_ = checked(
+        "limits", checkout
+    )
+    force = 98.0 * 0.035  # layer 1's spring over half the width
+    steady = cases["--case 0"].metrics["steady_contact_force"]
+    assert steady == pytest.approx([force, force], abs=1e-6)
+    squeeze = 2.0 * force / (98.0 + 1000.0)  # each side's spring against it
+    assert cup["0"].signals["plant.squeeze"][-1] == pytest.approx(squeeze, rel=1e-3)
+    for ratio in ("0.57", "0.89", "1.15"):
+        run, behind = colours[ratio], max(float(ratio), 1 / float(ratio)) ** (1.0 / 1.1506)
+        times = run.metrics["time_to_contact"]
+        gap = run.signals[f"plant.gap[{2 if times[0] < times[1] else 1}]"]
+        found = np.interp(min(times), run.time, gap)
+        assert found == pytest.approx(
+            5e-3 * (behind - 1.0), abs=0.3e-3
+        )  # what the target is behind
+    assert [run.metrics["time_difference"] < 0.1 for run in colours.values()] == [
+        False, False, True, True, True, False, True, True,
+    ]  # fmt: skip
+    f_s = 3.0 * math.tanh(0.14 / 1.86)
+    for mass, run in carried.items():
+        speed = max(0.0, f_s - 36.0 * 0.3 * float(mass) * 9.80665 / (2.0 * 98.0)) / 12.0
+        x = run.signals["plant.object_position"]
+        assert (x[-251] - x[-1]) / 0.5 == pytest.approx(speed, abs=0.2e-3)
+    for law, ratio in (("adaptive", 0.57), ("adaptive --set sensor_1.reflectance=0.3", 0.3)):
+        learnt = laws[law].signals["controller.reflectance_ratio"][-1]
+        assert learnt == pytest.approx(ratio, rel=0.01)
+    for volts in ("0.9", "0.5"):
+        signals = converter[volts].signals
+        free = ~signals["plant.contact[1]"].astype(bool) & (signals["plant.gap[1]"] < 0.02)
+        slowest = np.argmax(np.where(free, signals["plant.velocity[1]"], -np.inf))
+        blind = (0.0024 / float(volts)) ** (1.0 / 1.1506) - 0.005
+        assert signals["plant.gap[1]"][slowest] == pytest.approx(blind, abs=0.1e-3)
+    assert friction["5"].signals["plant.gap[1]"][-1] == pytest.approx(5.0 / 98.0 - 0.035, abs=2e-4)
+    assert swings(loop["--step 0.02"]) == 0
+    assert swings(loop["--step 0.04"]) >= 3
+
+
+def swings(run):
+    """How often the virtual force of layer 2 turns its sign before the contact."""
+    force = run.signals["controller.impact_reduction_force[1]"]
+    free = ~np.maximum.accumulate(run.signals["plant.contact[1]"].astype(bool))
+    return int((force[free][1:] * force[free][:-1] < 0.0).sum())
+
+
+@pytest.mark.slow
+def test_your_plant(checkout, capsys):
+    source = (DOCS / "spring_plant.py").read_text("utf-8")
+    excerpts = 0
+    for kind, block in BLOCKS.findall(page("your_plant").partition("## b.")[0]):
+        if kind == "python":
+            assert block in source
+            excerpts += 1
+        elif kind == "console":
+            try_commands(block, capsys)
+        else:
+            assert block.startswith("[signals]")
+            (checkout / "bands.toml").write_text(block, encoding="utf-8")
+    assert excerpts == 2
+    (cases,) = checked("your_plant", checkout)
+    case_1 = cases["1"]
+    k = int(np.flatnonzero(case_1.signals["plant.contact[2]"])[0])
+    before = slice(k - 2, k)  # both free: how fast the gap closes is the impact, whoever moves
+    rate = -np.diff(case_1.signals["plant.gap[2]"][before]) / np.diff(case_1.time[before])
+    assert case_1.metrics["impact_velocity"][1] == pytest.approx(rate[0], rel=0.05)
+    place = case_1.signals["plant.object_position"]
+    assert place[k] < place[k - 1]  # finger 2 is the left one
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_an_fmu_from_elsewhere(checkout, grasp, capsys):
+    """From the file of a vendor to QUALIFIED, by the page alone."""
+    vendor_plant(checkout / "vendor.fmu")
+    page_b = page("your_plant").partition("## b.")[2].partition("## c.")[0]
+    for kind, block in BLOCKS.findall(page_b):
+        if kind == "console":
+            try_commands(block, capsys)
+        else:
+            fill_in(checkout / "my_system.toml", block)
+    assert (checkout / "vendor/report.html").is_file()
+    ours, theirs = simulate(grasp, step=1e-3).metrics, load_run(checkout / "vendor").metrics
+    for name in ("time_to_contact", "impact_velocity", "steady_contact_force", "object_shift"):
+        assert theirs[name] == pytest.approx(ours[name], rel=1e-9, abs=1e-12)
+
+
+def fill_in(system, block):
+    """Put each line of a table in the place of that with its key."""
+    chunks = system.read_text("utf-8").split("\n\n")
+    for table in block.strip().split("\n\n"):
+        heading, *new = table.splitlines()
+        (place,) = (i for i, chunk in enumerate(chunks) if chunk.startswith(heading))
+        lines = {line.partition(" = ")[0]: line for line in chunks[place].splitlines()}
+        for line in new:
+            assert line.partition(" = ")[0] in lines
+            lines[line.partition(" = ")[0]] = line
+        chunks[place] = "\n".join(lines.values())
+    system.write_text("\n\n".join(chunks), encoding="utf-8")
+
+
+def try_commands(block, capsys):
+    """Do the commands of a block, which print first what the page shows below them."""
+    whole = block.replace("\\\n", " ")
+    for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", whole, re.MULTILINE | re.DOTALL):
+        command, _, shown = part.partition("\n")
+        if "CASE" in command:
+            continue  # the rows of a table
+        if not command.startswith("grasp-cosim "):
+            subprocess.run(command, shell=True, check=True)
+            continue
+        capsys.readouterr()
+        code = cli.main(shlex.split(command)[1:])
+        assert capsys.readouterr().out.startswith(shown), command
+        assert code == (1 if shown.startswith("NOT") else 0), command
