@@ -116,7 +116,7 @@ def proxy_members(
     target: Path, original: Original, fmi: Version = 2, settings: Settings = DEFAULTS
 ) -> dict[str, bytes]:
     """Return the files of a proxy but for the binaries, by name; ValueError as build_proxy()."""
-    from .bench_header import wire
+    from .native.bench_header import wire
     from .native.sources import proxy_sources, with_description
     from .package import HASH, Model
     from .page import icon

@@ -16,7 +16,6 @@ from grasp_cosim.hil.server import Server
 from grasp_cosim.master.compiled import has_compiler
 from grasp_cosim.ssp.to_archive import write_ssp
 from support.both_engines import needs_compiler
-from support.imports import graph, read_imports, read_modules
 from support.slow import slow
 
 ROOT = Path(__file__).parents[2]
@@ -229,12 +228,8 @@ def test_a_card_says_what_comes_in_what_goes_out_and_what_to_read(room):
     assert (ROOT / f"orchestrator/grasp_cosim/{room}" / re.match(pattern, card)[1]).exists()
 
 
-def test_the_map_has_all_rooms_each_below_those_that_import_it():
+def test_the_map_has_all_rooms():
     text = PAGES["orchestrator/README.md"]
     rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
     assert sorted(rows) == ROOMS
-    modules = read_modules(ROOT / "orchestrator/grasp_cosim")
-    imports = graph(read_imports(modules), of_rooms=True)
-    for i, row in enumerate(rows):
-        assert {*imports.get(row, ())} <= {*rows[:i]}, row
     assert groups() == ("grasp", "hand")

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import pytest
 from grasp_cosim.hil.driven import MOST_LOST
-from grasp_fmus.bench_header import bench_header, c_prefix
 from grasp_fmus.contract import declared
 from grasp_fmus.link.message import (
     BUSY,
@@ -39,6 +38,7 @@ from grasp_fmus.link.message import (
 )
 from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
 from grasp_fmus.link.signature import LinkVariable, Signature
+from grasp_fmus.native.bench_header import bench_header, c_prefix
 from gripper_plant import rigid
 from support import compiled
 from support.proxies import HandProxy, RefusedError

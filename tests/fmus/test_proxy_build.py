@@ -17,7 +17,7 @@ from grasp_cosim.hil.served import Service
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Component
-from grasp_fmus.bench_header import bench_header
+from grasp_fmus.native.bench_header import bench_header
 from grasp_fmus.page import icon
 from support import native_fmus
 from support.proxies import ANY_PORT, build_proxy, serving

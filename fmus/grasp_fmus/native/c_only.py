@@ -12,11 +12,11 @@ from string import Template
 
 from c_compilers import BITS, LIBM
 
-from ..bench_header import Group, Member, comment, members, structs
 from ..link.message import Value
 from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
 from ..package import Model, write_file
 from ..variable import Scalar, Variable
+from .bench_header import Group, Member, comment, members, structs
 from .blocks import translated
 
 FOLDER = Path(__file__).parent

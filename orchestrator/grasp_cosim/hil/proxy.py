@@ -85,7 +85,7 @@ def _check_other(fmu: Path, out: Path) -> None:
 
 def _header(interface: Interface) -> str:
     """The C header of the peer."""
-    from grasp_fmus.bench_header import bench_header
+    from grasp_fmus.native.bench_header import bench_header
 
     signature, _ = link_signature(interface)
     starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}

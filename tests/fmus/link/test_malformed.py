@@ -15,7 +15,6 @@ from random import Random
 from typing import Literal
 
 import pytest
-from grasp_fmus.bench_header import bench_header
 from grasp_fmus.link.message import (
     HEAD,
     INITIALISE,
@@ -26,6 +25,7 @@ from grasp_fmus.link.message import (
     Sealer,
 )
 from grasp_fmus.link.peer import Peer, Request
+from grasp_fmus.native.bench_header import bench_header
 from support import campaign
 from support.native_proxies import write_sources
 from support.proxies import HandProxy

@@ -7,9 +7,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from grasp_fmus.bench_header import bench_header
 from grasp_fmus.link.message import HELLO, INITIALISE, STEP, VERSION
 from grasp_fmus.link.signature import LinkVariable, Signature
+from grasp_fmus.native.bench_header import bench_header
 from support import campaign
 from support.native_proxies import write_sources
 

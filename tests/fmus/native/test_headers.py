@@ -2,10 +2,10 @@
 
 import re
 import subprocess
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
-from support.imports import circles
 from support.native_fmus import needs_gcc
 
 FOLDER = Path(__file__).parents[3] / "fmus/grasp_fmus/native/c"
@@ -25,7 +25,7 @@ def lacks(name):
 
 def test_no_headers_include_each_other_in_a_circle():
     assert "slave.h" in INCLUDES["block_slave.h"]
-    assert circles(INCLUDES) == []
+    TopologicalSorter(INCLUDES).prepare()  # CycleError where there is one
 
 
 @needs_gcc

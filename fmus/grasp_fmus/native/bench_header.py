@@ -13,11 +13,11 @@ from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
-from .link import message
-from .link.message import Codec, Value, check_size
-from .link.peer import TOO_LONG
-from .link.signature import ORDER, Causality, LinkVariable, Signature
-from .native.text import string
+from ..link import message
+from ..link.message import Codec, Value, check_size
+from ..link.peer import TOO_LONG
+from ..link.signature import ORDER, Causality, LinkVariable, Signature
+from .text import string
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
 WIRE = Path(__file__).with_name("wire.h.in")
