@@ -1,16 +1,13 @@
 """The command line: what it writes, one line per mistake, exit codes."""
 
-import csv
 import json
 import math
 import re
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
 from grasp_cosim import cli, simulate
-from grasp_fmus.shipped import blocks
 from support.cases import CASES
 
 METRICS = {
@@ -71,27 +68,6 @@ def test_run_writes_signals_metrics_and_a_picture(command, tmp_path):
     assert report["components"]["plant"]["values"]["object_width"] == 0.07
 
 
-def test_csv_holds_every_bit(command, grasp, tmp_path):
-    command("run", "--stop", "0.01", "--out", "results")
-    result = simulate(grasp, stop=0.01)
-    with (tmp_path / "results/signals.csv").open() as file:
-        rows = list(csv.reader(file))
-    assert rows[0] == ["time", *result]
-    assert len(rows) == 102
-    for name, column in zip(rows[0][1:], list(zip(*rows[1:], strict=True))[1:], strict=True):
-        assert [float(value) for value in column] == result[name].astype(float).tolist()
-
-
-def test_case_1_is_layer_3_off(command):
-    _, one, _ = command("run", "--stop", "0.01", "--case", "1", "--json")
-    _, two, _ = command(
-        "run", "--stop", "0.01", "--set", "controller.simultaneous_contact.enabled=false", "--json"
-    )
-    _, three, _ = command("run", "--stop", "0.01", "--json")
-    target = [json.loads(text)["target_position"] for text in (one, two, three)]
-    assert target[0] == target[1] != target[2]
-
-
 WRONG = [
     (["--set", "plant.object_width=0.5"], "object_width = 0.5 m .* must fit between"),
     (
@@ -141,33 +117,6 @@ def test_a_folder_that_cannot_be_written_is_found_at_once(command, tmp_path, com
     assert len(err.splitlines()) == 1
 
 
-def test_what_is_no_grasp_is_drawn_as_its_signals(command, fmus, tmp_path):
-    fmu = fmus / "ProximitySensor.fmu"
-    (tmp_path / "sensor.toml").write_text(
-        "[experiment]\nstep = 1e-3\nstop = 0.01\n"
-        f'[components.sensor]\nfmu = "{fmu}"\nvalues = {{ gap = 0.02 }}\n'
-    )
-    code, out, err = command("run", "sensor.toml", "--out", "results", "--plot")
-    assert (code, err) == (0, "drew results/signals.png\n")
-    assert len(out.splitlines()) == 1  # no metrics, and no word about a grasp
-    written = sorted(path.name for path in (tmp_path / "results").iterdir())
-    assert written == ["run.json", "signals.csv", "signals.png"]
-
-
-def test_a_vendor_plant_with_one_more_input(command, altered):
-    force = "    force: Force = (0.0, 0.0)\n"
-    ambient = (
-        '    ambient: Annotated[float, Input("temperature", unit="K", nominal=300.0)] = 300.0\n'
-    )
-    fmu = altered("GripperPlant", "gripper_plant/fingers.py", force, force + ambient)
-    code, _, err = command("run", "--stop", "0.01", "--swap", f"plant={fmu}")
-    assert code == 2
-    assert "input plant.ambient has no source" in err
-    assert "--set plant.ambient=VALUE" in err
-    options = ["--swap", f"plant={fmu}", "--set", "plant.ambient=290", "--json"]
-    assert command("run", "--stop", "0.01", *options)[0] == 0
-
-
 def test_no_arguments_show_the_help(command):
     code, out, err = command()
     assert (code, out) == (2, "")
@@ -204,60 +153,11 @@ def test_help_has_an_example(command, name):
 
 
 @pytest.mark.slow
-def test_build_names_what_it_built(command, tmp_path):
-    code, out, _ = command("build", "--out", "here", "--json")
-    built = [Path(p) for p in json.loads(out)["fmus"]]
-    assert code == 0
-    assert [p.name for p in built] == [f"{name}.fmu" for name in blocks()]
-    assert all((tmp_path / p).is_file() for p in built)
-
-
-@pytest.mark.slow
 def test_the_built_in_grasp_leaves_nothing_in_the_current_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["run", "--stop", "0.01", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["steps"] == 100
     assert not list(tmp_path.iterdir())
-
-
-def test_inspect_shows_the_interface(command, fmus):
-    fmu = str(fmus / "ProximitySensor.fmu")
-    code, out, err = command("inspect", fmu)
-    assert (code, err) == (0, "")
-    assert re.search(r"^intensity +output +continuous +Real +V +gap +xi, ", out, re.MULTILINE)
-    code, out, _ = command("inspect", fmu, "--json")
-    assert code == 0
-    assert json.loads(out)["variables"][0]["name"] == "gap"
-
-
-def test_inspect_of_what_is_no_fmu(command, tmp_path):
-    text = tmp_path / "notes.fmu"
-    text.write_text("not an archive")
-    code, out, err = command("inspect", str(text))
-    assert (code, out) == (2, "")
-    assert err.startswith(f"grasp-cosim: {text}: not a readable FMU: ")
-    assert err.count("\n") == 1
-
-
-@pytest.mark.slow
-def test_inspect_finds_nothing_wrong_with_ours(command, fmus):
-    code, out, err = command("inspect", "--load", str(fmus / "ProximitySensor.fmu"), "--json")
-    assert (code, err) == (0, "")
-    found = {f["check"]: f["status"] for f in json.loads(out)["findings"]}
-    assert found["trial"] == "ok"
-    assert "problem" not in found.values()
-
-
-def test_inspect_finds_what_is_missing(command, fmus, tmp_path):
-    bare = tmp_path / "bare.fmu"
-    with zipfile.ZipFile(fmus / "ProximitySensor.fmu") as whole, zipfile.ZipFile(bare, "w") as part:
-        for name in whole.namelist():
-            if not name.startswith("binaries/linux64"):
-                part.writestr(name, whole.read(name))
-    code, out, _ = command("inspect", str(bare))
-    assert code == 1
-    assert re.search(r"^problem +binary +has a binary for win64 only; ", out, re.MULTILINE)
-    assert "fix: " in out
 
 
 def test_a_missing_file_without_a_name_is_told(command, monkeypatch):
@@ -274,16 +174,3 @@ def test_a_folder_is_no_fmu(command, tmp_path):
     code, out, err = command("inspect", str(tmp_path))
     assert (code, out) == (2, "")
     assert err == f"grasp-cosim: {tmp_path}: is a folder; must be an FMU, a file\n"
-
-
-def test_of_a_very_long_message_the_middle_is_left_out(command, tmp_path):
-    (tmp_path / "long.toml").write_text(f"{'x' * 100_000} = 1\n")
-    code, _, said = command("run", "long.toml")
-    assert code == 2
-    assert len(said) < 3000
-    assert said.startswith("grasp-cosim: long.toml: unknown entry 'xxx")
-    assert said.endswith(
-        "; valid: components, connections, events, experiment, faults, "
-        "initialisation, input, metrics, presets, realtime, roles\n"
-    )
-    assert "x" * 100_000 in command("--debug", "run", "long.toml")[2]

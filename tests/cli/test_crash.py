@@ -6,9 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from grasp_cosim import System, simulate
 from grasp_cosim.fmi.process import ProcessInstance
-from support.isolated import isolated
 from support.native_fmus import TYPES, build, needs_gcc
 
 
@@ -105,10 +103,3 @@ def test_the_option_goes_before_the_file(tmp_path, said, started, monkeypatch, c
     path = system_file(tmp_path, isolation="process")
     assert command("run", path, *given)[0] == 0
     assert names == ["motor"] * started
-
-
-@needs_gcc
-def test_the_numbers_are_the_same(tmp_path):
-    system = System.load(system_file(tmp_path))
-    here, there = (simulate(isolated(system, i)) for i in ("none", "process"))
-    assert all((here[name] == there[name]).all() for name in here)

@@ -10,7 +10,6 @@ from comparison.made import write_fmu
 from grasp_cosim import System
 from grasp_cosim.cli.commands.init import shown
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.system.toml import to_do
 from support.models import build_model
 from support.native_fmus import needs_gcc
 
@@ -170,15 +169,6 @@ def test_values_and_presets_are_in_the_units_of_the_fmu(fmus_here, tmp_path):
     assert bench[2].endswith("# TODO: in the unit that it has")
 
 
-def test_a_name_that_means_something_else_in_the_fmu(fmus_here, tmp_path):
-    own = {"gap[1]": 'causality="parameter" variability="fixed" | Boolean start="false"'}
-    write_fmu(tmp_path / "vendor.fmu", {**FOREIGN, **own}, {})
-    assert fmus_here("init", "a.toml", "--as", "plant=vendor.fmu")[0] == 0
-    filled_in(tmp_path / "a.toml")
-    found = System.load(tmp_path / "a.toml").component("plant", "test").interface.by_name
-    assert (found["gap[1]"].causality, found["gap[1]_of_the_FMU"].kind) == ("output", "Boolean")
-
-
 @pytest.mark.slow
 @needs_gcc
 def test_fmus_alone(fmus_here, tmp_path):
@@ -196,17 +186,6 @@ def test_fmus_alone(fmus_here, tmp_path):
     assert "# g = -9.81  # parameter" in text
     code, out, _ = fmus_here("run", "alone.toml", "--json")
     assert (code, json.loads(out)["steps"]) == (0, 300)
-
-
-def test_an_fmu_that_recommends_no_experiment(fmus_here, tmp_path):
-    write_fmu(tmp_path / "vendor.fmu", FOREIGN, {}, step="0.3")
-    code, _, err = fmus_here("init", "alone.toml", "--fmu", "a=vendor.fmu")
-    assert (code, err) == (
-        0,
-        "no FMU recommends a stop time: chosen, step = 0.3 s, stop = 1 s\n"
-        "stop = 1 s: 0.9 s is a whole number of steps\n",
-    )
-    assert System.load("alone.toml").total_steps == 3
 
 
 def test_paths(tmp_path):
@@ -236,19 +215,6 @@ def test_names_that_a_system_file_has_to_quote(fmus_here, tmp_path):
     plant = System.load(tmp_path / "a.toml").component("plant", "test")
     assert plant.values == {brake: 0.25}
     assert plant.rename["gap[2]"] == "plant.l_2"
-
-
-def test_many_lines_to_do_are_counted(fmus_here, tmp_path):
-    inputs = {f"u{i}": 'causality="input" | Real start="0" unit="m"' for i in range(40)}
-    write_fmu(tmp_path / "vendor.fmu", FOREIGN | inputs, {})
-    code, out, _ = fmus_here("init", "my file.toml", "--as", "plant=vendor.fmu")
-    lines = out.splitlines()
-    assert (code, sum("TODO:" in line for line in lines)) == (0, 24)
-    more = len(to_do((tmp_path / "my file.toml").read_text("utf-8"))) - 24
-    assert lines[-2:] == [
-        f"    and {more} lines more",
-        "    when no TODO is left: grasp-cosim run 'my file.toml'",
-    ]
 
 
 @pytest.mark.slow

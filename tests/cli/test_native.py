@@ -1,27 +1,21 @@
 """--native and --python: which FMUs a command runs, what it says of them, and the same bytes."""
 
-import errno
 import json
 import os
 import shutil
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import pytest
-from c_compilers import CompilerError, cache
-from grasp_cosim import grasp_system, identify
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus import build as builds
-from grasp_fmus.build import Plan, build_block, planned, shipped_twins
+from grasp_fmus.build import build_block, planned, shipped_twins
 from grasp_fmus.native.targets import here
 from grasp_fmus.shipped import together
 from support.both_engines import needs_compiler
-from support.slow import slow
 
 pytestmark = needs_compiler
 
-ANNOUNCED = "compiling the native FMUs, once for these sources, 00:00\n"
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
 HERE = ("--set", "components.plant.isolation=none")
@@ -55,23 +49,6 @@ def test_a_run_has_the_same_bytes(command, case, scheme):
 def test_at_the_published_step_with_all_electronics(command):
     asked = ("--preset", "bench", "--stop", "0.5")
     assert recorded(command, "a", *asked, "--python") == recorded(command, "b", *asked)
-
-
-@pytest.mark.parametrize("plant", [slow("GripperPlantCompliant"), "GripperPlantMovable"])
-def test_a_swapped_plant_has_its_own_twin(command, fmus, plant):
-    asked = ("--swap", f"plant={fmus / plant}.fmu", *SHORT, "--case", "0")
-    assert recorded(command, "a", *asked, "--python") == recorded(command, "b", *asked)
-    native, python = ran("b")["plant"], ran("a")["plant"]
-    assert native["native_twin_of"] == python["guid"] != native["guid"]
-
-
-@pytest.mark.slow
-def test_in_processes_of_their_own(command):
-    asked = ("--step", "1e-3", "--stop", "0.05")
-    parts = ("plant", "sensor_1", "sensor_2", "controller")
-    apart = [word for p in parts for word in ("--set", f"components.{p}.isolation=process")]
-    native = recorded(command, "b", *asked, "--native", *apart)
-    assert recorded(command, "a", *asked, "--python") == native
 
 
 # ------------------------------------------------------------------ what each command does
@@ -125,34 +102,6 @@ def folder(arguments, number):
     return ("--out", f"out_{number}.csv") if arguments[0] == "sweep" else ()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("source", [(), ("--bench",)], ids=["simulation", "bench"])
-def test_evaluate_has_the_same_files(command, grasp, monkeypatch, source):
-    coarse = grasp.with_experiment(step=2e-3)
-    monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: coarse)
-    code, out, err = command("evaluate", *source, "--out", "native", "--json")
-    assert err == ""
-    assert command("evaluate", *source, "--out", "python", "--json", "--python") == (code, out, "")
-    made, other = (
-        {p.name: p.read_bytes() for p in Path(kind).iterdir()} for kind in ("native", "python")
-    )
-    assert made == other
-    assert "evaluation.json" in made
-
-
-@pytest.mark.slow
-def test_identify_finds_the_same(tmp_path):
-    times = tmp_path / "times.csv"
-    times.write_text(
-        "x_m,case,finger,time\n0.03,2,1,2.1\n0.03,2,2,2.2\n0.03,1,1,1.4\n0.03,1,2,2.7\n"
-    )
-    found = [
-        identify(times, fit=["viscous"], system=grasp_system(native=native)).as_json()
-        for native in (True, False)
-    ]
-    assert found[0] == found[1]
-
-
 def test_a_log_needs_no_fmu_to_run(command):
     assert command("run", *SHORT, "--case", "0", "--out", "run")[0] == 0
     code, _, err = command("identify", "run/signals.csv", "--fit", "coulomb")
@@ -193,42 +142,6 @@ def test_where_nothing_can_be_kept_they_are_compiled_for_this_process(
     assert err.startswith(f"{tmp_path}/file/grasp-cosim: cannot be written to, so each process")
     shipped_twins.cache_clear()
     builds._until_the_end.clear()
-
-
-@pytest.mark.usefixtures("no_compiler")
-def test_a_full_disk_is_one_line_that_names_the_file(command, monkeypatch):
-    def full(*_: Any, **__: Any):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/home/of/GripperPlant.fmu")
-
-    monkeypatch.setattr(builds, "planned", lambda: Plan(2, {}, {}, ""))
-    monkeypatch.setattr(builds, "_build_native", full)
-    code, _, err = command("run", *SHORT, "--native")
-    assert (code, err) == (
-        2,
-        "grasp-cosim: native FMUs cannot be built: /home/of/GripperPlant.fmu: No space left on "
-        "device\n",
-    )
-
-
-def test_what_is_kept_runs_where_nothing_can_be_written(command, monkeypatch):
-    shipped_twins(together("GripperPlant"))
-    shipped_twins.cache_clear()
-    monkeypatch.setattr(cache, "writable", lambda _: None)
-    assert command("run", *SHORT, "--native")[::2] == (0, "")
-
-
-def test_the_first_compilation_is_announced(command, monkeypatch):
-    def slow(*_: Any, **__: Any):
-        raise CompilerError("out of patience")
-
-    monkeypatch.setenv("XDG_CACHE_HOME", str(Path("empty").absolute()))
-    monkeypatch.setattr("grasp_fmus.package.shipped_model", slow)
-    why = "grasp-cosim: native FMUs cannot be built: out of patience\n"
-    monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
-    for option, line in (("--quiet", ""), ("--native", ANNOUNCED)):
-        shipped_twins.cache_clear()
-        assert command("run", *SHORT, "--native", option)[2] == line + why
-    shipped_twins.cache_clear()
 
 
 # ------------------------------------------------------------------ whose FMUs, and where

@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from grasp_cosim import InputError, System, simulate
+from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_fmus import package
@@ -85,24 +85,6 @@ def test_without_a_compiler_one_line_says_what_brings_one(other_machine, foreign
 
 
 @needs_compiler
-def test_from_python_too(foreign, grasp):
-    here = simulate(System.load(SYSTEM, foreign), step=1e-3, stop=0.3)
-    there = simulate(grasp, step=1e-3, stop=0.3)
-    assert all((here[name] == there[name]).all() for name in there.signals)
-
-
-@needs_compiler
-def test_what_has_no_twin_does_not_load(foreign):
-    system = System.load(SYSTEM, foreign).swap("plant", foreign / "SpringPlant.fmu")
-    with pytest.raises(InputError) as error:
-        simulate(system, stop=0.1)
-    assert str(error.value) == (
-        f"plant: {foreign}/SpringPlant.fmu {LACKS}; ask the vendor for an FMU with a binary "
-        f"for {HERE}, or make a native one of its block: grasp-cosim build --native"
-    )
-
-
-@needs_compiler
 @pytest.mark.slow
 def test_build_makes_native_ones_too(command, tmp_path, monkeypatch):
     folder = tmp_path / "pythonfmu"
@@ -121,12 +103,3 @@ def test_build_makes_native_ones_too(command, tmp_path, monkeypatch):
     code, _, err = command("run", *swap)
     assert code == 0
     assert err == ""
-
-
-def test_inspect_tells_the_processor(other_machine, foreign):
-    found = json.loads(other_machine("inspect", foreign / "GripperPlant.fmu", "--json")[1])
-    assert (found["platforms"], found["this_machine"]) == (["linux64 (RISC-V)", "win64"], HERE)
-    code, out, _ = other_machine("inspect", foreign / "GripperPlant.fmu")
-    assert code == 1
-    assert "GripperPlant.so is RISC-V, 64 bit; must be " in out
-    assert "or as a native FMU: grasp-cosim build --native" in out

@@ -5,7 +5,7 @@ import zipfile
 import pytest
 from grasp_cosim.inspection.loading import examine
 from support.native_fmus import build, needs_gcc
-from support.refused import BINARIES, KINDS, changed, linked, refused
+from support.refused import BINARIES, KINDS, changed, refused
 
 SYSTEM = """connections = []
 [experiment]
@@ -89,63 +89,6 @@ def test_a_binary_for_others(name, command, tmp_path):
     assert code == 0
     assert what in err
     one_line(command("run", "s.ssp"), what, ask)
-
-
-@pytest.mark.slow
-def test_a_candidate_with_a_binary_for_others(command, fmus, tmp_path):
-    changed(
-        fmus / "GripperPlant.fmu",
-        tmp_path / "x.fmu",
-        lambda files: {n: d for n, d in files.items() if "linux" not in n},
-    )
-    for isolation in ("none", "process"):
-        run = command(
-            "qualify",
-            "x.fmu",
-            "--as",
-            "plant",
-            "--set",
-            f"components.plant.isolation={isolation}",
-            "--python",
-        )
-        one_line(run, "x.fmu: has a binary for win64 only", "ask the vendor for an FMU with a bin")
-
-
-@pytest.mark.slow
-@needs_gcc
-def test_what_an_fmu_lacks_is_a_warning_where_this_host_has_it(command, tmp_path):
-    findings = found(linked(tmp_path))
-    assert findings["trial"].status == "ok", findings
-    libraries = findings["libraries"]
-    assert libraries.status == "warning"
-    assert "tanh" in libraries.text
-    assert "this host has them" in libraries.text
-    assert command("inspect", "--load", "x.fmu")[0] == 0
-    (tmp_path / "s.toml").write_text(SYSTEM)
-    assert command("run", "s.toml")[0] == 0
-
-
-@pytest.mark.slow
-@needs_gcc
-def test_what_an_fmu_lacks_is_a_problem_where_nobody_has_it(command, tmp_path):
-    findings = found(linked(tmp_path, missing=True))
-    assert findings["libraries"].status == findings["trial"].status == "problem"
-    assert "licence_check" in findings["trial"].text
-    assert findings["trial"].fix is None  # a name alone is no want of a licence
-    (tmp_path / "s.toml").write_text(SYSTEM)
-    for more in ((), ("--set", "components.a.isolation=process")):
-        run = command("run", "s.toml", *more)
-        one_line(run, "undefined symbol: licence_check", "linux64/")
-        assert "it needs a licence" not in run[2]
-
-
-@pytest.mark.slow
-@needs_gcc
-def test_an_fmu_of_3_0_for_co_simulation_is_fine(command, tmp_path):
-    """Also one without the functions of the other kinds, as run takes it."""
-    findings = found(build(tmp_path, "x", "3.0"))
-    assert {findings[check].status for check in ("fmu", "binary", "libraries", "trial")} == {"ok"}
-    assert command("inspect", "--load", "x.fmu")[0] == 0
 
 
 @pytest.mark.slow

@@ -2,14 +2,12 @@
 
 import json
 import sys
-from dataclasses import replace
 
 import pytest
 from grasp_cosim import cli, simulate
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.page import page_html
-from report.runs import grasp_run, ring_run, write_run
-from report.timings import paced
+from report.runs import grasp_run, write_run
 
 
 @pytest.fixture
@@ -43,27 +41,6 @@ def test_json_and_another_place(folder, tmp_path, capsys):
         "pictures": [str(page.parent / "grasp.png")],
     }
     assert sorted(p.name for p in folder.iterdir()) == ["run.json", "signals.csv"]
-
-
-def test_a_system_that_is_no_grasp_has_a_picture_of_its_signals(tmp_path):
-    write_run(tmp_path / "ring", ring_run(["a", "b"]))
-    assert cli.main(["report", str(tmp_path / "ring")]) == 0
-    assert {p.name for p in (tmp_path / "ring").iterdir()} == {
-        "report.html", "run.json", "signals.csv", "signals.png",
-    }  # fmt: skip
-
-
-@pytest.mark.slow
-def test_a_paced_run_has_a_picture_of_its_timing_too(tmp_path, capsys):
-    run = replace(ring_run(["a", "b"]), timing=paced(steps=50, hiccups=2))
-    write_run(tmp_path / "ring", run)
-    assert cli.main(["report", str(tmp_path / "ring"), "--json"]) == 0
-    pictures = [tmp_path / "ring" / name for name in ("signals.png", "timing.png")]
-    assert json.loads(capsys.readouterr().out)["pictures"] == [str(p) for p in pictures]
-    assert all(p.read_bytes().startswith(b"\x89PNG") for p in pictures)
-    html = (tmp_path / "ring" / "report.html").read_text("utf-8")
-    assert html == page_html(run)
-    assert "2 of 50 steps (4 %) ended after their period" in html
 
 
 def test_without_matplotlib_there_is_the_page_alone(folder, monkeypatch, capsys):

@@ -1,14 +1,12 @@
 """run --input: columns for inputs of a system file, of an archive and of a swapped FMU."""
 
 import json
-import zipfile
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, load_run, simulate
-from grasp_cosim.comparison.qualify import qualify
+from grasp_cosim import System, load_run
 from grasp_cosim.ssp.to_archive import write_ssp
-from support.native_fmus import build, needs_gcc
+from support.native_fmus import needs_gcc
 from support.stimuli import driven
 
 pytestmark = needs_gcc
@@ -49,36 +47,6 @@ def test_what_is_wrong_is_one_line(command, tmp_path):
         assert said in err.splitlines()[-1]
 
 
-def test_an_fmu_that_is_swapped_in(command, tmp_path):
-    """The file has no a.u_Real before, and the new FMU no other source for it."""
-    system = driven(tmp_path, "time,a.u_Integer\n0,3\n")
-    system.write_text(
-        system.read_text()
-        .replace("native.fmu", "bare.fmu")
-        .replace("[components.a]", "[components.b]\nfmu = 'native.fmu'\nvalues = { u_Real = 1, "
-                 "u_Integer = 1, u_Boolean = false, u_Enumeration = 1, u_String = '' }\n"
-                 "[components.a]")
-        .replace("values = { u_Real = 0, ", "values = { ")
-    )  # fmt: skip
-    build(tmp_path, "native", "2.0")
-    with zipfile.ZipFile("native.fmu") as whole, zipfile.ZipFile("bare.fmu", "w") as bare:
-        for name in whole.namelist():
-            data = whole.read(name)
-            if name == "modelDescription.xml":
-                data = data.replace(b'"u_Real" valueReference="100" causality="input"',
-                                    b'"u_Real" valueReference="100" causality="local"')  # fmt: skip
-                data = data.replace(b'<Real start="0"/>', b"<Real/>", 1)
-            bare.writestr(name, data)
-    Path("drive.csv").write_text("time,a.u_Integer,a.u_Real\n0,3,7\n", "utf-8")
-    code, _, err = command("run", "driven.toml", "--input", "drive.csv")
-    assert code == 2
-    assert "column 3, a.u_Real: no input 'a.u_Real'" in err
-    swap = ("--swap", "a=native.fmu")
-    code, _, err = command("run", "driven.toml", "--input", "drive.csv", *swap, "--out", "out")
-    assert code == 0, err
-    assert last("out") == 7.0
-
-
 def test_a_misspelt_column_of_an_input_without_a_source(command, tmp_path):
     text = driven(tmp_path, TEXT).read_text("utf-8")
     (tmp_path / "driven.toml").write_text(text.replace("values = { u_Real = 0, ", "values = { "))
@@ -103,12 +71,3 @@ def test_an_archive_whose_input_would_keep_its_start_value(command, tmp_path):
     Path("drive.csv").write_text("time,a.u_Real\n0,5\n", "utf-8")
     assert command("run", "a.ssp", "--input", "drive.csv", "--out", "out")[0] == 0
     assert last("out") == 5.0
-
-
-@pytest.mark.slow
-def test_a_qualification_is_driven_too(tmp_path):
-    path = driven(tmp_path, TEXT, more=INPUT)
-    build(tmp_path, "other", "2.0", {"u_Real": "N"})
-    assert qualify(System.load(path), "a", tmp_path / "other.fmu").qualified
-    result = simulate(System.load(path))
-    assert result["a.y_Real"][-1] == pytest.approx(9.0)

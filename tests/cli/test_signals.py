@@ -7,7 +7,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -23,9 +22,6 @@ from support.slow import slow
 pytestmark = pytest.mark.usefixtures("ctrl_c")
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
-
-
-Start = Callable[..., subprocess.Popen[str]]
 
 
 @pytest.fixture
@@ -199,35 +195,3 @@ def test_a_session_leaves_ctrl_c_as_it_was(grasp):
             signal.raise_signal(signal.SIGINT)
         assert other.step(3)  # it came outside of an FMU
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-HALF_IMPORTED = """
-import atexit, os, signal, sys
-from grasp_cosim.base import interruption
-from grasp_cosim.cli import entry
-from grasp_cosim.cli.group import cli
-
-class Crash:
-    def __del__(self, abort=os.abort):
-        abort()
-
-def main(*arguments, **options):
-    atexit.register(os.write, 2, b"cleaned up")
-    interruption.command()
-    global kept
-    kept = Crash()
-    signal.raise_signal(int(sys.argv[1]))
-
-cli.main = main
-entry()
-"""
-
-
-@pytest.mark.parametrize("how", CODES)
-def test_an_interrupted_command_does_not_crash_at_its_end(how):
-    """As libraries do that were interrupted while they were imported."""
-    done = subprocess.run(
-        [sys.executable, "-c", HALF_IMPORTED, str(int(how))], capture_output=True, check=False
-    )
-    assert (done.returncode, done.stdout) == (CODES[how], b"")
-    assert done.stderr == b"grasp-cosim: interrupted\ncleaned up"

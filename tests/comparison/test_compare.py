@@ -9,10 +9,7 @@ from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.words import as_json, as_text
 from grasp_cosim.grasp.presets import SYSTEM
-from hypothesis import given
-from hypothesis import strategies as st
 from report.runs import grasp_run, write_run
-from support.examples import examples
 
 GAP = "plant.gap[1]"
 
@@ -159,22 +156,6 @@ def test_a_band_for_nothing_is_refused(folders):
     bands = Bands("own.toml", signals={"plant.gp*": Given(absolute=1.0)})
     with pytest.raises(InputError, match=r"own.toml: \[signals\]: nothing is called 'plant.gp\*'"):
         folders(grasp_run(), grasp_run(), bands=bands)
-
-
-@pytest.mark.slow
-@examples(25)
-@given(by=st.floats(-1e-2, 1e-2), width=st.floats(1e-6, 1e-2))
-def test_an_offset_is_inside_just_where_it_is_no_wider_than_its_band(tmp_path_factory, by, width):
-    folder = tmp_path_factory.mktemp("offset")
-    rows = [(t, 0.1) for t in np.linspace(0.0, 1.0, 11).tolist()]
-    for name, offset in (("a", 0.0), ("b", by)):
-        lines = [f"{t!r},{v + offset!r}" for t, v in rows]
-        (folder / f"{name}.csv").write_text("\n".join(["time,x.y", *lines]))
-    bands = Bands(signals={"x.y": Given(absolute=width)})
-    found = compare(folder / "a.csv", folder / "b.csv", bands=bands)
-    assert found.alike == (abs((0.1 + by) - 0.1) <= width)
-    back = compare(folder / "b.csv", folder / "a.csv", bands=bands)
-    assert back.signals[0].deviation == found.signals[0].deviation
 
 
 def test_a_run_that_did_not_come_to_its_end_is_not_alike(folders):

@@ -15,9 +15,6 @@ from grasp_cosim.comparison.words import (
 from grasp_cosim.comparison.words import (
     qualification_text as as_text,
 )
-from support.cases import CASES
-
-OF_OBJECT = ("object_tilt", "toppled", "squeeze", "damaged")
 
 NUMERICS = ("every second sample", "step 0.002 s", "scheme jacobi")
 
@@ -199,59 +196,6 @@ def test_a_blocked_candidate_is_not_run(short, fmus):
     blocked = {d["variable"] for d in report["differences"] if d["severity"] == "blocks"}
     assert {"force[1]", "gap[2]", "velocity[1]"} <= blocked
     assert "blocks  missing" in as_text(found)
-
-
-@pytest.mark.slow
-def test_metrics_of_the_object_that_only_one_of_two_plants_has(short, fmus):
-    """The box that moves, then the rigid object, tell of no squeeze: nothing to compare."""
-    soft = short.swap("plant", fmus / "GripperPlantCompliant.fmu")
-    for system, plant in ((short, "Compliant"), (soft, ""), (soft, "Movable")):
-        found = qualify(system, "plant", fmus / f"GripperPlant{plant}.fmu", isolation="none")
-        assert len(found.metrics) + len(found.absent) == 19
-        assert not any(c.name in OF_OBJECT for c in found.metrics)
-    assert set(found.uncompared) == {"plant.squeeze", "plant.damaged"}
-
-
-@pytest.mark.slow
-def test_a_plant_that_lacks_what_metrics_want(short, tmp_path):
-    plant = replace(short.component("plant", ""), rename={"elsewhere": "object_position"})
-    found = qualify(short, "plant", plant, isolation="none")
-    assert not found.qualified
-    assert "to judge it without them: --bands with '*' = { absolute = inf }" in as_text(found)
-    (tmp_path / "bands.toml").write_text('[metrics]\n"*" = { absolute = inf }\n', "utf-8")
-    bands = read_bands(tmp_path / "bands.toml")
-    assert qualify(short, "plant", plant, isolation="none", bands=bands).qualified
-
-
-def test_damage_is_a_difference(grasp, fmus, altered):
-    """A cup of a tenth of the limit takes damage from the impact of Case 0."""
-    fmu = altered(
-        "GripperPlantCompliant",
-        "gripper_plant/compliant.py",
-        "),\n    ] = 0.01",
-        "),\n    ] = 0.001",
-    )
-    cup = grasp.swap("plant", fmus / "GripperPlantCompliant.fmu").with_values(dict(CASES[0]))
-    found = qualify(cup.with_experiment(step=1e-3, stop=0.3), "plant", fmu, isolation="none")
-    metrics = by_name(found.metrics)
-    assert len(metrics) + len(found.absent) == 21
-    assert (metrics["damaged"].original, metrics["damaged"].candidate) == (0.0, 1.0)
-    assert [c.name for c in found.outside] == ["plant.damaged", "damaged"]
-
-
-@pytest.mark.slow
-def test_a_grasp_with_another_stabilisation_of_the_contact(grasp, altered):
-    """The contact times stay, the contact force shows it."""
-    before = "beta * beta * (s"
-    fmu = altered(
-        "GripperPlant", "gripper_plant/contact.py", before, before.replace("b", "1.5 * b", 1)
-    )
-    found = qualify(grasp.with_experiment(step=4e-4, stop=2.0), "plant", fmu, isolation="none")
-    assert not found.qualified
-    assert any(c.name.startswith("plant.contact") for c in found.outside)
-    metrics = by_name(found.metrics)
-    assert metrics["time_to_contact[1]"].inside
-    assert metrics["time_to_contact[1]"].original == pytest.approx(1.887, abs=2e-3)
 
 
 def test_json_holds_all_of_it(heavy, heavier):

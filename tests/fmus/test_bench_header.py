@@ -21,10 +21,8 @@ from grasp_fmus.link.message import (
     END,
     FAILED,
     HEAD,
-    HELLO,
     INITIALISE,
     LONGEST_STEP,
-    OTHER_VERSION,
     OUTPUTS,
     REFUSE,
     STEP,
@@ -208,14 +206,6 @@ def test_prefix(name, prefix):
     assert c_prefix(name) == prefix
 
 
-@pytest.mark.parametrize("which", ["input", "parameter", "output", "nothing"])
-def test_a_model_with_one_side_only(tmp_path, which):
-    signature = Signature(tuple(v for v in EVERY_KIND.variables if v.causality == which))
-    compile_c(
-        tmp_path, bench_header("M", signature), "M", '#include "m.h"\nint main(void) {return 0;}'
-    )
-
-
 STARTS = {
     "u.real": 0.1, "u.integer": -(2**31), "u.boolean": True, "p.real": -5e-324,
     "p.integer": 2**31 - 1, "y.real": 4.0,
@@ -387,42 +377,6 @@ def test_no_value_is_taken_from_what_is_malformed(driver, what):
     assert (records[2].event, records[2].answer, records[2].time) == (NOTHING, b"", 0.0)
     assert (records[3].event, records[3].behind) == (DO_STEP, 0.0)
     assert counters == PeerCounters(steps=2, initialisations=1, malformed=1)
-
-
-@pytest.mark.parametrize("version", [1, 3, 65535])
-def test_another_version_is_refused_by_its_name(driver, version):
-    """By both peers, in a REFUSE that any version reads; nothing else of it is looked at."""
-    received = [session().pack(kind, cookie=7, version=version) for kind in (HELLO, STEP, END)]
-    reference = Reference()
-    expected = [reference.receive(datagram, 0) for datagram in received]
-    records, counters = linked(driver, [(0, datagram) for datagram in received])
-    assert [(r.event, r.answer) for r in records] == expected
-    opened = Sealer().open(records[0].answer)
-    assert isinstance(opened, Message)
-    assert opened[:2] == (REFUSE, OTHER_VERSION)
-    assert (opened.version, opened.session, opened.cookie) == (VERSION, 99, 7)
-    assert counters == reference.peer.counters == PeerCounters(other_version=3)
-
-
-def test_another_interface_is_named(driver):
-    lines = EVERY_KIND.text.encode().splitlines(keepends=True)
-    others = [
-        b"".join(lines[:3]), b"".join([*lines, b"output\tReal\tm\tz\n"]), b"", b"\n",
-        b"".join([*lines[:2], b"input\tReal\tN\tx\n", *lines[2:]]), b"".join(lines)[:-2],
-        b"x" * 300,
-    ]  # fmt: skip
-    reference = Reference()
-    received = [session().pack(HELLO, body=o + bytes(200), interface=bytes(16)) for o in others]
-    expected = [reference.receive(datagram, 0) for datagram in received]
-    records, counters = linked(driver, [(0, datagram) for datagram in received])
-    said = [r.answer[HEAD.size :] for r in records]
-    assert said[:2] == [
-        b"the proxy has no more, the peer parameter Boolean - p.boolean",
-        b"the proxy has output Real m z, the peer no more",
-    ]
-    assert said[4].startswith(b"the proxy has input Real N x, the peer input Boolean - u.bool")
-    assert said == [answer[HEAD.size :][:256] for _, answer in expected]
-    assert counters.foreign == len(others)
 
 
 def test_lost_requests_are_told(driver):
@@ -659,21 +613,6 @@ def test_the_plant_in_c_to_the_last_bit(target):
             seen.add((expected[8], expected[9]))
     assert seen >= {(False, False), (True, True)}
     assert expected[8:10] == [False, False]
-
-
-@pytest.mark.parametrize(("lost", "made_up"), [(3.0, [1, 1, 1]), slow(2.25, [1, 1, 0.25])])
-def test_steps_lost_on_the_way_are_made_up_for(target, lost, made_up):
-    """In steps of the length that is asked for; one long one would meet the object otherwise."""
-    p, u, h = rigid.Params(), rigid.Inputs((-2.3, 1.9)), 2**-4
-    x = rigid.initial_state(p, u)
-    at_once = rigid.step(p, rigid.step(p, x, u, lost * h), u, h)
-    for part in (*made_up, 1):
-        x = rigid.step(p, x, u, part * h)
-    assert rigid.outputs(p, x, u) != rigid.outputs(p, at_once, u)
-    with Target(target) as bench:
-        bench.begin()
-        outputs = bench.proxy.step(lost * h, h, bench.values(u.force))
-        assert outputs == flat(rigid.outputs(p, x, u))
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,6 @@
 """A proxy with a peer that answers as it is told, by the clock and the network of the test."""
 
-import errno
 import math
-import os
-import resource
 import struct
 from random import Random
 
@@ -27,7 +24,7 @@ from grasp_fmus.link.message import (
     Message,
 )
 from grasp_fmus.proxy import shared_signature
-from support.native_proxies import Host, connected, hosted, on_each_version
+from support.native_proxies import connected, hosted
 from support.ports import kept_port
 from support.scripted_peer import (
     SIGNATURE,
@@ -45,8 +42,6 @@ from support.scripted_peer import (
     send_kept_and_answer,
     send_kept_and_miss,
 )
-
-__all__ = ("on_each_version",)
 
 START = [3.0, 3, False]
 """The outputs to the start values."""
@@ -215,24 +210,6 @@ def test_values_that_are_refused(name, value, reason):
         line = host.refused(lambda: host.set(**{name: value}))
         assert line.startswith(f"proxy, t = 0 s: {reason}")
         assert host.get(name) == before
-
-
-def test_a_host_with_more_files_open_than_can_be_watched():
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if hard != resource.RLIM_INFINITY and hard < 1200:
-        pytest.skip(f"NO {hard} files: must be 1200")
-    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1200), hard))
-    opened = [os.open(os.devnull, os.O_RDONLY)]
-    with hosted(9) as host:
-        try:
-            while opened[-1] < 1024:
-                opened.append(os.dup(opened[0]))
-            line = host.refused(host.enter)
-        finally:
-            for descriptor in opened:
-                os.close(descriptor)
-            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-    assert line.endswith("127.0.0.1:9: no connection: Too many open files")
 
 
 # Keys
@@ -496,51 +473,6 @@ def test_a_flood_does_not_put_off_the_deadline():
         assert host.get("proxy.missed") == 1
         assert 0 < host.get("proxy.rejected") <= looks
         clock.tick = 0
-
-
-def down(datagram):
-    """A cable was pulled."""
-    raise OSError(errno.ENETUNREACH, "Network is unreachable")
-
-
-@pytest.mark.parametrize("at", [HELLO, INITIALISE, STEP])
-def test_a_network_that_is_down_is_a_peer_that_is_silent(at):
-    calls = {
-        HELLO: Host.enter, INITIALISE: Host.outputs, STEP: Host.step,
-    }  # fmt: skip
-    how = {"connect_timeout": 0.1, "timeout": 0.1, "misses_tolerated": 0, "on_loss": "stop"}
-    with ScriptedPeer() as peer, hosted(peer.port, peer.clock, **how) as host:
-        if at == STEP:
-            host.initialise()
-        elif at == INITIALISE:
-            host.enter()
-        host.intercept = down
-        peer.clock.tick = 40_000_000
-        line = host.refused(calls[at], host)
-        assert " within 0.1 s (Network is unreachable)" in line
-        peer.clock.tick = 0
-
-
-@pytest.mark.parametrize(
-    ("reports", "state", "timeout", "tick"), [(1, 1, 2.0, 50_000_000), (2, 3, 0.001, 400_000)]
-)
-def test_a_send_that_only_reported_an_earlier_datagram_is_made_again(reports, state, timeout, tick):
-    """Once, as a report is of one datagram; the peer gets it once."""
-    sent = []
-
-    def reporting(datagram):
-        sent.append(datagram[6])
-        if len(sent) <= reports:
-            raise OSError(errno.ECONNREFUSED, "Connection refused")
-
-    with connected(misses_tolerated=0, timeout=timeout) as (host, peer):
-        peer.clock.tick = tick  # so that it does not wait for ever in vain
-        host.intercept = reporting
-        host.step()
-        peer.clock.tick = 0
-        assert sent == [STEP, STEP]
-        assert host.state() == state
-        assert all("no answer within 0.001 s; proxy.on_loss" in line for line in host.log())
 
 
 # All of that in any order

@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_controller import contact_force, impact_reduction, series, simultaneous_contact
 from grasp_cosim.grasp.metrics import FINGERS, first_contact
@@ -19,9 +18,6 @@ from support.direct import closed_loop
 from support.examples import examples
 from support.slow import slow
 
-Array = npt.NDArray[np.float64]
-
-CASES = (0, 1, 2)
 SLOW_CASES = (0, slow(1), slow(2))
 STEP = 1e-4
 """s; the published controller runs at 10 kHz."""
@@ -102,15 +98,6 @@ def test_the_reference_gives_the_known_grasps(case, times, speeds):
     assert solution.closing_speed == pytest.approx(speeds, rel=0.01)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_the_reference_settles_with_the_stiffness_over_half_the_width(case):
-    g = Grasp(case=case, x_m=OFF_CENTRE)
-    solution = solve(g, 5.0, to_the_end=True)
-    settled = 0.5 * g.K_i * g.W
-    assert solution.contact_force == pytest.approx((settled, -settled), abs=1e-4)
-    assert solution.target == pytest.approx(g.x_m, abs=1e-6)
-
-
 @pytest.mark.parametrize("x_m", [0.0, OFF_CENTRE, 0.05])
 @pytest.mark.parametrize("case", SLOW_CASES)
 def test_contact_times(case, x_m):
@@ -127,17 +114,6 @@ def test_contact_times_err_in_proportion_to_the_step(case):
     for finger in errors.T:
         slope, _ = np.polyfit(np.log(steps), np.log(np.abs(finger)), 1)
         assert 0.8 <= slope <= 1.2
-
-
-@pytest.mark.parametrize("case", SLOW_CASES)
-def test_contact_times_tend_to_the_reference(case):
-    """Without the part that falls with the step nothing is left: the equations are the same.
-
-    What the extrapolation leaves is of second order in the step, here below 0.1 us.
-    """
-    g = Grasp(case=case, x_m=OFF_CENTRE)
-    limit = 2.0 * _contact_times(g, STEP) - _contact_times(g, 2.0 * STEP)
-    assert limit == pytest.approx(_reference_times(g), abs=1e-6)
 
 
 @pytest.mark.parametrize("case", SLOW_CASES)

@@ -1,19 +1,14 @@
 """A plant of another vendor in mm, mm/s and mN has the metrics of the one in SI."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from grasp_cosim import System, load_run, simulate
+from grasp_cosim import System, simulate
 from grasp_cosim.comparison.qualify import qualify
-from grasp_cosim.grasp.identification.identification import chosen
-from grasp_cosim.grasp.identification.log import identify_from_log
 from grasp_cosim.grasp.presets import SYSTEM, start_in_si, with_case, with_si_values
 from grasp_cosim.grasp.published.grasps import settled_force
-from grasp_cosim.grasp.scene import grasp_scene
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.recording.load import load_log
 from grasp_cosim.recording.result import UNITS
 from support.milli import milli_plant
 from support.packages import needs_pythonfmu
@@ -113,13 +108,6 @@ def test_signals_and_their_units_stay_as_recorded(result, original):
     assert result.by_role["plant.gap[1]"] == pytest.approx(original["plant.gap[1]"], abs=1e-12)
 
 
-def test_the_energy_of_the_exchange_is_in_joule(result, original):
-    for j in (1, 2):
-        name = f"plant.exchange_energy[{j}]"
-        assert result.units[name] == "J"
-        np.testing.assert_allclose(result[name], original[name], rtol=1e-9, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     ("kind", "named", "factors"),
     [("named", False, False), ("none", True, False), ("none", True, True)],
@@ -137,33 +125,6 @@ def test_a_plant_whose_units_are_names_or_named_in_the_file(
         np.testing.assert_allclose(found[name], original[name], rtol=1e-9, atol=1e-15)
 
 
-def test_a_run_read_back_has_the_same_metrics(result, original, tmp_path):
-    result.to_csv(tmp_path / "signals.csv")
-    result.to_json(tmp_path / "run.json")
-    check(load_run(tmp_path).metrics, original.metrics)
-    table = json.loads((tmp_path / "run.json").read_text("utf-8"))
-    del table["to_si"]  # as earlier versions wrote it
-    (tmp_path / "run.json").write_text(json.dumps(table), "utf-8")
-    check(load_run(tmp_path).metrics, original.metrics)
-
-
-def test_the_scene_gets_what_it_draws_in_si(result, original):
-    ours, theirs = grasp_scene(original), grasp_scene(result)
-    assert ours is not None
-    assert theirs is not None
-    assert ours.state["toSi"] == {}
-    milli = {"factor": 1e-3, "offset": 0.0}
-    expected = {
-        f"plant.{name}[{j}]": milli
-        for name in ("position", "gap", "velocity", "contact_force")
-        for j in (1, 2)
-    }
-    assert theirs.state["toSi"] == expected
-    assert theirs.state["actuator"] == ours.state["actuator"]
-    for here, there in zip(ours.state["contacts"], theirs.state["contacts"], strict=True):
-        assert there["t"] == pytest.approx(here["t"], rel=1e-9)
-
-
 @pytest.mark.slow
 def test_the_plant_may_take_the_place_of_the_original(grasp, plants, original):
     fast = grasp.with_experiment(STEP, STOP)
@@ -179,14 +140,6 @@ def test_the_plant_may_take_the_place_of_the_original(grasp, plants, original):
     assert qualify(fast, "plant", bare, units=named, isolation="none").qualified
 
 
-@pytest.mark.slow
-def test_the_original_may_take_the_place_of_the_plant(defined, fmus, original):
-    fast = defined.with_experiment(STEP, STOP)
-    swapped = fast.swap("plant", fmus / "GripperPlant.fmu")
-    check(simulate(swapped, metrics=[closest]).metrics, original.metrics)
-    assert qualify(fast, "plant", fmus / "GripperPlant.fmu", isolation="none").qualified
-
-
 def test_parameters_are_converted_to_si_and_from_it(defined, grasp):
     assert start_in_si(defined, "plant.object_width") == pytest.approx(0.07, rel=1e-15)
     assert settled_force(defined) == pytest.approx(settled_force(grasp), rel=1e-15)
@@ -200,30 +153,6 @@ def test_a_parameter_without_a_unit_is_in_si(defined):
     bare = replace(plant, fmu=plant.fmu.parents[1] / "none/MilliPlant.fmu")
     others = [c for c in defined.components if c.name != "plant"]
     assert start_in_si(replace(defined, components=(bare, *others)), "plant.object_width") == 70.0
-
-
-@pytest.mark.slow
-def test_friction_from_a_log_in_mm(result, original, grasp, tmp_path):
-    fits = []
-    for name, run in (("si", original), ("mm", result)):
-        run.to_csv(tmp_path / name / "signals.csv")
-        run.to_json(tmp_path / name / "run.json")
-        log = load_log(tmp_path / name / "signals.csv")
-        _, fit = identify_from_log(grasp, log, chosen(("viscous",), ("viscous",), "test"), name)
-        fits.append([e.value for e in fit.estimates])
-    assert fits[1] == pytest.approx(fits[0], rel=1e-6, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_a_sweep_has_the_metrics_in_si(command, fmus, plants, tmp_path, original):
-    written(tmp_path / "mm.toml", fmus, plants / "defined/MilliPlant.fmu")
-    """And takes its values in SI, though the plant has them in mm."""
-    vary = ("--vary", "plant.initial_object_position=0.03", "--step", "1e-3")
-    code, out, _ = command("sweep", "mm.toml", *vary, "--json", "--workers", "1")
-    metrics = json.loads(out)["metrics"]
-    assert code == 0
-    expected = original.metrics["impact_velocity"][0]
-    assert metrics["impact_velocity[1]"]["mean"] == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """The published grasp with components of other names: roles say who is the plant."""
 
-import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -108,15 +107,6 @@ def test_a_run_read_back_is_the_result_it_was(original, fmus, tmp_path):
     assert (tmp_path / "back.png").read_bytes() == (tmp_path / "result.png").read_bytes()
 
 
-def test_what_a_run_lacks_is_read_back_too(gripper, tmp_path):
-    result = simulate(gripper, step=1e-3, stop=0.01)
-    result.to_csv(tmp_path / "signals.csv")
-    result.to_json(tmp_path / "run.json")
-    assert json.loads((tmp_path / "run.json").read_text())["missing_metrics"] == list(LOST)
-    assert load_run(tmp_path).measured.missing == LOST
-    assert load_run(tmp_path).view.stem == "signals"
-
-
 @given(
     st.lists(
         st.sampled_from(["plant", "controller", "sensor_1", "gripper", "a b", "x", "plant2", "p"]),
@@ -164,44 +154,7 @@ def test_a_preset_of_the_file_comes_before_the_built_in_one(grasp, fmus, tmp_pat
     assert set(built_in_presets()) == {"bench", *(f"case_{n}" for n in CASES)}
 
 
-def test_without_roles_a_case_says_what_it_does_not_find(fmus, tmp_path):
-    names = {"controller": "brain"}
-    system = System.load(written(fmus, tmp_path, names, roles=False, presets=False))
-    with pytest.raises(InputError) as caught:
-        with_case(system, 0)
-    assert str(caught.value) == (
-        "[presets.case_0] of grasp.toml: controller.simultaneous_contact.enabled: no component "
-        "'controller'; valid: plant, sensor_1, sensor_2, brain"
-    )
-
-
 # ------------------------------------------------------------------------- commands
-
-
-def enabled(out, layer):
-    run = json.loads(Path(out, "run.json").read_text())
-    return run["components"]["brain"]["values"].get(f"{layer}.enabled")
-
-
-@pytest.mark.parametrize("presets", [True, False], ids=["own presets", "built-in presets"])
-def test_run_takes_presets_of_a_system_with_roles(command, fmus, tmp_path, presets):
-    path = written(fmus, tmp_path, NAMES, roles=True, presets=presets)
-    short = ("run", path, "--step", "1e-3", "--stop", "0.01")
-    for options, expected in (
-        (("--case", "1"), (False, True)),
-        (("--preset", "case_1"), (False, True)),
-        (("--preset", "case_2", "--case", "0"), (False, False)),
-    ):
-        assert command(*short, *options, "--out", "out")[0] == 0
-        layers = ("simultaneous_contact", "impact_reduction")
-        assert tuple(enabled("out", layer) for layer in layers) == expected
-    assert command(*short, "--preset", "bench", "--case", "1", "--out", "out")[0] == 0
-    values = json.loads(Path("out/run.json").read_text())["components"]
-    assert values["right"]["values"]["noise.enabled"] is True
-    assert values["gripper"]["values"]["friction.coulomb[2]"] == pytest.approx(1.34, abs=0.01)
-    code, _, err = command(*short, "--preset", "case_9")
-    assert (code, err.count("\n")) == (2, 1)
-    assert "no preset 'case_9'; did you mean " in err
 
 
 def test_run_says_why_there_are_no_metrics(command, fmus, tmp_path):
@@ -274,45 +227,6 @@ def test_a_user_s_metrics_are_wherever_those_of_the_grasp_are(command, own, tmp_
     assert back.metric_units == run["metric_units"]
     expected = np.ptp(back["plant.position[1]"])
     assert back.metrics["reach"][0] == expected > 0.0
-
-
-@pytest.mark.slow
-def test_a_user_s_metrics_are_columns_of_a_sweep(command, own, tmp_path):
-    vary = ("--case", "0", "--vary", "plant.finger_mass[1]=0.5,2")
-    short = ("--step", "1e-3", "--stop", "0.05", "--metrics", own)
-    code, out, _ = command("sweep", *vary, *short, "--workers", "1", "--json")
-    assert code == 0
-    assert json.loads(out)["metrics"]["reach[1]"]["runs"] == 2
-    with Path("sweep.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert float(rows[0]["reach[1] [m]"]) > float(rows[1]["reach[1] [m]"]) > 0.0
-    assert [row["lazy"] for row in rows] == ["false", "false"]
-    assert not any(name.startswith("heat") for name in rows[0])
-    code, _, err = command("sweep", *vary, *short, "--metrics", own, "--out", "other.csv")
-    assert (code, err.count("\n")) == (2, 1)
-    assert "metric 'reach': is defined twice" in err
-
-
-@pytest.mark.slow
-def test_a_user_s_metrics_have_bands_in_a_qualification(command, own, fmus, tmp_path):
-    short = (
-        "qualify", fmus / "GripperPlant.fmu", "--as", "plant", "--step", "1e-3", "--stop", "0.05",
-        "--set", "components.plant.isolation=none", "--metrics", own,
-    )  # fmt: skip
-    code, out, _ = command(*short, "--json")
-    found = {m["name"]: m for m in json.loads(out)["metrics"]}
-    assert code == 0
-    assert (found["reach[1]"]["unit"], found["lazy"]["unit"]) == ("m", None)
-    assert found["reach[1]"]["original"] == found["reach[1]"]["candidate"] > 0.0
-    assert "heat" not in found
-    assert "reach[1]" in json.loads(out)["bands"]["metrics"]
-    bands = tmp_path / "bands.toml"
-    bands.write_text("[metrics]\nreach = { absolute = 0.125 }\n")
-    code, out, _ = command(*short, "--json", "--bands", bands)
-    judged = {m["name"]: (m["band"], m["band_source"]) for m in json.loads(out)["metrics"]}
-    assert code == 0
-    assert judged["reach[1]"] == judged["reach[2]"] == (0.125, "given")
-    assert judged["lazy"][1] == "derived"
 
 
 @needs_pythonfmu

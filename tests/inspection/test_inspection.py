@@ -3,21 +3,11 @@
 import io
 import json
 import zipfile
-from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
 
 import fmpy
 import pytest
-from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection.inspection import COLUMNS, as_text, inspect_fmu
-from grasp_cosim.interface.capabilities import FLAGS
-from grasp_cosim.interface.obstacles import this_platform
-
-Archive = Callable[..., Path]
-Report = dict[str, Any]
 
 FMI_1 = """<?xml version="1.0" encoding="ISO-8859-1"?>
 <fmiModelDescription fmiVersion="1.0" modelName="Drive" modelIdentifier="drive" guid="{1}"
@@ -175,31 +165,6 @@ def test_our_controller(fmus):
     assert rows["simultaneous_contact.enabled"]["start"] == "true"
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "GripperPlant",
-        "GripperPlantCompliant",
-        "GripperPlantMovable",
-        "ProximitySensor",
-        "GraspController",
-        "GraspControllerAdaptive",
-    ],
-)
-def test_our_fmus_are_shown_as_fmpy_reads_them(fmus, name):
-    report = inspect_fmu(fmus / f"{name}.fmu")
-    model = fmpy.read_model_description(fmus / f"{name}.fmu")
-    assert report["guid"] == model.guid
-    assert report["generation_tool"] == model.generationTool
-    for mine, theirs in zip(report["variables"], model.modelVariables, strict=True):
-        for key in ("name", "causality", "variability", "initial", "type", "unit", "description"):
-            assert mine[key] == getattr(theirs, key)
-        for key in ("start", "min", "max", "nominal"):
-            text = getattr(theirs, key)
-            expected = text == "true" if theirs.type == "Boolean" else text and float(text)
-            assert mine[key] == (None if text is None else expected)
-
-
 @pytest.mark.parametrize("xml", [FMI_1, FMI_2, FMI_3])
 def test_json_and_text_hold_the_same_variables(archive, xml):
     report = inspect_fmu(archive(xml))
@@ -270,49 +235,6 @@ def test_every_column(valve):
     assert starts == ["true", "false", "a.csv", "nan", ""]
 
 
-def test_every_line_of_the_head(archive):
-    path = archive(
-        FMI_2, "binaries/win64/valve.dll", "binaries/linux64/valve.so", "binaries/win32/lib/x.dll",
-        "binaries\\aarch64-darwin\\valve.dylib", "binaries/linux32/readme.txt", "sources/all.c",
-        "resources/slavemodule.txt",
-    )  # fmt: skip
-    assert head(as_text(inspect_fmu(path))) == {
-        "model": "Valve",
-        "FMI version": "2.0",
-        "kinds": "co-simulation, model exchange",
-        "generation tool": "Tool 7",
-        "GUID": "{2}",
-        "default experiment": "start 1, stop 2.5, tolerance 1e-06, step 0.01",
-        "platforms": f"aarch64-darwin, linux64, win64; this machine: {this_platform('2.0')}",
-        "sources": "yes, in C",
-        "Python": "needed, made with pythonfmu",
-        "capabilities": "canInterpolateInputs, providesDirectionalDerivative (model exchange), "
-        "completedIntegratorStepNotNeeded",
-    }
-
-
-def test_what_is_absent_is_said(archive):
-    report = inspect_fmu(archive(FMI_3.replace("true", "false").replace("0.5", "")))
-    assert (
-        head(as_text(report)).items()
-        >= {
-            "generation tool": "not declared",
-            "default experiment": "none",
-            "platforms": f"none; this machine: {fmpy.platform_tuple}",
-            "sources": "no",
-            "Python": "not needed",
-            "capabilities": "none",
-        }.items()
-    )
-    report |= {"model_name": None, "guid": None}
-    assert (
-        head(as_text(report)).items() >= {"model": "not declared", "GUID": "not declared"}.items()
-    )
-    assert set(report["default_experiment"].values()) == {None}
-    assert (report["generation_tool"], report["platforms"]) == (None, [])
-    assert report["python"] is False
-
-
 def test_fmi_1(archive):
     report = inspect_fmu(archive(FMI_1))
     assert (report["fmi_version"], report["kinds"]) == ("1.0", ["co-simulation"])
@@ -370,36 +292,6 @@ def test_long_arrays_do_not_widen_the_table(archive):
     assert start == "1, 1, 1, 1, 1, 1, 1, 1, ... (991 more)"
 
 
-def test_no_capability_of_the_standard_is_left_out():
-    """Against the schemas of FMI, which come with FMPy."""
-    schemas = Path(fmpy.__file__).parent / "schema"
-    for version, name in (
-        ("1", "fmiImplementation"), ("2", "fmi2ModelDescription"), ("3", "fmi3InterfaceType"),
-    ):  # fmt: skip
-        tree = ElementTree.parse(schemas / f"fmi{version}" / f"{name}.xsd")
-        attributes = {e.get("name", "") for e in tree.iter() if e.tag.endswith("}attribute")}
-        prefixes = (
-            "can",
-            "needs",
-            "provides",
-            "max",
-            "fixed",
-            "recom",
-            "might",
-            "has",
-            "completed",
-        )
-        flags = {flag for (v, _), flags in FLAGS.items() if v == version for flag in flags.split()}
-        assert flags == {a for a in attributes if a.startswith(prefixes)}
-
-
-def test_columns_are_aligned_two_spaces_apart(valve):
-    lines = as_text(valve).split("\n\n")[1].splitlines()
-    assert lines[0].startswith("name    causality  variability  type         unit  start")
-    assert lines[1].startswith("p_in    input      continuous   Real         Pa    101325")
-    assert all(line == line.rstrip() for line in lines)
-
-
 def test_the_description_is_cut_to_the_terminal(valve):
     valve["variables"][0]["description"] = "d" * 200
     valve["variables"][7]["start"] = "path/" * 20
@@ -412,14 +304,6 @@ def test_the_description_is_cut_to_the_terminal(valve):
     assert rows["p_in"]["description"].endswith("dd…")
     assert rows["table"]["start"] == ("path/" * 20)[:31] + "…"
     assert rows["p_in"] | {"description": ""} == uncut["p_in"] | {"description": ""}
-
-
-def test_a_narrow_terminal_costs_no_other_column(valve):
-    valve["variables"][0]["description"] = "d" * 200
-    rows = table(as_text(valve, 40))
-    assert rows["p_in"]["description"] == "d" * 10 + "…"
-    assert rows["flow"]["dependencies"] == "p_in, p_out"
-    assert set(rows["flow"]) == set(COLUMNS)
 
 
 def test_no_variables(archive):
@@ -478,46 +362,3 @@ def test_fmi_3_types_that_fmpy_does_not_know(archive):
 def test_a_start_that_is_no_number_is_shown_as_it_is(archive, text):
     report = inspect_fmu(archive(FMI_2.replace('min="1" start="3"', f'min="1" start="{text}"')))
     assert column(report, "start")["stages"] == text
-
-
-@pytest.mark.parametrize(
-    ("xml", "message"),
-    [
-        ("", "some.fmu: not a readable FMU: no element found"),
-        ("<fmiModelDescription", "some.fmu: not a readable FMU: unclosed token"),
-        ("<html/>", "no fmiVersion in modelDescription.xml"),
-        ('<fmiModelDescription fmiVersion="4.0"/>', "Unsupported FMI version: 4.0"),
-        (
-            FMI_2.replace('index="5"', 'index="x"'),
-            "some.fmu: not a readable FMU: Output: index = 'x': must be a whole number",
-        ),
-        (
-            FMI_2.replace('"1 2"', '"1 99"'),
-            "FMU: Output 'flow': dependencies = '99': must be the index of a variable",
-        ),
-    ],
-)
-def test_a_garbled_description_is_one_line(archive, xml, message):
-    with pytest.raises(InputError, match=message) as caught:
-        inspect_fmu(archive(xml))
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_a_file_that_is_no_fmu_is_one_line(tmp_path):
-    text, empty = tmp_path / "text.fmu", tmp_path / "empty.fmu"
-    text.write_text("hello")
-    with zipfile.ZipFile(empty, "w") as file:
-        file.writestr("Valve/modelDescription.xml", FMI_2)
-    for path, message in (
-        (tmp_path / "missing.fmu", "no such FMU file"),
-        (tmp_path, f"is a folder; must be an FMU, a file; there is: {empty}, {text}"),
-        (text, "not a readable FMU: File is not a zip file"),
-        (
-            empty,
-            "not a readable FMU: no modelDescription.xml at the top of the archive; must be there, "
-            "and called so: there is Valve/modelDescription.xml",
-        ),
-    ):
-        with pytest.raises(InputError) as caught:
-            inspect_fmu(path)
-        assert str(caught.value) == f"{path}: {message}"

@@ -2,13 +2,11 @@
 
 import dataclasses
 import json
-import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from shlex import quote
 
@@ -17,15 +15,10 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection import loading
-from grasp_cosim.inspection.loading import Finding, Unpacked, unpack
+from grasp_cosim.inspection.loading import Finding, unpack
 from support import native_fmus
 from support.models import build_model
 from support.slow import slow
-
-Changes = dict[str, bytes | None]
-Opened = Callable[..., Unpacked]
-
-NOWHERE = str(Path(__file__, "nowhere"))
 
 SCRIPT = """\
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -155,19 +148,6 @@ def test_json_has_four_keys():
     assert json.loads(json.dumps([dataclasses.asdict(finding)])) == [expected]
 
 
-@pytest.mark.parametrize(
-    ("version", "largest", "expected"),
-    [
-        ((3, 11, 0), 2**63 - 1, "ok"),
-        ((3, 14, 1), 2**63 - 1, "ok"),
-        ((3, 10, 9), 2**63 - 1, "problem"),
-        ((3, 11, 7), 2**31 - 1, "problem"),
-    ],
-)
-def test_python_is_new_and_64_bit(version, largest, expected):
-    assert status(loading.interpreter(version, largest)) == expected
-
-
 @pytest.mark.parametrize("name", ["a#b", "a+b", "a%b", "é", "a,b", "a:b", "(a)"])
 def test_a_temporary_folder_that_crashes_python_fmus(name):
     verdict, text, fix = loading.temporary_folder(Path("/tmp", name), False, True)
@@ -216,22 +196,6 @@ def test_python3_on_the_path(tmp_path):
     assert str(Path(sys.executable).parent) in (fix or "")
     for missing in (None, str(tmp_path / "none")):
         assert status(loading.python_on_path(missing)) == "warning"
-
-
-@pytest.mark.parametrize(
-    ("environ", "fix"),
-    [
-        ({}, None),
-        ({"PYTHONHOME": sys.base_prefix, "PYTHONPATH": f"{Path.cwd()}{os.pathsep}"}, None),
-        ({"PYTHONHOME": NOWHERE}, "unset PYTHONHOME"),
-        ({"PYTHONPATH": NOWHERE}, "unset PYTHONPATH"),
-        ({"PYTHONPATH": "."}, "unset PYTHONPATH"),
-        ({"PYTHONPATH": "/usr/lib/python3.1/site-packages"}, "unset PYTHONPATH"),
-    ],
-)
-def test_the_environment_of_python(environ, fix):
-    verdict = loading.environment(environ)
-    assert (verdict[0], verdict[2]) == ("warning" if fix else "ok", fix)
 
 
 def test_the_environment_of_another_python(tmp_path):
@@ -416,14 +380,6 @@ def test_libpython_in_other_hosts(linked, expected, fix, opened, tmp_path, monke
     assert fix.format(folder, loading.LIBPYTHON) in (verdict[2] or "")
 
 
-@pytest.mark.skipif(
-    f"{loading.LIBPYTHON}\n" not in Path("/proc/self/maps").read_text(), reason="a static Python"
-)
-def test_libpython_that_only_this_process_finds(opened):
-    linked = f"\t{loading.LIBPYTHON} => not found\n{LOADER}"
-    assert status(loading.host(dataclasses.replace(opened(), linked=linked))) == "warning"
-
-
 @pytest.mark.parametrize(
     ("linked", "text"),
     [
@@ -504,13 +460,6 @@ def test_what_a_script_imports_is_packed_or_installed(files, missing, opened):
         assert verdict[2] == f"{quote(sys.executable)} -m pip install {names}"
 
 
-def test_the_package_of_a_module_may_be_called_otherwise(opened, monkeypatch):
-    monkeypatch.setattr(loading, "_spec", lambda name: None)
-    verdict = loading.script(opened({"resources/Stock.py": b"import yaml"}))
-    assert verdict is not None
-    assert (verdict[2] or "").endswith(" pip install pyyaml")
-
-
 def test_an_extension_module_may_be_packed(opened):
     changes = {"resources/Stock.py": b"import fast", "resources/fast.abi3.so": b""}
     assert status(loading.script(opened({**changes}))) == "ok"
@@ -520,26 +469,6 @@ def test_what_is_imported_is_named(opened):
     verdict = loading.script(opened({"resources/Stock.py": b"import numpy, math"}))
     assert verdict is not None
     assert verdict[1] == "resources/Stock.py imports, besides the standard library: numpy"
-
-
-def test_a_module_whose_name_another_has(opened, tmp_path, monkeypatch):
-    assert status(loading.modules(opened())) == "ok"
-    verdict = loading.modules(opened({"resources/statistics.py": b""}))
-    assert verdict is not None
-    assert verdict[0] == "warning"
-    assert "'statistics', which is in the standard library too" in verdict[1]
-    other = tmp_path / "elsewhere" / "twin.py"
-    other.parent.mkdir()
-    other.touch()
-    changes = [{"resources/twin.py": b""}, {"resources/twin/__init__.py": b""}]
-    for change in changes:
-        assert status(loading.modules(opened(change))) == "ok"
-    monkeypatch.syspath_prepend(other.parent)
-    for change in changes:
-        verdict = loading.modules(opened(change))
-        assert verdict is not None
-        assert verdict[0] == "warning"
-        assert f"'twin', which is in {other} too" in verdict[1]
 
 
 @pytest.mark.slow

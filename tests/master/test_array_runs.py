@@ -4,7 +4,6 @@ import json
 
 import fmpy
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.cli.entry import main
@@ -19,7 +18,6 @@ from support.state_space import TYPES, state_space
 
 pytestmark = needs_gcc
 STEP, STOP = 0.125, 2.0
-Floats = npt.NDArray[np.float64]
 
 
 def load(folder, tables, connections="", scheme="sequential", types=True, kind="CoSimulation"):
@@ -123,19 +121,6 @@ def test_fmpy_finds_the_same_bits(tmp_path, engine):
     np.testing.assert_array_equal(signals(result, "ss.y", 3), theirs["y"])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ["compiled", pytest.param("python", marks=pytest.mark.slow)])
-def test_a_process_of_its_own_changes_no_bit(tmp_path, engine):
-    more = '[[events]]\nat = 0.5\nset = { "b.u[3]" = 4.0, "b.A[1,2]" = 0.5 }\n'
-    system = two(tmp_path, '"a.y[2] -> b.u[1]", "a.y_Int8 -> b.u_Int8"', more)
-    system = system.with_values({"a.r": 2, "a.u_Int8": 5, "b.u_Float32": [[1, 2, 3], [4, 5, 6]]})
-    here = simulate(system, engine=engine)
-    there = simulate(isolated(system, "process"), engine=engine)
-    assert list(here.signals) == list(there.signals)
-    for name in here.signals:
-        np.testing.assert_array_equal(here[name], there[name], name)
-
-
 @engines
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 def test_whole_arrays_and_their_elements_are_connected(tmp_path, engine, scheme):
@@ -207,34 +192,6 @@ def test_events_set_elements_of_arrays(tmp_path, engine):
     assert signals(result, "b.y", 3)[after].tolist() == [0.0, 7.0, 4.0]
     assert result["b.y_Int16[1,2]"][[9, 10]].tolist() == [0, 77]
     assert "t = 1.125 s: b.u_Int16[1,2] = 77 (a.y_Enumeration[2,1] == 'fast')" in result.log
-
-
-@engines
-def test_faults_act_on_elements(tmp_path, engine):
-    more = (
-        '[[faults]]\nconnection = "a.y[2] -> b.u[2]"\nkind = "bias"\nvalue = 10.0\n'
-        '[[faults]]\nconnection = "b.u_Enumeration[1,1]"\nkind = "stuck"\nvalue = "fast"\n'
-    )
-    system = two(tmp_path, '"a.y -> b.u", "a.y_Enumeration -> b.u_Enumeration"', more)
-    result = simulate(system.with_values({"b.C": 0, "a.C": 0}), engine=engine)
-    assert signals(result, "b.y", 3)[-1].tolist() == [1.0, 12.0, 3.0]
-    assert result["b.y_Enumeration[1,1]"][-1] == 2
-    assert result["b.y_Enumeration[1,2]"][-1] == 1
-
-
-@engines
-def test_sizes_of_0(tmp_path, engine):
-    values = {"a.m": 0, "a.k": 0, "a.n": 0, "b.m": 2, "b.r": 1, "a.r": 2}
-    result = simulate(two(tmp_path, '"a.y -> b.u"').with_values({"b.m": 3}), engine=engine)
-    assert result["b.y[1]"][0] == 1.0
-    result = simulate(
-        load(tmp_path, '[components.a]\nfmu = "ss.fmu"\n').with_values(
-            {k: v for k, v in values.items() if k[0] == "a"}
-        ),
-        engine=engine,
-    )
-    assert list(result.signals) == ["a.y[1]", "a.y[2]"]
-    assert signals(result, "a.y", 2).tolist() == [[0.0, 0.0]] * 17
 
 
 @engines

@@ -1,17 +1,11 @@
 """Events and faults in runs of the built-in grasp, against the sensor's equation and NumPy."""
 
-import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from grasp_cosim import InputError, SimulationError, simulate
+from grasp_cosim import SimulationError, simulate
 from grasp_cosim.system.parts import Condition, Event, Fault, Port
-from support.both_engines import needs_compiler
-
-Array = npt.NDArray[Any]
 
 STEP = 1e-3
 GAP = Port("sensor_1", "gap")
@@ -21,11 +15,6 @@ REFLECTANCE = Port("sensor_1", "reflectance")
 def intensity(gap, reflectance=1.0):
     """Eq. (9) in V, for a gap in m."""
     return np.asarray(0.0024 * reflectance / (np.maximum(gap, 0.0) + 0.005) ** 1.1506)
-
-
-def seen(result):
-    """The gap in m that sensor 1 must have got for what it puts out, in each row."""
-    return np.asarray((0.0024 / result["sensor_1.intensity"]) ** (1 / 1.1506) - 0.005)
 
 
 def run(system, stop=0.3, **changes):
@@ -119,62 +108,10 @@ def window(rows, start, end):
     return np.asarray((steps >= start) & (steps < end))
 
 
-DETERMINISTIC = [
-    (on_gap("stuck", 50, 90), lambda gap: np.full_like(gap, gap[51])),
-    (on_gap("stuck", 50, 90, value=0.02), lambda gap: np.full_like(gap, 0.02)),
-    (on_gap("bias", 50, 90, value=0.003), lambda gap: gap + 0.003),
-    (on_gap("delay", 50, 90, time=0.005), lambda gap: np.roll(gap, 5)),
-    (on_gap("saturation", 50, 90, low=0.041, high=0.0445), lambda g: np.clip(g, 0.041, 0.0445)),
-    (on_gap("quantisation", 50, 90, step=1e-3), lambda gap: np.rint(gap / 1e-3) * 1e-3),
-]
-
-
-@pytest.mark.parametrize(
-    ("fault", "expected"), DETERMINISTIC, ids=[fault.kind for fault, _ in DETERMINISTIC]
-)
-def test_a_fault_of_a_connection(grasp, fault, expected):
-    result = run(grasp, stop=0.15, faults=(fault,))
-    gap = result["plant.gap[1]"]
-    got = np.where(window(151, 50, 90), expected(gap), gap)
-    assert result["sensor_1.intensity"] == pytest.approx(intensity(got), rel=1e-12)
-    assert result["sensor_2.intensity"] == pytest.approx(
-        intensity(result["plant.gap[2]"]), rel=1e-12
-    )
-    assert [line for line in result.log if "sensor_1.gap" in line] == [
-        f"t = 0.05 s: sensor_1.gap: {fault.kind} begins",
-        f"t = 0.09 s: sensor_1.gap: {fault.kind} ends",
-    ]
-
-
 def test_a_fault_from_0_acts_at_t_0(grasp):
     result = run(grasp, stop=0.01, faults=(on_gap("bias", value=0.003),))
     expected = intensity(result["plant.gap[1]"] + 0.003)
     assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_delay_from_0_repeats_the_value_of_t_0(grasp):
-    result = run(grasp, stop=0.05, faults=(on_gap("delay", time=0.005),))
-    gap = result["plant.gap[1]"]
-    expected = intensity(gap[np.maximum(np.arange(51) - 5, 0)])
-    assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
-
-
-def test_noise_of_a_connection(grasp):
-    result = run(grasp, faults=(on_gap("noise", standard_deviation=1e-4),))
-    x = (seen(result) - result["plant.gap[1]"]) / 1e-4
-    n = len(x)
-    assert abs(x.mean()) < 5 / math.sqrt(n)
-    assert abs(x.std() - 1) < 5 / math.sqrt(2 * n)
-    assert abs((x[1:] * x[:-1]).mean()) < 5 / math.sqrt(n)
-
-
-def test_dropouts_of_a_connection(grasp):
-    result = run(grasp, stop=0.2, faults=(on_gap("dropout", probability=0.5),))
-    gap = result["plant.gap[1]"]
-    through = np.isclose(seen(result), gap, rtol=0, atol=1e-12)
-    assert 60 < through.sum() < 140
-    newest = np.maximum.accumulate(np.where(through, np.arange(201), 0))
-    assert result["sensor_1.intensity"] == pytest.approx(intensity(gap[newest]), rel=1e-12)
 
 
 def test_a_fault_may_begin_on_a_condition(grasp):
@@ -208,17 +145,6 @@ def bits(result):
     return {name: np.ascontiguousarray(result[name]).tobytes() for name in result}
 
 
-@needs_compiler
-@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_both_engines_give_the_same_bits(grasp, scheme):
-    system = replace(grasp, **FULL).with_experiment(STEP, 0.3, scheme)
-    plain = simulate(system, engine="python")
-    compiled = simulate(system, engine="compiled")
-    assert bits(plain) == bits(compiled)
-    assert plain.log == compiled.log
-    assert sum("sensor_1.reflectance" in line for line in plain.log) == 2
-
-
 def test_the_same_run_twice_gives_the_same_bits(grasp):
     assert bits(run(grasp, **FULL)) == bits(run(grasp, **FULL))
 
@@ -227,30 +153,6 @@ def test_another_seed_gives_other_values(grasp):
     fault = on_gap("noise", standard_deviation=1e-4)
     one, two = (run(grasp, 0.02, faults=(replace(fault, seed=seed),)) for seed in (1, 2))
     assert (one["sensor_1.intensity"] != two["sensor_1.intensity"]).all()
-
-
-def test_steps_may_be_done_one_by_one(grasp):
-    whole = run(grasp, 0.05, **FULL)
-    with simulate.session(replace(grasp, **FULL), step=STEP, stop=0.05) as session:
-        while session.step():
-            pass
-        assert bits(session.result()) == bits(whole)
-
-
-def test_what_a_session_sets_is_what_an_event_sets(grasp):
-    event = Event({REFLECTANCE: 0.6}, at_ns=20_000_000)
-    whole = run(grasp, 0.05, events=(event,))
-    with simulate.session(grasp, step=STEP, stop=0.05) as session:
-        session.step(20)
-        session.set("sensor_1.reflectance", 0.6)
-        session.step(30)
-        result = session.result()
-        with pytest.raises(
-            InputError, match=r"sensor_1\.gap: has a connection, from plant\.gap\[1\]"
-        ):
-            session.set("sensor_1.gap", 0.1)
-    assert bits(result) == bits(whole)
-    assert result.log == whole.log == ("t = 0.02 s: sensor_1.reflectance = 0.6",)
 
 
 def test_a_surface_set_by_name_has_its_reflectance(grasp):

@@ -2,17 +2,14 @@
 
 import math
 import os
-import signal
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from fmi.instances import KINDS
 from fmi.test_rejected_steps import alone
 from grasp_cosim import InputError, SimulationError, simulate
-from grasp_cosim.master import master, simulation
-from grasp_cosim.recording.memory import MemoryListener
+from grasp_cosim.master import master
 from support.both_engines import engines
 from support.mocks import Mock, make_system
 from support.native_fmus import needs_gcc
@@ -69,37 +66,6 @@ def test_an_interrupted_session_does_not_go_on(tmp_path, version, isolation):
         assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-9)
 
 
-@pytest.mark.usefixtures("ctrl_c")
-def test_an_interruption_of_which_an_fmu_makes_an_error_is_one_all_the_same(grasp, monkeypatch):
-    def load(_):
-        try:
-            signal.raise_signal(signal.SIGINT)
-        except KeyboardInterrupt:  # as pythonfmu does
-            raise InputError("plant: refused its initialisation: KeyboardInterrupt") from None
-
-    monkeypatch.setattr(simulation, "load", load)
-    with pytest.raises(KeyboardInterrupt):
-        simulate(grasp, stop=0.01)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_an_fmu_that_goes_to_another_folder_takes_nobody_with_it(tmp_path, monkeypatch):
-    """Paths are relative to where the user stands, to the end of the run."""
-    here = Path.cwd()
-    with simulate.session(alone(tmp_path, "2.0", "none"), engine="python") as session:
-        advance = session._master.advance
-
-        def away(steps):
-            os.chdir("/")
-            return advance(steps)
-
-        monkeypatch.setattr(session._master, "advance", away)
-        session.step()
-        assert Path.cwd() == here
-        session._stack.callback(os.chdir, "/")
-    assert Path.cwd() == here
-
-
 def test_a_session_that_has_not_stepped_has_metrics(tmp_path):
     with simulate.session(alone(tmp_path, "3.0", "none")) as session:
         metrics = session.result().metrics
@@ -120,43 +86,6 @@ def test_an_engine_that_does_not_exist_is_refused(grasp):
         simulate(grasp, stop=1e-3, engine="complied")  # type: ignore[arg-type]
 
 
-class Blocks(MemoryListener):
-    """Remembers how many rows came at once."""
-
-    def __init__(self):
-        super().__init__()
-        self.sizes = []
-
-    def block(self, steps, rows):
-        self.sizes.append(len(steps))
-        super().block(steps, rows)
-
-
-def test_rows_of_single_steps_are_handed_on_together(grasp, monkeypatch):
-    monkeypatch.setattr(master, "LONG", math.inf)
-    blocks = Blocks()
-    with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
-        for _ in range(80):
-            session.step()
-        assert blocks.sizes == [1, 32, 32]
-        assert len(session.result().time) == 81
-        session.step(2000)
-        assert session.complete
-    assert blocks.sizes == [1, 32, 32, 16, 920]
-    assert np.array_equal(
-        blocks.columns()[1]["plant.gap[1]"], simulate(grasp, stop=0.1)["plant.gap[1]"]
-    )
-
-
-def test_rows_that_wait_are_handed_on_after_a_while(grasp, monkeypatch):
-    monkeypatch.setattr(master, "LONG", 0.0)
-    blocks = Blocks()
-    with simulate.session(grasp, stop=0.1, listeners=[blocks]) as session:
-        for _ in range(3):
-            session.step()
-    assert blocks.sizes == [1, 1, 1, 1]
-
-
 @engines
 def test_a_value_that_is_not_finite_is_found_in_its_step(tmp_path, monkeypatch, engine):
     """Also where it has gone again at the end of the call."""
@@ -172,25 +101,6 @@ def test_a_value_that_is_not_finite_is_found_in_its_step(tmp_path, monkeypatch, 
             session.step(5)
         assert error.value.result is not None
         assert len(error.value.result.time) == 6
-
-
-def test_a_listener_that_fails_at_a_look_breaks_the_session(grasp, monkeypatch):
-    monkeypatch.setattr(master, "LONG", math.inf)
-
-    class Full(Blocks):
-        def block(self, steps, rows):
-            if len(self.sizes):
-                raise SimulationError("full")
-            super().block(steps, rows)
-
-    with simulate.session(grasp, stop=0.1, listeners=[Full()]) as session:
-        session.step()
-        with pytest.raises(SimulationError, match=r"^full$") as error:
-            session.result()
-        assert error.value.result is not None
-        assert len(error.value.result.time) == 2
-        with pytest.raises(InputError, match="broken off by a failure"):
-            session.step()
 
 
 def test_a_setting_is_checked_each_time(grasp):

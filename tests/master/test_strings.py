@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from grasp_cosim import System, load_run, simulate
 from grasp_cosim.cli import main
-from grasp_cosim.report.page import page_html
 from support.both_engines import engines, needs_compiler
 from support.mocks import Mock, Run, make_system
 from support.native_fmus import TYPES, build, needs_gcc
@@ -77,35 +76,11 @@ def test_native_fmus_and_what_is_read_back(tmp_path, version, isolation, scheme)
 
 
 @needs_gcc
-def test_nothing_that_takes_a_result_stumbles_over_a_text(tmp_path):
-    pytest.importorskip("matplotlib")
-    system = changing(tmp_path, "2.0", "none")
-    result = simulate(system)
-    assert '"texts": ["at rest", "=1+1"' in page_html(result)
-    result.plot(tmp_path / "signals.png")
-    assert "a.y_String" not in result.numbers
-    assert "a.x" in result.numbers
-
-
-@needs_gcc
 def test_a_session_has_the_text_of_now(tmp_path):
     with simulate.session(changing(tmp_path, "3.0", "none")) as session:
         assert session["b.y_String"] == "at rest"
         assert session.step()
         assert session["b.y_String"] == TEXTS[0]
-
-
-@needs_gcc
-def test_mdf_has_the_texts(tmp_path):
-    asammdf = pytest.importorskip("asammdf")
-    result = simulate(changing(tmp_path, "3.0", "none"))
-    result.to_mdf(tmp_path / "signals.mf4")
-    with asammdf.MDF(tmp_path / "signals.mf4") as mdf:
-        samples = mdf.get("a.y_String").samples
-        numbers = mdf.get("a.x").samples
-    # asammdf leaves out the end of a text that is a line break
-    assert [s.decode().rstrip() for s in samples[:3]] == ["at rest", TEXTS[0], TEXTS[1]]
-    assert numbers.tobytes() == result["a.x"].tobytes()
 
 
 @needs_gcc

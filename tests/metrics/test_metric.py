@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grasp_cosim import InputError, metric, simulate
-from grasp_cosim.base.parallel import run_all
-from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS, time_difference
+from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS
 from grasp_cosim.metrics.metric import (
     RESERVED,
     MissingSignalError,
@@ -307,20 +306,6 @@ def test_a_result_has_the_metrics_of_its_system(grasp, monkeypatch):
         assert result.measured.missing == ()
 
 
-def test_titles_and_columns():
-    both = made("rise_time", lambda _: [1.0, 2.0], unit="s", entries=("right", "left"))
-    assert (both.title, both.columns) == ("rise time", ("rise_time[1]", "rise_time[2]"))
-    assert both.column_title("rise_time[2]") == "rise time, left"
-    share = made("share", lambda _: 0.5, unit="1", label="overshoot", factor=1e2, shown_unit="%")
-    assert (share.title, share.columns, share.display_unit) == ("overshoot", ("share",), "%")
-    assert share.column_title("share") == "overshoot"
-    assert [made("x", lambda _: 1.0, unit=u).display_unit for u in ("m", "1", None)] == [
-        "m",
-        "",
-        "",
-    ]
-
-
 # ------------------------------------------------------------------------- files
 
 
@@ -406,22 +391,6 @@ def test_ctrl_c_in_a_file_is_no_wrong_input(file):
 @metric("at_end", unit="m")
 def at_end(run):
     return float(run["plant.gap"][-1])
-
-
-def _measured(job):
-    return [m.name for m in job], dict(measure(signals(), job).values)
-
-
-@pytest.mark.slow
-def test_metrics_work_in_another_process(file):
-    """Of a file that is gone meanwhile, of a module, and of every result."""
-    path = file(FILE)
-    own = (*load_metrics(path), at_end)
-    path.unlink()
-    check_portable([*own, time_difference])
-    ((names, values),) = run_all(_measured, [(*own, time_difference)], 1, False, "metrics")
-    assert names == ["zeta", "alpha", "at_end", "time_difference"]
-    assert values == {"zeta": [0.3, 0.1], "alpha": 0.1, "at_end": 0.1}
 
 
 def test_a_metric_of_every_result_comes_back_as_itself():

@@ -110,24 +110,6 @@ def test_a_silent_peer_by_the_real_clock(fmu):
     assert peer.kinds().count(STEP) == 4
 
 
-def test_many_instances_side_by_side(fmu):
-    peers = [ScriptedPeer() for _ in range(8)]
-    instances = [Instance(fmu, f"bench {k}") for k in range(len(peers))]
-    try:
-        for k, (instance, peer) in enumerate(zip(instances, peers, strict=True)):
-            initialised(instance, peer.port)
-            assert instance.set({"force": float(k)}) == OK
-        for step in range(3):
-            for k, instance in enumerate(instances):
-                assert instance.step(0.5 * step, 0.5) == OK
-                assert instance.get("doubled") == [2.0 * k]
-    finally:
-        for instance in instances:
-            instance.call("FreeInstance")
-        for peer in peers:
-            peer.__exit__()
-
-
 def test_plain_fmpy_simulates_it(path):
     with ScriptedPeer() as peer:
         force = np.array([(0.0, 1.0), (1.0, 2.0)], [("time", "f8"), ("force", "f8")])

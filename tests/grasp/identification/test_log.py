@@ -1,10 +1,8 @@
 """Friction from a log: of our own simulation with noise, and of a model that scipy integrates."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, simulate
 from grasp_cosim.grasp.identification.identification import OF_A_LOG, chosen
@@ -23,8 +21,6 @@ TRUE = {
     "plant.friction.viscous[1]": 8.0,
     "plant.friction.viscous[2]": 3.0,
 }
-
-Array = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
@@ -152,26 +148,6 @@ def test_a_log_that_is_too_coarse_is_refused(grasp, recorded):
         identified(grasp, coarse)
 
 
-@pytest.mark.parametrize("name", ["plant.velocity[1]", "controller.force[2]"])
-@pytest.mark.parametrize("value", [np.nan, -np.inf])
-def test_a_sample_that_is_no_number_is_named(grasp, recorded, name, value):
-    spoilt = recorded.by_name[name].copy()
-    spoilt[[40, 41]] = value
-    log = replace(recorded, by_name={**recorded.by_name, name: spoilt})
-    message = (
-        rf"^test: {re.escape(name)} = {value} at 0.04 s, one of 2 such samples; must be finite"
-    )
-    with pytest.raises(InputError, match=message):
-        identified(grasp, log)
-
-
-@pytest.mark.parametrize(("size", "said"), [(0, "0 samples"), (1, "1 sample")])
-def test_a_log_of_a_sample_is_refused(grasp, recorded, size, said):
-    log = Signals(recorded.time[:size], {k: v[:size] for k, v in recorded.items()})
-    with pytest.raises(InputError, match=rf"^test: {said}; must be at least two"):
-        identified(grasp, log)
-
-
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
 def test_time_that_does_not_grow_is_refused(grasp, recorded, value):
     time = recorded.time.copy()
@@ -191,21 +167,6 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
         assert (w.time > recorded.time[400]).any()
     for e in identified(grasp, gone).estimates:
         assert e.value == pytest.approx(TRUE[e.name], rel=5e-3, abs=5e-3), e.name
-
-
-@pytest.mark.parametrize("error", [IndexError("list\nindex"), KeyError((0, 1))])
-def test_whatever_asammdf_stumbles_over_is_one_line(tmp_path, monkeypatch, error):
-    def stumble(path):
-        raise error
-
-    monkeypatch.setattr(pytest.importorskip("asammdf"), "MDF", stumble)
-    (tmp_path / "log.mf4").touch()
-    name = type(error).__name__
-    with pytest.raises(
-        InputError, match=rf"log.mf4: is damaged, not an MDF file: {name}: "
-    ) as caught:
-        load_log(tmp_path / "log.mf4")
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -1,21 +1,13 @@
 """Each claim of the simulation can fail, and the second column is what it says it is."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
-import numpy as np
 import pytest
 from grasp_cosim.grasp.published import compared as module
 from grasp_cosim.grasp.published.evaluation import as_report
-from grasp_cosim.grasp.published.grasps import Run, as_run
+from grasp_cosim.grasp.published.grasps import Run
 from grasp_cosim.grasp.published.tables import Setting, published_rows
-from grasp_cosim.recording.result import Result
-from grasp_cosim.system.settings import settings
-
-Evaluated = Callable[..., dict[str, Any]]
-Judge = Callable[..., list[int]]
 
 SETTLED = 98.0 * 0.07 / 2.0
 """N; K_i·W/2 of the built-in grasp."""
@@ -225,30 +217,3 @@ def test_the_second_column_is_earlier_by_what_the_last_gap_takes(evaluated, runs
         },
         abs=1e-12,
     )
-
-
-def test_that_gap_is_met_where_the_signal_says(grasp):
-    """Of fingers that close 65 mm in 1 s and 85 mm in 1.2 s, evenly."""
-    time = np.linspace(0.0, 2.0, 2001)
-    right = 0.065 * np.maximum(1.0 - time, 0.0)
-    left = 0.085 * np.maximum(1.0 - time / 1.2, 0.0)
-    signals = {
-        "plant.object_position": np.full_like(time, 0.01),
-        "controller.target_position": 0.01 * np.minimum(2.0 * time, 1.5 - 0.25 * time),
-    }
-    for j, side, gap in ((1, 1.0, right), (2, -1.0, left)):
-        position = 0.01 + side * (0.035 + gap)
-        signals |= {
-            f"plant.gap[{j}]": gap,
-            f"plant.position[{j}]": position,
-            f"plant.velocity[{j}]": np.gradient(position, time),
-            f"plant.contact_force[{j}]": np.where(gap == 0.0, side * 3.4, 0.0),
-            f"plant.contact[{j}]": gap == 0.0,
-        }
-    result = Result(settings(grasp), time, signals, {}, 1.0, True)
-    run = as_run(result, Setting(0.01), 2)
-    assert run.times == pytest.approx((1.0, 1.2), abs=1e-9)
-    expected = (1.0 - 0.37 / 65.0, 1.2 * (1.0 - 0.37 / 85.0))
-    assert run.times_at_sensor_contact == pytest.approx(expected, abs=1e-9)
-    assert run.overshoot == pytest.approx(0.01 * 4.0 / 3.0 - 0.01, abs=1e-5)
-    assert run.off_target == pytest.approx(0.0, abs=1e-12)
