@@ -55,13 +55,6 @@ def test_a_shift_by_numerics_needs_no_width():
     assert signal_band(SINE, [late], None, 0.01).width == pytest.approx(2.0 * SHARE)
 
 
-def test_a_contact_must_be_the_same_unless_numerics_change_it():
-    contact = Curve(TIME, (TIME > 0.5).astype(float), held=True)
-    bounce = Curve(TIME, contact.values * ((TIME < 0.6) | (TIME > 0.62)), held=True)
-    assert signal_band(contact, [contact], None, 0.01).width == 0.0
-    assert signal_band(contact, [bounce], None, 0.001).width == BOTH
-
-
 @pytest.mark.parametrize(
     ("given", "expected"),
     [

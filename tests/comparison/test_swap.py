@@ -10,9 +10,8 @@ from comparison.made import DEPENDENCIES, PLANT, changed, without, write_fmu, wr
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.comparison.interface_difference import capability_differences
 from grasp_cosim.comparison.swap import component_of, prepare_swap
-from grasp_cosim.interface.interface import Interface, Variable, kind_of
+from grasp_cosim.interface.interface import Interface, kind_of
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
-from si_units import Unit
 
 GAP = Port("plant", "gap")
 POSITION = Port("spring", "position")
@@ -202,36 +201,6 @@ def test_a_range_and_a_value_are_compared_in_the_candidates_unit(system, tmp_pat
     assert "value 70 mm is set in the system; must be 0 to 60 mm" in result.differences[0].text
 
 
-def test_a_unit_with_an_offset():
-    units = {
-        "K": Unit("K", (0, 0, 0, 0, 1, 0, 0, 0)),
-        "degC": Unit("degC", (0, 0, 0, 0, 1, 0, 0, 0), 1.0, 273.15),
-    }
-    celsius, kelvin, length, bare = (
-        Interface(
-            Path("x.fmu"), "", "x", (Variable("T", "Real", "input", 0, unit, None, None, None),),
-            units=units,
-        )
-        for unit in ("degC", "K", "m", None)
-    )  # fmt: skip
-    there, back = celsius.conversion("T", kelvin), kelvin.conversion("T", celsius)
-    assert there is not None
-    assert back is not None
-    assert there(20.0) == pytest.approx(293.15)
-    assert back(293.15) == pytest.approx(20.0)
-    assert celsius.conversion("T", length) is None
-    assert bare.conversion("T", length) == (1.0, 0.0)
-
-
-def test_outputs_are_converted_back(system, tmp_path):
-    variables = {**changed("spare", '"m"', '"N"'), "touching": PLANT["spare"].replace("m", "mm")}
-    result = of_variables(system, tmp_path, {**variables, **changed("gap", '"m"', '"mm"')})
-    assert result.back["plant.gap"] == (0.001, 0.0)
-    assert set(result.back) == {"plant.gap", "plant.touching", "plant.spare"}
-    other = of_variables(system, tmp_path, changed("spare", '"m"', '"N"'))
-    assert other.back == {"plant.gap": (1, 0), "plant.touching": (1, 0), "plant.spare": None}
-
-
 @pytest.mark.parametrize(
     "more",
     [
@@ -246,13 +215,6 @@ def test_numbers_that_the_system_states_in_the_originals_unit(system, tmp_path, 
     assert "is meant in m" in result.differences[0].text
 
 
-def test_an_event_needs_a_tunable_parameter(system, tmp_path):
-    event = Event({Port("plant", "mass"): 0.6}, at_ns=1000)
-    fixed = changed("mass", "tunable", "fixed")
-    result = of_variables(replace(system, events=(event,)), tmp_path, fixed)
-    assert found(result) == [("blocks", "variability", "mass")]
-
-
 def test_the_algebraic_loop_that_a_candidate_closes(system, tmp_path):
     path = write_fmu(tmp_path / "c.fmu", dependencies={**DEPENDENCIES, "gap": ["force"]})
     result = swap(system, path)
@@ -263,20 +225,6 @@ def test_the_algebraic_loop_that_a_candidate_closes(system, tmp_path):
     )
     refused = replace(system, initialisation=Initialisation("refuse"))
     assert found(swap(refused, path)) == [("blocks", "dependency", "gap")]
-
-
-def test_a_direct_dependence_that_closes_no_loop(system, tmp_path):
-    path = write_fmu(tmp_path / "c.fmu", dependencies={**DEPENDENCIES, "spare": ["force"]})
-    result = swap(system, path)
-    assert found(result) == [("notes", "dependency", "spare")]
-    assert result.differences[0].text == "depends directly on force; closes no loop"
-
-
-def test_undeclared_dependencies_are_all_inputs(system, tmp_path):
-    result = swap(system, write_fmu(tmp_path / "c.fmu", dependencies={**DEPENDENCIES, "gap": None}))
-    assert found(result) == [("warns", "dependency", "gap")]
-    text = result.differences[0].text
-    assert text.startswith("may depend directly on force, as it declares no dependencies: an alg")
 
 
 def test_a_direct_dependence_that_is_gone(system, tmp_path):
@@ -325,14 +273,6 @@ def test_fmi_3_names_of_capabilities_are_those_of_fmi_2():
     two = able("2.0", canGetAndSetFMUstate=True, providesDirectionalDerivative=True)
     three = able("3.0", canGetAndSetFMUState=True, providesDirectionalDerivatives=True)
     assert [d.variable for d in capability_differences(two, three, 1e-3)] == ["fmiVersion"]
-
-
-def test_a_candidate_for_scheduled_execution_only():
-    candidate = replace(able("3.0"), kinds=("ScheduledExecution",))
-    (difference,) = capability_differences(able("3.0"), candidate, 1e-3)
-    assert (difference.severity, difference.variable) == ("blocks", "kind")
-    must = "must be for co-simulation or model exchange"
-    assert difference.text == f"is for scheduled execution; {must}"
 
 
 @pytest.mark.parametrize(("internal", "fits"), [(1e-4, True), (1e-3, True), (3e-4, False)])

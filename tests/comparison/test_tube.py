@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grasp_cosim.comparison.tube import Curve, curve, deviation, tube
+from grasp_cosim.comparison.tube import Curve, deviation, tube
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -45,13 +45,6 @@ def by_hand(one, other, shift):
 
 
 @QUICK
-@given(SAMPLES, SHIFT, HELD)
-def test_a_curve_is_in_its_own_tube(values, shift, held):
-    same = sampled(values, held)
-    assert deviation(same, same, shift * STEP).values.max() == 0.0
-
-
-@QUICK
 @given(SAMPLES, SHIFT, SHIFT, HELD)
 def test_a_curve_that_comes_later_is_inside_up_to_the_shift(values, later, more, held):
     early = sampled(np.concatenate([values, np.full(later, values[-1])]), held)
@@ -85,20 +78,6 @@ def test_it_is_symmetric_and_what_its_definition_says(both, shift):
     assert (there.values == back.values).all()
     assert (there.reference == back.candidate).all() or (there.values == 0.0).any()
     assert there.values.max() == pytest.approx(by_hand(one, other, shift), abs=1e-9)
-
-
-@QUICK
-@given(pairs(), SHIFT)
-def test_the_values_it_names_are_as_far_apart_as_it_says(both, shift):
-    found = deviation(*both, shift * STEP)
-    assert np.abs(found.reference - found.candidate).tolist() == found.values.tolist()
-
-
-@QUICK
-@given(pairs(), SHIFT)
-def test_more_shift_allows_more(both, shift):
-    tight, loose = (deviation(*both, n * STEP).values for n in (shift, shift + 1))
-    assert (loose <= tight + 1e-9).all()
 
 
 @QUICK
@@ -145,13 +124,6 @@ def test_curves_of_different_steps_are_compared_at_the_times_of_both():
     assert 0.0 < found.values.max() < 1e-6
 
 
-def test_what_is_held_does_not_change_before_its_time():
-    contact = curve(np.array([0.0, 1.0, 2.0]), np.array([False, True, True]))
-    assert contact.held
-    assert contact.at(np.array([-1.0, 0.0, 0.999, 1.0, 5.0])).tolist() == [0, 0, 0, 1, 1]
-    assert not curve(np.zeros(1), np.zeros(1)).held
-
-
 def test_a_curve_until_a_time():
     short = sampled(np.arange(10.0)).until(0.004)
     assert short.values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
@@ -163,13 +135,6 @@ def test_a_late_curve_that_still_moves_at_the_end_is_inside():
     late = Curve(time, 5.0 * np.maximum(time - 0.002, 0.0))
     assert deviation(ramp, late, 0.002).values.max() == pytest.approx(0.0, abs=1e-12)
     assert deviation(ramp, late, 0.001).values.max() == pytest.approx(5.0 * 0.001)
-
-
-def test_every_second_sample_and_the_ends():
-    whole = sampled(np.arange(6.0))
-    assert whole.thinned(0).values.tolist() == [0.0, 2.0, 4.0, 5.0]
-    assert whole.thinned(1).values.tolist() == [0.0, 1.0, 3.0, 5.0]
-    assert sampled(np.arange(1.0)).thinned(1).values.tolist() == [0.0]
 
 
 def test_a_peak_between_samples_is_in_the_band_of_one_that_is_thinned():

@@ -148,16 +148,6 @@ def test_case_2_has_a_target_of_its_own():
     assert targets[-1] == pytest.approx(3.0 * tanh(0.5) / 36.0, rel=1e-6)
 
 
-def test_without_impact_reduction_the_fingers_follow_the_target():
-    """Its position and its velocity, which is that of Case 2."""
-    trace = zip(SAMPLES[1:], run(NO_IMPACT_REDUCTION, SAMPLES)[1:], integrated(True), strict=True)
-    for u, (_, y), (x, _, _, v, _, _) in trace:
-        assert y.target_position == pytest.approx(x, abs=1e-11)
-        assert y.virtual_position == (y.target_position, y.target_position)
-        expected = [-14.0 * (u.velocity[j] - v) - 98.0 * (u.position[j] - x) for j in (0, 1)]
-        np.testing.assert_allclose(y.force, expected, rtol=0.0, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("before", "after"),
     [(CASE_1, CASE_2), (CASE_0, NO_IMPACT_REDUCTION), (CASE_0, CASE_1),
@@ -206,30 +196,6 @@ def test_the_force_follows_the_sample_it_is_asked_for(p):
 
 
 # ----------------------------------------------------------------------------- the start
-
-POSITIONS = st.floats(-1.0, 1.0)
-INTENSITIES = st.floats(0.0, 5.0)
-
-
-@QUICK
-@given(POSITIONS, POSITIONS, INTENSITIES, INTENSITIES, st.booleans())
-def test_fingers_at_rest_start_without_a_force(x_1, x_2, xi_1, xi_2, layer_3_on):
-    u = Inputs((x_1, x_2), (0.0, 0.0), (xi_1, xi_2))
-    p = switched(layer_3_on, True)
-    y = series.outputs(p, series.initial_state(p, u), u)
-    assert y.force == (0.0, 0.0)
-    assert y.virtual_position == (x_1, x_2)
-    assert y.target_position == pytest.approx(0.5 * (x_1 + x_2), abs=1e-16)
-    assert y.impact_reduction_force == (0.0, 0.0)
-
-
-@pytest.mark.parametrize("p", [CASE_1, CASE_2])
-def test_the_force_grows_from_nothing(p):
-    """After h seconds of the same sample it is of the order of h: no jump at the start."""
-    u = Inputs((0.11, -0.11), (0.0, 0.0), (0.030, 0.010))
-    for h in (1e-3, 1e-4, 1e-5):
-        _, (_, y) = run(p, [u, u], h)
-        assert 0.0 < max(abs(force) for force in y.force) < 100.0 * h
 
 
 def test_the_first_sample_is_no_approach():
@@ -292,14 +258,6 @@ def test_a_value_outside_its_range_is_refused(layer, parameter):
         assert str(caught.value) == (
             f"{layer}.{parameter.name} = {number!r} {parameter.unit}: {parameter.valid}"
         )
-
-
-@pytest.mark.parametrize(("layer", "parameter"), PARAMETERS)
-def test_both_ends_of_a_range_are_accepted(layer, parameter):
-    for bound in (parameter.low, parameter.high):
-        for value in parameter.variants(bound):
-            p = LAYERS[layer](**{parameter.name: value})
-            assert getattr(p, parameter.name) == value
 
 
 def test_every_number_has_a_range():

@@ -98,15 +98,6 @@ def test_a_chirp_does_not_trip(size, start, rise, growing):
     assert watch(size * envelope * np.sin(start * K + rise * K**2)) is None
 
 
-@given(st.integers(1, ROWS - 10), ten(0.0, 6.5), st.integers(1, 500))
-def test_an_impact_in_a_small_unit_does_not_trip(start, peak, length):
-    """Up to 3e6 uN after 1 uN, as half a sine, and in steps of a stiff contact."""
-    after = K - start
-    pulse = np.where((after >= 0) & (after < length), np.sin(np.pi * after / length), 0.0)
-    assert watch(1.0 + peak * pulse, nominal=1.0) is None
-    assert watch(1.0 + peak * (after >= 0), nominal=1.0) is None
-
-
 @given(ten(-2.3, 0.7), ten(-4.0, 0.497), st.floats(0.0, 6.3), ten(-9.0, 3.0), st.integers(1, 2000))
 def test_what_grows_exponentially_trips_whatever_its_rate_and_frequency(
     rate, turn, phase, size, block
@@ -141,13 +132,6 @@ def test_the_scale_is_the_nominal_or_the_first_value():
     assert watch(1e4 * curve, nominal=1.0) is not None  # from 1e4: to be 1e10, and it is 1e12
     assert watch(1e-3 * curve) is None
     assert watch(1e-3 * curve, nominal=1e-3) is not None
-
-
-def test_without_a_nominal_value_small_units_count_as_si():
-    curve = 10.0 ** (K / 400.0)
-    assert watch(curve, unit="N") is not None
-    assert watch(curve, unit="uN") is None
-    assert watch(1e6 * curve, unit="uN") is not None
 
 
 def test_large_values_from_the_start_do_not_trip():

@@ -11,13 +11,12 @@ from grasp_cosim.exchange.energy import Bond, ExchangeEnergy, bonds
 from grasp_cosim.interface.arrays import MOST_ELEMENTS
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system import parts
-from grasp_cosim.system.parts import Connection, Port
+from grasp_cosim.system.parts import Port
 from gripper_plant import rigid
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from proximity_sensor import optics
-from si_units import Unit
 from support.direct import closed_loop
 from support.examples import examples
 
@@ -146,22 +145,8 @@ def test_it_falls_with_the_step():
     assert coarse / fine == pytest.approx(2.0, rel=0.02)
 
 
-def test_an_exchange_without_error_creates_nothing():
-    """A constant force, as of a weight: held or not, it does the same work."""
-    x = np.linspace(0.0, 1.0, 11) ** 2
-    rows = np.column_stack([np.full(11, 5.0), x, np.full(11, 5.0), x])
-    assert _energy(rows) == pytest.approx(np.zeros(11), abs=1e-15)
-
-
 def test_the_first_row_is_zero():
     assert _energy(_sequential().rows[:1]).tolist() == [0.0]
-
-
-def test_a_source_that_receives_no_position_is_taken_to_see_it_at_once():
-    rows = _sequential().rows
-    unseen = rows.copy()
-    unseen[:, COLUMN[SEEN]] = np.nan
-    assert np.array_equal(_energy(unseen, replace(BOND, seen=None)), _energy(rows))
 
 
 def test_values_that_are_not_finite_are_passed_on_without_a_warning():
@@ -257,52 +242,11 @@ def test_the_source_keeps_its_own_step(grasp):
     assert [b.period for b in bonds(system)] == [4, 4]
 
 
-def test_a_position_of_another_name_makes_no_bond(grasp):
-    plant = replace(grasp.component("plant", "test"), rename={"place[1]": "position[1]"})
-    place = Port("plant", "place[1]")
-    connections = tuple(
-        Connection(place, w.target) if w.source == Port("plant", "position[1]") else w
-        for w in grasp.connections
-    )
-    system = replace(grasp, components=_with_component(grasp, plant), connections=connections)
-    assert [b.index for b in bonds(system)] == [2]
-
-
-def test_a_force_without_a_connection_makes_no_bond(grasp):
-    plant = replace(grasp.component("plant", "test"), values={"force[1]": -1.0})
-    connections = tuple(w for w in grasp.connections if w.target != Port("plant", "force[1]"))
-    system = replace(grasp, components=_with_component(grasp, plant), connections=connections)
-    assert [b.index for b in bonds(system)] == [2]
-
-
-def test_a_source_that_has_no_connection_from_the_position(grasp):
-    controller = replace(grasp.component("controller", "test"), values={"position[1]": 0.1})
-    connections = tuple(
-        w for w in grasp.connections if w.target != Port("controller", "position[1]")
-    )
-    system = replace(grasp, components=_with_component(grasp, controller), connections=connections)
-    assert [b.seen for b in bonds(system)] == [None, Port("controller", "position[2]")]
-
-
 def unread(system):
     """The system as it was checked, but whose components read their FMUs anew."""
     other = copy(system)
     object.__setattr__(other, "components", tuple(replace(c) for c in system.components))
     return other
-
-
-@pytest.mark.parametrize(
-    ("exponents", "scales"),
-    [((1, 1, -2, 0, 0, 0, 0, 0), [1e3, 1e3]), ((1, 2, -2, 0, 0, 0, 0, 0), [])],
-)
-def test_forces_are_taken_in_their_declared_unit(exponents, scales, grasp, monkeypatch):
-    """Here N is declared as a kilonewton; and as a moment, which is no force."""
-
-    def declared(path):
-        return replace(read_interface(path), units={"N": Unit("N", exponents, 1e3)})
-
-    monkeypatch.setattr(parts, "read_interface", declared)
-    assert [b.scale for b in bonds(unread(grasp))] == scales
 
 
 @pytest.mark.parametrize("name", ["force[1]", "position[1]"])

@@ -60,26 +60,3 @@ def test_new_nominal_values_are_kept_to():
         counts.append(decay.count)
         decay.solver.close()
     assert counts[1] < counts[0] / 2
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_what_a_function_raises_is_raised(error):
-    def fail(*_: object):
-        raise error
-
-    solver = cvode(1, 0, fail, fail, Solver())
-    solver.restart(0.0)
-    with pytest.raises(error):
-        solver.step(1.0)
-    solver.close()
-
-
-def test_what_it_cannot_do_it_says(capfd):
-    from grasp_cosim.fmi.cvode import CvodeError
-
-    solver = cvode(1, 0, lambda *_: 1, lambda *_: 1, Solver())
-    solver.restart(0.0)
-    with pytest.raises(CvodeError, match="right-hand side"):
-        solver.step(1.0)
-    solver.close()
-    assert capfd.readouterr() == ("", "")

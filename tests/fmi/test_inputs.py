@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from fmi.instances import KINDS, real
 from grasp_cosim import SimulationError, System, simulate
@@ -18,30 +17,8 @@ def variable(name, kind="Real", causality="input", **more):
     return Variable(name, kind, causality, 1, **given)  # type: ignore[arg-type]
 
 
-def test_they_have_their_names_values_and_units():
-    inputs = Inputs()
-    inputs.set(variable("gap", unit="m"), 45.0)
-    inputs.set(variable("held", "Boolean"), True)
-    inputs.set(variable("count", "Integer"), 3)
-    inputs.set(variable("mode", "String"), "soft")
-    inputs.set(variable("mass", causality="parameter"), 0.5)
-    assert str(inputs) == " (inputs: gap = 45 m, held = true, count = 3, mode = 'soft')"
-
-
 def test_an_fmu_without_inputs_names_none():
     assert str(Inputs()) == ""
-
-
-def test_in_the_run_they_are_those_of_the_buffers_then_those_that_stay():
-    inputs, data = Inputs(), np.zeros(2)
-    forces = [variable("force[1]", unit="N"), variable("force[2]", unit="N")]
-    inputs.bind(forces, data)
-    inputs.set(variable("gap", unit="m"), 0.1)
-    inputs.set(forces[0], 7.0)
-    assert str(inputs) == " (inputs: force[1] = 7 N, gap = 0.1 m)"  # what was passed on until now
-    inputs.running = True
-    data[:] = 1.0, -2.5
-    assert str(inputs) == " (inputs: force[1] = 1 N, force[2] = -2.5 N, gap = 0.1 m)"
 
 
 def test_of_many_those_that_are_out_of_range_come_first():

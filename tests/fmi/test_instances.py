@@ -12,9 +12,7 @@ from fmi.instances import KINDS, SAMPLES, Bound, real, running, variable
 from fmpy import simulate_fmu
 from grasp_cosim import InputError, SimulationError
 from grasp_cosim.base.calls import STEP_2, STEP_3, TRANSFER_2, TRANSFER_3
-from grasp_cosim.fmi import fmi2
 from grasp_cosim.fmi.instance import DISCARD, EARLY, OK
-from grasp_cosim.fmi.loaded import KEPT
 from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.system.parts import Component
@@ -24,16 +22,6 @@ from support.packages import skip_where_fmpy_runs_none
 
 pytestmark = needs_gcc
 both = pytest.mark.parametrize(("version", "isolation"), KINDS)
-
-
-@both
-def test_every_scalar_type_goes_through_one_by_one(tmp_path, version, isolation):
-    with running(tmp_path, version, isolation) as part:
-        names = list(TYPES[version])
-        part.set([variable(part, f"u_{t}") for t in names], [SAMPLES[t] for t in names])
-        got = part.get([variable(part, f"y_{t}") for t in names])
-    assert got == [SAMPLES[t] for t in names]
-    assert [type(value) for value in got] == [type(SAMPLES[t]) for t in names]
 
 
 @both
@@ -88,21 +76,6 @@ def test_an_error_tells_what_the_fmu_logged(tmp_path, version, isolation):
         error = part.failure(bound.step(), 0.2)
     assert str(error) == "part: native.fmu returned error at t = 0.2 s: the lamp is broken"
     assert error.__notes__ == ["the lamp\nis broken"]
-
-
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_of_many_warnings_the_last_are_kept(tmp_path, version):
-    with running(tmp_path, version, values={"error_at": 0.1}) as part:
-        for k in range(1000):
-            text = f"warning {k}".encode()
-            if version == "2.0":
-                fmi2._log(None, b"part", 1, b"", text)
-            else:
-                part._log(None, 1, b"", text)  # type: ignore[attr-defined]
-        error = part.failure(Bound(part, 0.2).step(), 0.0)
-    warnings = " ".join(f"warning {k}" for k in range(1000 - KEPT + 1, 1000))
-    assert str(error).endswith(f"returned error at t = 0 s: {warnings} the lamp is broken")
-    assert len(error.__notes__) == KEPT
 
 
 @both
@@ -222,17 +195,6 @@ def test_without_a_binary_for_this_machine(tmp_path, version, isolation):
         f"part: {other} has a binary for win64 only; this machine: {ours}; ask the vendor for an "
         f"FMU with a binary for {ours}"
     )
-
-
-@both
-def test_a_token_that_differs_does_not_load(tmp_path, version, isolation):
-    component = Component(
-        "part", build(tmp_path, version=version, token="{other}"), {}, isolation=isolation
-    )
-    with pytest.raises(
-        InputError, match=r"^part: .*native.fmu does not load: wrong (GUID|inst.*)$"
-    ):
-        load(component)
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])

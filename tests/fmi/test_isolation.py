@@ -10,7 +10,6 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from fmi.instances import Bound, real, running
 from grasp_cosim import InputError, SimulationError, System, simulate
@@ -120,45 +119,12 @@ def test_a_hang_is_bounded(tmp_path, version, monkeypatch):
         assert not workers()
 
 
-@pytest.mark.usefixtures("ctrl_c")
-@versions
-def test_an_interrupted_call_is_not_answered_later(tmp_path, version):
-    """What it answers would be taken for the answer to the next call."""
-    values = {"interrupt_at": 0.1, "interrupted": os.getpid(), "hang_at": 0.1}
-    with running(tmp_path, version, "process", values) as part:
-        bound = Bound(part, 0.2)
-        with pytest.raises(KeyboardInterrupt):
-            bound.step()
-        message = r"^part: the process of native.fmu was interrupted and ended at t = 0 s"
-        with pytest.raises(SimulationError, match=message):
-            part.get([part.interface.by_name["x"]])
-        assert not workers()
-
-
 def test_a_crash_in_the_initialisation_is_a_wrong_input(tmp_path):
     with running(tmp_path, "3.0", "process") as part:
         (pid,) = workers()
         os.kill(pid, signal.SIGKILL)
         with pytest.raises(InputError, match=r"^part: the process of .* signal SIGKILL at t = 0 s"):
             part.enter_initialization({}, 1.0)
-
-
-def test_what_a_lost_process_leaves_is_cleared_away_in_silence(tmp_path):
-    """Where it ends between a command and its arguments; since 3.13 Python tells of all it met."""
-    with running(tmp_path, "3.0", "process") as part:
-        assert isinstance(part, process.ProcessInstance)
-        pid, send = part._process.pid, part._connection.send_bytes
-
-        def send_and_kill(data):
-            send(data)
-            os.kill(pid, signal.SIGKILL)
-            os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
-
-        part._connection.send_bytes = send_and_kill  # type: ignore[method-assign, assignment]
-        with pytest.raises(SimulationError, match=r"^part: the process of .* signal SIGKILL at t"):
-            part.get([part.interface.by_name["x"]])
-    del part
-    gc.collect()
 
 
 @pytest.mark.slow
@@ -259,29 +225,3 @@ part.stepper(np.zeros(2), 0.2).python()
         assert alive(worker)
         master.kill()
     assert ends(worker)
-
-
-def test_values_that_are_pending_are_passed_on_in_order(tmp_path):
-    """A value that is set one by one comes after what the loop has put before it."""
-    with running(tmp_path, "2.0", "process") as part:
-        bound = Bound(part, 0.1)
-        put, sent = bound.exchange("set", "u_Real")
-        fetch, got = bound.exchange("get", "y_Real")
-        sent[0] = 1.0
-        assert put() == OK
-        part.set([part.interface.by_name["u_Real"]], [2.0])
-        assert (fetch(), got.tolist()) == (OK, [2.0])
-        sent[0] = 3.0
-        assert (put(), fetch(), got.tolist()) == (OK, OK, [3.0])
-
-
-def test_many_more_values_than_a_page(tmp_path):
-    """Rooms in the shared memory do not overlap."""
-    with running(tmp_path, "3.0", "process") as part:
-        bound = Bound(part, 0.1)
-        fetches = [bound.exchange("get", "now", "y_Float64") for _ in range(300)]
-        put, sent = bound.exchange("set", "u_Float64")
-        sent[0] = 5.0
-        assert (put(), bound.step()) == (OK, OK)
-        assert all(fetch() == OK for fetch, _ in fetches)
-        assert np.array([got for _, got in fetches]).tolist() == [[0.1, 5.0]] * 300

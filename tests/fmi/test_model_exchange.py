@@ -48,16 +48,6 @@ def test_a_ball_bounces_as_it_should(tmp_path, step):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_a_ball_bounces_300_times(tmp_path, version):
-    result = run(part("bouncing_ball", tmp_path, version, e=0.99, v_min=0.01), 0.01, 60.0)
-    height, speed = bouncing_ball(result.time, e=0.99, v_min=0.01)
-    assert result["bouncing_ball.h"] == pytest.approx(height, abs=WITHIN)
-    landing = np.abs(height) < 1e-5  # the speed jumps there
-    assert result["bouncing_ball.v"][~landing] == pytest.approx(speed[~landing], abs=4.0 * WITHIN)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
 def test_van_der_pol(tmp_path, version):
     result = run(part("van_der_pol", tmp_path, version, mu=5.0), 0.1, 20.0)
 
@@ -98,13 +88,6 @@ def test_a_stair_has_its_steps_at_the_very_points(tmp_path, version, width, step
     result = run(part("stair", tmp_path, version, width=width, last=100), step, 30.0 * width)
     count = 1 + np.floor(result.time / width + 1e-9)
     assert result["stair.counter"].tolist() == count.tolist()
-
-
-def test_events_without_states(tmp_path):
-    """Half waves of 1 Hz; the one that begins at 0 counts, too."""
-    result = run(part("sine", tmp_path), 0.1, 3.0)
-    count = 1 + np.floor(2.0 * result.time[1:] - 1e-9)
-    assert result["sine.count"][1:].tolist() == count.tolist()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -208,27 +191,6 @@ def test_what_does_not_go_on_ends_in_one_line(tmp_path, kind):
         run(part("odd", tmp_path, kind=kind), 0.1, 1.0)
     assert "\n" not in str(caught.value)
     assert caught.value.result is not None
-
-
-def test_a_ball_that_never_rests_ends_in_one_line(tmp_path):
-    """Where its bounces come together, at (1 + e) / (1 - e) times that of the first."""
-    component = part("bouncing_ball", tmp_path, v_min=0.0)
-    with pytest.raises(SimulationError, match="chatters, or does not come to rest") as caught:
-        run(component, 0.01, 9.0)
-    assert "at t = 2.5586285" in str(caught.value)
-
-
-@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("engine", ENGINES)
-def test_the_bits_are_the_same_everywhere(tmp_path, isolation, engine):
-    """In both engines, in a process, in FMI 3.0, beside another instance."""
-    here = run(part("bouncing_ball", tmp_path), 0.1, 1.0)
-    fmu = build_model("bouncing_ball", tmp_path, "3.0", EXCHANGE, "other")
-    parts = tuple(Component(n, fmu, {}, isolation=isolation) for n in ("a", "b"))
-    system = System("two", parts, (), 100_000_000, 1_000_000_000, "sequential")
-    result = simulate(system, engine=engine)  # type: ignore[arg-type]
-    for name in ("a.h", "b.h"):
-        assert result[name].tolist() == here["bouncing_ball.h"].tolist()
 
 
 def test_a_session_and_its_settings(tmp_path):

@@ -5,11 +5,9 @@ import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 from fmi.instances import Bound, variable
-from grasp_cosim import InputError, SimulationError
 from grasp_cosim.fmi.fmi2 import SharedInstance
-from grasp_cosim.fmi.instance import ERROR, OK
+from grasp_cosim.fmi.instance import OK
 from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.system.parts import Component
 from support.native_fmus import build, needs_gcc
@@ -56,25 +54,6 @@ def test_one_after_the_other_starts_anew_from_the_same_files(tmp_path, monkeypat
             extracted.append(a._slave.unzipDirectory)
     assert len(set(extracted)) == 1
     assert [f.name for f in tmp_path.iterdir() if f.is_dir()] == [Path(extracted[0]).name]
-
-
-def test_what_one_logs_is_of_that_one(tmp_path):
-    fmu = build(tmp_path, version="2.0")
-    with shared(fmu, "a", error_at=0.5) as a, shared(fmu, "b") as b:
-        assert Bound(a, 1.0).step() == ERROR
-        assert steps(b, 1) == 0.0
-        error = a.failure(ERROR, 0.0)
-    assert isinstance(error, SimulationError)
-    assert str(error).startswith("a: native.fmu returned error at t = 0 s: ")
-
-
-def test_a_refusal_leaves_the_library_to_the_others(tmp_path):
-    fmu = build(tmp_path, version="2.0")
-    refused = pytest.raises(InputError, match=r"a: native\.fmu refused .*gain must be >= 0")
-    with refused, shared(fmu, "a", gain=-1.0):
-        pass
-    with shared(fmu, "a", u_Real=1.0) as a:
-        assert steps(a, 1) == 1.0
 
 
 def test_an_fmu_that_was_built_anew_is_loaded_anew(tmp_path):

@@ -76,14 +76,6 @@ def test_what_cannot_be_told_stays_as_it_comes(tmp_path, form):
     assert said(ctypes.CDLL(str(file)))[0] == [form.encode()]
 
 
-def test_on_another_processor_all_stay_as_they_come():
-    heard = []
-    logger = logger_type(None)(lambda *arguments: heard.append(arguments))
-    logger(None, b"part", 3, b"why", b"the %s is broken")
-    assert heard == [(None, b"part", 3, b"why", b"the %s is broken")]
-    assert formatted(b"the %s is broken", (), None) == b"the %s is broken"
-
-
 def test_fmpys_own_logger_is_not_used_and_what_it_prints_is_not_seen():
     """Where FMPy has none for a processor, it says so on standard output."""
     code = """

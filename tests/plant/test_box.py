@@ -100,14 +100,6 @@ def test_it_tilts_where_the_push_exceeds_m_g_w_over_2h():
         assert way * after(ROUGH, REST, above, 1e-4, 500).tilt > 0.0
 
 
-def test_a_sliding_box_tilts_by_its_own_friction_where_mu_exceeds_w_over_h():
-    """The floor's mu·m·g at the height of the centre against m·g·b."""
-    sliding = Box(0.0, 0.0, 0.5, 0.0)
-    for mu, tilts in ((0.99 * 0.035 / 0.05, False), (1.01 * 0.035 / 0.05, True)):
-        box = advance(UPRIGHT._replace(mu=mu), sliding, NOTHING, 1e-4)
-        assert (box.tilt > 0.0) is tilts
-
-
 def test_tilting_under_a_constant_push_is_that_of_the_equation():
     """On an edge that sticks: 4/3·m·r^2·theta'' = Q - m·g·X."""
     push = 0.25
@@ -134,15 +126,6 @@ def test_on_a_smooth_floor_the_centre_is_shifted_by_pushes_alone():
     assert 0.0 < box.tilt < 0.29
     assert box.v != 0.0
     assert centre(q, box) == pytest.approx(centre(q, tilted), abs=1e-8)
-
-
-def test_it_falls_back_flat_and_loses_the_energy_of_the_fall():
-    q = ROUGH._replace(mu=0.5)
-    states = list(islice(run(q, Box(0.0, 0.3, 0.0, 0.0), NOTHING, 1e-4), 3000))
-    assert states[0].tilt > 0.299
-    assert min(box.tilt for box in states) == 0.0
-    assert (states[-1].tilt, states[-1].v, states[-1].w) == (0.0, 0.0, 0.0)
-    assert energy(q, states[-1]) == 0.0
 
 
 def fall(q, tilt):
@@ -183,27 +166,6 @@ def test_it_lands_when_it_should_and_slides_on_as_far_as_the_impulse_of_the_floo
     assert (states[-1].v, states[-1].tilt, states[-1].w) == (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_low_box_on_a_rough_floor_stays_where_it_lands(side):
-    """The floor could take more off than there is: mu·b > a."""
-    q = Shape(b=0.06, a=0.03, m=0.05, mu=0.9, h=0.03)
-    states = list(islice(run(q, Box(0.01, side * 0.2, 0.0, 0.0), NOTHING, 1e-4), 1000))
-    assert states[-1] == Box(0.01, 0.0, 0.0, 0.0)
-    assert {box.x for box in states} == {0.01}
-    assert {box.v for box in states} == {0.0}
-
-
-@pytest.mark.parametrize("v", [0.2, -0.3])
-def test_on_a_smooth_floor_a_landing_changes_no_momentum(v):
-    """No force acts along the floor: the centre keeps its speed, before and after."""
-    q, d, n = UPRIGHT._replace(mu=0.0), 1e-4, 2000
-    begin = Box(0.0, 0.2, v, 0.0)
-    box = after(q, begin, NOTHING, d, n)
-    assert (box.tilt, box.w) == (0.0, 0.0)
-    assert box.v == pytest.approx(v, abs=1e-5)
-    assert centre(q, box) == pytest.approx(centre(q, begin) + v * n * d, abs=1e-6)
-
-
 def test_the_balance_is_where_the_centre_is_above_the_edge():
     assert balance(UPRIGHT) == pytest.approx(atan2(0.035, 0.05))
     for share, rises in ((0.999, False), (1.001, True)):
@@ -211,14 +173,6 @@ def test_the_balance_is_where_the_centre_is_above_the_edge():
         assert (advance(UPRIGHT, box, NOTHING, 1e-3).tilt > box.tilt) is rises
     over = Box(0.0, balance(UPRIGHT), 0.0, 0.0)
     assert centre(UPRIGHT, over) == pytest.approx(0.035)
-
-
-def test_squeezing_a_tilted_box_rights_it():
-    """Both fingertips at one height: the box is narrowest there when it is upright."""
-    tilted = Box(0.0, 0.1, 0.0, 0.0)
-    squeezed = after(ROUGH, tilted, Pushes(5.0, 5.0), 1e-4, 50)
-    alone = after(ROUGH, tilted, NOTHING, 1e-4, 50)
-    assert 0.0 <= squeezed.tilt < alone.tilt
 
 
 def test_the_faces_at_the_height_of_the_fingertips():

@@ -1,13 +1,13 @@
 """Sliding and sticking: analytic, exact at the stop, and without chatter."""
 
 from itertools import pairwise
-from math import exp, log, sqrt
+from math import exp, sqrt
 from typing import Any
 
 import numpy as np
 import pytest
-from gripper_plant import contact, fingers, friction, rigid
-from gripper_plant.fingers import Actuator, Inputs, Side
+from gripper_plant import fingers, friction, rigid
+from gripper_plant.fingers import Actuator, Inputs
 from gripper_plant.friction import Params, move, resistance
 from hypothesis import given
 from hypothesis import strategies as st
@@ -56,14 +56,6 @@ def test_at_rest_below_breakaway_nothing_moves_at_all(m, f, d):
     assert run(0.123, 0.0, m, f, STRIBECK, d, 10) == (0.123, 0.0)
 
 
-@QUICK
-@given(MASSES, st.floats(0.7001, 50.0), st.sampled_from([-1.0, 1.0]), STEPS)
-def test_above_breakaway_it_goes_the_way_of_the_force(m, f, way, d):
-    x, v = move(0.0, 0.0, m, way * f, STRIBECK, d)
-    assert way * x > 0.0
-    assert way * v > 0.0
-
-
 def test_breakaway_is_at_the_static_force_under_a_slow_ramp():
     """And then the Stribeck curve lets it run away from where it stuck."""
     x, v, moved = 0.0, 0.0, 0.0
@@ -84,14 +76,6 @@ def test_friction_never_gives_energy(m, v, f, d):
     assert gained <= 1e-12 * (0.5 * m * (rate**2 + v**2) + abs(f * x))
 
 
-@QUICK
-@given(MASSES, SPEEDS, st.floats(-5.0, 5.0), STEPS)
-def test_left_is_as_right(m, v, f, d):
-    x, rate = move(0.1, v, m, f, STRIBECK, d)
-    y, mirrored = move(-0.1, -v, m, -f, STRIBECK, d)
-    assert (y, mirrored) == (-x, -rate)
-
-
 def test_there_is_no_chatter_about_a_stop():
     """Slowed down under a force that cannot move it, the velocity falls to zero and stays."""
     x, v = 0.0, 0.05
@@ -103,24 +87,6 @@ def test_there_is_no_chatter_about_a_stop():
     assert 10 < stopped < 200
     assert all(later < before for before, later in pairwise(speeds[:stopped]))
     assert set(speeds[stopped:]) == {0.0}
-
-
-def test_viscous_friction_alone_is_an_exponential():
-    m, b, v, t = 0.5, 2.0, 0.3, 0.4
-    x, rate = run(0.0, v, m, 0.0, (0.0, 0.0, b, 1.0), t / 4000, 4000)
-    assert rate == pytest.approx(v * exp(-b * t / m), rel=1e-6)
-    assert x == pytest.approx(v * m / b * (1.0 - exp(-b * t / m)), rel=1e-6)
-
-
-def test_coulomb_and_viscous_friction_stop_at_a_finite_time():
-    """t = m/b·ln(1 + b·v/F_C)."""
-    m, b, v, coulomb = 0.5, 2.0, 0.3, 0.1
-    stop = m / b * log(1.0 + b * v / coulomb)
-    law, d = (coulomb, coulomb, b, 1.0), stop / 2000.5
-    _, before = run(0.0, v, m, 0.0, law, d, 1998)
-    _, after = run(0.0, v, m, 0.0, law, d, 2003)
-    assert before > 0.0
-    assert after == 0.0
 
 
 def test_the_stribeck_curve():
@@ -226,20 +192,6 @@ def stored(p, x, j):
     gap = rigid.outputs(p, x, Inputs()).gap[j]
     m = p.finger_mass[j]
     return 0.5 * m * (x.velocity[j] ** 2 + (p.baumgarte_beta * min(gap, 0.0)) ** 2)
-
-
-def test_without_friction_the_fingers_are_those_of_the_contact_alone():
-    """Bit for bit, from flight into rest."""
-    p, h = rigid.Params(), 1e-3
-    assert not any(map(friction.acts, (*friction.laws(p.friction), friction.NONE)))
-    x = rigid.initial_state(p, Inputs())
-    finger, side = (0.11, 0.0, 0.0), Side(0.065, 0.5, friction.NONE)
-    for _ in range(400):
-        s, v, _ = finger
-        finger = contact.advance(side, contact.Rates(200.0, 200.0), s, v, -2.0, h)
-        x = rigid.step(p, x, Inputs((-2.0, 0.0)), h)
-        assert (x.position[0], x.velocity[0], x.contact_force[0]) == finger
-    assert finger[2] > 0.0
 
 
 # ------------------------------------------------------------------------------ the actuator

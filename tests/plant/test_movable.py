@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from gripper_plant import box as standing
-from gripper_plant import contact_laws, friction, movable
+from gripper_plant import contact_laws, movable
 from gripper_plant.box import GRAVITY, Box
 from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt
 from gripper_plant.movable import Inputs, Params, State
@@ -59,13 +59,6 @@ def test_the_start_is_at_rest_where_the_parameters_say():
     assert (y.object_position, y.tilt, y.toppled) == (0.03, 0.0, False)
 
 
-def test_a_symmetric_push_does_not_shift_it():
-    """Impact, grip and all, to the last bit."""
-    for x in islice(run(NEAR, start(NEAR), (-2.0, 2.0), 1e-3), 1200):
-        assert x.box == Box(0.0, 0.0, 0.0, 0.0)
-    assert x.contact_force == pytest.approx((2.0, -2.0), rel=1e-6)
-
-
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_one_sided_push_shifts_it(way):
     """And in the end both go as one body, slowed down by the floor."""
@@ -79,14 +72,6 @@ def test_a_one_sided_push_shifts_it(way):
     assert (x.box.tilt, x.toppled) == (0.0, False)
 
 
-def test_a_finger_that_presses_less_than_the_floor_holds_does_not_shift_it():
-    """Put to it gently: a viscous finger arrives at 1 mm/s."""
-    p = replace(NEAR, friction=friction.Params(viscous=(100.0, 100.0)))
-    x = after(p, start(p), (0.0, 0.1), 2e-3, 4000)
-    assert x.box == Box(0.0, 0.0, 0.0, 0.0)
-    assert x.contact_force[1] == pytest.approx(-0.1, rel=1e-3)
-
-
 def test_a_push_near_the_top_topples_it_for_good():
     x = start(TALL)
     seen = []
@@ -98,30 +83,10 @@ def test_a_push_near_the_top_topples_it_for_good():
     assert y.tilt == pytest.approx(standing.balance(standing.shape(TALL)), rel=0.02)
 
 
-def test_a_short_push_tilts_it_and_it_falls_back():
-    pushed = after(TALL, start(TALL), (0.0, 1.0), 1e-4, 1010)
-    states = list(islice(run(TALL, pushed, (0.0, -8.0), 1e-4), 6000))
-    x, tilts = states[-1], [x.box.tilt for x in states]
-    assert 0.01 < max(tilts) < standing.balance(standing.shape(TALL))
-    assert tilts[-1] == 0.0
-    assert not x.toppled
-    assert x.contact_force == (0.0, 0.0)
-
-
 def test_a_toppled_box_stays_as_it_was():
     x = after(TALL, start(TALL), (0.0, 0.4), 1e-3, 800)
     assert x.toppled
     assert after(TALL, x, (-3.0, 3.0), 1e-3, 300).box == x.box
-
-
-def test_the_other_finger_stops_what_the_first_has_set_going():
-    """In the grip the box is at rest, exactly; and so are fingers with friction."""
-    p = replace(NEAR, friction=friction.Params((0.05, 0.05), (0.05, 0.05)))
-    x = after(p, start(p), (0.0, 0.6), 1e-3, 300)
-    x = after(p, x, (-3.0, 3.0), 1e-3, 1200)
-    assert (x.velocity, x.box.v) == ((0.0, 0.0), 0.0)
-    assert x.box.x > 0.0
-    assert after(p, x, (-3.0, 3.0), 1e-3, 20) == x
 
 
 @pytest.mark.parametrize("enabled", [False, True], ids=["Kelvin-Voigt", "Hunt-Crossley"])

@@ -1,7 +1,6 @@
 """The gripper's parameters, and its symmetry: neither side of the gripper is special."""
 
 from dataclasses import replace
-from math import inf, nan
 from typing import Any
 
 import pytest
@@ -49,32 +48,6 @@ def test_a_value_outside_its_range_is_refused(parameter):
         assert text.startswith(f"{parameter.name} = {number!r} {parameter.unit}: ")
         assert text.endswith(parameter.valid)
         assert "\n" not in text
-
-
-@pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
-def test_both_ends_of_a_range_are_accepted(parameter):
-    if parameter.name == "initial_position":
-        return  # both fingers must move together with the object, see below
-    for bound in (parameter.low, parameter.high):
-        for value in parameter.variants(bound):
-            p = Params(**SURROUNDINGS[parameter.name] | {parameter.name: value})
-            assert getattr(p, parameter.name) == value
-
-
-@pytest.mark.parametrize(
-    ("position", "x_m"), [((10.0, -10.0), 3.0), ((10.0, 10.0), 10.0), ((-10.0, -10.0), -10.0)]
-)
-def test_both_ends_of_the_travel_are_accepted(position, x_m):
-    p = Params(initial_position=position, initial_object_position=x_m, object_width=0.0)
-    assert p.initial_position == position
-
-
-@pytest.mark.parametrize("mass", [-0.5, 0.0, nan, inf])
-@pytest.mark.parametrize("finger", [0, 1])
-def test_a_mass_that_is_none_is_refused_by_name(mass, finger):
-    masses = (mass, 0.5) if finger == 0 else (0.5, mass)
-    valid = "must be from 0.001 to 1000 kg"
-    assert message(finger_mass=masses) == f"finger_mass = {mass!r} kg: {valid}"
 
 
 @pytest.mark.parametrize(

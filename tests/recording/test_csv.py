@@ -1,11 +1,8 @@
 """Writes CSV as the FMI cross-check has it, while the run goes on."""
 
 import csv
-import errno
 import math
-import os
 import struct
-from io import FileIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -80,13 +77,6 @@ def test_the_file_takes_its_name_at_the_end(tmp_path, complete):
     assert len(path.read_text().splitlines()) == 11
 
 
-def test_a_run_without_a_row_leaves_no_file(tmp_path):
-    """Where initialisation fails, a file that was there stays."""
-    (tmp_path / "s.csv").write_text("before")
-    play(CsvListener(tmp_path / "s.csv"), rows(0), complete=False)
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.csv", "before")]
-
-
 def test_memory_does_not_grow_with_the_run(tmp_path):
     def run(count):
         table, steps = rows(count), np.arange(count)
@@ -95,16 +85,6 @@ def test_memory_does_not_grow_with_the_run(tmp_path):
     one, four = run(2_500), run(10_000)
     assert four < one + 10_000
     assert four < 1_000_000
-
-
-def test_memory_does_not_grow_with_a_block(tmp_path):
-    def run(count):
-        table, steps = rows(count), np.arange(count)
-        return peak(lambda: play(CsvListener(tmp_path / "s.csv"), table, steps, block=count))
-
-    copied = 7_500 * (len(SIGNALS) + 1) * 8  # by play(), with the step numbers
-    one, four = run(2_500), run(10_000)
-    assert four < one + copied + 10_000
 
 
 def test_a_full_disk_leaves_whole_lines(tmp_path):
@@ -119,31 +99,6 @@ def test_a_full_disk_leaves_whole_lines(tmp_path):
     assert last == ""
     assert {line.count(",") for line in lines} == {3}
     assert 500 < len(lines) < 3000
-
-
-class Broken(FileIO):
-    """A file on a disk that fails within the second text; it writes the half of it."""
-
-    writes = 0
-
-    def write(self, data):
-        self.writes += 1
-        if self.writes < 3:
-            return super().write(data if self.writes < 2 else data[: len(data) // 2])
-        raise OSError(errno.EIO, os.strerror(errno.EIO))
-
-
-def test_a_broken_disk_leaves_whole_lines(tmp_path, monkeypatch):
-    monkeypatch.setattr("grasp_cosim.recording.csv.FileIO", Broken)
-    listener = CsvListener(tmp_path / "s.csv")
-    listener.begin(EXPERIMENT, SIGNALS)
-    with pytest.raises(SimulationError, match=r"^.*s.csv: cannot be written: Input/output error$"):
-        listener.block(np.arange(500), rows(500))
-    (part,) = tmp_path.iterdir()
-    (names,) = part.read_text().splitlines(keepends=True)
-    assert names.endswith('"\n')
-    listener.end(False)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_cannot_be_written_is_a_wrong_input(tmp_path):

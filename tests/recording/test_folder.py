@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Realtime, SimulationError, simulate
+from grasp_cosim import InputError, Realtime, simulate
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.load import load_run
-from recording.rows import EXPERIMENT, SIGNALS, full_disk, rows
+from recording.rows import EXPERIMENT, SIGNALS, rows
 
 STOP = 0.05
 
@@ -90,26 +90,6 @@ def test_without_a_row_the_older_run_stays(run, tmp_path):
     assert {p.read_text() for p in tmp_path.iterdir()} == {"older"}
 
 
-def test_no_picture_of_another_run_stays(run, tmp_path):
-    theirs = ("notes.txt", "photo.png", "evaluation.json")
-    for name in ("run.json", "signals.csv", *DRAWN, *theirs):
-        (tmp_path / name).write_text("older")
-    run.begin(EXPERIMENT, SIGNALS)
-    run.block(np.arange(1), rows(1))
-    run.end(complete=False)
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
-        [".lock", "run.json", "signals.csv", *theirs]
-    )
-
-
-def test_what_is_not_of_a_run_is_not_removed(run, tmp_path):
-    (tmp_path / "report.html").write_text("theirs")
-    run.begin(EXPERIMENT, SIGNALS)
-    run.block(np.arange(1), rows(1))
-    run.end(complete=False)
-    assert (tmp_path / "report.html").read_text() == "theirs"
-
-
 class Killed(BaseException):
     """Stands for a kill between two changes of the folder."""
 
@@ -159,19 +139,6 @@ def test_two_runs_do_not_share_a_folder(run, grasp, tmp_path):
         second.end(complete=False)
     run.end(complete=True)
     assert len((tmp_path / "signals.csv").read_text().splitlines()) == 3
-
-
-def test_rows_that_are_not_there_are_not_told_of(grasp, tmp_path, monkeypatch):
-    """A full disk: run.json stays the one of a run that did not end."""
-    result = simulate(grasp, stop=STOP)
-    with RunFolder(tmp_path, grasp) as folder:
-        folder.begin(EXPERIMENT, SIGNALS)
-        folder.block(np.arange(1), rows(1))
-        with full_disk(size=10_000), pytest.raises(SimulationError):
-            folder.block(np.arange(1, 1000), rows(999))
-        folder.end(complete=False)
-        folder.finish(result)
-    assert json.loads((tmp_path / "run.json").read_text())["wall_time"] is None
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

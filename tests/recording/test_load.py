@@ -142,14 +142,6 @@ def test_metrics_get_si_as_run_json_says_and_signals_stay_as_recorded(tmp_path):
     assert load_run(in_unit(tmp_path, "mm", to_si={})).by_role["a.x"][0] == 1.5
 
 
-@pytest.mark.parametrize(
-    ("unit", "si"), [("mm", 1.5e-3), ("m", 1.5), ("degC", 274.65), ("cubit", 1.5), (None, 1.5)]
-)
-def test_an_earlier_run_has_the_units_that_are_known_by_name(tmp_path, unit, si):
-    run = load_run(in_unit(tmp_path, unit))
-    assert run.by_role["a.x"][0] == pytest.approx(si, rel=1e-15)
-
-
 @pytest.mark.parametrize("entry", [1.0, {}, {"factor": 1.0}, {"factor": "1", "offset": 0.0}])
 def test_a_damaged_conversion_is_one_line(tmp_path, entry):
     with pytest.raises(InputError, match=r"run\.json: to_si: a\.x = .*; must be factor a"):

@@ -7,10 +7,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError
-from grasp_cosim.exchange.listener import Experiment, Signal
+from grasp_cosim.exchange.listener import Experiment
 from grasp_cosim.recording.mdf import PIECE, MdfListener
 from grasp_cosim.system.settings import settings
-from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows
+from recording.rows import EXPERIMENT, SIGNALS, full_disk, play, rows
 
 asammdf = pytest.importorskip("asammdf")
 
@@ -68,38 +68,9 @@ def test_the_header_has_the_settings(grasp, tmp_path, complete):
     }
 
 
-def test_a_run_without_a_row_leaves_no_file(tmp_path):
-    """Where initialisation fails, a file that was there stays."""
-    (tmp_path / "s.mf4").write_text("before")
-    play(MdfListener(tmp_path / "s.mf4"), rows(0), complete=False)
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.mf4", "before")]
-
-
 def test_a_run_without_signals_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"s.mf4: nothing to record; must be a system with out"):
         MdfListener(tmp_path / "s.mf4").begin(EXPERIMENT, ())
-
-
-@pytest.mark.slow
-def test_memory_does_not_grow_with_the_run(tmp_path):
-    """asammdf writes a file in fragments of 4 MB; both runs have more than that."""
-    signals = tuple(Signal(f"a.x[{i}]", "m", "Real") for i in range(64))
-    table = np.random.default_rng(1).integers(0, 9, (1000, 64)).astype(np.float64)
-
-    def run(blocks):
-        listener = MdfListener(tmp_path / f"{blocks}.mf4")
-        listener.begin(EXPERIMENT, signals)
-        for k in range(blocks):
-            listener.block(np.arange(1000 * k, 1000 * (k + 1)), table)
-        listener.end(True)
-
-    run(1)  # imports
-    one, ten = peak(lambda: run(15)), peak(lambda: run(150))
-    assert ten < 1.1 * one
-    with asammdf.MDF(tmp_path / "150.mf4") as file:
-        last = file.get("a.x[63]")
-    assert last.samples.tolist() == 150 * table[:, 63].tolist()
-    assert last.timestamps.tolist() == [k * 100_000 / 1e9 for k in range(150_000)]
 
 
 def test_a_full_disk_leaves_nothing(tmp_path):

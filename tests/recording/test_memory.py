@@ -28,22 +28,6 @@ def test_time_is_that_of_the_step_numbers():
     assert memory.columns()[0].tolist() == [k * 100_000 / 1e9 for k in (0, 3, 6, 9, 10)]
 
 
-def test_there_are_no_rows_before_the_first():
-    memory = MemoryListener()
-    memory.begin(EXPERIMENT, SIGNALS)
-    assert memory.columns()[0].shape == (0,)
-    assert [column.shape for column in memory.columns()[1].values()] == [(0,)] * 3
-
-
-def test_what_was_read_on_the_way_stays_as_it_was():
-    table, memory = rows(100), MemoryListener()
-    memory.begin(EXPERIMENT, SIGNALS)
-    memory.block(np.arange(10), table[:10])
-    _, early = memory.columns()
-    memory.block(np.arange(10, 100), table[10:])
-    assert early["a.x[1]"].tolist() == table[:10, 0].tolist()
-
-
 @pytest.mark.parametrize("stop", [10**18, 10**13])
 def test_a_run_that_does_not_fit_is_refused_at_the_start(stop):
     long = replace(EXPERIMENT, step_ns=1, stop_ns=stop)

@@ -2,17 +2,13 @@
 
 import json
 import pickle
-import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Result, load_run
+from grasp_cosim import InputError, load_run
 from grasp_cosim.base.checks import extra_module
-from hypothesis import given
-from hypothesis import strategies as st
 from report.runs import grasp_run, ring_run, write_run
 
 GAP = "plant.gap[1]"
@@ -40,28 +36,6 @@ def test_what_was_read_back_looks_and_works_like_what_was_run(tmp_path, monkeypa
     assert rest == same
     assert back._repr_html_().replace(", read from run", "") == run._repr_html_()
     assert back.metrics == run.metrics
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"signals": {}, "units": {}},
-        {"complete": False, "wall_time": None},
-        {"log": ("\x1b[31mred\nlines" * 30,)},
-    ],
-)
-def test_an_odd_result_has_a_repr_too(changes):
-    text = repr(replace(grasp_run(), **changes))  # type: ignore[arg-type]
-    assert len(text.splitlines()) == 5
-    assert "\x1b" not in text
-
-
-@pytest.mark.slow
-@given(names=st.lists(st.text(min_size=1), min_size=1, max_size=30, unique=True))
-def test_names_of_any_length_stay_in_their_line(names):
-    lines = repr(ring_run(names, rows=3)).split("\n")
-    assert len(lines) == 5
-    assert max(map(len, lines)) <= 100
 
 
 def test_html_shows_metrics_and_escapes_names():
@@ -98,15 +72,6 @@ def test_so_is_a_wrong_name_of_a_metric():
     assert json.loads(json.dumps(run.metrics))["scheme"] == run.metrics["scheme"]
 
 
-def test_a_name_like_none_lists_all_and_looking_for_one_is_no_error():
-    run = ring_run(["a", "b"])
-    with pytest.raises(KeyError, match=r"'zzzzzz': no such signal; valid: a.y, b.y"):
-        run["zzzzzz"]
-    assert "zzzzzz" not in run
-    assert run.get("zzzzzz") is None
-    assert "a.y" in run
-
-
 @pytest.mark.slow
 def test_plot_returns_a_figure_that_a_notebook_shows_and_writes_it_where_asked(tmp_path):
     figure_module = pytest.importorskip("matplotlib.figure")
@@ -132,18 +97,6 @@ def test_pandas_has_the_same_numbers_types_and_units():
     assert all(np.array_equal(frame[name], run[name]) for name in run)
     assert frame.attrs["units"] == {"time": "s", **run.units}
     assert frame.attrs["system"] == "grasp.toml"
-
-
-@pytest.mark.slow
-def test_a_csv_of_pandas_is_a_side_of_a_comparison(tmp_path):
-    pytest.importorskip("pandas")
-    from grasp_cosim.comparison.compare import compare
-
-    write_run(tmp_path / "run", grasp_run())
-    grasp_run().to_pandas().to_csv(tmp_path / "pandas.csv")
-    found = compare(tmp_path / "run", tmp_path / "pandas.csv")
-    assert found.alike
-    assert len(found.signals) == len(grasp_run())
 
 
 @pytest.mark.slow
@@ -174,16 +127,3 @@ def test_without_the_extra_it_is_one_line(method, monkeypatch):
     monkeypatch.setitem(sys.modules, method.removeprefix("to_"), None)
     with pytest.raises(InputError, match=r"-m pip install ('pandas>=[0-9.]+'|xarray)$"):
         getattr(grasp_run(), method)()
-
-
-@pytest.mark.slow
-def test_tables_and_pictures_are_not_imported_before_they_are_asked_for():
-    """Start-up stays short."""
-    code = (
-        "import sys, json; from grasp_cosim import Result, load_run, simulate; "
-        "print(json.dumps([m for m in ('pandas', 'xarray', 'matplotlib', 'difflib') "
-        "if m in sys.modules]))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout) == []
-    assert Result.__name__ == "Result"

@@ -1,12 +1,7 @@
 """What pictures and pages say of themselves."""
 
-from dataclasses import replace
-from importlib.metadata import version
-from pathlib import Path
-
 import pytest
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.recording.folder import now
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.caption import about, caption, changes
 from report.runs import grasp_run, ring_run, write_run
@@ -22,27 +17,10 @@ def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_p
     assert caption(kept, "After").title == caption(kept.titled("After")).title == "After"
 
 
-def test_a_run_without_a_date_says_none(monkeypatch):
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
-    run = replace(grasp_run(), origin={})
-    fresh = f"2001-09-09 · grasp-cosim {version('grasp-cosim')}"
-    assert caption(run).about == fresh
-    assert not caption(replace(run, folder=Path("results"))).about
-    changed = replace(run, settings={**run.settings, "changed": {}})
-    assert caption(changed).about == f"as in the system file · {fresh}"
-
-
 def test_many_changes_are_counted():
     assert changes({}) == "as in the system file"
     assert changes({"a": True, "b": 0.1, "c": "x.fmu"}) == "a = true, b = 0.1, c = x.fmu"
     assert changes({f"v{k}": k for k in range(8)}).endswith("v5 = 5, 2 more")
-
-
-def test_the_date_is_that_of_now(monkeypatch):
-    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
-    before = now()
-    said = about({})
-    assert any(f" · {moment.date()} · " in said for moment in (before, now()))
 
 
 @pytest.mark.parametrize("epoch", ["today", "1e9", "-1" + 30 * "0"])

@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 from grasp_cosim.metrics.metric import Metric
-from grasp_cosim.report.page import Scene, Zoom, page_html, write_page
+from grasp_cosim.report.page import Scene, Zoom, page_html
 from report.runs import grasp_run, ring_run
 from report.test_embed import unpacked
 from report.timings import paced
@@ -85,16 +85,6 @@ def test_the_data_in_the_page_are_those_of_the_run_to_the_bit():
         assert unpacked(page.texts[signal["id"]]).tobytes() == values.astype(float).tobytes()
         assert signal["unit"] == run.units[signal["name"]]
         assert signal["steps"] == (values.dtype == bool)
-
-
-def test_a_long_run_is_thinned_and_the_page_says_so():
-    run = grasp_run()
-    html = page_html(run, limit=len(run.time) * len(run.signals) // 2)
-    state = json.loads(Elements(html).texts["page"])
-    assert state["rows"] < len(run.time) / 2 + 2
-    assert "of each 5, the lowest and the highest value" in Elements(html).visible
-    assert "to the last bit" not in html
-    assert "to the last bit" in page_html(run)
 
 
 def test_names_stay_text():
@@ -210,10 +200,3 @@ def test_lines_of_the_log_with_a_time_are_marked():
     page = Elements(page_html(logged))
     marks = [(m["color"], m["t"]) for m in json.loads(page.texts["page"])["marks"]]
     assert marks == [("--fault", 0.25), ("--fault", 0.001)]
-
-
-def test_the_page_is_written_in_one_piece(tmp_path):
-    path = tmp_path / "page.html"
-    write_page(ring_run(["a"]), path)
-    assert path.read_text("utf-8") == page_html(ring_run(["a"]))
-    assert list(tmp_path.iterdir()) == [path]

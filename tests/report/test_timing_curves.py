@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from grasp_cosim.realtime.timing import Histogram, Spread
-from grasp_cosim.report.timing import curves, decades, looks
+from grasp_cosim.report.timing import curves, decades
 from report.timings import PERIOD, paced
 
 
@@ -50,36 +50,6 @@ def test_curves_fall_from_all_steps_to_the_worst_one_through_the_quantiles():
         assert curve.marks["p99"] == (spread.p99, 0.01)
         assert curve.marks["p99.9"] == (spread.p999, 0.001)
         assert set(curve.marks.values()) <= set(curve.points)
-
-
-@pytest.mark.parametrize(
-    ("steps", "marks"),
-    [
-        (1000, ["median", "p99", "p99.9", "worst"]),
-        (999, ["median", "p99", "worst"]),
-        (49, ["median", "worst"]),  # 49 * (1 / 49) < 1
-        (2, ["median", "worst"]),
-        (1, ["worst"]),
-    ],
-)
-def test_a_quantile_that_is_the_worst_step_is_no_mark_of_its_own(steps, marks):
-    timing = of_times([1e-6] * (steps - 1) + [2e-6], [1e-6, 1.5e-6, 3e-6])
-    assert list(curves(timing)[0].marks) == marks
-
-
-def test_every_part_and_culprit_looks_different():
-    timing = paced(components={f"c{k}": 1e-6 for k in range(20)}, hiccups=0)
-    timing = replace(timing, culprits={"backlog": 1, "slow": 2})
-    look = looks(timing)
-    assert {*timing.parts, "backlog", "slow"} <= set(look)
-    assert len(set(look.values())) == len(look)
-
-
-def test_an_axis_holds_its_times_in_whole_decades():
-    assert decades([3e-7, PERIOD]) == pytest.approx((1e-7, 1e-2))
-    assert decades([PERIOD]) == pytest.approx((1e-3, 1e-2))
-    assert decades([0.0, 2e-3, 30.0]) == pytest.approx((1e-3, 100.0))
-    assert decades([2e-5, 4.96e-3]) == pytest.approx((1e-5, 1e-2))
 
 
 def test_an_axis_begins_where_the_clock_is_exact_and_has_a_decade_at_least():

@@ -8,7 +8,7 @@ import pytest
 from grasp_cosim.realtime.timing import Overrun, Spread
 from grasp_cosim.report.page import page_html
 from grasp_cosim.report.timing_html import timing_html
-from report.runs import grasp_run, ring_run
+from report.runs import grasp_run
 from report.test_page import Elements
 from report.timings import paced
 
@@ -38,13 +38,6 @@ def test_only_a_paced_run_has_the_section():
 
 
 @pytest.mark.usefixtures("no_chart")
-def test_the_entry_of_the_timing_is_no_metric():
-    run = ring_run(["a"])
-    timing = paced(steps=50)
-    assert "There are no metrics" in Elements(page_html(replace(run, timing=timing))).visible
-
-
-@pytest.mark.usefixtures("no_chart")
 def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked():
     timing = paced(steps=3000, hiccups=0)
     plant = Spread(24.04e-6, 31e-6, 90e-6, 1.2345678e-3, 0.125)
@@ -66,15 +59,6 @@ def test_a_row_for_each_part_with_the_worst_beyond_the_period_marked():
     assert re.findall(r'<td class="n warn">([^<]*)</td>', html) == [f"1{thin}234.6"]
     assert ["0.125", "125", "300.0", "plant", f"1{thin}234.6"] in rows(html)
     assert "The overrun</summary>" in html
-
-
-@pytest.mark.usefixtures("no_chart")
-def test_a_culprit_that_is_no_part_has_a_row_too():
-    late = Overrun(125, 0.125, 3e-4, "backlog", 2e-3)
-    timing = replace(
-        paced(steps=3000, hiccups=0), overruns=1, listed=(late,), culprits={"backlog": 1}
-    )
-    assert ["backlog", "", "", "", "", "", "1"] in rows(timing_html(timing, 3.0))
 
 
 @pytest.mark.usefixtures("no_chart")
@@ -111,18 +95,6 @@ def test_without_matplotlib_a_line_says_what_the_chart_needs(monkeypatch):
     assert "pip install &#x27;matplotlib&gt;=" in html
     assert html[html.index('<div class="paced">') :] == drawn[drawn.index('<div class="paced">') :]
     assert html.partition("</p>")[0] == drawn.partition("</p>")[0]
-
-
-@pytest.mark.usefixtures("no_chart")
-def test_pace_and_what_the_machine_granted_and_refused():
-    text = Elements(timing_html(paced(steps=3000), 3.0)).visible
-    for expected in (
-        "period1 ms",
-        "after an overruncatch-up",
-        "Granted by the machineSCHED_FIFO, priority 50",
-        "Refused by the machinememory not locked: RLIMIT_MEMLOCK is 65536 bytes",
-    ):
-        assert expected in text
 
 
 @pytest.mark.usefixtures("no_chart")

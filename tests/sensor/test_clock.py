@@ -65,13 +65,6 @@ def test_any_split_of_a_time_has_the_same_samples(parts, seed, rate):
     assert wait_split == pytest.approx(wait, abs=1e-9)
 
 
-def test_an_instant_at_the_end_of_a_step_is_left_to_the_next():
-    p = Params(1e4)
-    assert clock.samples(p, 0.0, 1e-4) == (1, 0.0)
-    assert clock.samples(p, 0.5, 0.5e-4) == (0, 0.0)
-    assert clock.due(0.0)
-
-
 def test_rounding_does_not_move_an_instant():
     for off in (1e-9, -1e-9):
         assert clock.due(off)
@@ -79,13 +72,6 @@ def test_rounding_does_not_move_an_instant():
         assert n == 1
         assert wait == pytest.approx(off, abs=1e-15)
     assert not clock.due(1e-5)
-
-
-def test_steps_too_short_to_matter_add_up():
-    """A step of a tenth of the tolerance: the sample is taken, once."""
-    total, wait = counted(Params(1e4), [1e-11] * 1000)
-    assert total == 1
-    assert wait == pytest.approx(1.0 - 1e-4, abs=1e-12)
 
 
 def test_a_state_that_was_damaged_has_no_endless_step():

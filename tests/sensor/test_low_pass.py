@@ -1,6 +1,6 @@
 """The low-pass filter against scipy's, and against what a Butterworth filter is."""
 
-from math import pi, tan
+from math import pi
 
 import numpy as np
 import pytest
@@ -44,15 +44,6 @@ def test_the_published_filter_is_scipys():
     np.testing.assert_allclose(below, a, rtol=1e-12, atol=0.0)
 
 
-@pytest.mark.parametrize("cutoff", [50.0, 137.0, 500.0, 1000.0, 2500.0, 4000.0, 4900.0])
-def test_other_filters_are_scipys_too(cutoff):
-    """scipy goes through the poles, which costs it digits where they are close together."""
-    b, a = signal.butter(5, cutoff, fs=10_000)
-    above, below = polynomials(low_pass.coefficients(cutoff, 10_000.0))
-    np.testing.assert_allclose(above, b, rtol=1e-11, atol=0.0)
-    np.testing.assert_allclose(below, a, rtol=0.0, atol=1e-12)
-
-
 @QUICK
 @given(CUTOFFS)
 def test_the_magnitude_is_butterworths(part):
@@ -89,19 +80,3 @@ def test_the_samples_are_scipys():
 def test_it_starts_settled(part, v):
     values = run(low_pass.coefficients(part, 1.0), [v] * 50, v)
     assert values == pytest.approx([v] * 50, rel=1e-9)
-
-
-def test_a_ramp_comes_a_millisecond_late():
-    """The sum of the sections' delays: (1 + 2·cos(pi/5) + 2·cos(2·pi/5)) / 2k periods."""
-    values = run(PUBLISHED, [float(k) for k in range(500)], 0.0)
-    late = (1.0 + 5.0**0.5) / (2.0 * tan(0.05 * pi))
-    assert 499.0 - values[-1] == pytest.approx(late, rel=1e-9)
-    assert late == pytest.approx(10.2, abs=0.05)
-
-
-def test_it_settles_on_a_step_and_overshoots_as_it_should():
-    """12.8 % for a Butterworth filter of 5th order."""
-    values = run(PUBLISHED, [1.0] * 300, 0.0)
-    assert values[0] == pytest.approx(signal.butter(5, 500, fs=10_000)[0][0], rel=1e-12)
-    assert max(values) == pytest.approx(1.128, abs=0.002)
-    assert values[-1] == pytest.approx(1.0, abs=1e-9)

@@ -3,9 +3,9 @@
 from math import exp, isnan, log, nan
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
-from proximity_sensor import channel, optics
+from proximity_sensor import optics
 from proximity_sensor.optics import Inputs, Params
 from support.declared import parameters
 from support.examples import examples
@@ -38,22 +38,6 @@ def test_the_intensity_is_eq_9(p, gap):
     assert intensity(p, gap) == pytest.approx(expected, rel=140 * 2.3e-16, abs=0.0)
 
 
-@pytest.mark.parametrize(
-    ("gap", "volts"), [(0.0, 1.066047005857), (0.005, 0.4801879325166), (0.045, 0.07536615422703)]
-)
-def test_the_published_sensor(gap, volts):
-    """0.0024 / (l + 0.005)^1.1506, worked out in decimal."""
-    assert intensity(Params(), gap) == pytest.approx(volts, rel=1e-11)
-
-
-@QUICK
-@given(SENSORS, GAPS, GAPS)
-def test_nearer_is_brighter(p, a, b):
-    near, far = sorted((a, b))
-    assume(far + p.offset_distance > (near + p.offset_distance) * (1.0 + 1e-12))
-    assert intensity(p, near) > intensity(p, far) > 0.0
-
-
 @QUICK
 @given(GAPS, st.floats(0.01, 1.0), st.floats(1.0, 1e6))
 def test_the_intensity_is_proportional_to_reflectance_and_gain(gap, reflectance, gain):
@@ -77,13 +61,6 @@ def test_a_gap_below_zero_reads_as_zero(p, gap):
 
 def test_a_gap_that_is_no_number_is_not_taken_for_contact():
     assert isnan(intensity(Params(), nan))
-
-
-def test_the_optics_have_no_memory():
-    p = channel.Params()
-    x = channel.initial_state(p, Inputs(0.1))
-    x = channel.step(p, x, Inputs(0.001), 1e-3)
-    assert channel.outputs(p, x, Inputs(0.1)).intensity == intensity(Params(), 0.1)
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)

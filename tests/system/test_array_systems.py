@@ -1,16 +1,12 @@
 """Arrays in a system: connections, values, sizes and units, and each mistake in one line."""
 
-from collections.abc import Callable
-
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.cli import main
-from grasp_cosim.system.parts import Condition, Port
-from grasp_cosim.system.scenario import event_entry, read_events
+from grasp_cosim.system.parts import Port
 from grasp_cosim.system.validity import remarks
 from support.state_space import state_space
 
-Load = Callable[..., System]
 TABLES = '[components.a]\nfmu = "ss.fmu"\n{}\n[components.b]\nfmu = "ss.fmu"\n{}\n'
 
 
@@ -88,26 +84,6 @@ def test_a_mistake_is_one_line(load, connections, a, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        ('at = 0.5\nset = { "a.u" = 2.0 }', r"set.a.u: is an array; .* valid: a.u\[1\], a.u\[2\]"),
-        ('at = 0.5\nset = { "a.n" = 2 }', "set.a.n: is a tunable structuralParameter; must be"),
-        ('when = "a.y_Enumeration[1,1] == \'quick\'"\nset = { "a.u[1]" = 2.0 }', "has no item"),
-        (
-            'when = "a.y_Int8[1,1] == \'fast\'"\nset = { "a.u[1]" = 2.0 }',
-            "no item 'fast'; valid: none",
-        ),
-        ('when = "a.y_Int64[1,1] == 9007199254740993"\nset = { "a.u[1]" = 2.0 }', r"2\*\*53"),
-        ('at = 0.5\nset = { "a.u_Enumeration[1,1]" = "quick" }', "must be one of slow, fast"),
-    ],
-)
-def test_a_mistake_in_an_event_is_one_line(load, more, message):
-    with pytest.raises(InputError, match=message) as caught:
-        load(more=f"[[events]]\n{more}\n")
-    assert "\n" not in str(caught.value)
-
-
 def test_a_value_that_a_smaller_array_has_no_place_for_is_named(load):
     system = load(a="values = { A = 1 }")
     with pytest.raises(
@@ -122,28 +98,10 @@ def test_a_long_number_for_a_fault_is_refused(load):
         load('"a.y_Int64 -> b.u_Int64"', more=fault)
 
 
-@pytest.mark.parametrize("name", ["fast", "it's", "two words", "1", "a == b"])
-def test_the_name_of_an_item_in_a_condition_reads_back(name):
-    quote = '"' if "'" in name else "'"
-    entry = {"when": f"a.mode == {quote}{name}{quote}", "set": {"a.u": 1.0}}
-    (event,) = read_events("here", [entry])
-    assert event.when == Condition(Port("a", "mode"), "==", name)
-    assert event_entry(event) == entry
-
-
 def test_inputs_without_a_source_are_said_in_one_line(load):
     (of_a, of_b) = remarks(load('"a.y[2] -> b.u[1]"'))
     assert of_a.startswith("a: no source for u, u_Float64, u_Float32, ")
     assert of_b.startswith("b: no source for u[2], u[3], u_Float64, ")
-
-
-def test_a_remark_on_a_connection_of_arrays_is_one_line(load):
-    lines = remarks(load('"a.y_Float64 -> b.u_Float32"', 'units = { y_Float64 = "mm" }'))
-    assert lines[:2] == (
-        "a.y_Float64 -> b.u_Float32: from Float64 to Float32, rounded to 7 digits",
-        "a.y_Float64 -> b.u_Float32: b.u_Float32 has no unit, taken to be in mm",
-    )
-    assert len(lines) == 4
 
 
 def test_inspect_shows_shapes_and_what_they_come_from(tmp_path, capsys):

@@ -5,7 +5,6 @@ import zipfile
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.comparison.swap import prepare_swap
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.validity import remarks
@@ -176,27 +175,6 @@ def test_a_number_between_the_items_is_none(grasp, fmus, tmp_path):
     swapped = grasp.swap("sensor_1", other_sensor(fmus, tmp_path, red=0))
     with pytest.raises(InputError, match="surface = 3: must be one of custom, white, blue, brown"):
         swapped.with_values({"sensor_1.surface": 3})
-
-
-def test_a_swap_does_not_change_what_a_value_stands_for(grasp, fmus, tmp_path):
-    brown = grasp.with_values({"sensor_1.surface": "brown"})
-    other = other_sensor(fmus, tmp_path, brown=5, black=4)
-    message = (
-        "swap sensor_1: surface = 4 is brown in ProximitySensor.fmu and black in Other.fmu; must "
-        "be set anew, as one of custom, white, blue, red, brown, black"
-    )
-    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
-        brown.swap("sensor_1", other)
-    anew = brown.with_settings({"components.sensor_1.fmu": other, "sensor_1.surface": "brown"})
-    assert anew.start("sensor_1.surface") == 5.0
-    assert grasp.swap("sensor_1", other).start("sensor_1.surface") == 0.0
-    white = grasp.with_values({"sensor_1.surface": "white"}).swap("sensor_1", other)
-    assert white.start("sensor_1.surface") == 1.0
-    (found,) = prepare_swap(brown, "sensor_1", other, {}, {}, "none").differences
-    assert (found.severity, found.kind, found.variable) == ("blocks", "items", "surface")
-    assert found.text == "has other items; not as before: brown, black"
-    (found,) = prepare_swap(grasp, "sensor_1", other, {}, {}, "none").differences
-    assert found.severity == "warns"
 
 
 def test_an_output_cannot_be_set(grasp):

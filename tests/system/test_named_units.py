@@ -6,7 +6,6 @@ import pytest
 from comparison.made import PLANT, write_fmu
 from grasp_cosim import InputError, System
 from grasp_cosim.interface.read import read_interface
-from grasp_cosim.system.parts import Condition, Event, Port
 from grasp_cosim.system.settings import settings
 from grasp_cosim.system.validity import connection_transform, remarks
 from si_units import Unit
@@ -110,14 +109,6 @@ def test_a_unit_in_other_capitals_is_asked_about(tmp_path, unit, end):
     assert str(caught.value).endswith(f"; {end}")
 
 
-def test_keys_are_the_names_of_the_system(tmp_path):
-    link = '"plant.distance -> spring.position"'
-    more = 'rename = { distance = "gap" }\nunits = { distance = "mm" }'
-    assert gap_to_position(load(tmp_path, BARE, more, link)) == (1e-3, 0.0)
-    with pytest.raises(InputError, match=r"units: 'gap' = 'mm': plant\.fmu has no variable 'gap'"):
-        load(tmp_path, BARE, more.replace('{ distance = "mm"', '{ gap = "mm"'), link)
-
-
 # ------------------------------------------------------------------------- another FMU in its place
 
 
@@ -136,40 +127,3 @@ def test_values_are_converted_for_an_fmu_in_other_units(tmp_path):
     assert again.start("plant.width") == pytest.approx(0.07, rel=1e-15)
     revised = system.with_settings({"components.plant.fmu": in_mm(tmp_path), "plant.width": 60.0})
     assert revised.start("plant.width") == 60.0
-
-
-def test_a_value_in_a_unit_that_the_other_fmu_lacks_is_refused(tmp_path):
-    bare = write_fmu(tmp_path / "bare.fmu", BARE)
-    system = load(tmp_path, dict(PLANT))
-    assert system.swap("plant", bare).start("plant.width") == 0.07  # in SI, as without units
-    swapped = system.swap("plant", in_mm(tmp_path))
-    with pytest.raises(
-        InputError, match=r"^swap plant: width has no unit in bare\.fmu, but is set"
-    ):
-        swapped.swap("plant", bare)
-    volts = {
-        **PLANT,
-        "width": 'causality="parameter" variability="fixed" | Real start="1" unit="N"',
-    }
-    with pytest.raises(
-        InputError, match=r"^swap plant: width is in N, which its value in m cannot"
-    ):
-        system.swap("plant", write_fmu(tmp_path / "volts.fmu", volts))
-
-
-def test_a_condition_in_another_unit_is_refused(tmp_path):
-    system = load(tmp_path, dict(PLANT))
-    event = Event({Port("plant", "mass"): 0.4}, when=Condition(Port("plant", "gap"), "<", 0.01))
-    with pytest.raises(
-        InputError, match=r"^swap plant: gap is in mm, but an event, a fault or the"
-    ):
-        replace(system, events=(event,)).swap("plant", in_mm(tmp_path))
-
-
-def test_a_named_unit_gives_way_to_what_another_fmu_declares(tmp_path):
-    system = load(tmp_path, BARE, 'units = { gap = "mm" }')
-    same = system.swap("plant", write_fmu(tmp_path / "bare.fmu", BARE))
-    assert gap_to_position(same) == (1e-3, 0.0)
-    declared = system.swap("plant", write_fmu(tmp_path / "si.fmu"))
-    assert gap_to_position(declared) == (1.0, 0.0)
-    assert declared.component("plant", "").units == {}

@@ -1,8 +1,6 @@
 """System.natively(): the native twins of the FMUs of a system, with the same bits."""
 
 import logging
-import pickle
-import shutil
 
 import numpy as np
 import pytest
@@ -57,29 +55,3 @@ def test_without_a_compiler_they_run_in_python_unless_asked(grasp, caplog):
     assert said.startswith("FMUs run in Python, which takes longer: no C compiler: must be one of")
     with pytest.raises(InputError, match=r"^native FMUs cannot be built: no C compiler: must"):
         grasp.natively(True)
-
-
-def test_an_fmu_that_is_replaced_between_runs_is_noticed(grasp, tmp_path):
-    """A system keeps what it has read, but not for longer than the files stay as they were."""
-    fmu = tmp_path / "plant.fmu"
-    shutil.copy(grasp.component("plant", "test").fmu, fmu)
-    system = grasp.swap("plant", fmu)
-    before = simulate(system, step=1e-3, stop=0.01)
-    assert "plant.object_tilt" not in before
-    movable = grasp.component("plant", "test").fmu.with_name("GripperPlantMovable.fmu")
-    fmu.unlink()
-    shutil.copy(movable, fmu)
-    after = simulate(system, step=1e-3, stop=0.01)
-    assert {*after} > {*before}
-    fmu.unlink()
-    with pytest.raises(InputError, match=r"plant\.fmu: no such FMU file"):
-        simulate(system, step=1e-3, stop=0.01)
-
-
-def test_a_component_travels_without_what_it_has_read(grasp):
-    (plant, *_) = grasp.components
-    assert plant.interface.by_name
-    again = pickle.loads(pickle.dumps(plant))
-    assert again == plant
-    assert "interface" not in vars(again)
-    assert again.interface == plant.interface

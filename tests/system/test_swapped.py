@@ -1,7 +1,7 @@
 """A component with another FMU: which of its names, units and values stay, and which are given."""
 
 import pytest
-from comparison.made import PLANT, changed, write_fmu, write_system
+from comparison.made import PLANT, write_fmu, write_system
 from grasp_cosim import InputError, System
 from grasp_cosim.system.toml import to_do
 
@@ -43,14 +43,6 @@ def test_names_that_are_given_go_before(vendor, tmp_path):
         vendor.swap("plant", tmp_path / "c.fmu", rename={"gap": "weg"})
 
 
-def test_crossed_names_stay(vendor, tmp_path):
-    crossed = {"gap": "spare", "spare": "gap"}
-    fmu = write_fmu(tmp_path / "crossed.fmu", PLANT, {})
-    swapped = vendor.swap("plant", fmu, rename=crossed)
-    same = write_fmu(tmp_path / "same.fmu", PLANT, {})
-    assert swapped.swap("plant", same).component("plant", "test").rename == crossed
-
-
 def test_a_unit_that_the_new_fmu_declares_otherwise_is_not_kept(vendor, tmp_path):
     grams = {**VENDOR, "mass": PLANT["mass"] + ' unit="1"'}
     fmu = write_fmu(tmp_path / "kg.fmu", grams, {})
@@ -68,13 +60,6 @@ def test_a_value_of_a_variable_that_is_not_there_is_left_out_and_said(vendor, tm
     )
     with pytest.raises(InputError, match=r"with_values plant.width: bare.fmu has no input or para"):
         swapped.with_values({"plant.width": 0.05})
-
-
-def test_isolation_stays(vendor, tmp_path):
-    alone = vendor.with_settings({"components.plant.isolation": "process"})
-    assert [c.isolation for c in alone.components] == ["process", "none"]
-    fmu = write_fmu(tmp_path / "c.fmu", changed("mass", '"0.5"', '"0.6"'), {})
-    assert alone.swap("plant", fmu).component("plant", "test").isolation == "process"
 
 
 TODO = """connections = [
