@@ -85,20 +85,6 @@ def test_what_is_wrong_is_one_line(arguments, said, command):
     assert [*Path().iterdir()] == []
 
 
-def test_what_cannot_be_translated_is_named_with_its_line(command, tmp_path):
-    text = SPRING.read_text("utf-8")
-    (tmp_path / "lists.py").write_text(f"{text}\n\ndef unused() -> None:\n    [1, 2]\n")
-    assert command("build", "--native", "lists.py")[0] == 0
-    before, found, after = text.partition("def step(")
-    body = after.replace(":\n", ":\n    listed = [h, h]\n", 1)
-    (tmp_path / "lists.py").write_text(f"{before}{found}{body}")
-    code, out, err = command("build", "--native", "lists.py")
-    assert (code, out) == (2, "")
-    line = f"{before}{found}{body}".partition("listed")[0].count("\n") + 1
-    assert err.startswith(f"grasp-cosim: build: lists.py: line {line}: ")
-    assert err.count("\n") == 1
-
-
 def test_no_compiler_is_one_line_with_its_fix(command, monkeypatch, tmp_path):
     monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
     code, _, err = command("build", "--native", "--target", "win64")
@@ -109,15 +95,6 @@ def test_no_compiler_is_one_line_with_its_fix(command, monkeypatch, tmp_path):
     code, _, err = command("build", "--native")
     assert (code, err.count("\n")) == (2, 1)
     assert err.endswith(f"{sys.executable} -m pip install ziglang\n")
-
-
-def test_a_compiler_that_fails_is_a_failure_on_the_way(command, monkeypatch):
-    monkeypatch.setenv("CC", "gcc --no-such-option")
-    code, out, err = command("build", "--native", "GripperPlant")
-    assert (code, out, err.count("\n")) == (3, "", 1)
-    assert err.startswith("grasp-cosim: GripperPlant.c: gcc --no-such-option: exit code 1: ")
-    assert "error: unrecognized command-line option" in err
-    assert not Path("fmus").exists()
 
 
 @pytest.mark.slow

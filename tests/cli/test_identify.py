@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 import tomllib
 from pathlib import Path
 
@@ -43,13 +42,6 @@ def test_friction_from_a_log(command, recorded, grasp, kind):
     assert grasp.with_values(values).start(name) == values[name]
 
 
-def test_the_estimates_are_printed_with_their_intervals(command, recorded):
-    recorded.to_csv("signals.csv")
-    code, out, _ = command("identify", "signals.csv", "--fit", "coulomb")
-    assert code == 0
-    assert re.search(r"plant\.friction\.coulomb\[1\] +0\.6\d* N, \[0\.\d+, 0\.\d+\]", out)
-
-
 @pytest.mark.parametrize(
     ("table", "data"),
     [
@@ -87,10 +79,3 @@ def test_wrong_input_is_one_line(command, tmp_path, arguments, message):
     assert err.startswith(f"grasp-cosim: {message}")
     assert len(err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
-
-
-def test_what_a_log_says_nothing_about_is_refused(command, recorded):
-    recorded.to_csv("signals.csv")
-    code, _, err = command("identify", "signals.csv", "--fit", "ratio")
-    assert code == 2
-    assert "signals.csv: 'ratio' cannot be fitted; valid: coulomb" in err

@@ -1,7 +1,6 @@
 """Standard files that are closed, full or gone, Ctrl-C before a command begins: one line each."""
 
 import os
-import signal
 import subprocess
 import sys
 
@@ -9,7 +8,6 @@ import pytest
 from grasp_cosim.cli import main
 
 PROGRAM = (sys.executable, "-m", "grasp_cosim")
-SCRIPT = (sys.executable, "-c", "from grasp_cosim.__main__ import entry; entry()")
 
 
 def shell(line, **more):
@@ -71,27 +69,6 @@ def test_a_file_of_the_run_is_not_taken_for_standard_output(tmp_path):
     assert (code, said.count("standard output: Bad file descriptor")) == (3, 1)
     one, two = ((tmp_path / name / "signals.csv").read_bytes() for name in "ab")
     assert one == two
-
-
-@pytest.mark.parametrize("program", [PROGRAM, SCRIPT])
-@pytest.mark.parametrize(("module", "begun"), [("click", False), ("numpy", True)])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_during_the_imports(tmp_path, program, module, begun, number):
-    """click comes with the command line, numpy with the command."""
-    (tmp_path / f"{module}.py").write_text(
-        f"import os, time\nos.kill(os.getpid(), {int(number)})\ntime.sleep(60)\n"
-    )
-    done = subprocess.run(
-        [*program, "run"], env={**os.environ, "PYTHONPATH": str(tmp_path)}, timeout=50,
-        capture_output=True, text=True, check=False,
-        preexec_fn=_hear_interrupts,
-    )  # fmt: skip
-    assert (done.returncode, done.stdout) == (128 + number if begun else -number, "")
-    assert done.stderr.strip() == "grasp-cosim: interrupted" * begun
-
-
-def _hear_interrupts():
-    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 HOSTILE = "n\x1b]0;owned\x07\x1b[2J\r\u202eümf\x9b31m"

@@ -8,9 +8,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from c_compilers import cache
 from grasp_fmus import build as builds
-from grasp_fmus.build import Plan, build, build_block, build_native, planned, sources_key
+from grasp_fmus.build import build, build_block, build_native, planned, sources_key
 from grasp_fmus.native.targets import here
 from grasp_fmus.package import HASH, Built, package_folder
 from grasp_fmus.page import icon
@@ -196,19 +195,6 @@ def test_of_what_is_kept_the_newest_stay(own_cache, monkeypatch):
 
 
 @pytest.mark.usefixtures("own_cache")
-def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process(monkeypatch):
-    ends = []
-    monkeypatch.setattr(builds, "_until_the_end", {})
-    monkeypatch.setattr(cache, "writable", lambda _: None)
-    monkeypatch.setattr("atexit.register", ends.append)
-    folder = builds._kept(made_once, "a")
-    assert [path.name for path in folder.iterdir()] == ["made.fmu"]
-    for end in ends:
-        end()
-    assert not folder.exists()
-
-
-@pytest.mark.usefixtures("own_cache")
 def test_a_build_that_fails_leaves_what_was_there(fmus, out, monkeypatch):
     monkeypatch.setattr("grasp_fmus.page.icon", lambda name: (_ for _ in ()).throw(OSError("none")))
     with pytest.raises(OSError, match="none"):
@@ -221,14 +207,6 @@ def test_a_build_that_fails_leaves_what_was_there(fmus, out, monkeypatch):
 
 def test_all_are_chosen_where_none_is_named():
     assert builds.chosen_names() == TRANSLATED
-
-
-@pytest.mark.parametrize("name", ["gripperplant", ""])
-def test_a_name_that_is_none(name, tmp_path):
-    said = rf"^{name}: no such block; must be of GraspController, "
-    with pytest.raises(ValueError, match=said):
-        build_native(tmp_path / "out", Plan(2, {}, {}, ""), ["ProximitySensor", name])
-    assert not (tmp_path / "out").exists()
 
 
 @needs_gcc

@@ -75,34 +75,9 @@ def test_a_cache_that_cannot_be_written_to_is_read(tmp_path, monkeypatch):
     assert ctypes.CDLL(str(library)).sum() == 43
 
 
-@pytest.mark.parametrize("place", ["/dev/null", "/proc"], ids=["a file", "read-only"])
-def test_a_place_that_cannot_be_written_to(place, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", place)
-    assert cache.writable("zig") is None
-    assert cache.kept("zig") is None
-
-
-def test_a_folder_is_kept_as_a_file_is_and_the_first_stays(tmp_path):
-    """Two processes may make the same at once."""
-    for text in ("one", "two"):
-        (tmp_path / text).mkdir()
-        (tmp_path / text / "file").write_text(text)
-        assert (cache.keep(tmp_path / text, "all/key") / "file").read_text() == "one"
-    assert [path.name for path in (tmp_path / "cache/grasp-cosim/all").iterdir()] == ["key"]
-
-
 def test_no_two_lists_of_parts_have_one_key():
     lists = [["ab", "c"], ["a", "bc"], ["abc"], ["abc", ""], [b"2\0ab"]]
     assert len({cache.key(parts) for parts in lists}) == len(lists)
-
-
-def test_a_relative_folder_does_not_count(tmp_path, monkeypatch):
-    """It would be another one in each folder, and what a stranger left there would be loaded."""
-    monkeypatch.setenv("XDG_CACHE_HOME", "here")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert cache.folder() == tmp_path / ".cache/grasp-cosim"
-    monkeypatch.setenv("HOME", "there")
-    assert cache.folder() is None
 
 
 @pytest.mark.parametrize("given", ["cc 'half a quote", "   ", "no-such-compiler -m64"])

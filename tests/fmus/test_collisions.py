@@ -83,21 +83,6 @@ def test_two_builds_of_one_fmu_run_their_own_code(load, tmp_path, altered):
             instance.call("FreeInstance")
 
 
-def test_two_builds_run_their_own_slave(fmus, tmp_path, altered):
-    """The modules of the adapter, and those that they import, are of the same build."""
-    change = "step size = ", "length of the step = "
-    other = altered("GripperPlant", "grasp_fmus/slave.py", *change)
-    ours = Fmu(fmus / "GripperPlant.fmu", tmp_path / "ours")
-    theirs = Fmu(other, tmp_path / "theirs")
-    with Instance(ours).initialise() as one, Instance(theirs).initialise() as two:
-        for instance in (one, two, one):
-            assert instance.step(0.0, -1.0) != OK
-        said = [m.text.removeprefix("instance, t = 0 s: ") for m in (*one.log, *two.log)]
-    assert [text.partition(" = ")[0] for text in said] == [
-        "step size", "step size", "length of the step",
-    ]  # fmt: skip
-
-
 # Other hosts, and other people's FMUs: each in a process of its own
 
 HOST = """
@@ -165,63 +150,3 @@ def test_a_host_does_not_change_what_an_fmu_computes(fmus, tmp_path):
     ]
     assert len(set(printed[0].splitlines())) > 250
     assert printed[0] == printed[1] == printed[2]
-
-
-FOREIGN = """
-from pythonfmu import Fmi2Causality, Fmi2Slave, Real
-
-
-class Integrator(Fmi2Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.u = 1.0
-        self.y = 0.0
-        self.register_variable(Real("u", causality=Fmi2Causality.input))
-        self.register_variable(Real("y", causality=Fmi2Causality.output))
-
-    def do_step(self, current_time, step_size):
-        self.y += step_size * self.u
-        return True
-"""
-
-BUILD_FOREIGN = """
-import sys
-from pythonfmu import FmuBuilder
-FmuBuilder.build_FMU(sys.argv[1], dest=sys.argv[2])
-"""
-
-NEIGHBOURS = """
-import sys
-from pathlib import Path
-from support.fmi2 import Fmu, Instance
-folder, *paths = map(Path, sys.argv[1:])
-fmus = {path.stem: Fmu(path, folder / path.stem) for path in paths}
-instances = {name: Instance(fmu, name).initialise() for name, fmu in fmus.items()}
-foreign, plant = instances["Integrator"], instances["GripperPlant"]
-for k in range(100):
-    assert foreign.set({"u": 0.5 * k}) == 0
-    assert plant.set({"force[1]": -0.5 * k}) == 0
-    for instance in instances.values():
-        assert instance.step(k * 0.0078125, 0.0078125) == 0
-    print(*foreign.outputs(), *plant.outputs())
-for instance in instances.values():
-    assert instance.call("Terminate") == 0
-    instance.call("FreeInstance")
-"""
-
-
-@pytest.mark.parametrize("first", ["ours", "theirs"])
-def test_a_stock_pythonfmu_fmu_lives_in_the_same_process(fmus, load, tmp_path, first):
-    script = tmp_path / "Integrator.py"
-    script.write_text(FOREIGN)
-    run(BUILD_FOREIGN, script, tmp_path)
-    paths = [fmus / "GripperPlant.fmu", tmp_path / "Integrator.fmu"]
-    printed = run(NEIGHBOURS, tmp_path / "u", *(paths if first == "ours" else paths[::-1]))
-    h = 0.0078125  # a power of two: the sum is exact
-    with Instance(load("GripperPlant")).initialise() as plant:
-        expected = []
-        for k in range(100):
-            assert plant.set({"force[1]": -0.5 * k}) == OK
-            assert plant.step(k * h, h) == OK
-            expected.append([0.25 * h * k * (k + 1), *plant.outputs()])
-    assert [[float(v) for v in line.split()] for line in printed.splitlines()] == expected

@@ -2,7 +2,6 @@
 
 import ctypes
 import sys
-from collections.abc import Callable
 from math import inf, nan
 
 import pytest
@@ -18,8 +17,6 @@ from support.fmi2 import FATAL, OK, Fmu, Instance
 from support.kinds import all_kinds, both_of_fmi_2, python_only
 
 pytestmark = all_kinds
-
-Act = Callable[[Instance], int]
 
 
 def plant(load, **options):
@@ -155,53 +152,6 @@ def test_a_step_with_no_finite_result_leaves_everything_as_it_was(load):
         assert instance.step(0.0, 1e-3) == OK
 
 
-def test_large_values_whose_sum_is_not_finite_are_values(load):
-    with plant(load) as instance:
-        instance.initialise()
-        assert instance.set({"force[1]": 1.7e308, "force[2]": 1.7e308}) == OK
-        assert instance.get("force[1]", "force[2]") == [1.7e308, 1.7e308]
-
-
-@pytest.mark.parametrize("start", [0.0, -3.0, 1e6])
-def test_time_may_begin_anywhere_and_be_summed_up(load, start):
-    with plant(load) as instance:
-        assert (instance.setup(start), instance.enter(), instance.exit()) == (OK, OK, OK)
-        time = start
-        for _ in range(2000):
-            assert instance.step(time, 1e-4) == OK
-            time += 1e-4
-        assert instance.step(start, 1e-4) == instance.fmu.refused
-
-
-@pytest.mark.parametrize(("start", "off"), [(0.0, 1e-9), (-3.0, 1e-9), (1e6, 1e-6)])
-def test_how_far_the_clocks_may_be_apart(load, start, off):
-    """A nanosecond, or 1e-12 of the time where that is more."""
-    with plant(load) as instance:
-        assert (instance.setup(start), instance.enter(), instance.exit()) == (OK, OK, OK)
-        for factor in (1.5, -1.5):
-            assert instance.step(start + factor * off, 1e-3) == instance.fmu.refused
-        assert instance.step(start + 0.8 * off, 1e-3) == OK
-        assert instance.step(start + 1e-3, 1e-3) == OK
-
-
-@pytest.mark.parametrize("name", ["", "50 %s", "x" * 60, "Größe µ"])
-def test_the_reason_is_logged_whatever_the_name(load, name):
-    """The logger of FMI is a printf: a %s in a message would read memory that is not there."""
-    with Instance(load("GripperPlant"), name) as instance:
-        assert instance.set({"force[1]": nan}) == instance.fmu.refused
-        (said,) = instance.log
-        shown = name.replace("%", "%%")
-        assert said.instance == name
-        assert said.text == f"{shown}, t = 0 s: force[1] = nan N: must be a finite number"
-
-
-def test_a_host_that_does_not_log(load):
-    with plant(load, logging=False) as instance:
-        assert instance.set({"force[1]": nan}) == instance.fmu.refused
-        instance.initialise()
-        assert bool(instance.log) != instance.fmu.python
-
-
 # What a block does wrong
 
 LIGHT = "    l = 0.0 if u.gap < 0.0 else u.gap\n"
@@ -295,15 +245,3 @@ def test_the_reason_reaches_the_log_of_fmpy(load, kind, monkeypatch):
     assert told == []
     reason = "one, t = 0 s: finger_mass[1] = -1.0 kg: must be from 0.001 to 1000 kg"
     assert [text.endswith(reason) for text in said] == [True] * 3
-
-
-def test_sixty_refusals_and_a_reset_in_one_instance(load):
-    """pythonfmu 0.7.0 alone gives up a reference to it with each."""
-    with plant(load) as instance:
-        for _ in range(60):
-            assert instance.set({"force[1]": nan}) == instance.fmu.refused
-        instance.initialise()
-        assert instance.call("Reset") == OK
-        for _ in range(60):
-            assert instance.step(0.0, 1e-3) == instance.fmu.refused
-        assert instance.call("Terminate") == OK

@@ -3,9 +3,7 @@
 import re
 import struct
 import zipfile
-from importlib import metadata
 from pathlib import Path
-from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -149,16 +147,6 @@ def test_licences_are_those_of_the_distributions():
     assert [Path(file).name for file in found] == ["license.txt", "pythonfmu.txt"]
     assert found["documentation/licenses/license.txt"] == (ROOT / "LICENSE").read_bytes()
     assert all(b"Permission is hereby granted, free of charge" in text for text in found.values())
-
-
-@pytest.mark.parametrize("name", ["no-such-distribution", "grasp-cosim"])
-def test_a_missing_licence_is_named(name, monkeypatch):
-    """The distribution's class may be that of a backport, which other packages bring along."""
-    if name == "grasp-cosim":
-        bare = SimpleNamespace(read_text=lambda _: None)
-        monkeypatch.setattr(metadata, "distribution", lambda _: bare)
-    with pytest.raises(FileNotFoundError, match=rf"^{name}: .*licenses/LICENSE.*pip$"):
-        licences(name)
 
 
 def test_icons_are_small_pictures_with_a_transparent_background():

@@ -1,6 +1,5 @@
 """The FMU of a block that is one file of the user's own."""
 
-import json
 import sys
 from math import exp
 
@@ -167,19 +166,3 @@ def test_a_name_that_does_not_do(command, tmp_path, name, said):
     code, _, err = command("build", file)
     assert code == 2
     assert err.startswith(f"grasp-cosim: build: {file}: {said}")
-
-
-def test_what_the_file_prints_is_not_among_the_results(command, tmp_path):
-    text = LAG.replace("from math", "print('imported')\nfrom math")
-    text = text.replace("    return State(0.0)", "    print('started')\n    return State(0.0)")
-    code, out, err = command("build", write(tmp_path, text), "--json")
-    assert (code, json.loads(out)["fmus"]) == (0, ["fmus/build/FirstOrderLag.fmu"])
-    assert err == "imported\nstarted\n"
-
-
-def test_a_folder_in_the_place_of_the_fmu(command, tmp_path):
-    (tmp_path / "out/FirstOrderLag.fmu").mkdir(parents=True)
-    code, out, err = command("build", write(tmp_path, LAG), "--out", "out")
-    assert (code, out) == (2, "")
-    assert err == "grasp-cosim: out/FirstOrderLag.fmu: is a folder; must be the name of a file\n"
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["FirstOrderLag.fmu"]

@@ -23,12 +23,10 @@ from grasp_fmus.link.message import (
     Codec,
     Message,
 )
-from grasp_fmus.proxy import shared_signature
 from support.native_proxies import connected, hosted
 from support.ports import kept_port
 from support.scripted_peer import (
     SIGNATURE,
-    VARIABLES,
     Clock,
     ScriptedPeer,
     answer,
@@ -126,32 +124,6 @@ def test_a_peer_that_refuses_is_named_with_its_reason(act, reason):
         line = host.refused(host.enter)
         said = reason.replace("%", "%%")
         assert line == f"proxy, t = 0 s: 127.0.0.1:{peer.port}: {said}"
-
-
-@pytest.mark.parametrize("answer", [(WELCOME, 1), (REFUSE, 1), (OUTPUTS, 1)])
-def test_of_another_version_nothing_else_is_understood(answer):
-    def speak_so(peer, m):
-        peer.send(peer.pack(m, answer[0], b"", OTHER_INTERFACE, version=answer[1], cookie=5))
-        peer.send(peer.pack(m, REFUSE, b"", OTHER_VERSION))  # of this version, which is none
-        peer.clock.now += 10**12
-        peer.send(b"")
-
-    with ScriptedPeer() as peer, hosted(peer.port, peer.clock, connect_timeout=0.2) as host:
-        peer.told(HELLO, speak_so)
-        assert "no answer from" in host.refused(host.enter)
-
-
-def test_nobody_there_and_the_host_tries_again():
-    with ScriptedPeer() as peer, hosted(1, Clock(tick=40_000_000), connect_timeout=0.1) as host:
-        assert host.refused(host.enter) == (
-            "proxy, t = 0 s: no answer from 127.0.0.1:1 within 0.1 s: "
-            "is the peer running there, and has it no key? "
-            "e.g. grasp-cosim serve Original.fmu --port 1"
-        )
-        assert host.state() == 0
-        host.set(**{"proxy.port": peer.port, "proxy.connect_timeout": 100.0})
-        host.initialise()
-        assert host.outputs() == START
 
 
 def test_a_peer_that_refuses_the_start_values_may_get_others():
@@ -572,29 +544,7 @@ def test_the_end_is_said_once_and_values_stay():
     assert peer.kinds() == [HELLO, INITIALISE, STEP, END]
 
 
-def test_before_a_session_there_is_nothing_to_end():
-    with ScriptedPeer() as peer:
-        peer.told(HELLO, *[lambda p, m: None] * 5)
-        with hosted(peer.port, FOR_EVER, connect_timeout=0.1) as host:
-            host.refused(host.enter)
-    assert set(peer.kinds()) == {HELLO}
-
-
 def test_there_are_no_states():
     with hosted(9) as host:
         line = host.refused(host.must, "SetFMUstate", None)
         assert line.endswith(": is not supported by this FMU")
-
-
-def test_an_original_without_outputs():
-    inputs = [v for v in VARIABLES if v.causality == "input"]
-    wire = shared_signature(inputs)
-    with (
-        ScriptedPeer(signature=wire, outputs=lambda values: []) as peer,
-        hosted(peer.port, peer.clock, variables=inputs) as host,
-    ):
-        host.initialise()
-        peer.told(STEP, answer, fail)
-        for state in (1, 3):
-            host.step()
-            assert host.state() == state

@@ -25,7 +25,6 @@ from support.slow import platforms, slow
 from support.state_space import state_space
 
 Proxy = Callable[..., Path]
-Run = Callable[..., tuple[int, str, str]]
 
 pytestmark = native_fmus.needs_gcc
 
@@ -285,23 +284,6 @@ def test_arrays_are_exchanged_by_element(tmp_path, run):
         np.testing.assert_array_equal(direct, there)
 
 
-def test_texts_and_structural_parameters_are_left_out(tmp_path, run):
-    original = state_space(
-        tmp_path,
-        more='<String name="label" valueReference="50" '
-        'causality="parameter" variability="fixed"><Start value="x"/></String>',
-    )
-    code, out, err = run(original, "-o", "TheProxy.fmu", "--json")
-    assert code == 0
-    notes = [
-        "ss.fmu: m, n, r, k: structural: left out",
-        "ss.fmu: label: a text, as the link has none: left out",
-    ]
-    assert json.loads(out)["notes"] == notes
-    assert err.splitlines()[-2:] == notes
-    assert "label" not in variables(Path("TheProxy.fmu"))
-
-
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
@@ -358,21 +340,6 @@ def test_a_proxy_of_a_proxy_has_no_names_left(fmus, proxy, run):
 # What is in it
 
 
-def test_its_own_start_values_and_capabilities(fmus, proxy):
-    made = variables(proxy(fmus / "ProximitySensor.fmu"))
-    for name, (_, start) in OWN_PARAMETERS.items():
-        assert made[name]["start"] == start
-    options = ("--host", "192.0.2.7", "--port", "6000", "--timeout", "2e-3")
-    path = proxy(fmus / "ProximitySensor.fmu", *options)
-    names = ("proxy.host", "proxy.port", "proxy.timeout")
-    assert [variables(path)[name]["start"] for name in names] == ["192.0.2.7", 6000, 0.002]
-    element = read(path).find("CoSimulation")
-    assert element is not None
-    found = {key.lower(): value for key, value in element.attrib.items()}
-    assert found["cangetandsetfmustate"] == found["canserializefmustate"] == "false"
-    assert found.get("needsexecutiontool", "false") == "false"
-
-
 def test_the_files_in_it(fmus, run):
     assert run(fmus / "GripperPlant.fmu", "-o", "P.fmu")[0] == 0
     with zipfile.ZipFile("P.fmu") as archive:
@@ -386,19 +353,6 @@ def test_the_files_in_it(fmus, run):
         assert text in page
     ElementTree.fromstring(page)
     assert "pthread" not in sources
-
-
-def test_an_unchanged_proxy_is_left_alone(fmus, run):
-    arguments = (fmus / "ProximitySensor.fmu", "-o", "sub/Eye.fmu")
-    assert run(*arguments)[:2] == (0, "sub/Eye.fmu: new\n")
-    before = Path("sub/Eye.fmu").stat().st_mtime_ns
-    assert run(*arguments)[:2] == (0, "sub/Eye.fmu: unchanged\n")
-    assert Path("sub/Eye.fmu").stat().st_mtime_ns == before
-    guid = read(Path("sub/Eye.fmu")).get("guid")
-    code, out, _ = run(*arguments, "--port", "7000")
-    assert (code, out.splitlines()[0]) == (0, "sub/Eye.fmu: changed")
-    assert read(Path("sub/Eye.fmu")).get("guid") != guid
-    assert [p.name for p in Path("sub").iterdir()] == ["Eye.fmu"]
 
 
 def test_the_peers_side_as_a_c_header(fmus, run):

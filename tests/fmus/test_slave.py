@@ -28,18 +28,6 @@ def test_runs_in_plain_fmpy(of, name):
     assert all(np.isfinite(result[column]).all() for column in result.dtype.names)
 
 
-def test_a_free_finger_in_plain_fmpy_is_a_parabola(of):
-    result = simulate_fmu(
-        of / "GripperPlant.fmu",
-        stop_time=0.1,
-        step_size=1e-3,
-        start_values={"force[1]": -1.0, "finger_mass[1]": 0.8},
-    )
-    expected = 0.11 - 0.5 / 0.8 * result["time"] ** 2
-    np.testing.assert_allclose(result["position[1]"], expected, rtol=1e-13)
-    assert (result["position[2]"] == -0.11).all()
-
-
 @pytest.mark.parametrize("name", BLOCKS)
 def test_start_values_are_those_of_the_block(load, name):
     block = BLOCKS[name]
@@ -68,13 +56,3 @@ def test_outputs_follow_a_tunable_parameter_at_run_time(load):
         assert instance.get("intensity") == [0.25 * before]
         assert instance.step(1e-3, 1e-3) == OK
         assert instance.get("intensity") == [0.25 * before]
-
-
-def test_values_in_any_order_and_none(load):
-    with Instance(load("GraspController")) as instance:
-        assert (instance.setup(), instance.enter()) == (OK, OK)
-        names = ["intensity[2]", "position[1]", "intensity[1]"]
-        assert instance.set(dict(zip(names, (0.3, 0.1, 0.2), strict=True))) == OK
-        assert instance.get(*reversed(names)) == [0.2, 0.1, 0.3]
-        assert instance.get("virtual_position[1]") == [0.1]
-        assert (instance.set_real([], []), instance.get_real([])) == (OK, (OK, []))

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import SimulationError, System, simulate
-from grasp_cosim.comparison.qualify import qualify
-from grasp_cosim.master import master
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.toml import read_toml
@@ -62,16 +60,6 @@ def test_it_is_kept_up_to_there_the_same_bits_in_both_engines(grasp, engine, eve
     assert line.endswith(HINT + "; the run went on")
 
 
-def test_how_the_rows_come_does_not_matter(grasp, monkeypatch):
-    texts = set()
-    for enough in (1, 32, 5000):
-        monkeypatch.setattr(master, "ENOUGH", enough)
-        with pytest.raises(SimulationError) as caught:
-            simulate(turned(grasp), step=1e-3)
-        texts.add((str(caught.value), caught.value.result.time[-1]))
-    assert len(texts) == 1
-
-
 @pytest.mark.slow
 def test_the_command_keeps_the_recording_and_is_3(command, fmus, tmp_path):
     path = as_file(tmp_path, fmus)
@@ -92,26 +80,6 @@ def test_a_system_file_lets_it_go_on_and_so_does_its_archive(fmus, tmp_path):
     assert simulate(system, stop=0.5, step=1e-3).settings["diverging"] == "continue"
     write_ssp(system, tmp_path / "turned.ssp")
     assert System.load(tmp_path / "turned.ssp").diverging == "continue"
-
-
-@pytest.mark.slow
-def test_a_qualification_says_which_run(grasp, fmus):
-    wrong = turned(grasp).with_experiment(step=1e-3, stop=0.64)
-    with pytest.raises(SimulationError, match=AWAY[:30]):
-        qualify(wrong, "sensor_1", fmus / "ProximitySensor.fmu", isolation="none")
-
-
-@pytest.mark.slow
-def test_a_sweep_has_it_as_failed_runs(command, fmus, tmp_path):
-    as_file(tmp_path, fmus)
-    vary, short = "plant.finger_mass[1]=0.5,100", ("--step", "1e-3", "--stop", "0.5")
-    code, out, _ = command(
-        "sweep", "turned.toml", "--vary", vary, *short, "--workers", "1", "--json"
-    )
-    summary = json.loads(out)
-    assert code == 0
-    assert summary["failed"] == 1  # a finger that heavy hardly moves
-    assert summary["errors"]["0"].startswith("controller.force[1] ran away: ")
 
 
 @pytest.mark.slow

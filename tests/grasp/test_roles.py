@@ -1,17 +1,15 @@
 """The published grasp with components of other names: roles say who is the plant."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, System, load_run, simulate
+from grasp_cosim import System, load_run, simulate
 from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS
 from grasp_cosim.grasp.presets import (
     CASES,
     SYSTEM,
-    built_in_presets,
     with_case,
     with_preset,
 )
@@ -88,25 +86,6 @@ def test_with_roles_they_are_the_same_to_the_bit(original, fmus, tmp_path):
     assert result.view.stem == "grasp"
 
 
-@pytest.mark.slow
-def test_a_run_read_back_is_the_result_it_was(original, fmus, tmp_path):
-    (tmp_path / "out").mkdir()
-    system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=False))
-    run = simulate(with_case(system, 0), step=1e-3, stop=0.5)
-    result = replace(run, origin={"date": "2026-11-23T12:00:00", "versions": {"grasp-cosim": "1"}})
-    result.to_csv(tmp_path / "out/signals.csv")
-    result.to_json(tmp_path / "out/run.json")
-    back = load_run(tmp_path / "out")
-    assert dict(back.metrics) == dict(result.metrics)
-    assert back.metric_units == result.metric_units
-    assert back.measured.missing == result.measured.missing == ()
-    assert (back.roles, back.units) == (result.roles, result.units)
-    assert back.view is result.view
-    back.plot(tmp_path / "back.png")
-    result.plot(tmp_path / "result.png")
-    assert (tmp_path / "back.png").read_bytes() == (tmp_path / "result.png").read_bytes()
-
-
 @given(
     st.lists(
         st.sampled_from(["plant", "controller", "sensor_1", "gripper", "a b", "x", "plant2", "p"]),
@@ -142,16 +121,6 @@ def test_cases_and_bench_find_components_by_their_roles(grasp, fmus, tmp_path, p
         for role, name in NAMES.items():
             assert ours.component(name, "").values == theirs.component(role, "").values
         assert ours.roles == NAMES
-
-
-def test_a_preset_of_the_file_comes_before_the_built_in_one(grasp, fmus, tmp_path):
-    own = replace(grasp, presets={"case_0": {"plant.object_width": 0.06}, "mine": {}})
-    assert with_case(own, 0).start("plant.object_width") == 0.06
-    assert with_case(own, 0).component("controller", "").values == {}
-    assert with_case(own, 1).component("controller", "").values != {}
-    with pytest.raises(InputError, match=r"no preset 'yours'; valid: case_0, mine"):
-        with_preset(own, "yours")
-    assert set(built_in_presets()) == {"bench", *(f"case_{n}" for n in CASES)}
 
 
 # ------------------------------------------------------------------------- commands

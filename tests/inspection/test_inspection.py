@@ -344,20 +344,6 @@ def test_a_sloppy_fmu_is_shown_all_the_same(archive, valve, mistake):
     assert report == valve
 
 
-def test_fmi_3_types_that_fmpy_does_not_know(archive):
-    types = (
-        '<TypeDefinitions><ClockType name="T" intervalVariability="triggered"/>'
-        '<BinaryType name="B" maxSize="9"/><Float32Type name="G" unit="dB" min="-9"/>'
-        "</TypeDefinitions><ModelVariables>"
-    )
-    xml = FMI_3.replace("<ModelVariables>", types)
-    for name, type_ in (("tick", "T"), ("raw", "B"), ("gain", "G")):
-        xml = xml.replace(f'name="{name}"', f'name="{name}" declaredType="{type_}"')
-    report = inspect_fmu(archive(xml))
-    assert column(report, "unit")["gain"] == "dB"
-    assert column(report, "min")["gain"] == -9.0
-
-
 @pytest.mark.parametrize("text", ["1" * 400, "1" * 5000, "", "one"])
 def test_a_start_that_is_no_number_is_shown_as_it_is(archive, text):
     report = inspect_fmu(archive(FMI_2.replace('min="1" start="3"', f'min="1" start="{text}"')))

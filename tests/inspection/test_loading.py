@@ -178,13 +178,6 @@ def test_libpython_is_found(monkeypatch, tmp_path):
     assert loading.find_libpython() == str(tmp_path / "lib" / loading.LIBPYTHON)
 
 
-def test_no_libpython_is_a_warning_with_a_fix():
-    assert status(loading.libpython("/lib/libpython.so")) == "ok"
-    verdict, _, fix = loading.libpython(None)
-    assert verdict == "warning"
-    assert f"libpython{loading.VERSION}" in (fix or "")
-
-
 def test_python3_on_the_path(tmp_path):
     assert status(loading.python_on_path(sys.executable)) == "ok"
     other = tmp_path / "python3"
@@ -361,26 +354,6 @@ BOUND = "\tlibpython{} => {}\n" + LOADER
 
 
 @pytest.mark.parametrize(
-    ("linked", "expected", "fix"),
-    [
-        (BOUND.format("3.9.so.1.0", "/lib/libpython3.9.so.1.0 (0x2)"), "ok", ""),
-        (BOUND.format("3.9.so.1.0", "not found"), "problem", "build it again"),
-        (BOUND.format("0.so", "not found"), "problem", "export LD_LIBRARY_PATH='{}'"),
-        (f"{LOADER}undefined symbol: _Py_NoneStruct\t(x.so)\n", "warning", "LD_PRELOAD='{}/{}'"),
-    ],
-)
-def test_libpython_in_other_hosts(linked, expected, fix, opened, tmp_path, monkeypatch):
-    folder = tmp_path / "a b"
-    folder.mkdir()
-    (folder / "libpython0.so").touch()
-    monkeypatch.setattr(loading, "find_libpython", lambda: str(folder / loading.LIBPYTHON))
-    verdict = loading.host(dataclasses.replace(opened(), linked=linked))
-    assert verdict is not None
-    assert verdict[0] == expected
-    assert fix.format(folder, loading.LIBPYTHON) in (verdict[2] or "")
-
-
-@pytest.mark.parametrize(
     ("linked", "text"),
     [
         ("\tlibm.so.9 => not found\n" + LOADER, "not found: libm.so.9"),
@@ -552,12 +525,3 @@ def test_a_native_fmu_without_a_library(tmp_path):
     assert verdict is not None
     assert verdict[1] == "not found though packed: liblost.so"
     assert "$ORIGIN" in (verdict[2] or "")
-
-
-@gcc
-def test_a_native_fmu_with_an_undefined_symbol(tmp_path):
-    fmu = native(tmp_path, "return lost() ? &model : 0")
-    (tmp_path / "unpacked").mkdir()
-    verdict = loading.libraries(linked(fmu, tmp_path / "unpacked"))
-    assert verdict is not None
-    assert verdict[:2] == ("problem", "undefined symbols: lost")

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,24 +66,6 @@ def test_what_was_built_from_other_constants_is_not_taken(monkeypatch):
     before = compiled._job().kept_as
     monkeypatch.setattr(compiled, "EARLY", 7)
     assert compiled._job().kept_as != before
-
-
-@pytest.mark.usefixtures("cache")
-def test_where_nothing_can_be_kept_it_is_built_for_this_process(tmp_path, monkeypatch):
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert counts() == 3
-    assert not compiled.is_there() or compiled.library.cache_info().currsize
-
-
-@pytest.mark.usefixtures("cache")
-def test_where_the_user_has_no_home(monkeypatch):
-    def no_home():
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setattr(Path, "home", no_home)
-    assert counts() == 3
 
 
 @pytest.mark.slow

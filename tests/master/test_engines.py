@@ -87,17 +87,6 @@ def chain(tmp_path, engine, *mocks):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean", "String"])
-def test_components_in_python_run_in_both(tmp_path, engine, kind):
-    def output(u, t):
-        return {"Real": t, "Integer": round(10 * t), "Boolean": t > 0.15, "String": f"{t:g}"}[kind]
-
-    a, b = Mock(tmp_path, "a", output, kind), Mock(tmp_path, "b", lambda u, t: u, kind)
-    chain(tmp_path, engine, a, b).to_the_end()
-    assert b.u == output(0.0, a.time)
-
-
-@pytest.mark.parametrize("engine", ENGINES)
 def test_rejected_steps_are_resolved_in_both(tmp_path, engine):
     clock = Mock(tmp_path, "clock", lambda u, t: t, direct=False)
     slow = Mock(

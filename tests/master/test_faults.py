@@ -164,13 +164,6 @@ def test_noise_of_another_seed_or_connection_is_independent():
         assert abs(np.corrcoef(x, y)[0, 1]) < 5 / math.sqrt(len(x))
 
 
-def test_two_noises_on_a_connection_are_independent():
-    """Their variances add up; the same numbers twice would add up to four times one of them."""
-    twice = on_connection(*2 * [fault("noise", standard_deviation=1.0)])
-    variance = passed(twice, np.zeros(20_000)).var()
-    assert abs(variance - 2.0) < 5 * 2.0 * math.sqrt(2 / 20_000)
-
-
 @pytest.mark.parametrize(
     "one",
     [

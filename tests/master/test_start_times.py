@@ -1,6 +1,5 @@
 """A run that begins at another time than 0: all that goes by time agrees on it."""
 
-import json
 import re
 from dataclasses import replace
 from math import floor
@@ -121,14 +120,6 @@ def test_in_real_time_sessions_files_and_archives(later, tmp_path):
     assert (again.start_ns, again.stop_ns) == (2_000_000_000, 5_000_000_000)
 
 
-def test_the_command_takes_it(command):
-    code, out, err = command("run", "--set", "experiment.start=1", "--stop", "1.01", "--json")
-    assert code == 0, err
-    assert json.loads(out)["steps"] == 100
-    code, _, err = command("run", "--set", "experiment.start=4")
-    assert (code, err) == (2, "grasp-cosim: start = 4 s: must be before stop = 3 s\n")
-
-
 @pytest.mark.parametrize(
     ("start", "said"),
     [
@@ -142,10 +133,3 @@ def test_one_that_does_not_fit_is_refused(tmp_path, start, said):
     made = make_system([Mock(tmp_path, "x", lambda u, t: u)], [], 10)
     with pytest.raises(InputError, match=re.escape(said)):
         made.with_settings({"experiment.start": start})
-
-
-def test_it_may_be_before_0(tmp_path):
-    mocks = [Mock(tmp_path, "x", lambda u, t: t)]
-    made = make_system(mocks, [], 10).with_settings({"experiment.start": -0.2})
-    found = MockRun(made, mocks).to_the_end()
-    assert found["x.y"][1:] == pytest.approx([-0.1 + k / 10 for k in range(12)])

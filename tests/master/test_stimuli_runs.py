@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
-from grasp_cosim import InputError, Realtime, System, simulate
+from grasp_cosim import InputError, System, simulate
 from grasp_cosim.system.stimuli import read_stimuli
 from hypothesis import given
 from hypothesis import strategies as st
 from support.both_engines import engines
 from support.examples import examples
-from support.isolated import isolated
 from support.native_fmus import build, needs_gcc
 from support.packages import skip_where_fmpy_runs_none
 from support.stimuli import REALS, driven
@@ -95,17 +94,6 @@ def test_the_first_output_agrees_with_the_first_value(tmp_path):
     assert column(result, "a.y_Real")[:2] == [5.0, 5.0]
 
 
-@pytest.mark.slow
-def test_isolation_and_real_time_change_nothing(tmp_path):
-    system = System.load(driven(tmp_path, TEXT.format("Real"), more=INPUT))
-    plain = simulate(system)
-    for other in (
-        simulate(isolated(system, "process")),
-        simulate(system, realtime=Realtime(factor=10.0)),
-    ):
-        assert all(column(plain, n) == column(other, n) for n in ("a.y_Real", "a.x", "a.y_Boolean"))
-
-
 def test_a_session_goes_along_and_does_not_set_what_is_driven(tmp_path):
     system = System.load(driven(tmp_path, "time,a.u_Real\n0,0\n1,1\n", more=INPUT))
     with simulate.session(system) as session:
@@ -113,15 +101,6 @@ def test_a_session_goes_along_and_does_not_set_what_is_driven(tmp_path):
         assert session["a.u_Real"] == pytest.approx(0.5)
         with pytest.raises(InputError, match=r"a.u_Real: has a column in drive.csv"):
             session.set("a.u_Real", 1.0)
-
-
-def test_run_json_names_the_file(tmp_path):
-    system = System.load(driven(tmp_path, "time,a.u_Real\n0,0\n1,1\n", more=INPUT))
-    entry = simulate(system).settings["input"]
-    assert (entry["file"], entry["interpolation"]) == ("drive.csv", "linear")
-    (tmp_path / "drive.csv").write_text("time,a.u_Real\n0,0\n1,2\n", "utf-8")
-    other = simulate(system.with_input(tmp_path / "drive.csv")).settings["input"]
-    assert entry["sha256"] != other["sha256"]
 
 
 def test_a_swap_to_another_unit_keeps_what_is_meant(tmp_path):

@@ -15,9 +15,7 @@ from grasp_cosim.metrics.metric import (
     check_portable,
     load_metrics,
     measure,
-    metrics_of,
 )
-from grasp_cosim.sweeps.run import Task, run_row
 from support.groups import bring_group
 
 TIME = np.array([0.0, 0.5, 1.0])
@@ -165,18 +163,6 @@ def test_a_function_that_raises_is_a_wrong_input_that_names_it_and_its_line():
             asked()
 
 
-def test_a_metric_in_a_sweep_that_raises_fails_its_run_alone(grasp):
-    short = grasp.with_experiment(step=1e-3, stop=0.01)
-
-    def late(run):
-        return 1.0 / float(run.time[-1] - 0.01)
-
-    outcome = run_row(Task(short, (made("late", late),)), 3, {})
-    assert (outcome.index, outcome.metrics) == (3, {})
-    assert outcome.error
-    assert "metric 'late': test_metric.py, line " in outcome.error
-
-
 # ------------------------------------------------------------------------- what is missing
 
 
@@ -281,17 +267,6 @@ def test_what_every_run_tells_is_no_name_of_a_metric(grasp, tmp_path):
             metric(name)
 
 
-def test_two_metrics_of_one_name_are_refused():
-    again = made("time_to_contact", lambda _: 1.0)
-    with pytest.raises(InputError, match=r"^metric 'time_to_contact': is defined twice; must have"):
-        metrics_of(["grasp"], [again])
-    own = made("own", lambda _: 1.0)
-    with pytest.raises(InputError, match=r"^metric 'own': is defined twice; must have"):
-        metrics_of([], [own, own])
-    assert metrics_of(["grasp"], [own]) == (*METRICS, own)
-    assert metrics_of([], [own]) == (own,)
-
-
 def test_a_result_has_the_metrics_of_its_system(grasp, monkeypatch):
     end = made("end", lambda run: run.time[-1])
     bring_group(monkeypatch, "ends", end)
@@ -361,15 +336,6 @@ def test_a_file_without_metrics_is_one_line(file, text, message):
             load_metrics(path)
         assert message in str(caught.value)
         assert "\n" not in str(caught.value)
-
-
-def test_a_file_that_cannot_be_read_is_one_line(tmp_path):
-    path = tmp_path / "mine.py"
-    with pytest.raises(InputError, match=r"mine\.py: No such file.*; must be a Python file"):
-        load_metrics(path)
-    path.write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match=r"mine\.py: .*; must be a Python file$"):
-        load_metrics(path)
 
 
 def test_a_file_that_is_no_python_is_not_run(tmp_path):

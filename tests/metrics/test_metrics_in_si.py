@@ -1,6 +1,5 @@
 """Metrics get signals in SI units, or the system is refused before any FMU is loaded."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,6 @@ from support.groups import bring_group
 OUTPUT = 'causality="output" | Real'
 INPUT = 'causality="input" | Real start="0"'
 ROOM = {"x": OUTPUT, "y": OUTPUT, "p": 'causality="parameter" | Real start="1"'}
-Load = Callable[..., System]
 
 
 @metric("travel", unit="m", needs={"room.x": "m", "room.y": "m"})
@@ -55,11 +53,6 @@ def load(tmp_path):
         return System.load(path)
 
     return system
-
-
-def scaled(factor, offset=None, target="a"):
-    more = "" if offset is None else f", offset = {offset}"
-    return [f'{{ from = "room.x", to = "sink.{target}", factor = {factor}{more} }}']
 
 
 MM, M = unit(OUTPUT, "mm"), unit(OUTPUT, "m")
@@ -119,33 +112,12 @@ def test_a_signal_of_another_quantity_is_refused(load):
     assert "room.x is in 'cubit', which its FMU does not define in SI units" in refusal(unknown)
 
 
-def test_of_several_that_are_refused_the_first_that_is_expected_is_named(load):
-    wrong = load({name: unit(OUTPUT, "N") for name in "xy"})
-    needs = {"room.y": "m", "room.x": "m"}
-    assert "room.y is in N" in refusal(wrong, Metric("back", travel.function, needs=needs))
-    assert "room.x is in N" in refusal(wrong)
-
-
-def test_only_what_a_metric_expects_is_asked_for(load):
-    odd = load({"x": unit(OUTPUT, "N"), "y": unit(OUTPUT, "cubit")})
-    silent = Metric("silent", travel.function, needs=("room.x",))
-    elsewhere = Metric("elsewhere", travel.function, needs={"room.x": "m", "room.z": "m"})
-    assert found(odd, silent, elsewhere).conversions == {}
-
-
 @pytest.mark.parametrize("name", ["mm", "cubit", ""])
 def test_a_metric_expects_units_of_si(load, name):
     wrong = Metric("wrong", travel.function, needs={"room.x": name})
     message = rf"^wrong: needs room\.x in '{name}'; must be a unit of SI like 'm'"
     with pytest.raises(InputError, match=message):
         found(load({"x": MM}), wrong)
-
-
-def test_the_offset_of_a_temperature_does_not_apply_to_a_difference(load):
-    warm = Metric("warm", travel.function, needs={"room.x": "K", "room.y": "K"})
-    rise = unit(OUTPUT, "degC", ' relativeQuantity="true"')
-    system = load({"x": unit(OUTPUT, "degC"), "y": rise})
-    assert found(system, warm).conversions == {"room.x": Conversion(1.0, 273.15)}
 
 
 def test_an_angle_may_be_a_number(load):

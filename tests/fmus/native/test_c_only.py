@@ -4,12 +4,9 @@ import ctypes
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
 from contextlib import contextmanager
 from functools import cache
-from math import inf, nan
 from pathlib import Path
-from typing import Any
 
 import pytest
 from c_compilers import BITS
@@ -136,7 +133,6 @@ class InC:
 
 
 CONTROLLER_INPUTS = ctypes.c_double * 6
-Controller = Callable[[str], tuple[InC, Any]]
 
 
 @pytest.fixture(scope="module")
@@ -183,41 +179,6 @@ def test_the_same_bits_as_the_block_over_changing_inputs(fmus, controller, name)
         x = block.step(params, x, pack(row), STEP_SIZE)
         expected = listed(block.outputs(params, x, pack(row)))
         assert repr([*y][: len(expected)]) == repr(expected)
-
-
-@pytest.mark.parametrize(
-    ("inputs", "step", "code", "why"),
-    [
-        ([nan, 0, 0, 0, 0, 0], 1e-3, 1, "position[1] = nan m: must be a finite number"),
-        ([0, 0, 0, 0, 0, -inf], 1e-3, 1, "intensity[2] = -inf V: must be a finite number"),
-        ([0, 0, 0, 0, 0, 0], 0.0, 1, "step of 0.0 s: must be over 0 s"),
-        ([0, 0, 0, 0, 0, 0], nan, 1, "step of nan s: must be over 0 s"),
-    ],
-)
-def test_what_is_refused_leaves_the_state(inputs, step, code, why, controller):
-    c, p = controller("GraspController")
-    zeros = CONTROLLER_INPUTS()
-    assert c.call("initial_state")(p, zeros, c.state, None) == 0
-    before = bytes(c.state)
-    u = CONTROLLER_INPUTS(*inputs)
-    assert c.call("step")(p, u, ctypes.c_double(step), c.state, c.why) == code
-    assert c.why.value.decode() == why
-    assert c.call("step")(p, u, ctypes.c_double(step), c.state, None) == code
-    assert bytes(c.state) == before
-
-
-@pytest.mark.slow
-def test_a_parameter_out_of_its_range_is_named(tmp_path):
-    """As the FMU names it."""
-    made = shipped_model("GripperPlant")
-    c = InC(made, tmp_path)
-    variables = [v for v in made.description.variables if v.causality == "parameter"]
-    assert {v.kind for v in variables} == {float}
-    p = (ctypes.c_double * 64)(*(float(v.start or 0.0) for v in variables))
-    (place,) = (i for i, v in enumerate(variables) if v.name == "finger_mass[1]")
-    p[place] = -1.0
-    assert c.call("check")(p, c.why) == 1
-    assert c.why.value.decode() == "finger_mass[1] = -1.0 kg: must be from 0.001 to 1000 kg"
 
 
 def test_libm_is_what_the_block_calls():

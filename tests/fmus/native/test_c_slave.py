@@ -6,7 +6,6 @@ Texts are those of FMI 2.0; support.fmi3 puts those of FMI 3.0 so, and is a host
 import ctypes
 import re
 import struct
-from collections.abc import Callable
 from ctypes import byref, c_bool, c_double, c_float, c_int, c_int64, c_size_t, c_uint, c_void_p
 from math import inf, nan
 from typing import Any
@@ -26,7 +25,6 @@ from support.fmi2 import (
     OK,
     Fmu,
     Instance,
-    State,
     _Callbacks,
 )  # fmt: skip
 from support.hand_written import GUID, native_fmu
@@ -81,7 +79,6 @@ def begin(instance, phase):
     return instance
 
 
-Call = Callable[[Instance], int]
 REFUSED = [
     ("", lambda i: i.step(0.0, H), "fmi2DoStep before initialisation: must be in step mode"),
     ("", lambda i: i.exit(),
@@ -228,26 +225,6 @@ def instantiate(fmu, functions, name=b"one", guid=GUID.encode(), kind=1):  # noq
     return c_void_p(fmu.library.fmi2Instantiate(name, kind, guid, None, reference, 0, 1))
 
 
-@given(st.binary(max_size=60).filter(lambda name: 0 not in name))
-@examples(100)
-@example(b"%n" * 100_000)
-@example("\N{MICRO SIGN}".encode() * 1000)
-@example(b"\xff" * 300)
-def test_any_name(fmus, name):
-    """Of what is too long the beginning, in whole characters."""
-    said = []
-    functions, two = callbacks(said), fmus[2, False]
-    component = instantiate(two, functions, name)
-    assert two.library.fmi2DoStep(component, c_double(0.0), c_double(H), 1) == ERROR
-    two.library.fmi2FreeInstance(component)
-    shown, _, text = said[0].replace(b"%%", b"%").rpartition(b", t = 0 s: ")
-    assert text == b"fmi2DoStep before initialisation: must be in step mode"
-    assert name.startswith(shown)
-    assert len(shown) == len(name) or 250 < len(shown) < 256
-    if name[:2] == b"\xc2\xb5":
-        assert len(shown) % 2 == 0
-
-
 def test_what_cannot_be_instantiated(fmus):
     said = []
     functions = callbacks(said)
@@ -361,26 +338,6 @@ def test_bytes_that_are_no_state(fmu, change, text):
         assert (status, state.pointer.value) == (ERROR, None)
         assert instance.log[0].text.startswith(f"instance, t = 0.001 s: {text}")
         assert saved(instance) == data
-
-
-def test_states_of_others_and_memory_that_is_too_small(fmu):
-    strange = ctypes.create_string_buffer(b"graspFMUffffffffffffffff", SIZE)
-    buffer = ctypes.create_string_buffer(b"\xaa" * 2 * SIZE, 2 * SIZE)
-    with Instance(fmu) as instance:
-        other = State(instance, c_void_p(ctypes.addressof(strange)))
-        for call, argument in (
-            ("SetFMUstate", other.pointer), ("GetFMUstate", byref(other.pointer)),
-            ("FreeFMUstate", byref(other.pointer)),
-        ):  # fmt: skip
-            assert instance.call(call, argument) == ERROR
-            assert "state of another FMU: must be of this one" in instance.log[-1].text
-        state = instance.state()
-        pointer, size = state.pointer, c_size_t(SIZE - 1)
-        assert instance.call("SerializeFMUstate", pointer, buffer, size) == ERROR
-        assert buffer.raw == b"\xaa" * 2 * SIZE
-        assert instance.call("SerializeFMUstate", pointer, buffer, c_size_t(2 * SIZE)) == OK
-        assert buffer.raw[SIZE:] == b"\xaa" * SIZE
-        state.free()
 
 
 # Functions and types

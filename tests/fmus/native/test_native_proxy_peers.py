@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import cli, simulate
-from grasp_cosim.hil.served import Service
-from support.proxies import build_proxy, serving, wait_until
+from support.proxies import build_proxy
 
 KEY = b"sixteen bytes of key, and some more"
 STEP, STOP = 4e-3, 2.0
@@ -61,30 +60,3 @@ def test_with_the_peer_in_c(grasp, target, tmp_path, with_key, scheme):
     for signal, column in direct.items():
         np.testing.assert_array_equal(column, there[signal], signal)
     assert not there["controller.proxy.missed"].any()
-
-
-@pytest.mark.parametrize(
-    ("ours", "theirs"), [(KEY, KEY), (KEY, None), (None, KEY), (KEY, b"another key of 24 bytes.")]
-)
-def test_keys_of_both_sides(grasp, tmp_path, ours, theirs):
-    """Only with the same key is there an answer."""
-    system = grasp.with_experiment(step=STEP, stop=0.1)
-    fmu = system.component("plant", "test").fmu
-    key = tmp_path / "key"
-    key.write_bytes(ours or b"")
-    key.chmod(0o600)
-    values = {
-        "plant.proxy.key_file": str(key) if ours else "",
-        "plant.proxy.connect_timeout": 60.0 if ours == theirs else 0.3,
-    }
-    with serving(fmu, Service(lockstep=True, key=theirs)) as server:
-        proxy = build_proxy(fmu, tmp_path / "Bench.fmu", server.address[1])
-        there = system.swap("plant", proxy).with_values(values)
-        if ours == theirs:
-            assert simulate(there, engine="python").complete  # the server is a thread of ours
-            return
-        with pytest.raises(Exception, match="no answer from") as error:
-            simulate(there)
-        assert f"has it {'the same' if ours else 'no'} key" in str(error.value)
-        wait_until(lambda: server.fmu.counters()["forged" if theirs else "malformed"] > 0)
-        assert server.fmu.counters()["steps"] == 0
