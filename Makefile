@@ -4,11 +4,11 @@
 # make platforms  other machines and compilers, FMI 3.0     make interop  other makers' tools
 # make explore    whole campaigns and properties, with new seeds; to repeat one: make explore SEED=...
 # make check  lint, format, types, import rules
-# make docs   the site of all pages in results/site, and what the notebook in docs/ shows
+# make docs   the site of all pages in results/site; a warning is an error
 # make dist   a release in dist/: wheel, sdist, FMUs for all platforms, SSP archives, the playground
 # make bench  measurements     make cards    the variable tables of the equation cards
 # make mutants ROOM=plant/gripper_plant/contact.py  which changes of a module its tests let pass
-# make pictures   those in docs/, in ten minutes; needs Chromium
+# make pictures   those in docs/, and what the notebook shows, in ten minutes; needs Chromium
 # make playground  docs/playground.html; needs zig where the C of the FMUs has changed
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.15 python3.14 python3.13 python3.12 python3.11,$(shell \
@@ -62,7 +62,6 @@ check: .venv/dev
 
 docs: .venv/dev
 	$(BIN)/python docs/website.py
-	$(BIN)/python docs/notebook.py
 
 bench: .venv/dev
 	$(BIN)/python -m benchmarks.masters
@@ -80,6 +79,7 @@ cards: .venv/run
 
 pictures: .venv/dev
 	$(BIN)/python docs/pictures.py
+	$(BIN)/python docs/notebook.py
 
 playground: .venv/run
 	PYTHONPATH=docs $(BIN)/python -m playground.page
