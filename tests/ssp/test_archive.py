@@ -299,10 +299,10 @@ def test_comments_and_processing_instructions_are_passed_over(tmp_path):
         assert System.load(archive(tmp_path, noisy, {"a": A})) == plain
 
 
-def step_of(folder, *steps, stop="1"):
+def step_of(folder, *steps, start="0", stop="1"):
     names = "abc"[: len(steps)]
     fmus = {n: fmu("parameter Real p 1.0", step=s) for n, s in zip(names, steps, strict=True)}
-    experiment = f'<ssd:DefaultExperiment stopTime="{stop}"/>'
+    experiment = f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>'
     ssd = structure(system("top", "".join(map(component, names))), experiment)
     return System.load(archive(folder, ssd, fmus)).step_ns
 
@@ -311,6 +311,7 @@ def test_the_step_is_the_smallest_of_the_fmus_that_divides_the_stop(tmp_path):
     assert step_of(tmp_path, "0.01", "0.001", "") == 1_000_000
     assert step_of(tmp_path, "0.01", "0.0003") == 10_000_000
     assert step_of(tmp_path, "0.01", "0.0003", stop="0.9") == 300_000
+    assert step_of(tmp_path, "0.01", "0.0003", start="0.1", stop="1") == 300_000
     assert step_of(tmp_path, "-1", "1e-20", "0.5") == 500_000_000
     assert step_of(tmp_path, "1.4e-9", "0.5") == 500_000_000  # no whole nanosecond
 
@@ -345,8 +346,9 @@ def test_in_a_loop_the_order_of_the_file_holds(tmp_path):
 def test_what_has_no_bearing_is_said(tmp_path):
     annotation = '<ssd:Annotations><ssc:Annotation type="com.maker"/></ssd:Annotations>'
     ssd = structure(TOP, annotations=annotation)
-    notes = System.load(archive(tmp_path, ssd, {"a": A}, {"VariantB.ssd": ssd})).notes
-    assert "variant VariantB.ssd is not used; SystemStructure.ssd is" in notes
+    notes = System.load(archive(tmp_path, ssd, {"a": A}, {"VariantB.ssd": ssd, "A.ssd": ssd})).notes
+    for variant in ("VariantB.ssd", "A.ssd"):
+        assert f"variant {variant} is not used; SystemStructure.ssd is" in notes
     assert "annotations of type 'com.maker' are not used (1)" in notes
 
 

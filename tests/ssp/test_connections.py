@@ -178,6 +178,13 @@ def test_connections_in_a_circle_are_refused(tmp_path):
             "transforms a Boolean; must be Real",
         ),
         (
+            fmu("output String y -"),
+            fmu("input String u -"),
+            linear(2.0),
+            "transforms a String; must be Real",
+        ),
+        (fmu("output Real y -"), fmu("input Integer u 0"), "", "from Real to Integer at b.u; must"),
+        (
             fmu("calculatedParameter Real y -"),
             fmu("parameter Real u 0.0"),
             "",
@@ -190,6 +197,14 @@ def test_values_that_connections_do_not_carry(tmp_path, a, b, content, message):
     elements = component("a", f"{kinds[0]} y") + component("b", f"{kinds[1]} u")
     with pytest.raises(InputError, match=message):
         connections(tmp_path, system("top", elements, connect("a/y", "b/u", content)), a, b)
+
+
+def test_a_connection_from_a_parameter_names_where_it_begins(tmp_path):
+    """Also where it goes on into a system; an input there would take the value of an output."""
+    sub = system("sub", component("b", "input u"), connect("in", "b/u"), "input in")
+    top = system("top", component("a", "calculatedParameter y") + sub, connect("a/y", "sub/in"))
+    with pytest.raises(InputError, match=r"leads from a\.y to a parameter, or from one"):
+        connections(tmp_path, top, fmu("calculatedParameter Real y -"), fmu("input Real u 0.0"))
 
 
 def test_an_enumeration_goes_to_an_enumeration(tmp_path):
