@@ -4,12 +4,10 @@ import re
 import sys
 from dataclasses import replace
 from itertools import islice
-from math import e, pi
 from pathlib import Path
 from random import Random
 
 import mujoco_plant
-import numpy as np
 import pytest
 from grasp_cosim import simulate
 from grasp_fmus.build import build_block
@@ -26,8 +24,6 @@ NEAR = Params(initial_position=(0.04, -0.04), initial_object_position=0.0)
 """5 mm of gap on either side."""
 
 FREE = replace(NEAR, object_fixed=False)
-FAR = replace(FREE, initial_position=(5.0, -5.0), floor_friction=1.0)
-"""The fingers are out of the way."""
 
 WEIGHT = FREE.object_mass * GRAVITY
 
@@ -50,45 +46,6 @@ def seen(p, x):
     return mujoco_plant.outputs(p, x, Inputs())
 
 
-def tilting(p, rate):
-    """At the start, turning about an edge that sticks, the right one for a rate > 0 in rad/s."""
-    return moving(p, x=rate * 0.05, z=abs(rate) * 0.035, tilt=rate)
-
-
-def moving(p, **rates):
-    """At the start, but for some of the coordinates' rates."""
-    names = ("x_1", "x_2", "x", "z", "tilt")
-    x = start(p)
-    a, b, c, d, f = (rates.get(name, 0.0) for name in names)
-    return x._replace(v=(a, b, c, d, f))
-
-
-def test_free_flight_is_a_parabola_to_first_order_in_the_timestep():
-    errors = []
-    for timestep in (1e-4, 5e-5, 2.5e-5):
-        p = Params(finger_mass=(0.5, 0.8), timestep=timestep)
-        y = seen(p, after(p, start(p), (0.7, -0.7), 1e-3, 400))
-        assert y.velocity == pytest.approx((0.7 * 0.4 / 0.5, -0.7 * 0.4 / 0.8), rel=1e-10)
-        assert y.contact_force == (0.0, 0.0)
-        exact = (0.11 + 0.5 * 0.7 / 0.5 * 0.16, -0.11 - 0.5 * 0.7 / 0.8 * 0.16)
-        errors.append([abs(a - b) for a, b in zip(y.position, exact, strict=True)])
-    assert max(errors[0]) < 0.5e-4 * 0.7 * 0.4 / 0.5 * 1.01
-    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=1e-3)
-
-
-def test_coulomb_friction_stops_a_finger_and_holds_it():
-    """After m·v^2/(2·F_C); at rest it creeps, as the card says, no faster."""
-    p = replace(Params(friction=friction.Params(coulomb=(0.5, 0.25))), timestep=1e-5)
-    x = after(p, moving(p, x_1=0.1, x_2=-0.1), (0.0, 0.0), 1e-3, 400)
-    ways = (x.q[0] - 0.11, -0.11 - x.q[1])
-    assert ways == pytest.approx((0.5 * 0.01 / 2.0 / 0.5, 0.5 * 0.01 / 2.0 / 0.25), rel=2e-3)
-    x = after(p, x, (-0.4, 0.2), 1e-3, 100)
-    creep = tuple((1.0 - IMPEDANCE) * p.contact_time_constant * f / (2 * 0.5) for f in (0.4, 0.2))
-    assert (-x.v[0], x.v[1]) == pytest.approx(creep, rel=1e-3)
-    x = after(p, x, (-0.6, 0.3), 1e-3, 100)
-    assert (-x.v[0], x.v[1]) == pytest.approx((0.1 * 0.1 / 0.5, 0.05 * 0.1 / 0.5), rel=1e-2)
-
-
 @pytest.mark.parametrize("time_constant", [0.002, 0.005, 0.02])
 def test_a_finger_at_rest_is_sunk_in_as_the_card_says(time_constant):
     p = replace(NEAR, contact_time_constant=time_constant, finger_mass=(0.5, 0.8))
@@ -99,18 +56,6 @@ def test_a_finger_at_rest_is_sunk_in_as_the_card_says(time_constant):
     assert depths == pytest.approx((soft * 2.0 / 0.5, soft * 3.0 / 0.8), rel=1e-3)
     assert seen(p, x).gap == (0.0, 0.0)
     assert seen(p, x).contact == (True, True)
-
-
-def test_an_impact_is_that_of_a_critical_damper_that_does_not_hold():
-    """It sinks in by v·T/e, and leaves with v/e^2, when the damper would begin to pull."""
-    p = replace(NEAR, timestep=1e-5)
-    states = list(islice(run(p, moving(p, x_1=-0.1), (0.0, 0.0), 1e-5), 12000))
-    x = states[-1]
-    impulse = 1e-5 * sum(y.contact_force[0] for y in states)
-    deepest = max(0.035 - y.q[0] for y in states)
-    assert deepest == pytest.approx(0.1 * 0.005 / e, rel=0.01)
-    assert x.v[0] == pytest.approx(0.1 / e**2, rel=0.01)
-    assert impulse == pytest.approx(0.5 * (0.1 + x.v[0]), rel=1e-9)
 
 
 @pytest.mark.parametrize("fixed", [True, False])
@@ -137,14 +82,6 @@ def test_the_gap_is_the_distance_that_mujoco_measures(fixed):
     assert len(kinds) == 4
 
 
-@pytest.mark.parametrize("mu", [0.1, 0.3])
-def test_the_floor_brakes_a_sliding_box(mu):
-    p = replace(FAR, floor_friction=mu, object_height=0.02, contact_height=0.01, timestep=2.5e-5)
-    x = after(p, moving(p, x=0.2), (0.0, 0.0), 1e-3, 400)
-    assert x.q[2] == pytest.approx(0.04 / (2.0 * mu * GRAVITY), rel=0.01)
-    assert abs(x.v[2]) < 1e-6
-
-
 @pytest.mark.parametrize(("share", "topples"), [(0.95, False), (1.05, True)])
 def test_it_topples_above_m_g_w_over_2_h(share, topples):
     """Pressed on gently: beside a finger that touches it."""
@@ -158,15 +95,6 @@ def test_it_topples_above_m_g_w_over_2_h(share, topples):
     x = after(p, start(p), (0.0, share * WEIGHT * 0.07 / (2.0 * 0.08)), 1e-3, 4000)
     assert x.toppled is topples
     assert (abs(x.q[4]) > 0.5) is topples
-
-
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_a_toppled_box_lies_on_its_side(way):
-    x = after(FAR, tilting(FAR, 12.0 * way), (0.0, 0.0), 1e-3, 1500)
-    y = seen(FAR, x)
-    assert y.toppled
-    assert y.tilt == pytest.approx(way * pi / 2.0, abs=1e-3)
-    assert x.q[3] == pytest.approx(0.035, abs=1e-5)
 
 
 def trajectory(p, x, n, seed):
@@ -248,13 +176,6 @@ def test_without_mujoco_the_build_says_what_is_missing(command, tmp_path, monkey
 
 
 # As an FMU
-
-
-def test_it_has_no_native_twin(command, tmp_path):
-    code, _, said = command("build", "--native", FILE, "--out", tmp_path)
-    assert (code, said) == (
-        2, "grasp-cosim: build: MujocoPlant: stays Python only, as it needs mujoco\n",
-    )  # fmt: skip
 
 
 @pytest.mark.slow

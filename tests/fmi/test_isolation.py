@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -165,27 +164,6 @@ def test_without_posix_it_is_refused(tmp_path, monkeypatch):
         running(tmp_path, "3.0", "process"),
     ):
         pass
-
-
-@pytest.mark.slow
-def test_the_grasp_has_the_same_bits(grasp):
-    """Also with FMUs that are written in Python, each in a Python of its own."""
-    alone = tuple(replace(component, isolation="process") for component in grasp.components)
-    here = simulate(grasp, stop=0.01)
-    there = simulate(replace(grasp, components=alone), stop=0.01)
-    assert all((here[name] == there[name]).all() for name in here)
-
-
-def test_an_fmu_that_a_process_can_have_once(tmp_path):
-    for isolation in ("process", "none"):
-        path = system_file(tmp_path, "2.0", "", isolation)
-        build(tmp_path, version="2.0", capabilities={"canBeInstantiatedOnlyOncePerProcess": "true"})
-        if isolation == "process":
-            assert simulate(System.load(path)).complete
-        else:
-            message = "second and first are both native.fmu, of which a process can have one only"
-            with pytest.raises(InputError, match=message):
-                System.load(path)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import re
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, get_args, get_origin, get_type_hints
 from xml.etree.ElementTree import fromstring
 
 import fmpy
@@ -24,7 +24,6 @@ from support.fmi2 import OK, Instance
 from support.kinds import TRANSLATED, all_kinds
 
 SCHEMA = Path(fmpy.__file__).parent / "schema"
-Kind = Literal["python", "2", "3"]
 KINDS = ("python", "2", "3")
 
 every = pytest.mark.parametrize("name", TRANSLATED)
@@ -233,15 +232,6 @@ def test_how_it_is_built(networked):
         assert [file.get("name") for file in files] == ["Mass.c"]
     libraries = [(c.get("platform"), lib.get("name")) for c in more for lib in c.iter("Library")]
     assert libraries == ([("x86_64-windows", "ws2_32")] if networked else [])
-
-
-@each
-def test_surfaces_are_chosen_by_name(kind):
-    root = root_of("ProximitySensor", kind)
-    (choice,) = root.findall("TypeDefinitions/*")
-    assert choice.get("name") == found(root)["surface"]["declaredType"]
-    items = {i.attrib["name"]: int(i.attrib["value"]) for i in choice.iter("Item")}
-    assert items == {"custom": 0, "white": 1, "blue": 2, "red": 3, "brown": 4, "black": 5}
 
 
 def test_the_time_of_fmi_3_has_a_name_of_its_own():

@@ -198,17 +198,3 @@ def test_what_does_not_go_together_is_refused_when_it_is_needed(load):
         assert (status, instance.restore(again)) == (OK, OK)
         assert instance.step(H, H) == instance.fmu.refused
         again.free()
-
-
-@pytest.mark.parametrize("name", BLOCKS)
-def test_one_that_is_fixed_is_refused(load, name):
-    fmu = load(name)
-    with Instance(fmu, "one").initialise() as instance:
-        for n in fmu.names("parameter"):
-            if n not in fmu.tunable:
-                assert instance.assign({n: 1.0}) == instance.fmu.refused
-                assert instance.log[-1].text == (
-                    f"one, t = 0 s: {n}: fixed parameter set in step mode: must be before "
-                    "fmi2ExitInitializationMode"
-                )
-        assert instance.step(0.0, H) == OK

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grasp_cosim.grasp import pictures
-from report.runs import TOUCH, component, grasp_run
+from report.runs import component, grasp_run
 from support.slow import slow
 
 
@@ -76,22 +76,3 @@ def test_fingers_differ_in_grey_and_there_is_one_legend():
     (legend,) = figure.legends
     names = [text.get_text() for text in legend.get_texts()]
     assert names == ["finger 1", "finger 2", "target", "centre of the object"]
-
-
-def test_a_peak_above_the_axes_is_written_there():
-    run = grasp_run()
-    name = "plant.contact_force[2]"
-    hard = replace(run, signals={**run.signals, name: 40.0 * run.signals[name]})
-    texts = [text.get_text() for text in pictures.draw_grasp(hard).axes[3].texts]
-    assert texts == ["peaks: 3 and 136 N"]
-
-
-def test_a_close_up_shows_the_samples_around_the_contact():
-    run = grasp_run()
-    gap, force, speed = pictures.draw_grasp(run).axes[1::3]
-    time, shown = gap.lines[0].get_data()
-    rows = (run.time >= TOUCH[1] - 0.015) & (run.time < TOUCH[1] + 0.03)
-    np.testing.assert_array_equal(time, run.time[rows])
-    np.testing.assert_array_equal(shown, 1e3 * run.signals["plant.gap[1]"][rows])
-    assert np.max(force.lines[0].get_ydata()) == 3.4
-    assert np.max(speed.lines[0].get_ydata()) == pytest.approx(65.0)

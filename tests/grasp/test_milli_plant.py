@@ -1,13 +1,10 @@
 """A plant of another vendor in mm, mm/s and mN has the metrics of the one in SI."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.comparison.qualify import qualify
-from grasp_cosim.grasp.presets import SYSTEM, start_in_si, with_case, with_si_values
-from grasp_cosim.grasp.published.grasps import settled_force
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.metrics.metric import metric
 from grasp_cosim.recording.result import UNITS
 from support.milli import milli_plant
@@ -138,21 +135,6 @@ def test_the_plant_may_take_the_place_of_the_original(grasp, plants, original):
     named = dict(entry.split(" = ") for entry in ENTRY.replace('"', "").split(", "))
     bare = plants / "none/MilliPlant.fmu"
     assert qualify(fast, "plant", bare, units=named, isolation="none").qualified
-
-
-def test_parameters_are_converted_to_si_and_from_it(defined, grasp):
-    assert start_in_si(defined, "plant.object_width") == pytest.approx(0.07, rel=1e-15)
-    assert settled_force(defined) == pytest.approx(settled_force(grasp), rel=1e-15)
-    moved = with_si_values(defined, {"plant.initial_object_position": 0.02}, "test:")
-    assert moved.start("plant.initial_object_position") == pytest.approx(20.0, rel=1e-15)
-    assert with_case(defined, 1).start("plant.object_width") == 70.0
-
-
-def test_a_parameter_without_a_unit_is_in_si(defined):
-    plant = defined.component("plant", "")
-    bare = replace(plant, fmu=plant.fmu.parents[1] / "none/MilliPlant.fmu")
-    others = [c for c in defined.components if c.name != "plant"]
-    assert start_in_si(replace(defined, components=(bare, *others)), "plant.object_width") == 70.0
 
 
 @pytest.mark.parametrize(

@@ -146,19 +146,6 @@ def test_never_more_under_way_than_there_is_room_for(net, arriving):
     assert fates["passed"] + fates["held back"] == len(delivered)
 
 
-def test_the_room_is_for_both_directions_together():
-    net = Network(dict.fromkeys(DIRECTIONS, Conditions(delay=1.0, duplicate=1.0)), capacity=5)
-    traffic = Traffic[None](net)
-    for _ in range(3):
-        for direction in DIRECTIONS:
-            traffic.receive(direction, b"", None, 0)
-    request, reply = traffic.snapshot().values()
-    assert request == Counters(received=3, duplicated=3, held=3, overflow=3)
-    assert reply == Counters(received=3, duplicated=3, held=2, overflow=4)
-    assert traffic.take(10**9 - 1) is None
-    assert traffic.next_due() == 10**9
-
-
 def test_what_this_machine_refuses_to_send_is_counted():
     traffic = Traffic[str](network())
     traffic.receive("request", b"x", "somewhere", 5)
@@ -187,32 +174,6 @@ def test_frequencies_are_those_asked_for(probability, direction):
     lost = np.array([not f for f in fates])
     runs = np.count_nonzero(lost[1:] != lost[:-1])  # neighbours are independent
     assert stats.binomtest(int(runs), MANY - 1, 2 * p * (1 - p)).pvalue > 1e-3
-
-
-def test_delays_are_uniform_and_those_of_a_copy_independent():
-    net = network(5, delay=0.010, jitter=0.005, duplicate=1.0)
-    delays = np.array([[p.delay_ns for p in net.fate("request", n)] for n in range(1, MANY + 1)])
-    for column in delays.T:
-        assert stats.kstest(column / 1e9, stats.uniform(0.010, 0.005).cdf).pvalue > 1e-3
-    assert stats.pearsonr(*delays.T).pvalue > 1e-3
-
-
-def test_certainty_and_impossibility():
-    numbers = range(1, 1001)
-    assert not any(network(loss=1.0).fate("request", n) for n in numbers)
-    assert all(network().fate("request", n) == ((0, False),) for n in numbers)
-    assert all(
-        network(duplicate=1.0, reorder=1.0).fate("request", n) == ((20 * MS, True),) * 2
-        for n in numbers
-    )
-
-
-def test_seeds_and_directions_differ():
-    def lost(seed, direction):
-        net = Network(dict.fromkeys(DIRECTIONS, Conditions(loss=0.5)), seed=seed)
-        return [n for n in range(1, 200) if not net.fate(direction, n)]
-
-    assert len({tuple(lost(s, d)) for s in range(10) for d in DIRECTIONS}) == 20
 
 
 def test_a_higher_loss_leaves_the_delays_of_the_others():

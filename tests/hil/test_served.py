@@ -146,18 +146,6 @@ def test_lost_requests_are_not_made_up_for_when_the_end_has_come(fmus, clocked):
     assert len(asked) == 11
 
 
-def test_a_step_in_parts_is_given_up_when_the_end_has_come(natives, clocked):
-    fmu = natives / "GripperPlantMovable.fmu"
-    it = clocked(fmu, Service(lockstep=True))
-    push = starts(fmu, **{"force[1]": -3.0, "force[2]": 3.0})
-    it.proxy.begin(1, push)
-    it.served.over = lambda: True
-    with pytest.raises(
-        RefusedError, match=r"the end came at t = 0 s of a step to 100 s, in parts$"
-    ):
-        it.proxy.step(0.0, 100.0, push)
-
-
 @pytest.mark.parametrize("lockstep", [True, False])
 def test_a_step_that_is_too_long_ends_its_session_alone(fmus, clocked, lockstep):
     fmu = fmus / "GripperPlant.fmu"
@@ -169,18 +157,6 @@ def test_a_step_that_is_too_long_ends_its_session_alone(fmus, clocked, lockstep)
     it.proxy.begin(2, starts(fmu))
     it.proxy.step(0.0, STEP, starts(fmu))
     assert (it.served.counters()["failures"], it.served.counters()["steps"]) == (1, 1)
-
-
-@pytest.mark.parametrize("step", [5e-324, 4e-10, 1e10, 1e300])
-def test_a_step_that_no_clock_can_keep_fails_and_the_next_session_is_served(fmus, step, clocked):
-    fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Service())
-    it.proxy.begin(1, starts(fmu))
-    with pytest.raises(RefusedError, match=r"step of .* s: must be 1 ns or more|too long: must be"):
-        it.proxy.step(0.0, step, starts(fmu))
-    assert it.served.due() is None
-    it.proxy.begin(2, starts(fmu))
-    assert it.proxy.step(0.0, STEP, starts(fmu))
 
 
 def test_a_parameter_that_the_fmu_refuses_is_said(fmus, clocked):

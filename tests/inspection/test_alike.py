@@ -119,23 +119,6 @@ def test_unit_type_and_causality_decide(plant):
     }  # fmt: skip
 
 
-def test_of_two_that_are_as_much_alike_none_is_taken(plant):
-    two = [output(f"{word}{j}", "m") for word in ("clearance", "distance") for j in (1, 2)]
-    assert names(plant, *two) == {}
-    assert [v.name for v in candidates(plant, "gap[1]", foreign(*two), ["distance1"])] == [
-        "clearance1", "clearance2", "distance2",
-    ]  # fmt: skip
-    exact = [output(f"gap{j}", "m") for j in (1, 2)]
-    assert names(plant, *two, *exact)["gap[1]"] == "gap1"
-
-
-def test_an_integer_may_be_a_flag_that_is_recorded(plant):
-    flags = output("Kontakt", kind="Integer"), output("Zustand", kind="Boolean")
-    theirs = foreign(*flags, output("l"))
-    assert candidates(plant, "contact[1]", theirs, []) == [*flags]
-    assert [v.name for v in candidates(plant, "gap[1]", theirs, [])] == ["l"]
-
-
 def test_parameters(plant):
     width, start = settable("partWidth", "parameter", "mm"), settable("W", "parameter", "m")
     assert names(plant, width, certain=True) == {"object_width": "partWidth"}

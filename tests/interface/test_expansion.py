@@ -58,20 +58,6 @@ def test_all_types_of_numbers_are_taken_apart(tmp_path):
         assert {found.by_name[n].type for n in names} == {fmi_type}
 
 
-def test_an_interface_without_arrays_is_itself(tmp_path):
-    whole = declared(tmp_path)
-    assert whole.sized_by == ("n", "m", "r")
-    assert expanded(whole, {"n": 2}) is expanded(whole, {"n": 2})
-    assert expanded(whole, {"n": 2}) is not expanded(whole, {"n": 3})
-
-
-def test_a_size_of_0_leaves_nothing(tmp_path):
-    found = expanded(declared(tmp_path), {"m": 0})
-    assert found.arrays["u"].names == found.arrays["B"].names == ()
-    assert values_of(found, "here", "u", []) == values_of(found, "here", "u", 1.0) == {}
-    assert not [v for v in found.variables if v.name.startswith(("u", "B", "D"))]
-
-
 @pytest.mark.parametrize("dimensions", [(2**40,), (2**20, 2**20), (2**63, 3), (1, 10**5 + 1)])
 def test_too_many_elements_are_left_alone_by_name(tmp_path, dimensions):
     found = expanded(declared(tmp_path, of(*dimensions)), {})

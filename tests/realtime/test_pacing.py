@@ -7,7 +7,6 @@ import pytest
 from grasp_cosim import InputError, Realtime, SimulationError
 from grasp_cosim.master.master import CHUNK
 from grasp_cosim.master.plan import Planner
-from grasp_cosim.realtime.meter import LISTED
 from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
 from realtime.fake import MS, NEAR, US, Fake, Paced
 from support.both_engines import ENGINES
@@ -110,27 +109,6 @@ def test_stop_ends_the_run_and_keeps_what_was_recorded(tmp_path, engine):
     assert culprits(run.timing()) == [(3, "b")]
 
 
-def test_stop_after_single_steps_says_the_same(tmp_path):
-    """Where no row waits to be handed on when it is found out."""
-    run = Paced(tmp_path, {"a": {3: 140 * MS}}, Realtime(overrun="stop"))
-    for _ in range(4):
-        run.master.advance(1)
-        run.master.hand_on()
-    with pytest.raises(SimulationError, match=r"the step at t = 0\.3 s ended .* a took 140 ms"):
-        run.master.advance(1)
-    assert run.master.steps_done == 4
-
-
-@pytest.mark.parametrize("overrun", ["catch-up", "continue"])
-def test_the_last_step_can_be_late(tmp_path, engine, overrun):
-    run = Paced(tmp_path, {"a": {9: 150 * MS}}, Realtime(overrun=overrun), engine)
-    timing = run.to_the_end()
-    assert culprits(timing) == [(9, "a")]
-    assert timing.steps == 10
-    assert timing.listed[0].late == pytest.approx(0.05, abs=NEAR)
-    assert timing.real_time_factor == pytest.approx(1.0 / 1.05, abs=1e-4)
-
-
 def test_the_last_step_can_stop_the_run(tmp_path, engine):
     run = Paced(tmp_path, {"a": {9: 150 * MS}}, Realtime(overrun="stop"), engine)
     with pytest.raises(SimulationError, match=r"the step at t = 0\.9 s ended 50 ms late: a took"):
@@ -202,15 +180,6 @@ def test_rows_wait_where_there_is_no_time_for_them(tmp_path, engine):
     assert len(run.memory.columns()[0]) == CHUNK + 501
 
 
-def test_who_calls_single_steps_is_to_blame_for_a_pause(tmp_path):
-    run = Paced(tmp_path, {"a": {-1: 50 * MS}})
-    run.master.advance(3)
-    run.fake.time += 80 * MS
-    timing = run.to_the_end()
-    assert culprits(timing) == [(2, "between")]
-    assert timing.listed[0].took == pytest.approx(0.08, abs=NEAR)
-
-
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
 def test_a_slow_component_is_counted_where_it_steps(tmp_path, scheme):
     """It takes its time at every fifth step, and is then to blame although that is usual."""
@@ -230,13 +199,6 @@ def test_where_the_machine_is_too_slow_the_longest_part_is_to_blame(tmp_path):
     timing = Paced(tmp_path, costs).to_the_end()
     assert timing.culprits == {"b": 10}
     assert timing.real_time_factor == pytest.approx(100 / 131, abs=0.01)
-
-
-def test_all_overruns_are_counted_and_the_first_are_listed(tmp_path, engine):
-    steps = LISTED + 500
-    timing = Paced(tmp_path, {"a": {-1: 150 * MS}}, engine=engine, steps=steps).to_the_end()
-    assert (timing.overruns, timing.culprits) == (steps, {"a": steps})
-    assert [o.step for o in timing.listed] == list(range(LISTED))
 
 
 def test_the_time_between_two_beginnings_is_divided_without_a_gap(tmp_path):

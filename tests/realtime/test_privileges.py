@@ -91,31 +91,6 @@ def test_a_system_that_has_none_of_it(monkeypatch):
     ]
 
 
-@linux
-@pytest.mark.parametrize(
-    ("runtime", "sleeps", "said"),
-    [
-        (950_000, False, 1),
-        (950_000, True, 0),
-        (-1, False, 0),
-        (1_000_000, False, 0),
-        (None, False, 0),
-    ],
-)
-def test_a_priority_that_the_kernel_breaks_off_is_said(
-    monkeypatch, tmp_path, runtime, sleeps, said
-):
-    System(monkeypatch)
-    monkeypatch.setattr("grasp_cosim.realtime.privileges.THROTTLE", tmp_path)
-    if runtime is not None:
-        (tmp_path / "sched_rt_runtime_us").write_text(f"{runtime}\n")
-        (tmp_path / "sched_rt_period_us").write_text("1000000\n")
-    with privileges(Realtime(priority=20), sleeps) as found:
-        assert found.granted == ["SCHED_FIFO, priority 20"]
-    assert len(found.refused) == said
-    assert all("for 50 ms in every 1000 ms; sysctl kernel.sched" in line for line in found.refused)
-
-
 @pytest.mark.parametrize("collecting", [True, False])
 def test_no_garbage_is_collected_on_the_way(collecting):
     before = gc.isenabled()

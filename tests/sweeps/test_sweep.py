@@ -10,7 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from grasp_cosim import InputError, SimulationError, sweep
+from grasp_cosim import InputError, sweep
 from grasp_cosim.metrics.metric import load_metrics
 from grasp_cosim.sweeps.cluster import cluster
 from grasp_cosim.sweeps.rows import grid
@@ -206,23 +206,6 @@ def test_a_dask_cluster_gives_the_same_bits(system, mine, tmp_path):
     assert there == sweep(system, FAILING, metrics=mine, workers=2)
 
 
-@pytest.mark.slow
-def test_a_run_that_kills_workers_is_a_row_of_its_own(system, mine):
-    distributed = pytest.importorskip("distributed", reason="dask is not installed")
-    import dask
-
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
-        distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
-        ) as local,
-        cluster(local.scheduler_address) as executor,
-    ):
-        rows = [{"a.crash_at": 1e9}, {"a.crash_at": 0.055}]
-        table = sweep(system, rows, metrics=mine, executor=executor)
-    assert "the worker of the run died" in table.errors[1]
-
-
 def test_a_scheduler_that_is_none(monkeypatch):
     def client(*_: object, **__: object):
         raise TimeoutError
@@ -234,15 +217,3 @@ def test_a_scheduler_that_is_none(monkeypatch):
         monkeypatch.setitem(sys.modules, "distributed", module)
         with pytest.raises(InputError, match=said), cluster("tcp://x"):
             pass
-
-
-def test_an_executor_that_breaks_ends_the_sweep_with_a_reason(system, mine):
-    class Broken(ProcessPoolExecutor):
-        def submit(self, *_: object, **__: object):
-            return super().submit(int, "x")
-
-    with (
-        Broken(1, get_context("spawn")) as pool,
-        pytest.raises(SimulationError, match="sweep: run 0: invalid literal"),
-    ):
-        sweep(system, [{"a.gain": 1.0}], metrics=mine, executor=pool)

@@ -1,11 +1,10 @@
 """Which folders of an FMU hold which binaries, on any machine."""
 
 import platform
-import struct
 import sys
 
 import pytest
-from grasp_fmus.native.targets import KNOWN, NAMES, Target, folders, here, targets, universal
+from grasp_fmus.native.targets import KNOWN, NAMES, Target, folders, here, targets
 
 LINUX_X86, WINDOWS, LINUX_ARM, MAC_X86, MAC_ARM = KNOWN
 LINUX = ("linux", "x86_64")
@@ -78,15 +77,3 @@ def test_fmi_2_has_a_folder_for_each_system_and_fmi_3_one_for_each_platform(
     assert said in note
     assert len(note.splitlines()) == bool(said)
     assert folders(asked, 3) == ({t: t.tuple for t in (here(), *asked)}, "")
-
-
-def test_one_library_for_both_processors_of_macos():
-    """Mach-O files are told apart by their processor; each begins on a page."""
-    thin = [struct.pack("<III", 0xFEEDFACF, cpu, sub) + bytes(n) for cpu, sub, n in
-            ((0x01000007, 3, 5), (0x0100000C, 0, 20_000))]  # fmt: skip
-    fat = universal(thin)
-    assert struct.unpack_from(">II", fat) == (0xCAFEBABE, 2)
-    for i, binary in enumerate(thin):
-        cpu, sub, place, size, align = struct.unpack_from(">5I", fat, 8 + 20 * i)
-        assert (cpu, sub) == struct.unpack_from("<II", binary, 4)
-        assert (place % (1 << align), fat[place : place + size]) == (0, binary)

@@ -166,19 +166,6 @@ def test_where_a_decimal_point_is_a_comma(grasp, expected, host, tmp_path):
     same_bits(grasp.read(tmp_path / "rows"), expected)
 
 
-def test_instances_in_threads(parts, host, tmp_path):
-    """Of the same libraries, with other values, each a whole run."""
-    values = [{**BENCH, "plant.initial_object_position": 0.01 * k} for k in range(4)]
-    grasps = [Grasp(parts, v) for v in values] * 2
-    scripts = [g.whole(tmp_path / f"rows_{i}", 300, H) for i, g in enumerate(grasps)]
-    for answers in host.run(*scripts, folder=tmp_path):
-        good(answers)
-    found = [g.read(tmp_path / f"rows_{i}") for i, g in enumerate(grasps)]
-    for i, v in enumerate(values):
-        same_bits(found[i], rows_in_python(v, 300, H))
-        same_bits(found[i + len(values)], found[i])
-
-
 def test_memory_is_asked_for_at_the_start_and_for_states_alone(grasp, tmp_path):
     """Counted in malloc itself: a real-time target needs it so. Refusals ask for none, either."""
     host = host_of(here(), tmp_path, ["-DCOUNT_ALLOCATIONS"])
