@@ -272,7 +272,7 @@ def command(monkeypatch, capsys, built_in, tmp_path):
     """Runs a command line in an empty folder; exit code, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: str | Path):
+    def run(*arguments):
         code = cli.main([*map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err

@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 from hypothesis import settings
-from support.examples import examples
+from support.marks import examples
 
 TESTS = Path(__file__).parent
 

@@ -9,8 +9,8 @@ import pytest
 from c_compilers import CompilerError
 from grasp_cosim.interface.read import describe
 from grasp_fmus.native.targets import here
-from support.compilers import needs_zig
 from support.kinds import TRANSLATED
+from support.marks import needs_zig
 from support.native_fmus import needs_gcc
 
 ROOT = Path(__file__).parents[2]
@@ -49,7 +49,7 @@ def test_one_by_name_and_one_of_ones_own(command):
 
 
 def test_what_is_built_is_said_before_the_compiler_runs(command, monkeypatch):
-    def ended(*_: object):
+    def ended(*_):
         raise CompilerError("out of patience")
 
     monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)

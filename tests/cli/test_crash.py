@@ -10,7 +10,7 @@ from grasp_cosim.fmi.process import ProcessInstance
 from support.native_fmus import TYPES, build, needs_gcc
 
 
-def grasp_cosim(*arguments: object):
+def grasp_cosim(*arguments):
     return subprocess.run(
         [sys.executable, "-P", "-m", "grasp_cosim", *map(str, arguments)],
         capture_output=True, text=True, timeout=120, check=False,

@@ -8,8 +8,8 @@ from html import escape
 import pytest
 from grasp_cosim import load_run
 from grasp_cosim.cli import main
+from support.marks import slow
 from support.native_fmus import TYPES, build, needs_gcc
-from support.slow import slow
 
 NAMES = {
     "y_Float64": "=cmd|' /C calc'!A0",

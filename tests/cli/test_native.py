@@ -12,7 +12,7 @@ from grasp_fmus import build as builds
 from grasp_fmus.build import build_block, planned, shipped_twins
 from grasp_fmus.native.targets import here
 from grasp_fmus.shipped import together
-from support.both_engines import needs_compiler
+from support.marks import needs_compiler
 
 pytestmark = needs_compiler
 

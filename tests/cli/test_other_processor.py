@@ -11,7 +11,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_fmus import package
 from grasp_fmus.build import build_block
-from support.both_engines import needs_compiler
+from support.marks import needs_compiler
 
 HERE = this_platform("2.0")
 LACKS = f"has a binary for linux64 (RISC-V), win64 only; this machine: {HERE}"

@@ -24,7 +24,7 @@ def qualify(monkeypatch, capsys, grasp, tmp_path):
     monkeypatch.chdir(folder)
     monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: grasp)
 
-    def run(*arguments: str | Path):
+    def run(*arguments):
         code = cli.main(["qualify", "--python", *map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err

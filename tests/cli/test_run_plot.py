@@ -3,7 +3,7 @@
 import sys
 
 import pytest
-from support.slow import slow
+from support.marks import slow
 
 
 @pytest.fixture(autouse=True)

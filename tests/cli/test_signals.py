@@ -16,8 +16,8 @@ from grasp_cosim.base.interruption import AT_ONCE
 from grasp_cosim.base.scratch import PREFIX, lock_of
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.recording.load import load_run
+from support.marks import slow
 from support.native_fmus import build, needs_gcc
-from support.slow import slow
 
 pytestmark = pytest.mark.usefixtures("ctrl_c")
 
@@ -30,7 +30,7 @@ def start(tmp_path):
     (tmp_path / "tmp").mkdir()
     with ExitStack() as stack:
 
-        def command(*arguments: object):
+        def command(*arguments):
             process = subprocess.Popen(
                 [sys.executable, "-m", "grasp_cosim", *map(str, arguments)],
                 cwd=tmp_path,

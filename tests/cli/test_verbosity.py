@@ -16,7 +16,7 @@ def command(tmp_path, monkeypatch, capsys):
     write_oscillator(tmp_path, "")
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: str):
+    def run(*arguments):
         code = cli.main([*arguments])
         out, err = capsys.readouterr()
         return code, out, err

@@ -4,8 +4,8 @@ import pytest
 from grasp_cosim import System
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.comparison.words import qualification_text as as_text
+from support.marks import slow
 from support.native_fmus import build, needs_gcc
-from support.slow import slow
 
 pytestmark = needs_gcc
 

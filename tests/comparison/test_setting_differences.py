@@ -1,7 +1,6 @@
 """What the settings of two runs differ in."""
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from grasp_cosim.comparison.settings import differences
@@ -12,7 +11,7 @@ def with_settings(run, **settings):
     return replace(run, settings={**run.settings, **settings})
 
 
-def with_controller(**values: Any):
+def with_controller(**values):
     run = grasp_run()
     parts = dict(run.settings["components"])
     parts["controller"] = component("GraspController.fmu", **values)

@@ -6,7 +6,7 @@ from grasp_cosim.comparison.tube import Curve, deviation, tube
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 STEP = 1e-3

@@ -9,7 +9,7 @@ from grasp_controller import simultaneous_contact as layer_3
 from hypothesis import given
 from hypothesis import strategies as st
 from support.approach import ANY_SAMPLES, H, approach, pairs, published, run
-from support.examples import examples
+from support.marks import examples
 
 SAMPLES = ANY_SAMPLES | st.builds(approach, pairs(0.1, 2.0), pairs(0.01, 0.1))
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.approach import H, approach, numbers, relit, run
 from support.declared import parameters
-from support.examples import examples
+from support.marks import examples
 
 HARD = [0.0, -0.0, 5e-324, 1e-308, 1e-12, 1e-6, 1.0, 1e3, 1e9, 1e154, 1e300, sys.float_info.max]
 

@@ -10,7 +10,7 @@ from grasp_controller.adaptive import Params
 from hypothesis import given
 from hypothesis import strategies as st
 from support.approach import ANY_SAMPLES, approach, assert_mirrored, mirrored, pairs, run
-from support.examples import examples
+from support.marks import examples
 
 LAWS = st.builds(
     Params,

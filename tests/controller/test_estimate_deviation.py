@@ -14,7 +14,7 @@ from grasp_controller import holding, reflectance_ratio
 from grasp_controller.adaptive import Params
 from scipy.stats import chi2
 from support.approach import H, N, approach, relit, run
-from support.slow import slow
+from support.marks import slow
 
 TRIALS = 200
 

@@ -13,7 +13,7 @@ from grasp_controller.adaptive import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
 from support.approach import L_0, N, approach, intensity, pairs, run
-from support.examples import examples
+from support.marks import examples
 
 SURE = Params(
     reflectance=reflectance_ratio.Params(time_constant=1e-6, intensity_noise=1e-12, limit=10.0),

@@ -8,7 +8,7 @@ from grasp_controller.adaptive import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
 from support.approach import approach, run
-from support.examples import examples
+from support.marks import examples
 
 P = holding.Params()
 

@@ -10,7 +10,7 @@ from grasp_controller import simultaneous_contact as layer_3
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support.approach import ANY_SAMPLES, assert_mirrored, mirrored
 from support.declared import parameters
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(60)
 

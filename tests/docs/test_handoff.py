@@ -33,7 +33,7 @@ class Bench:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_: object):
+    def __exit__(self, *_):
         self.end()
 
     def start(self, words):

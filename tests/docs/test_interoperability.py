@@ -29,7 +29,7 @@ from support.foreign_tools import (
     run_in,
     script_of,
 )
-from support.slow import interop, slow
+from support.marks import interop, slow
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/interoperability.md").read_text("utf-8")

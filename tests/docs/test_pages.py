@@ -15,8 +15,7 @@ from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.server import Server
 from grasp_cosim.master.compiled import has_compiler
 from grasp_cosim.ssp.to_archive import write_ssp
-from support.both_engines import needs_compiler
-from support.slow import slow
+from support.marks import needs_compiler, slow
 
 ROOT = Path(__file__).parents[2]
 PAGES = {

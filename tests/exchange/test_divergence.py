@@ -24,7 +24,7 @@ ROWS = 4000
 K = np.arange(ROWS)
 
 
-def watch(*columns: Floats, **more: Any):
+def watch(*columns, **more):
     """What runs away, see followed()."""
     return followed(*columns, **more)[1]
 

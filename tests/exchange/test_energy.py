@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from proximity_sensor import optics
 from support.direct import closed_loop
-from support.examples import examples
+from support.marks import examples
 
 Array = npt.NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import numpy as np
 from grasp_cosim.fmi.instance import dtype
 from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.system.parts import Component
+from support.marks import slow
 from support.native_fmus import TYPES, build
-from support.slow import slow
 
 KINDS = [("2.0", "none"), slow("2.0", "process"), ("3.0", "none"), ("3.0", "process")]
 """Every version, in this process and in one of its own."""

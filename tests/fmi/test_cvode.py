@@ -1,7 +1,6 @@
 """CVode behind our calls: accurate, never beyond its stop, with the errors of its functions."""
 
 from ctypes import c_double
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from support.models import needs_cvode
 pytestmark = needs_cvode
 
 
-def cvode(*arguments: Any):
+def cvode(*arguments):
     from grasp_cosim.fmi.cvode import Cvode  # here, as it may not be there
 
     return Cvode(*arguments)

@@ -8,7 +8,7 @@ from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.fmi.inputs import Inputs
 from grasp_cosim.interface.interface import Variable
 from grasp_cosim.system.parts import Component, Connection, Port
-from support.both_engines import engines
+from support.marks import engines
 from support.native_fmus import TYPES, build, needs_gcc
 
 

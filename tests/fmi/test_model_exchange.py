@@ -4,15 +4,39 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
+import numpy.typing as npt
 import pytest
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.system.parts import Component, Connection, Event, Port, Solver
 from scipy.integrate import solve_ivp
-from support.analytic import bouncing_ball, held_input
-from support.both_engines import ENGINES
+from support.marks import ENGINES
 from support.models import build_model, needs_cvode
 from support.native_fmus import needs_gcc
 from support.state_space import state_space
+
+Floats = npt.NDArray[np.float64]
+
+
+def bouncing_ball(time, e=0.7, v_min=0.1, h=1.0, g=9.81):
+    """Height and speed, flight by flight."""
+    begin, up = -float(np.sqrt(2.0 * h / g)), float(np.sqrt(2.0 * h * g))
+    height, speed = np.zeros_like(time), np.zeros_like(time)
+    while up >= v_min and begin < time[-1]:
+        end = begin + 2.0 * up / g
+        flying = (time >= begin) & (time < end)
+        since = time[flying] - begin
+        height[flying], speed[flying] = up * since - 0.5 * g * since**2, up - g * since
+        begin, up = end, up * e
+    return height, speed
+
+
+def held_input(k, step, inputs, start):
+    """The states of x' = -k x + u at the communication points, where u is held over each step."""
+    states = [start]
+    for u in inputs[:-1]:
+        states.append(u / k + (states[-1] - u / k) * np.exp(-k * step))
+    return np.array(states)
+
 
 pytestmark = [needs_gcc, needs_cvode]
 EXCHANGE = ("ModelExchange",)

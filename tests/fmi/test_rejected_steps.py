@@ -4,7 +4,7 @@ import pytest
 from fmi.instances import KINDS, real
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.system.parts import Component
-from support.both_engines import engines
+from support.marks import engines
 from support.native_fmus import CAPABLE, EARLY, TYPES, build, needs_gcc
 
 pytestmark = needs_gcc

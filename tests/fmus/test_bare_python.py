@@ -3,6 +3,8 @@
 import json
 import shutil
 import subprocess
+import sys
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,8 +13,27 @@ from grasp_controller import adaptive, series
 from gripper_plant import compliant, movable, rigid
 from proximity_sensor import channel
 from support import fmi2, fmi3
-from support.pythons import VERSIONS, python
-from support.slow import slow
+from support.marks import slow
+
+VERSIONS = ["3.11", "3.12", "3.13", "3.14", "3.15"]
+
+_ASK = "import sys; print('{}.{}'.format(*sys.version_info))"
+
+
+@cache
+def python(version):
+    """The program of a Python of that version; skips the test without."""
+    programs = [
+        sys.executable,
+        shutil.which(f"python{version}"),
+        *sorted((Path.home() / ".pyenv/versions").glob(f"{version}.*/bin/python")),
+    ]
+    for program in map(str, filter(None, programs)):  # a shim of pyenv may be of no Python at all
+        done = subprocess.run([program, "-c", _ASK], capture_output=True, text=True)
+        if (done.returncode, done.stdout.strip()) == (0, version):
+            return program
+    pytest.skip(f"PYTHON {version} IS NOT ON THIS MACHINE: the FMUs go untested with it")
+
 
 STEPS, H = 50, 1e-3
 

@@ -39,8 +39,8 @@ from grasp_fmus.link.signature import LinkVariable, Signature
 from grasp_fmus.native.bench_header import bench_header, c_prefix
 from gripper_plant import rigid
 from support import compiled
+from support.marks import slow
 from support.proxies import HandProxy, RefusedError
-from support.slow import slow
 
 NATIVE = Path(__file__).parent / "native"
 STRICT = [
@@ -563,7 +563,7 @@ class Target:
     def __enter__(self):
         return self
 
-    def __exit__(self, *error: object):
+    def __exit__(self, *error):
         self.socket.close()
         self.process.kill()
         self.process.communicate()

@@ -16,8 +16,8 @@ from grasp_fmus.page import icon
 from grasp_fmus.shipped import SHIPPED
 from support.fmi2 import read_members
 from support.kinds import OWN, TRANSLATED
+from support.marks import slow
 from support.native_fmus import needs_gcc
-from support.slow import slow
 
 ENDS = ("_in.csv", "_ref.csv", "_ref.opt")
 FILES = sorted([f"{n}.fmu" for n in SHIPPED] + [n + end for n in TRANSLATED for end in ENDS])

@@ -14,7 +14,7 @@ import pytest
 from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 from grasp_fmus.build import compiler_for, job
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86
-from support.compilers import needs_zig
+from support.marks import needs_zig
 from support.native_fmus import needs_gcc
 from support.processes import ends
 

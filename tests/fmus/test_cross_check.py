@@ -17,7 +17,7 @@ from grasp_fmus.contract import declared, variables
 from grasp_fmus.cross_check import STEP_SIZE, cross_check_files
 from grasp_fmus.shipped import blocks
 from support.kinds import TRANSLATED, all_kinds
-from support.slow import slow
+from support.marks import slow
 
 BLOCKS = {name: block for name, block in blocks().items() if name in TRANSLATED}
 LITERAL = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")

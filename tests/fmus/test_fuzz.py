@@ -9,10 +9,9 @@ import pytest
 from grasp_fmus.shipped import SHIPPED
 from hypothesis import HealthCheck, given
 from support.drawn_calls import SEQUENCES, Drawn
-from support.examples import examples
 from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
-from support.slow import slow
+from support.marks import examples, slow
 
 pytestmark = all_kinds
 

@@ -12,7 +12,7 @@ from threading import Thread
 import pytest
 from support.compiled import compile_c
 from support.fmi2 import OK, Fmu, Instance
-from support.slow import slow
+from support.marks import slow
 
 ROUNDS = 10
 

@@ -20,8 +20,8 @@ from grasp_cosim.system.parts import Component
 from grasp_fmus.native.bench_header import bench_header
 from grasp_fmus.page import icon
 from support import native_fmus
+from support.marks import platforms, slow
 from support.proxies import ANY_PORT, build_proxy, serving
-from support.slow import platforms, slow
 from support.state_space import state_space
 
 Proxy = Callable[..., Path]
@@ -52,7 +52,7 @@ def run(tmp_path, monkeypatch, capsys):
     folder.mkdir()
     monkeypatch.chdir(folder)
 
-    def command(*arguments: str | Path):
+    def command(*arguments):
         code = cli.main(["proxy", *map(str, arguments)])
         out, err = capsys.readouterr()
         return code, out, err

@@ -14,7 +14,7 @@ TEN = {"": 0, "m": -3, "u": -6, "n": -9, "k": 3, "M": 6, "G": 9, "c": -2, "h": 2
 SYMBOLS = {"m": {"m": 1}, "s": {"s": 1}, "N": {"kg": 1, "m": 1, "s": -2}, "K": {"K": 1}}
 
 
-def exponents(**powers: int):
+def exponents(**powers):
     return tuple(powers.get(name, 0) for name in BASE)
 
 

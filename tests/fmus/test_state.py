@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.driven import H, drive
-from support.examples import examples
 from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
+from support.marks import examples
 
 pytestmark = all_kinds
 

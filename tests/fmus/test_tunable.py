@@ -7,10 +7,9 @@ from grasp_fmus.contract import build_params, declared, longest_step, packer, un
 from grasp_fmus.shipped import blocks
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
-from support.examples import examples
 from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
-from support.slow import slow
+from support.marks import examples, slow
 
 pytestmark = all_kinds
 

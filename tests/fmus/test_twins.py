@@ -7,9 +7,9 @@ import pytest
 from hypothesis import HealthCheck, given
 from support.drawn_calls import SEQUENCES, Drawn
 from support.driven import drive
-from support.examples import examples
 from support.fmi2 import OK, Instance
 from support.kinds import NAMES
+from support.marks import examples
 from support.twins import Twins
 
 pytestmark = pytest.mark.kinds("native", "native FMI 3")

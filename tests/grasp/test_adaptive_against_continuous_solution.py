@@ -16,8 +16,7 @@ from support.adaptive import adaptive_grasp, last, run, values_of
 from support.approach import pairs
 from support.continuous import Grasp, solve
 from support.continuous_learning import Adaptive
-from support.examples import examples
-from support.slow import slow
+from support.marks import examples, slow
 
 STEP = 1e-4
 """s; the published controller runs at 10 kHz."""

@@ -15,8 +15,7 @@ from proximity_sensor import optics
 from support.approach import pairs
 from support.continuous import Grasp, solve
 from support.direct import closed_loop
-from support.examples import examples
-from support.slow import slow
+from support.marks import examples, slow
 
 SLOW_CASES = (0, slow(1), slow(2))
 STEP = 1e-4

@@ -10,7 +10,7 @@ from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.toml import read_toml
-from support.slow import slow
+from support.marks import slow
 
 AWAY = r"^controller\.force\[1\] ran away: -1e\+06 N at t = 0\.413\d s, ten times as much every "
 HINT = "; look at factor = -1 of controller.force[1] -> plant.force[1], or try a shorter step"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from grasp_cosim.grasp import pictures
 from report.runs import component, grasp_run
-from support.slow import slow
+from support.marks import slow
 
 
 def width(path):

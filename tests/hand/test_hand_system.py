@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, System, grasp_system, hand_system, load_run, simulate
 from grasp_cosim.hand.system import directions_of, fmus_of
-from support.both_engines import needs_compiler
-from support.slow import slow
+from support.marks import needs_compiler, slow
 
 COLOURS = {"sensor_1.reflectance": 0.3, "sensor_2.reflectance": 1.2, "sensor_3.reflectance": 0.6}
 

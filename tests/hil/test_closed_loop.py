@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from grasp_cosim import simulate
 from grasp_cosim.hil.served import Service
+from support.marks import slow
 from support.proxies import ANY_PORT, build_proxy, serving
-from support.slow import slow
 
 ENGINE = "python"
 """The peers are threads of this process. The compiled loop keeps Python's lock to itself, where

@@ -6,7 +6,7 @@ from grasp_cosim.hil.figures import proxy_figures, proxy_lines
 TIME = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 
 
-def diagnostics(**values: list[float]):
+def diagnostics(**values):
     quiet = dict.fromkeys(
         ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected", "age"),
         [0.0] * 6,

@@ -8,9 +8,9 @@ import pytest
 from grasp_cosim import simulate
 from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.served import Service
+from support.marks import slow
 from support.ports import kept_port
 from support.proxies import ANY_PORT, build_proxy, relaying, serving, wait_until
-from support.slow import slow
 
 ENGINE = "python"
 """The peers are threads of this process: test_closed_loop.py."""

@@ -3,8 +3,10 @@
 import json
 import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
 from contextlib import ExitStack
 from csv import DictReader
 from dataclasses import asdict
@@ -16,9 +18,45 @@ from grasp_cosim.base.errors import InputError
 from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.traffic import Counters
-from support.echo_peer import EchoPeer, client
 from support.ports import kept_port
 from support.proxies import relaying, wait_until
+
+
+class EchoPeer:
+    """Echoes in a thread until the with statement ends; received holds (sender's port, data)."""
+
+    def __init__(self, port=0):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", port))
+        self.address = self.socket.getsockname()
+        self.received = []
+        self._thread = threading.Thread(target=self._echo)
+
+    def _echo(self):
+        while True:
+            data, sender = self.socket.recvfrom(65_535)
+            if sender == self.address:
+                return
+            self.received.append((sender[1], data))
+            self.socket.sendto(data, sender)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, kind, error, trace):
+        self.socket.sendto(b"", self.address)
+        self._thread.join()
+        self.socket.close()
+
+
+def client():
+    """A socket on loopback whose recv() gives up in the end."""
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.bind(("127.0.0.1", 0))
+    made.settimeout(30.0)
+    return made
+
 
 NASTY = Conditions(jitter=0.002, loss=0.2, duplicate=0.2, reorder=0.2, reorder_by=0.005)
 
@@ -146,7 +184,7 @@ def ended(monkeypatch):
     monkeypatch.setattr(Relay, "run", lambda _: signal.raise_signal(signal.SIGINT))
 
 
-def command(*arguments: str):
+def command(*arguments):
     """Run grasp-cosim relay in this process."""
     return cli.main(["relay", *arguments])
 
@@ -237,7 +275,7 @@ def started(tmp_path):
     """Starts the command as a process; returns it and where it listens. Ends what is left."""
     with ExitStack() as stack:
 
-        def start(*arguments: str):
+        def start(*arguments):
             process = stack.enter_context(
                 subprocess.Popen(
                     [sys.executable, "-m", "grasp_cosim", "relay", *arguments],

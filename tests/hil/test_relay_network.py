@@ -12,7 +12,7 @@ from grasp_cosim.hil.traffic import Counters, Traffic
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 MANY = 20_000

@@ -26,7 +26,7 @@ def settable(name, causality, unit=None):
     return Variable(name, "Real", causality, 0, unit, "0", None, None)
 
 
-def foreign(*variables: Variable):
+def foreign(*variables):
     return Interface(Path("vendor.fmu"), "", "vendor", variables)
 
 

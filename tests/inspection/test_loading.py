@@ -17,8 +17,8 @@ from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.loading import Finding, unpack
 from support import native_fmus
+from support.marks import slow
 from support.models import build_model
-from support.slow import slow
 
 SCRIPT = """\
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real

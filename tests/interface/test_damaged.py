@@ -10,7 +10,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.to_archive import write_ssp
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
-from support.examples import examples
+from support.marks import examples
 
 WORDS = st.sampled_from(
     [

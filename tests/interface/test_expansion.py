@@ -11,7 +11,7 @@ MATRIX = ("A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]")
 FIXED = '<Float64 name="{}" valueReference="300" causality="{}" {}>{}</Float64>'
 
 
-def of(*dimensions: int):
+def of(*dimensions):
     """A further array of fixed size."""
     sizes = "".join(f'<Dimension start="{n}"/>' for n in dimensions)
     return FIXED.format("F", "input", 'start="0"', sizes)

@@ -10,7 +10,7 @@ from grasp_cosim.inspection.inspection import inspect_fmu
 from grasp_cosim.inspection.loading import examine, unpack
 from grasp_cosim.interface import document, read
 from grasp_cosim.interface.read import describe, read_interface
-from support.slow import slow
+from support.marks import slow
 
 HEAD = '<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">'
 TAIL = '<CoSimulation modelIdentifier="m"/></fmiModelDescription>'
@@ -125,7 +125,7 @@ def variable(attributes):
     return f"<ScalarVariable {attributes}><Real/></ScalarVariable>"
 
 
-def described(*variables: str):
+def described(*variables):
     return f"{HEAD}<ModelVariables>{''.join(variables)}</ModelVariables>{TAIL}"
 
 

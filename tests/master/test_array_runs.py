@@ -9,12 +9,19 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.cli.entry import main
 from grasp_cosim.recording.load import load_run
 from scipy.linalg import expm
-from support.both_engines import engines
-from support.isolated import isolated
+from support.marks import engines
 from support.models import needs_cvode
 from support.native_fmus import needs_gcc
 from support.packages import skip_where_fmpy_runs_none
 from support.state_space import TYPES, state_space
+
+
+def isolated(system, isolation="process"):
+    """A copy with all components in processes of their own, or with "none" in this one."""
+    return system.with_settings(
+        {f"components.{c.name}.isolation": isolation for c in system.components}
+    )
+
 
 pytestmark = needs_gcc
 STEP, STOP = 0.125, 2.0

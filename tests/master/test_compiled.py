@@ -14,7 +14,7 @@ from grasp_cosim.base.calls import STEP_2, Call, Native
 from grasp_cosim.master import compiled, loop
 from grasp_cosim.master.engine import make_loop
 from grasp_cosim.master.plan import Plan
-from support.both_engines import needs_compiler
+from support.marks import needs_compiler
 
 pytestmark = needs_compiler
 

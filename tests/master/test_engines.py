@@ -12,8 +12,8 @@ from grasp_cosim.master import engine as engines
 from grasp_cosim.master.plan import Plan
 from grasp_cosim.recording.result import Rejection
 from grasp_cosim.system.parts import Connection, Port
-from support.both_engines import needs_compiler
 from support.cases import CASES
+from support.marks import needs_compiler
 from support.mocks import Mock, Run, make_system
 
 pytestmark = needs_compiler

@@ -10,7 +10,7 @@ from grasp_cosim.system.parts import Fault, Port
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 STEP = 1_000_000
@@ -25,7 +25,7 @@ def fault(kind, start=0, end=None, *, target=WIRE, seed=0, **parameters):
     return Fault(target, kind, parameters, round(start * STEP), until, seed=seed)
 
 
-def on_connection(*faults: Fault):
+def on_connection(*faults):
     """What a connection with these faults makes of a value."""
     windows = [Window(f"faults[{i}]", f, STEP) for i, f in enumerate(faults)]
     return fault_functions(windows, STEP)[faults[0].target]

@@ -7,7 +7,7 @@ from grasp_cosim.master import loop
 from grasp_cosim.master.engine import make_loop
 from grasp_cosim.master.loop import CALL, COPY, LOAD, LOAD_LONG, SCALE, STEP, STORE
 from grasp_cosim.master.plan import Plan
-from support.both_engines import engines
+from support.marks import engines
 
 TYPES = [
     "float32",

@@ -26,7 +26,7 @@ def through(u, t):
     return u
 
 
-def in_a_row(*mocks: Mock):
+def in_a_row(*mocks):
     """Each one's y goes to the next one's u."""
     return [Connection(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
 

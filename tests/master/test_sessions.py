@@ -10,7 +10,7 @@ from fmi.instances import KINDS
 from fmi.test_rejected_steps import alone
 from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.master import master
-from support.both_engines import engines
+from support.marks import engines
 from support.mocks import Mock, make_system
 from support.native_fmus import needs_gcc
 

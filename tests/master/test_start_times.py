@@ -10,7 +10,7 @@ from grasp_cosim import InputError, System, load_run, simulate
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Connection, Event, Fault, Port
 from grasp_cosim.system.stimuli import read_stimuli
-from support.both_engines import engines
+from support.marks import engines
 from support.mocks import Mock, make_system
 from support.mocks import Run as MockRun
 from support.models import KINDS, build_model, needs_cvode

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from grasp_cosim import System, load_run, simulate
 from grasp_cosim.cli import main
-from support.both_engines import engines, needs_compiler
+from support.marks import engines, needs_compiler, slow
 from support.mocks import Mock, Run, make_system
 from support.native_fmus import TYPES, build, needs_gcc
-from support.slow import slow
 
 ENGINES = ("python", "compiled")
 STARTS = {"Boolean": "false", "String": "'at rest'", "Enumeration": "1"}

@@ -10,7 +10,7 @@ from grasp_cosim.interface.interface import limits
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system.parts import Event, Port
 from grasp_cosim.system.validity import connection_transform, remarks
-from support.both_engines import engines
+from support.marks import engines
 from support.native_fmus import TYPES, build, needs_gcc
 
 pytestmark = needs_gcc

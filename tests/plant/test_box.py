@@ -9,7 +9,7 @@ from gripper_plant.box import GRAVITY, Box, Pushes, Shape, advance, balance, cen
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(60)
 

@@ -12,8 +12,8 @@ from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt, mean_force
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from support.examples import examples
 from support.gripper import assert_ranges_are_checked, swapped
+from support.marks import examples
 
 QUICK = examples(60)
 

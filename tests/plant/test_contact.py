@@ -13,7 +13,7 @@ from gripper_plant.substeps import MOST, count
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from support.examples import examples
+from support.marks import examples
 
 M = 0.5  # kg
 RATES = (Rates(200.0, 200.0), Rates(400.0, 200.0), Rates(20.0, 200.0))

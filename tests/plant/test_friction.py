@@ -2,7 +2,6 @@
 
 from itertools import pairwise
 from math import exp, sqrt
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support.declared import parameters
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 
@@ -115,7 +114,7 @@ def test_the_order_of_convergence():
 # ---------------------------------------------------------------------------- the fingers
 
 
-def gripper(**values: Any):
+def gripper(**values):
     return rigid.Params(friction=Params(**values))
 
 

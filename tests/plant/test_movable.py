@@ -12,8 +12,8 @@ from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt
 from gripper_plant.movable import Inputs, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
-from support.examples import examples
 from support.gripper import assert_ranges_are_checked, swapped
+from support.marks import examples
 
 QUICK = examples(25)
 

@@ -1,7 +1,6 @@
 """The gripper's parameters, and its symmetry: neither side of the gripper is special."""
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from gripper_plant import rigid
@@ -9,7 +8,7 @@ from gripper_plant.rigid import Inputs, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
 from support.declared import parameters
-from support.examples import examples
+from support.marks import examples
 
 PARAMETERS = parameters(Params)
 
@@ -30,7 +29,7 @@ SURROUNDINGS = {
 """Per parameter, the others such that both ends of its range are possible."""
 
 
-def message(**values: Any):
+def message(**values):
     with pytest.raises(ValueError, match=r".+") as caught:
         Params(**values)
     return str(caught.value)

@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +12,8 @@ from grasp_cosim.master import master, side_thread
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.load import load_run
-from support.both_engines import needs_compiler
+from support.marks import needs_compiler, slow
 from support.native_fmus import TYPES, build, needs_gcc
-from support.slow import slow
 
 pytestmark = [
     needs_compiler,
@@ -49,8 +47,8 @@ class Once:
     def __init__(self, act):
         self.left = [act]
 
-    def begin(self, *_: Any): ...
-    def end(self, *_: Any): ...
+    def begin(self, *_): ...
+    def end(self, *_): ...
     def block(self, steps, _):
         if steps[-1] > 0 and self.left:
             self.left.pop()()

@@ -9,7 +9,7 @@ from grasp_cosim.master.master import CHUNK
 from grasp_cosim.master.plan import Planner
 from grasp_cosim.realtime.pacer import BREATH_NS, SLICE_NS, SOME, SPIN_NS, Pacer
 from realtime.fake import MS, NEAR, US, Fake, Paced
-from support.both_engines import ENGINES
+from support.marks import ENGINES
 from support.mocks import Mock, make_system
 
 

@@ -16,7 +16,7 @@ ALL = Realtime(priority=20, cpu=0, lock_memory=True)
 
 
 def refuses(code):
-    def call(*_: object):
+    def call(*_):
         raise OSError(code, os.strerror(code))
 
     return call

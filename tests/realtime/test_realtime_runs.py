@@ -15,9 +15,8 @@ from grasp_cosim.realtime.privileges import check_cpu
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.load import load_run
 from realtime.fake import Fake
-from support.both_engines import ENGINES
+from support.marks import ENGINES, slow
 from support.mocks import Mock, make_system
-from support.slow import slow
 
 FAST = Realtime(factor=1e4)
 """Not to wait at all in a test."""

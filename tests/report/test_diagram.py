@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 import pytest
 from grasp_cosim.report.diagram import Link, diagram_svg
-from support.slow import slow
+from support.marks import slow
 
 SVG = "{http://www.w3.org/2000/svg}"
 

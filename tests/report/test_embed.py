@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from grasp_cosim.report.embed import fit, packed
 from report.javascript import run_node
-from support.slow import slow
+from support.marks import slow
 
 AWKWARD = [0.0, -0.0, 1.0, -1.0, 5e-324, 1.7976931348623157e308, np.inf, -np.inf, np.nan, 0.1, 1e-9]
 

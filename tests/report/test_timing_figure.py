@@ -12,7 +12,7 @@ from grasp_cosim.report.plot import RED
 from grasp_cosim.report.timing import draw_timing, looks
 from matplotlib.colors import same_color
 from report.timings import PERIOD, paced
-from support.slow import slow
+from support.marks import slow
 
 SAID = Caption("a run", "from 2026")
 

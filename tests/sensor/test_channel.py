@@ -24,7 +24,7 @@ from proximity_sensor import (
 from proximity_sensor.channel import Inputs, Params
 from scipy import signal
 from support.declared import parameters
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(60)
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import clock
 from proximity_sensor.clock import Params
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import converter
 from proximity_sensor.converter import Params
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(200)
 

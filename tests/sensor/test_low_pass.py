@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import low_pass
 from scipy import signal
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 

@@ -5,7 +5,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from proximity_sensor import mrg32k3a
 from proximity_sensor.mrg32k3a import JUMP_1, JUMP_2
-from support.examples import examples
+from support.marks import examples
 
 M_1, M_2 = 2**32 - 209, 2**32 - 22853
 QUICK = examples(100)

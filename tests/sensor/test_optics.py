@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from proximity_sensor import optics
 from proximity_sensor.optics import Inputs, Params
 from support.declared import parameters
-from support.examples import examples
+from support.marks import examples
 
 PARAMETERS = parameters(Params)
 

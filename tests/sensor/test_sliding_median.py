@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import sliding_median
 from scipy.ndimage import median_filter
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(300)
 

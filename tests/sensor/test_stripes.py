@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import stripes
 from proximity_sensor.stripes import Params
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(100)
 

@@ -23,7 +23,7 @@ from ssp.hand_made import (
     structure,
     system,
 )
-from support.examples import examples
+from support.marks import examples
 
 FMU = fmu("input Real u 0.5 m", "output Real y - m", "parameter Real k 1.0 m", "output Boolean b -")
 PARTS = component("a", "output y Real") + component("b", "input u Real")

@@ -19,8 +19,8 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.served import Service
 from grasp_cosim.ssp.to_archive import write_ssp
 from support.cases import CASES
+from support.marks import interop
 from support.proxies import build_proxy, serving
-from support.slow import interop
 
 STEP = 1e-3  # s
 GAPS = ("plant.gap[1]", "plant.gap[2]")

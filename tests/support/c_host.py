@@ -176,7 +176,7 @@ class Script:
     def __init__(self):
         self.lines = []
 
-    def add(self, *words: object):
+    def add(self, *words):
         self.lines.append("\t".join("-" if word is None else str(word) for word in words))
         return self
 

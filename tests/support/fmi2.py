@@ -145,7 +145,7 @@ class Instance:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_: object):
+    def __exit__(self, *_):
         self.call("FreeInstance")
 
     def call(self, function, *arguments):
@@ -161,7 +161,7 @@ class Instance:
     def exit(self):
         return self.call("ExitInitializationMode")
 
-    def initialise(self, **values: float):
+    def initialise(self, **values):
         """Set values and go through initialisation."""
         assert self.setup() == OK
         assert self.assign(values) == OK
@@ -210,7 +210,7 @@ class Instance:
         status = self.call("GetBoolean", (c_uint * n)(*references), c_size_t(n), values)
         return status, [bool(value) for value in values]
 
-    def get(self, *names: str):
+    def get(self, *names):
         """Values of real variables, which must be had."""
         status, values = self.get_real([self.fmu.references[name] for name in names])
         assert status == OK

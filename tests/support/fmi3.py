@@ -6,7 +6,6 @@ What it logs is put as FMI 2.0 has it, so that one test serves both: names of fu
 import ctypes
 from collections.abc import Callable
 from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_void_p
-from typing import Any
 
 OK, DISCARD, ERROR = 0, 2, 3
 
@@ -67,7 +66,7 @@ class Calls:
     def _fmi3(self, function, *arguments):
         return int(getattr(self._library, f"fmi3{function}")(self.component, *arguments))
 
-    def _SetupExperiment(self, *arguments: Any):
+    def _SetupExperiment(self, *arguments):
         """Part of fmi3EnterInitializationMode."""
         self._experiment = arguments
         return OK

@@ -6,8 +6,8 @@ import pytest
 from grasp_fmus.native.targets import here
 
 from .c_host import Part, unpacked
+from .marks import slow
 from .platforms import host_of
-from .slow import slow
 
 Parts = dict[str, Part]
 """By the names of the FMUs."""

@@ -11,7 +11,7 @@ from grasp_fmus.build import build_block, build_model, planned
 from grasp_fmus.package import shipped_model
 from grasp_fmus.shipped import SHIPPED
 
-from .slow import platforms, slow
+from .marks import platforms, slow
 
 Kind = Literal["python", "native", "native FMI 3"]
 

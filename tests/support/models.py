@@ -167,7 +167,7 @@ def _library(name, version, steps):
     return shared_library(SOURCES / f"{name}.c", options=options, asked=asked)
 
 
-def _attributes(**values: object):
+def _attributes(**values):
     """Those that are not None."""
     given = {key: v for key, v in values.items() if v is not None}
     lower = {key: str(v).lower() if isinstance(v, bool) else v for key, v in given.items()}

@@ -8,7 +8,6 @@ import zipfile
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 from c_compilers import Compiler, compile_all
@@ -19,8 +18,8 @@ from grasp_fmus.package import write_file
 from grasp_fmus.proxy import Original, proxy_members
 
 from .fmi2 import ERROR, OK, Fmu, Instance
+from .marks import platforms
 from .scripted_peer import VARIABLES, Clock, ScriptedPeer
-from .slow import platforms
 
 SHIM = Path(__file__).parents[1] / "fmus/native/proxy_shim.h"
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
@@ -119,7 +118,7 @@ class Host:
         self.must(f"{action}{kind}", reference, ctypes.c_size_t(1), values)
         return _PYTHON.get(kind, lambda value: value)(values[0])
 
-    def set(self, **values: Any):
+    def set(self, **values):
         for name, value in values.items():
             self._access("Set", name, value.encode() if isinstance(value, str) else value)
 

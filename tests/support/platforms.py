@@ -16,7 +16,7 @@ from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, her
 
 from .c_host import HEADERS, SOURCE, Host
 from .compiled import compile_c
-from .compilers import needs_zig
+from .marks import needs_zig
 
 ZIG = ("zig",)
 """Stands for the compiler that build takes for a target."""
@@ -25,7 +25,7 @@ ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 """The libc that Debian has for aarch64, in libc6-dev-arm64-cross."""
 
 
-def needs_programs(*programs: str):
+def needs_programs(*programs):
     missing = [program for program in programs if not shutil.which(program)]
     return pytest.mark.skipif(bool(missing), reason=f"NO {', '.join(missing)}")
 

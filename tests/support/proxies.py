@@ -118,7 +118,7 @@ class UdpAsk:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_: object):
+    def __exit__(self, *_):
         self._socket.close()
 
 

@@ -91,7 +91,7 @@ class ScriptedPeer:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_: object):
+    def __exit__(self, *_):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
             s.sendto(b"", ("127.0.0.1", self.port))
         self._thread.join()

@@ -20,7 +20,7 @@ class Twins(Instance):
         self.fmu = python
         self.both = Instance(python, "twins"), Instance(native, "twins")
 
-    def __exit__(self, *_: object):
+    def __exit__(self, *_):
         for instance in self.both:
             instance.__exit__()
 

@@ -207,7 +207,7 @@ def test_a_dask_cluster_gives_the_same_bits(system, mine, tmp_path):
 
 
 def test_a_scheduler_that_is_none(monkeypatch):
-    def client(*_: object, **__: object):
+    def client(*_, **__):
         raise TimeoutError
 
     for module, said in (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, System, grasp_system, simulate
 from grasp_cosim.grasp.controllers import with_controller
-from support.both_engines import needs_compiler
+from support.marks import needs_compiler
 from support.oscillator import write_oscillator
 
 pytestmark = needs_compiler

@@ -24,7 +24,7 @@ from grasp_cosim.system.parts import (
 from grasp_cosim.system.scenario import event_entry, fault_entry, read_events, read_faults
 from hypothesis import given
 from hypothesis import strategies as st
-from support.examples import examples
+from support.marks import examples
 
 QUICK = examples(60)
 GRASP = SYSTEM.read_text("utf-8")

@@ -9,7 +9,7 @@ from grasp_cosim.base.errors import InputError
 from playground import wasm
 from playground.page import playground_html
 from playground.system import PLANTS, page_system, shipped
-from support.compilers import needs_zig
+from support.marks import needs_zig
 
 DOCS = Path(__file__).parents[3] / "docs"
 

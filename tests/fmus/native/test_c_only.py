@@ -18,8 +18,8 @@ from grasp_fmus.package import shipped_model
 from grasp_fmus.shipped import blocks
 from support.compiled import compile_c
 from support.kinds import TRANSLATED
+from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
-from support.slow import platforms, slow
 
 ROOT = Path(__file__).parents[3]
 SPRING = ROOT / "docs/spring_plant.py"

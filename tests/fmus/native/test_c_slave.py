@@ -15,7 +15,6 @@ from grasp_fmus.native.sources import C
 from hypothesis import example, given
 from hypothesis import strategies as st
 from support.compiled import compile_c
-from support.examples import examples
 from support.fmi2 import (
     _ALLOCATE,
     _FREE,
@@ -28,8 +27,8 @@ from support.fmi2 import (
     _Callbacks,
 )  # fmt: skip
 from support.hand_written import GUID, native_fmu
+from support.marks import examples, slow
 from support.native_fmus import needs_gcc
-from support.slow import slow
 
 pytestmark = needs_gcc
 

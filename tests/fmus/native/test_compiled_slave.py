@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from support.compiled import compile_c
 from support.hand_written import GUID, NAME, compile_in, write_sources
+from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
-from support.slow import platforms, slow
 
 pytestmark = needs_gcc
 

@@ -13,9 +13,9 @@ from grasp_fmus.build import planned
 from grasp_fmus.description import Experiment
 from grasp_fmus.proxy import Original, Settings, build_proxy
 from support.kinds import TRANSLATED
+from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
 from support.scripted_peer import VARIABLES, ScriptedPeer
-from support.slow import platforms, slow
 
 BOTH = [(name, 2) for name in TRANSLATED] + [slow(name, 3) for name in TRANSLATED]
 

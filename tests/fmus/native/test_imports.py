@@ -11,8 +11,8 @@ import pytest
 from c_compilers import LIBM
 from grasp_fmus.build import build_native, planned
 from grasp_fmus.native.targets import KNOWN, LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86, WINDOWS
-from support.compilers import needs_zig
 from support.fmi2 import read_members
+from support.marks import needs_zig
 
 NAME = "ProximitySensor"
 """Of all blocks the one that calls most."""
@@ -58,7 +58,7 @@ def binaries(tmp_path_factory):
     return files
 
 
-def said(*command: str | Path):
+def said(*command):
     return subprocess.check_output([str(word) for word in command], text=True)
 
 

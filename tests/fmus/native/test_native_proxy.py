@@ -11,9 +11,9 @@ from grasp_fmus.build import planned
 from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
 from grasp_fmus.proxy import Settings, build_proxy
 from support.fmi2 import OK, WARNING, Fmu, Instance
+from support.marks import platforms
 from support.native_proxies import STRICT, original, write_sources
 from support.scripted_peer import ScriptedPeer, fail
-from support.slow import platforms
 
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 

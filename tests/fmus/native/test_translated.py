@@ -13,8 +13,8 @@ from fmus.native.random_block import random_block
 from grasp_fmus.shipped import blocks
 from support.campaign import part, seeds
 from support.kinds import TRANSLATED
+from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
-from support.slow import platforms, slow
 
 pytestmark = needs_gcc
 

@@ -53,7 +53,7 @@ def test_the_page_has_the_published_figures_beside_ours(
 
 
 def test_ctrl_c_is_130_and_nothing_is_written(command, monkeypatch):
-    def interrupted(*_: object):
+    def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(compared, "run_all", interrupted)

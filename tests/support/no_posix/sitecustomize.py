@@ -22,7 +22,6 @@ import sys
 import tempfile
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import asyncio  # isort: skip
 import filelock  # isort: skip  # which is written for both
@@ -82,7 +81,7 @@ def is_open(path):
 def refusing(call):
     """A function that does nothing to an open file."""
 
-    def refused(*paths: Any, **options: Any):
+    def refused(*paths, **options):
         for path in paths:
             if not any(options.values()) and is_open(path):
                 raise PermissionError(errno.EACCES, "the file is open", path)

@@ -13,7 +13,7 @@ from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_fmus.build import build_native, planned
 from grasp_fmus.native.targets import WINDOWS
-from support.compilers import needs_zig
+from support.marks import needs_zig
 from support.platforms import needs_programs, windows
 
 pytestmark = [pytest.mark.platforms, needs_programs("wine"), needs_zig]

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from grasp_fmus.native.targets import here
 from support.c_host import BENCH, Grasp, Host, Part, Script, bits, good, rows_in_python
+from support.marks import platforms, slow
 from support.platforms import host_of
-from support.slow import platforms, slow
 
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 

@@ -4,8 +4,8 @@ import pytest
 from grasp_cosim.hil.served import Service
 from grasp_fmus.native.targets import LINUX_ARM, WINDOWS
 from support.c_host import Script, bits, number, unpacked
-from support.compilers import needs_zig
 from support.fmi2 import Fmu, Instance
+from support.marks import needs_zig
 from support.platforms import needs_programs
 from support.proxies import build_proxy, serving, wait_until
 

@@ -1,0 +1,36 @@
+"""Which tests run when: slow ones, for other tools, with a compiler, in both engines, how often."""
+
+import importlib.util
+
+import pytest
+from grasp_cosim.master.compiled import has_compiler
+from hypothesis import settings
+
+needs_zig = pytest.mark.skipif(not importlib.util.find_spec("ziglang"), reason="NO ziglang")
+needs_compiler = pytest.mark.skipif(not has_compiler(), reason="there is no C compiler")
+
+ENGINES = ["python", pytest.param("compiled", marks=needs_compiler)]
+engines = pytest.mark.parametrize("engine", ENGINES)
+
+USUAL = 100
+"""Examples of a property that asks for no other count, four times those of `make test`."""
+
+
+def slow(*values):
+    """A case that only `make test-slow` runs."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+def platforms(*values):
+    """A case that only `make platforms` runs."""
+    return pytest.param(*values, marks=pytest.mark.platforms)
+
+
+def interop(*values):
+    """A case that only `make interop` runs."""
+    return pytest.param(*values, marks=pytest.mark.interop)
+
+
+def examples(count=USUAL, **more):
+    """The settings of a test with `count` examples, as many times more as the profile has."""
+    return settings(max_examples=max(1, count * settings().max_examples // USUAL), **more)
