@@ -20,9 +20,7 @@ pytestmark = needs_gcc
 
 DOCS = Path(__file__).parents[3] / "docs"
 HAND = Path(__file__).with_name("hand.py")
-OWN = {
-    name: DOCS / f"{name}.py" for name in ("spring_plant", "quotient_controller", "moving_object")
-}
+OWN = {name: DOCS / f"{name}.py" for name in ("spring_plant", "moving_object")}
 OWN["hand"] = HAND
 NAMES = [*TRANSLATED, *OWN]
 
