@@ -20,7 +20,7 @@ NAME = "ProximitySensor"
 FUNCTIONS = {
     *LIBM, "ceil", "copysign", "fabs", "floor", "sqrt",
     "memcmp", "memcpy", "memmove", "memset",
-    "strcat", "strcmp", "strcpy", "strcspn", "strlen", "strncmp",
+    "strcat", "strchr", "strcmp", "strcpy", "strcspn", "strlen", "strncmp",
     "calloc", "free", "malloc",
 }  # fmt: skip
 """No file, no time, no environment, no output: mathematics, bytes, and memory of the start."""
