@@ -78,10 +78,10 @@ def copied(folder: Path) -> dict[str, str]:
 
 
 def run(command: str, folder: Path, env: Mapping[str, str]) -> None:
-    """Run a command in the copy. RuntimeError with what it printed if it fails."""
+    """Run a command in the copy. SystemExit with what it printed if it fails."""
     done = subprocess.run(command.split(), cwd=folder, env=env, capture_output=True, text=True)
     if done.returncode:
-        raise RuntimeError(f"{command} failed: {(done.stdout + done.stderr)[-2000:]}")
+        raise SystemExit(f"{command}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
 
 
 def main() -> None:
@@ -91,6 +91,8 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=200, help="at most so many mutants [200]")
     parser.add_argument("--seed", type=int, default=1, help="which of them [1]")
     given = parser.parse_args()
+    if not (ROOT / given.room).exists():
+        parser.error(f"{given.room}: must be a module or a package, like plant/gripper_plant")
     tests = given.tests or tests_of(given.room)
     with tempfile.TemporaryDirectory(prefix="grasp_mutants_") as name:
         folder, session = Path(name, "tree"), Path(name, "session.sqlite")
