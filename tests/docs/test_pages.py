@@ -37,7 +37,7 @@ def blocks(page, kind):
 
 
 (METRIC,) = blocks("docs/guide.md", "python")
-MAP, CUBE, SOBOL = blocks("docs/studies.md", "python")
+MAP, SOBOL = blocks("docs/studies.md", "python")
 
 
 @pytest.fixture(scope="session")
@@ -102,10 +102,9 @@ def test_the_examples_of_a_hand_hold():
     ("script", "fewer", "printed"),
     [
         (MAP, {", 25)": ", 3)", ", 17)": ", 2)", "stop=6.0": "stop=0.5"}, ""),
-        (CUBE, {"random(200)": "random(4)", "stop=6.0": "step=1e-3, stop=3.0"}, "50%"),
         (SOBOL, {"n=64": "n=2"}, "alone"),
     ],
-    ids=["map", "cube", "sobol"],
+    ids=["map", "sobol"],
 )
 def test_the_scripts_of_studies(script, fewer, printed, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
