@@ -1,54 +1,9 @@
-"""Shared by the benchmarks: the FMUs, programs that answer, measuring by turns, and tables.
-
-A native FMU has the whole model description of one of ours, so that its ports, units and values are
-the same, and another binary: see native/lag.c. It needs gcc; the headers of FMI are those that FMPy
-brings along.
-"""
+"""Shared by the benchmarks: programs that answer, measuring by turns, and tables."""
 
 import statistics
 import subprocess
-import tempfile
-import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
-
-import fmpy
-from grasp_fmus.build import build
-
-LAG = Path(__file__).parent / "native" / "lag.c"
-HEADERS = Path(fmpy.__file__).parent / "c-code"
-
-
-@contextmanager
-def built_fmus() -> Iterator[tuple[Path, Path]]:
-    """A folder with our Python FMUs, and one with native ones of the same shape."""
-    with tempfile.TemporaryDirectory(prefix="grasp_bench_") as name:
-        python, native = Path(name, "python"), Path(name, "native")
-        build(python)
-        build_native(python, native)
-        yield python, native
-
-
-def build_native(fmus: Path, out: Path) -> None:
-    """The native counterparts of all FMUs in a folder. FileNotFoundError without gcc."""
-    out.mkdir()
-    for fmu in sorted(fmus.glob("*.fmu")):
-        description = fmpy.read_model_description(fmu)
-        causalities = [v.causality for v in description.modelVariables]
-        library = out / f"{fmu.stem}.so"
-        macros = {
-            "INPUTS": causalities.count("input"),
-            "OUTPUTS": causalities.count("output"),
-            "VARIABLES": len(causalities),
-        }
-        defined = [f"-D{name}={value}" for name, value in macros.items()]
-        compiler = ["gcc", "-O2", "-shared", "-fPIC", "-I", str(HEADERS)]
-        subprocess.run([*compiler, *defined, "-o", str(library), str(LAG)], check=True)
-        with zipfile.ZipFile(out / fmu.name, "w") as archive, zipfile.ZipFile(fmu) as original:
-            archive.writestr("modelDescription.xml", original.read("modelDescription.xml"))
-            archive.write(library, f"binaries/linux64/{fmu.stem}.so")
 
 
 class Program(subprocess.Popen[str]):

@@ -4,10 +4,9 @@
     python -m benchmarks.masters [--cofmupy-python PYTHON] [--native FOLDER] [--only CASE]
 
 Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, everything
-recorded, on our Python FMUs, our native ones, and native ones of the same shape without work, in
-chunks, one master after the other. Prints the tables of README.md. A master that is not installed
-is skipped by name; cofmupy pins an FMPy and a matplotlib of its own, so it may be in an environment
-of its own.
+recorded, on our Python FMUs and our native ones, in chunks, one master after the other. Prints the
+tables of README.md. A master that is not installed is skipped by name; cofmupy pins an FMPy and a
+matplotlib of its own, so it may be in an environment of its own.
 """
 
 import argparse
@@ -15,14 +14,16 @@ import os
 import statistics
 import subprocess
 import sys
+import tempfile
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from grasp_cosim.base.system_calls import cpus
+from grasp_fmus.build import build
 
-from benchmarks.harness import Program, built_fmus, by_turns, head, row, spread
+from benchmarks.harness import Program, by_turns, head, row, spread
 
 WORKER = Path(__file__).parent / "worker.py"
 
@@ -62,7 +63,6 @@ CASES = (
     Case("Python FMUs, one core", "python", 300, 60, True),
     Case("our native FMUs, runs of 3 s", "native", 30_000, 20, False),
     Case("our native FMUs, short chunks", "native", 1000, 60, False),
-    Case("native FMUs without work, all cores", "hollow", 1000, 60, False),
 )
 """ecospy and libcosimpy step their instances in several threads, which a Python FMU makes wait for
 one another: there one core can be faster than two, and a long chunk slower than a short one.
@@ -137,17 +137,17 @@ def main() -> None:
         "--native", metavar="FOLDER", type=Path, default=Path("fmus/native"),
         help="what `grasp-cosim build --native` wrote; default: %(default)s",
     )  # fmt: skip
-    parser.add_argument("--only", choices=("python", "native", "hollow"), help="FMUs to measure")
+    parser.add_argument("--only", choices=("python", "native"), help="FMUs to measure")
     given = parser.parse_args()
     masters = pythons(given.cofmupy_python)
-    with built_fmus() as (python, hollow):
-        folders = {"python": python, "native": given.native, "hollow": hollow}
+    with tempfile.TemporaryDirectory(prefix="grasp_bench_") as scratch:
+        folders = {"python": Path(scratch, "python"), "native": given.native.resolve()}
+        build(folders["python"])
         for case in CASES:
             if not any(folders[case.fmus].glob("*.fmu")):
                 print(f"{case.title}: skipped, build them with `grasp-cosim build --native`")
             elif given.only in (None, case.fmus):
-                folder = folders[case.fmus].resolve()
-                report(case.title, measure(masters, folder, case, hollow.parent))
+                report(case.title, measure(masters, folders[case.fmus], case, Path(scratch)))
 
 
 if __name__ == "__main__":
