@@ -195,8 +195,6 @@ COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float] | None]
     "impacts, mm/s": ("impact_velocity", 1e3, 1),
     "peak forces, N": ("peak_contact_force", 1.0, 2),
     "ratio learnt": (learnt, 1.0, 3),
-    "force difference, N": ("force_difference", 1.0, 3),
-    "drift, mm/s": ("object_drift", 1e3, 3),
     "steady forces, N": ("steady_contact_force", 1.0, 2),
     "target at the end, mm": ("target_position", 1e3, 1),
     "object shifted, mm": ("object_shift", 1e3, 2),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import json
+import tomllib
 import zlib
 from html import escape
 from importlib.metadata import version
@@ -18,13 +19,17 @@ from typing import Any
 
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import FINGERS, METRICS
+from grasp_cosim.grasp.presets import CASES, SYSTEM
 from grasp_cosim.grasp.scene import scene_script, scene_style
 from grasp_cosim.report.page import page_style, traces_script
 
 from . import wasm
-from .system import page_system, shipped
+from .wasm import LAWS, MODELS, PLANTS, model, shipped
 
 HERE = Path(__file__).parent
+
+_TYPES = {"Real": 0, "Boolean": 1, "Integer": 2}
+"""As play.c numbers them."""
 
 
 def playground_html() -> str:
@@ -61,6 +66,43 @@ def _scene() -> dict[str, Any]:
     target = "controller.target_position"
     signals = [*(name for of in drawn.values() for name in of.values()), target]
     return {**drawn, "target": target, "signals": signals, "toSi": {}, "contacts": []}
+
+
+def page_system() -> dict[str, Any]:
+    """Return what the scripts of the page know, as JSON has it."""
+    system = tomllib.loads(SYSTEM.read_text("utf-8"))
+    shown = tomllib.loads(_text("settings.toml"))
+    components = system["components"]
+    presets = system["presets"]
+    return {
+        "models": {name: _variables(name) for name in MODELS},
+        "components": {name: c["fmu"].removesuffix(".fmu") for name, c in components.items()},
+        "connections": [c.split(" -> ") for c in system["connections"]],
+        "values": {
+            f"{name}.{key}": value
+            for name, c in components.items()
+            for key, value in c.get("values", {}).items()
+        },
+        "step": system["experiment"]["step"],
+        "stop": system["experiment"]["stop"],
+        "plants": PLANTS,
+        "laws": LAWS,
+        "cases": [presets[f"case_{case}"] for case in CASES],
+        "bench": presets["bench"],
+        "groups": shown["groups"],
+        "presets": shown["presets"],
+    }
+
+
+def _variables(name: str) -> list[list[Any]]:
+    """The variables of an FMU that a page can set or get, by value reference.
+
+    Name, type, causality, unit, start and description each.
+    """
+    return [
+        [v.name, _TYPES.get(v.type), v.causality, v.unit, v.start, v.description]
+        for v in model(name).description.variables
+    ]
 
 
 def _text(name: str) -> str:

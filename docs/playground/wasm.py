@@ -11,6 +11,7 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Mapping
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -18,11 +19,25 @@ from pathlib import Path
 from c_compilers import BITS, LIBM, environment, find_zig
 from grasp_cosim.base.checks import install_command
 from grasp_cosim.base.errors import InputError
+from grasp_cosim.grasp.controllers import CONTROLLERS
 from grasp_fmus.native.blocks import translated
 from grasp_fmus.native.sources import native_sources
-from grasp_fmus.package import write_file
+from grasp_fmus.package import Model, shipped_model, write_file
 
-from .system import MODELS, WASM, model, shipped
+PLANTS = {
+    "fixed": "GripperPlant",
+    "soft": "GripperPlantCompliant",
+    "movable": "GripperPlantMovable",
+}
+"""The plants to choose from, by what the object does."""
+
+LAWS = {name: f"GraspController{law}" for name, law in CONTROLLERS.items()}
+
+MODELS = (*PLANTS.values(), "ProximitySensor", *LAWS.values())
+"""The FMUs that are in play.wasm, in the order of its kinds."""
+
+WASM = Path(__file__).with_name("play.wasm.z")
+"""The components in WebAssembly, deflated, as pages have it."""
 
 ZIG = "0.17.1"
 GUID = "playground"
@@ -46,6 +61,17 @@ OPTIONS = (
 
 _UNSEEN = re.compile(rb"/\*.*?\*/|\s+", re.DOTALL)
 """Comments and white space, which no C compiler minds."""
+
+
+@cache
+def model(name: str) -> Model:
+    """Return the model of an FMU that comes with the package."""
+    return shipped_model(name)
+
+
+def shipped() -> bytes:
+    """Return play.wasm.z as it is."""
+    return WASM.read_bytes()
 
 
 def sources() -> dict[str, bytes]:

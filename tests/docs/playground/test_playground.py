@@ -11,8 +11,8 @@ import pytest
 from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
 from playground import wasm
-from playground.page import playground_html
-from playground.system import LAWS, PLANTS, page_system, shipped
+from playground.page import page_system, playground_html
+from playground.wasm import LAWS, PLANTS, shipped
 from report.javascript import in_browser
 from support import campaign
 from support.marks import needs_zig

@@ -5,8 +5,8 @@ import re
 from urllib.parse import unquote
 
 import pytest
-from playground.page import playground_html
-from playground.system import PLANTS, page_system
+from playground.page import page_system, playground_html
+from playground.wasm import PLANTS
 from report.javascript import in_browser
 
 pytestmark = pytest.mark.slow
