@@ -135,7 +135,7 @@ def test_your_plant(checkout, capsys):
 def test_an_fmu_from_elsewhere(checkout, grasp, capsys):
     """From the file of a vendor to QUALIFIED, by the page alone."""
     vendor_plant(checkout / "vendor.fmu")
-    page_b = page("your_plant").partition("## b.")[2].partition("## c.")[0]
+    page_b = page("your_plant").partition("## b.")[2]
     for kind, block in BLOCKS.findall(page_b):
         if kind == "console":
             try_commands(block, capsys)
