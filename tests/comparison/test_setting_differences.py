@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from grasp_cosim.comparison.settings import differences
+from grasp_cosim.comparison.side import differences
 from report.runs import component, grasp_run
 
 

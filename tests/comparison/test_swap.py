@@ -9,7 +9,7 @@ import pytest
 from comparison.made import DEPENDENCIES, PLANT, changed, without, write_fmu, write_system
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.comparison.interface_difference import capability_differences
-from grasp_cosim.comparison.swap import component_of, prepare_swap
+from grasp_cosim.comparison.qualify import component_of, prepare_swap
 from grasp_cosim.interface.interface import Interface, kind_of
 from grasp_cosim.system.parts import Condition, Connection, Event, Fault, Initialisation, Port
 

@@ -1,7 +1,7 @@
-"""Tolerance bands of signals and metrics: given in a file, or derived from the reference itself.
+"""Each signal and metric of two runs in its band, given in a file or derived from the reference.
 
-How they are derived: docs/studies.md. A file overrides that where it names a
-signal or metric, in the unit of the original:
+How they are derived: docs/studies.md. A file overrides that where it names a signal or metric, in
+the unit of the original:
 
     [signals]
     "plant.gap[1]" = { absolute = 1e-5, relative = 1e-3, time = 2e-3 }
@@ -13,10 +13,11 @@ signal or metric, in the unit of the original:
 """
 
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,6 +25,8 @@ import numpy as np
 
 from ..base.checks import known, number, toml_table
 from ..base.errors import InputError, choices, nearest
+from ..metrics.metric import Metric, Signals, measure
+from .side import Side
 from .tube import Curve, deviation
 
 SHARE = 1e-3
@@ -35,13 +38,16 @@ SMALL = 1e-6
 BOTH = 2.0
 """The numerical errors of two runs, of that of one."""
 
+FEWEST_STEPS = 2
+"""The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
+
+Curves = Mapping[str, Curve]
+Values = Mapping[str, float | None]
+
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A deviation up to width is allowed, in the unit of what is judged, and a shift of time in s.
-
-    A metric has no time.
-    """
+    """A deviation up to width is allowed, in the unit of what is judged, and a shift in s."""
 
     width: float
     time: float
@@ -95,14 +101,13 @@ def read_bands(path: Path) -> Bands:
 
 def _used(path: Path) -> dict[str, Any]:
     """The bands in the JSON of a qualification; JSON has null for those that are infinite."""
+
+    def given(entry: dict[str, Any]) -> dict[str, Any]:
+        return {key: inf if value is None else value for key, value in entry.items()}
+
     try:
         bands = json.loads(path.read_text("utf-8"))["bands"]
-        return {
-            kind: {
-                n: {k: math.inf if v is None else v for k, v in e.items()} for n, e in of.items()
-            }
-            for kind, of in bands.items()
-        }
+        return {kind: {n: given(e) for n, e in of.items()} for kind, of in bands.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: {error!r}; must be what `qualify --json` printed") from error
 
@@ -178,6 +183,150 @@ def _given(place: str, entry: Any, valid: Sequence[str]) -> Given:
     for key, value in entry.items():
         known(f"{place}: unknown entry", key, valid)
         more = ", inf where it is not judged" if key == "absolute" else ""
-        if not (more and value == math.inf):
+        if not (more and value == inf):
             number(f"{place}: {key}", value, 0.0, must=f"a number of at least 0{more}")
     return Given(**{key: float(value) for key, value in entry.items()})
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """A signal or metric of both runs, in the unit of the original, which is the reference.
+
+    deviation is the largest (inf where only one run has a value of a metric), time in s when that
+    is, original and candidate are the values then, of one the nearest within the shift that its
+    band allows. span is the range of the original's signal. Metrics have no time and span.
+    """
+
+    name: str
+    unit: str | None
+    band: Band
+    deviation: float
+    original: float | None
+    candidate: float | None
+    time: float | None = None
+    span: float | None = None
+
+    @property
+    def ratio(self) -> float:
+        """The deviation in widths of its band."""
+        if self.deviation == 0.0 or self.band.width == inf:
+            return 0.0
+        return self.deviation / self.band.width if self.band.width else inf
+
+    @property
+    def inside(self) -> bool:
+        """True if the deviation is in its band."""
+        return self.ratio <= 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A run with which another is compared: all that both have, the worst first.
+
+    `asked` are the metrics that are compared, `shift` is that in time in s which a derived band
+    allows, `nominals` are the nominal values that its signals declare.
+    """
+
+    side: Side
+    asked: tuple[Metric, ...]
+    shift: float
+    bands: Bands
+    nominals: Mapping[str, float | None] = field(default_factory=dict)
+
+    @cached_property
+    def curves(self) -> Curves:
+        """Its signals."""
+        return self.side.curves()
+
+    @cached_property
+    def own(self) -> Values:
+        """Its metrics, see values()."""
+        return self.values(self.curves)
+
+    def values(self, curves: Curves) -> Values:
+        """The single metrics by name, like time_to_contact[1], of curves in our units."""
+        if not curves:
+            return {}
+        columns = {name: c.values for name, c in curves.items()}
+        side = replace(self.side, time=next(iter(curves.values())).time, signals=columns)
+        return single_values(side.by_role(), self.asked)
+
+    def check_bands(self, signals: Iterable[str] = (), metrics: Iterable[str] = ()) -> None:
+        """InputError where an entry of the bands is for nothing, neither for what the other run
+        may have beside: `signals` and `metrics`.
+        """
+        of, place = self.bands, self.bands.place
+        check_patterns(f"{place}: [signals]", of.signals, (*self.curves, *signals))
+        both = [n for name in self.own for n in dict.fromkeys((_plain(name), name))]
+        check_patterns(f"{place}: [metrics]", of.metrics, (*both, *metrics))
+
+    @property
+    def derives(self) -> bool:
+        """True if the width of some band is not given."""
+        there = [name for name, value in self.own.items() if value is not None]
+        given = [*map(self._of_signal, self.curves), *map(self._of_metric, there)]
+        return not all(entry and entry.wide for entry in given)
+
+    def _of_signal(self, name: str) -> Given | None:
+        return entry_for(self.bands.signals, name)
+
+    def _of_metric(self, name: str) -> Given | None:
+        return entry_for(self.bands.metrics, name, _plain(name))
+
+    def signals(self, candidate: Curves, again: Sequence[Curves]) -> tuple[Compared, ...]:
+        """All signals that both have, up to the end of the run that ends first.
+
+        The candidate's are in our units; again are our own run with other numerics.
+        """
+        found = []
+        for name, reference in self.curves.items():
+            if name not in candidate:
+                continue
+            theirs = candidate[name].until(float(reference.time[-1]))
+            nominal, others = self.nominals.get(name), [run[name] for run in again]
+            band = signal_band(reference, others, nominal, self.shift, self._of_signal(name))
+            apart = deviation(reference.until(float(theirs.time[-1])), theirs, band.time)
+            worst = apart.values.argmax()
+            time, distance, ours, other = (float(column[worst]) for column in apart)
+            span, unit = float(np.ptp(reference.values)), self.side.units[name]
+            found.append(Compared(name, unit, band, distance, ours, other, time, span))
+        return tuple(sorted(found, key=lambda c: -c.ratio))
+
+    def metrics(self, theirs: Values, again: Sequence[Curves]) -> tuple[Compared, ...]:
+        """The metrics that one of both has a value of.
+
+        One that is not among theirs has no value there; but for optional ones, which the
+        candidate's signals may not permit.
+        """
+        others = [self.values(run) for run in again]
+        asked, found = {m.name: m for m in self.asked}, []
+        for name, value in self.own.items():
+            metric, other = asked[_plain(name)], theirs.get(name)
+            if value is other is None or (metric.optional and name not in theirs):
+                continue
+            least = self.shift if metric.unit == "s" else SHARE if metric.unit == "1" else 0.0
+            band = metric_band(
+                value, (run.get(name) for run in others), least, self._of_metric(name)
+            )
+            apart = inf if value is None or other is None else abs(other - value)
+            found.append(Compared(name, metric.unit, band, apart, value, other))
+        return tuple(sorted(found, key=lambda c: -c.ratio))
+
+    def absent(self, theirs: Values) -> tuple[str, ...]:
+        """The metrics that neither run has a value of: nothing is judged by these."""
+        return tuple(name for name, v in self.own.items() if v is theirs.get(name) is None)
+
+
+def single_values(signals: Signals, asked: Iterable[Metric]) -> dict[str, float | None]:
+    """The metrics of signals as single values by name; true is 1 and false 0."""
+    found = measure(signals, asked).flat()
+    return {name: None if v is None else float(v) for name, v in found.items()}
+
+
+def every_second(curves: Curves) -> list[Curves]:
+    """The same curves with the samples of even numbers, and with those of odd ones."""
+    return [{n: c.thinned(first) for n, c in curves.items()} for first in (0, 1)]
+
+
+def _plain(name: str) -> str:
+    return name.partition("[")[0]

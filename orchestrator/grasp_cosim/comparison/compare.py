@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -14,23 +14,20 @@ from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
 from ..system.description import FILES, System
 from ..system.parts import NANOSECONDS
-from .bands import SHARE, Band, Bands
-from .judged import (
+from .bands import (
     FEWEST_STEPS,
+    SHARE,
+    Band,
+    Bands,
     Compared,
     Curves,
-    Entries,
     Reference,
     Values,
     every_second,
     single_values,
 )
-from .settings import Difference, differences
-from .side import Side, side_of
+from .side import Difference, Side, differences, read_side, side_of
 from .tube import ROUNDING, Curve
-
-RUNS = ("A", "B")
-"""What the two runs are called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +48,12 @@ class Comparison:
     metrics: tuple[Compared, ...]
     curves: tuple[Curves, Curves]
     asked: tuple[Metric, ...]
-    only: tuple[tuple[str, ...], tuple[str, ...]]
-    only_metrics: tuple[tuple[str, ...], tuple[str, ...]]
     differences: tuple[Difference, ...]
     notes: tuple[str, ...]
-    absent: tuple[str, ...] = ()
-    names: tuple[str, str] = RUNS
+    absent: tuple[str, ...]
+    only: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    only_metrics: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    names: tuple[str, str] = ("A", "B")
 
     @property
     def unfinished(self) -> tuple[str, ...]:
@@ -84,10 +81,7 @@ def compare(
     beside those of the system. InputError where one cannot be read, or the two
     have no time or no signal in common.
     """
-    bands = bands or Bands()
-    first, second = (
-        None if _is_system(run) else side_of(run, n) for run, n in ((a, "A"), (b, "B"))
-    )
+    first, second = (_recorded(run, called) for run, called in ((a, "A"), (b, "B")))
     first, second = first or _ran(a, second), second or _ran(b, first)
     first, second = first.like(second), second.like(first)
     begin, end = _overlap(first, second)
@@ -95,52 +89,35 @@ def compare(
     changes = _changes(ours, theirs)
     asked, other = (_asked(side, part, metrics) for side, part in ((first, ours), (second, theirs)))
     shift = max(SHARE * (end - begin), FEWEST_STEPS * max(ours.interval, theirs.interval))
-    reference = Reference(
-        ours.curves(), ours.units, shift, asked, ours.roles, ours.to_si, given=ours.values
-    )
-    entries, singles = reference.entries(bands, _lacking(theirs.signals, ours.signals))
-    curves = _converted(theirs, changes, reference.curves)
-    values, again = single_values(theirs.by_role(), other), every_second(reference.curves)
-    own = reference.values(reference.curves)
-    runs = first.result is not None and second.result is not None
+    reference = Reference(ours, asked, shift, bands or Bands())
+    reference.check_bands(theirs.signals)
+    again = every_second(reference.curves)
+    curves = _converted(theirs.curves(), changes, reference.curves)
+    values = single_values(theirs.by_role(), other)
+    runs = (first.result, second.result) if first.result and second.result else None
     of_both = {m.name for m in asked if runs and m in other and not m.optional}
     return Comparison(
         first,
         second,
         begin,
         end,
-        reference.signals(curves, again, entries),
-        _metrics(reference, values, again, singles, of_both),
+        reference.signals(curves, again),
+        _metrics(reference, values, again, of_both),
         ({name: reference.curves[name] for name in curves}, curves),
         asked,
-        (_lacking(ours.signals, theirs.signals), _lacking(theirs.signals, ours.signals)),
-        (_lacking(own, values), _lacking(values, own)),
-        differences(first.result, second.result) if first.result and second.result else (),
+        differences(*runs) if runs else (),
         tuple(_notes(first, second, begin, end, changes)),
         reference.absent(values),
+        _only(ours.signals, theirs.signals),
+        _only(reference.own, values),
     )
 
 
-def _metrics(
-    reference: Reference, values: Values, again: Sequence[Curves], given: Entries, both: set[str]
-) -> tuple[Compared, ...]:
-    """The metrics that both runs were asked for; one that only one has a value of is out."""
-
-    def asked(name: str) -> bool:
-        return name.partition("[")[0] in both
-
-    own, units = reference.values(reference.curves), {m.name: m.unit for m in reference.asked}
-    theirs = [
-        Compared(n, units[n.partition("[")[0]], Band(0.0, 0.0, "derived"), inf, None, v)
-        for n, v in values.items()
-        if n not in own and v is not None and asked(n)
-    ]
-    found = reference.metrics(values, again, given)
-    return (*theirs, *(c for c in found if c.name in values or asked(c.name)))
-
-
-def _is_system(run: Result | str | Path) -> bool:
-    return not isinstance(run, Result) and Path(run).suffix.lower() in FILES
+def _recorded(run: Result | str | Path, called: str) -> Side | None:
+    """The side of a result, which is `called` so, or of a file; None of a system."""
+    if isinstance(run, Result):
+        return side_of(run, called)
+    return None if Path(run).suffix.lower() in FILES else read_side(Path(run))
 
 
 def _ran(system: Result | str | Path, other: Side | None) -> Side:
@@ -156,25 +133,23 @@ def _ran(system: Result | str | Path, other: Side | None) -> Side:
 def _overlap(a: Side, b: Side) -> tuple[float, float]:
     """The first and the last time in s that both have; InputError where there is none."""
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
-    spans = [f"{s.name}: {s.time[0]:.6g} to {s.time[-1]:.6g} s" for s in (a, b)]
     if begin > end + ROUNDING:
+        spans = [f"{s.name}: {s.time[0]:.6g} to {s.time[-1]:.6g} s" for s in (a, b)]
         raise InputError(f"{'; '.join(spans)}: must have some time in common")
     for side in (a, b):
         if not len(side.part(begin, end).time):
-            raise InputError(
-                f"{side.name}: has no row from {begin:.6g} to {end:.6g} s; must have one"
-            )
+            span = f"{begin:.6g} to {end:.6g} s"
+            raise InputError(f"{side.name}: has no row from {span}; must have one")
     return float(begin), float(end)
 
 
 def _changes(a: Side, b: Side) -> dict[str, Conversion | None]:
     """The conversion of each signal that both have to the unit of a; None where there is none."""
     for side, other in ((a, b), (b, a)):
-        texts = [name for name in side.texts if name in other.signals]
-        if texts:
-            raise InputError(
-                f"{side.name}: {texts[0]}: has texts; must be numbers, as in {other.name}"
-            )
+        for name in side.texts:
+            if name in other.signals:
+                said = f"has texts; must be numbers, as in {other.name}"
+                raise InputError(f"{side.name}: {name}: {said}")
     found = {name: a.change(name, b) for name in a.signals if name in b.signals}
     if not any(found.values()):
         names = [f"{side.name} has {choices(side.signals, 3)}" for side in (a, b)]
@@ -185,36 +160,54 @@ def _changes(a: Side, b: Side) -> dict[str, Conversion | None]:
 def _asked(side: Side, part: Side, more: Sequence[Metric]) -> tuple[Metric, ...]:
     """The metrics of a side, those of its own file as they were recorded if all of it counts."""
     taken, whole = {m.name for m in more}, len(side.time) == len(part.time)
-    own = [m for m in side.recorded_metrics if whole and m.name not in taken]
+    recorded = side.result.more_metrics if side.result and whole else ()
+    own = [m for m in recorded if m.name not in taken]
     return tuple(m for m in metrics_of(side.groups, [*more, *own]) if not m.reason)
 
 
 def _converted(
-    side: Side, changes: Mapping[str, Conversion | None], like: Curves
+    curves: Curves, changes: Mapping[str, Conversion | None], like: Curves
 ) -> dict[str, Curve]:
     """The signals in the units of the other, held where one of both is."""
-    curves = side.curves()
     return {
-        name: Curve(curves[name].time, change(curves[name].values), curves[name].held)
-        if like[name].held == curves[name].held
-        else Curve(curves[name].time, change(curves[name].values), True)
+        name: Curve(c.time, change(c.values), c.held or like[name].held)
         for name, change in changes.items()
-        if change is not None
+        if change is not None and (c := curves[name])
     }
 
 
-def _lacking(names: Iterable[str], other: Collection[str] | Values) -> tuple[str, ...]:
-    return tuple(name for name in names if name not in other)
+def _metrics(
+    reference: Reference, values: Values, again: Sequence[Curves], both: set[str]
+) -> tuple[Compared, ...]:
+    """The metrics that both runs were asked for; one that only one has a value of is out."""
+    units = {m.name: m.unit for m in reference.asked if m.name in both}
+    theirs = [
+        Compared(name, units[plain], Band(0.0, 0.0, "derived"), inf, None, value)
+        for name, value in values.items()
+        if name not in reference.own
+        and value is not None
+        and (plain := name.partition("[")[0]) in both
+    ]
+    found = reference.metrics(values, again)
+    return (*theirs, *(c for c in found if c.name in values or c.name.partition("[")[0] in both))
+
+
+def _only(
+    ours: Collection[str], theirs: Collection[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What only one has, in the order of each."""
+    return tuple(n for n in ours if n not in theirs), tuple(n for n in theirs if n not in ours)
 
 
 def _notes(
     a: Side, b: Side, begin: float, end: float, changes: Mapping[str, Conversion | None]
 ) -> Iterator[str]:
     """Lines on the time compared, on runs that ended early, and on units that were assumed."""
-    spans = [f"{letter} is {s.time[0]:.6g} to {s.time[-1]:.6g} s" for letter, s in _sides(a, b)]
+    sides = (("A", a), ("B", b))
+    spans = [f"{letter} is {s.time[0]:.6g} to {s.time[-1]:.6g} s" for letter, s in sides]
     if (a.time[0], a.time[-1]) != (b.time[0], b.time[-1]):
         yield f"compared from {begin:.6g} to {end:.6g} s, where both are: {', '.join(spans)}"
-    for letter, side in _sides(a, b):
+    for letter, side in sides:
         if not side.result:
             yield f"{letter} is a log from elsewhere: its settings are not known"
             if side.silent:
@@ -226,7 +219,3 @@ def _notes(
     unlike = [f"{n} ({a.units[n]}, {b.units[n]})" for n, change in changes.items() if not change]
     if unlike:
         yield f"not compared, as the units do not convert: {choices(unlike, 6)}"
-
-
-def _sides(a: Side, b: Side) -> tuple[tuple[str, Side], tuple[str, Side]]:
-    return ("A", a), ("B", b)

@@ -7,7 +7,8 @@ It warns where results may differ, and is a note where nothing in this system de
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isclose
 from typing import Any, Literal
@@ -86,18 +87,16 @@ class Use:
 def use_of(system: System, name: str) -> Use:
     """Return the use that the system makes of the component of that name."""
     component = system.component(name, system.name)
-    ends = [(port, c) for c in system.connections for port in (c.source, c.target)]
-    tuned = [port for event in system.events for port in event.set]
 
-    def own(ports: Sequence[Port]) -> frozenset[str]:
+    def own(ports: Iterable[Port]) -> frozenset[str]:
         return frozenset(p.variable for p in ports if p.component == name)
 
     return Use(
         name,
-        own([port for port, _ in ends]),
+        own(port for c in system.connections for port in (c.source, c.target)),
         component.values,
         stated(system, name),
-        own(tuned),
+        own(port for event in system.events for port in event.set),
         (component.step_ns or system.step_ns) / NANOSECONDS,
         system.initialisation.loops,
     )
@@ -116,7 +115,10 @@ def interface_differences(
     for variable in original.of(*COMPARED):
         if variable.name in theirs:
             change = original.conversion(variable.name, candidate)
-            found += _changed(variable, theirs[variable.name], use, change)
+            for severity, kind, text, was, now in _changed(
+                variable, theirs[variable.name], use, change
+            ):
+                found.append(Difference(severity, kind, variable.name, text, was, now))
         else:
             found.append(_missing(variable, use, candidate))
     found += [_extra(v, use, given) for v in candidate.of(*COMPARED) if v.name not in ours]
@@ -151,112 +153,93 @@ def _extra(new: Variable, use: Use, given: Mapping[str, Value]) -> Difference:
     return Difference("notes", "extra", name, f"new {causality}")
 
 
-def _changed(
-    old: Variable, new: Variable, use: Use, change: Conversion | None
-) -> Iterator[Difference]:
+Found = tuple[Severity, Kind, str, Any, Any]
+"""A Difference without the name of its variable."""
+
+
+def _changed(old: Variable, new: Variable, use: Use, change: Conversion | None) -> Iterator[Found]:
     """Of a variable that both have; change is from the old unit to the new, None for no way."""
-    name = old.name
-    serious: Severity = "blocks" if use.uses(name) else "warns"
-    types = old.type, new.type
+    serious: Severity = "blocks" if use.uses(old.name) else "warns"
     if old.kind != new.kind:
-        yield Difference(serious, "type", name, f"is {new.type}, must be {old.type}", *types)
+        yield serious, "type", f"is {new.type}, must be {old.type}", old.type, new.type
         return
     if old.shape != new.shape:
         was, now = list(old.shape), list(new.shape)
-        text = f"has dimensions {now}, must have {was}"
-        yield Difference(serious, "type", name, text, was, now)
+        yield serious, "type", f"has dimensions {now}, must have {was}", was, now
         return
     if new.type == "Float32" != old.type:
-        yield Difference("warns", "type", name, "is Float32: 7 digits instead of 16", *types)
+        yield "warns", "type", "is Float32: 7 digits instead of 16", old.type, new.type
     if old.causality != new.causality:
         yield _causality(old, new, use)
     elif old.variability != new.variability:
         yield _variability(old, new, use)
     if old.unit != new.unit:
-        yield _unit(old, new, use, change)
+        severity, text = _unit(old, new, use, change)
+        yield severity, "unit", text, old.unit, new.unit
     if change is not None and old.kind in ("Real", "Integer"):
         yield from _range(old, new, use, change)
-    if old.items and new.items and old.items != new.items:
-        yield _items(old, new, use)
-    if old.settable and new.settable:
-        yield from _start(old, new, use, change)
+    if old.items and new.items and old.items != new.items:  # the system gives and takes numbers
+        moved = [item for item in old.items if new.items.get(item) != old.items[item]]
+        text = f"has other items; not as before: {choices(moved)}"
+        yield serious if moved else "notes", "items", text, old.items, new.items
+    if old.settable and new.settable and old.name not in use.values:
+        first, start = old.start_value, new.start_value
+        if not _same(first, start, change):
+            units = [f" {v.unit}" if v.unit else "" for v in (new, old)]
+            text = f"starts with {_shown(start)}{units[0]} instead of {_shown(first)}{units[1]}"
+            yield "notes" if old.name in use.connected else "warns", "start", text, first, start
 
 
-def _causality(old: Variable, new: Variable, use: Use) -> Difference:
+def _causality(old: Variable, new: Variable, use: Use) -> Found:
     name, was, now = old.name, old.causality, new.causality
     lonely = now == "input" and name not in use.connected and name not in use.values
     value_only = old.settable and new.settable and name not in use.connected
     severity: Severity = "blocks" if lonely or (use.uses(name) and not value_only) else "warns"
     more = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
-    text = f"is {_a(now)}, must be {_a(was)}{more}"
-    return Difference(severity, "causality", name, text, was, now)
+    return severity, "causality", f"is {_a(now)}, must be {_a(was)}{more}", was, now
 
 
-def _variability(old: Variable, new: Variable, use: Use) -> Difference:
-    name, was, now = old.name, old.variability, new.variability
-    if name in use.tuned and now in ("fixed", "constant"):
-        text = f"is {now}, but an event sets it; must be {was}"
-        return Difference("blocks", "variability", name, text, was, now)
+def _variability(old: Variable, new: Variable, use: Use) -> Found:
+    was, now = old.variability, new.variability
+    if old.name in use.tuned and now in ("fixed", "constant"):
+        return "blocks", "variability", f"is {now}, but an event sets it; must be {was}", was, now
     severity: Severity = "notes" if old.settable and old.causality != "input" else "warns"
-    return Difference(severity, "variability", name, f"is {now} instead of {was}", was, now)
+    return severity, "variability", f"is {now} instead of {was}", was, now
 
 
-def _unit(old: Variable, new: Variable, use: Use, change: Conversion | None) -> Difference:
-    name, was, now = old.name, old.unit, new.unit
-    used: Severity = "blocks" if use.uses(name) else "warns"
-    if change is None:
-        severity, text = used, f"is in {now}, which cannot be converted to {was}"
-    elif was is None or now is None:
-        severity = "notes" if {was, now} == {None, "1"} else "warns"
-        text = f"unit {now or 'not declared'} instead of {was or 'not declared'}: taken as the same"
-    elif change == IDENTITY:
-        severity, text = "notes", f"unit {now} instead of {was}, which is the same"
-    elif name in use.stated:
-        severity = "blocks"
-        text = f"is in {now}, but an event, a fault or the factor of a connection is meant in {was}"
-    elif name in use.values:
-        severity, value = "warns", float(use.values[name])
-        text = f"unit {now} instead of {was}: {value:.9g} {was} becomes {change(value):.9g} {now}"
-    else:
-        severity, text = "warns", f"unit {now} instead of {was}: converted"
-    return Difference(severity, "unit", name, text, was, now)
-
-
-def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterator[Difference]:
-    """Of what the original takes or gives, that which the candidate does not declare valid."""
-    name, unit = old.name, f" {new.unit}" if new.unit else ""
-    was, now = [change(old.low), change(old.high)], [new.low, new.high]
-    declared = [old.minimum, old.maximum], [new.minimum, new.maximum]
-    value = change(float(use.values[name])) if name in use.values else now[0]
-    valid = f"{now[0]:g} to {now[1]:g}{unit}"
-    if not now[0] <= value <= now[1]:
-        text = f"value {value:.9g}{unit} is set in the system; must be {valid}"
-        yield Difference("blocks", "range", name, text, *declared)
-    elif _less(was[0], now[0]) or _less(now[1], was[1]):
-        severity: Severity = "notes" if old.causality == "output" else "warns"
-        text = f"takes {valid} instead of {was[0]:g} to {was[1]:g}{unit}"
-        yield Difference(severity, "range", name, text, *declared)
-
-
-def _items(old: Variable, new: Variable, use: Use) -> Difference:
-    """Of two enumerations; what the system gives or takes are numbers."""
-    name, was, now = old.name, old.items, new.items
-    moved = [item for item in was if now.get(item) != was[item]]
-    severity: Severity = "blocks" if moved and use.uses(name) else "warns" if moved else "notes"
-    text = f"has other items; not as before: {choices(moved)}"
-    return Difference(severity, "items", name, text, was, now)
-
-
-def _start(
+def _unit(
     old: Variable, new: Variable, use: Use, change: Conversion | None
-) -> Iterator[Difference]:
-    name, was, now = old.name, old.start_value, new.start_value
-    if name in use.values or _same(was, now, change):
-        return
-    severity: Severity = "notes" if name in use.connected else "warns"
-    units = [f" {v.unit}" if v.unit else "" for v in (new, old)]
-    text = f"starts with {_shown(now)}{units[0]} instead of {_shown(was)}{units[1]}"
-    yield Difference(severity, "start", name, text, was, now)
+) -> tuple[Severity, str]:
+    name, was, now = old.name, old.unit, new.unit
+    if change is None:
+        serious: Severity = "blocks" if use.uses(name) else "warns"
+        return serious, f"is in {now}, which cannot be converted to {was}"
+    said = f"unit {now or 'not declared'} instead of {was or 'not declared'}"
+    if was is None or now is None:
+        return "notes" if {was, now} == {None, "1"} else "warns", f"{said}: taken as the same"
+    if change == IDENTITY:
+        return "notes", f"{said}, which is the same"
+    if name in use.stated:
+        place = "an event, a fault or the factor of a connection"
+        return "blocks", f"is in {now}, but {place} is meant in {was}"
+    if name in use.values:
+        value = float(use.values[name])
+        return "warns", f"{said}: {value:.9g} {was} becomes {change(value):.9g} {now}"
+    return "warns", f"{said}: converted"
+
+
+def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterator[Found]:
+    """Of what the original takes or gives, that which the candidate does not declare valid."""
+    unit, was, now = f" {new.unit}" if new.unit else "", change(old.low), change(old.high)
+    declared = [old.minimum, old.maximum], [new.minimum, new.maximum]
+    value = change(float(use.values[old.name])) if old.name in use.values else new.low
+    valid = f"{new.low:g} to {new.high:g}{unit}"
+    if not new.low <= value <= new.high:
+        text = f"value {value:.9g}{unit} is set in the system; must be {valid}"
+        yield "blocks", "range", text, *declared
+    elif _less(was, new.low) or _less(new.high, now):
+        text = f"takes {valid} instead of {was:g} to {now:g}{unit}"
+        yield "notes" if old.causality == "output" else "warns", "range", text, *declared
 
 
 def capability_differences(
@@ -318,3 +301,81 @@ def _shown(value: Any) -> str:
 
 def _a(noun: str) -> str:
     return f"an {noun}" if noun[0] in "aeio" else f"a {noun}"
+
+
+Interfaces = Mapping[str, Interface]
+"""What the FMUs of a system declare, under the system's names, by component."""
+
+
+def feedthrough_differences(
+    system: System, name: str, originals: Interfaces, candidate: Interface, use: Use
+) -> Iterator[Difference]:
+    """Of outputs that depend directly on other inputs than those of the original.
+
+    system is the one with the original in the component of that name.
+    """
+    ours, swapped = originals[name].by_name, {**originals, name: candidate}
+    inputs = _inputs(candidate)
+    for variable in candidate.of("output"):
+        old = ours.get(variable.name)
+        if old is None or old.causality != "output":
+            continue
+        before, now = _needs(old, originals[name]), _needs(variable, candidate)
+        added = [i for i in now if i in inputs and i not in before]
+        gone = [i for i in before if i not in now]
+        undeclared = variable.dependencies is None
+        severity: Severity = "notes"
+        if added:
+            text = f"depends directly on {choices(added)}"
+            if undeclared:
+                text = f"may depend directly on {choices(added)}, as it declares no dependencies"
+            if loop := _loop(system, Port(name, variable.name), added, swapped):
+                severity = "blocks" if use.loops == "refuse" else "warns"
+                text = f"{text}: an algebraic loop {' -> '.join(map(str, loop))}"
+            else:
+                text = f"{text}; closes no loop"
+        elif gone and not undeclared:
+            text = (
+                f"does not depend directly on {choices(gone)}: a change there shows one step later"
+            )
+        else:
+            continue
+        listed = [None if v.dependencies is None else list(v.dependencies) for v in (old, variable)]
+        yield Difference(severity, "dependency", variable.name, text, *listed)
+
+
+def _loop(
+    system: System, output: Port, inputs: Sequence[str], interfaces: Interfaces
+) -> list[Port]:
+    """The shortest way from an output back to it by one of its component's inputs, or none."""
+    ends = {Port(output.component, i) for i in inputs}
+    queue, seen = deque([[output]]), {output}
+    while queue:
+        path = queue.popleft()
+        if path[-1] in ends:
+            return [*path, output]
+        for following in _followers(system, path[-1], interfaces):
+            if following not in seen:
+                seen.add(following)
+                queue.append([*path, following])
+    return []
+
+
+def _followers(system: System, port: Port, interfaces: Interfaces) -> Iterator[Port]:
+    """The ports whose values follow at once from that of a port."""
+    yield from (connection.target for connection in system.connections if connection.source == port)
+    interface = interfaces[port.component]
+    if port.variable not in _inputs(interface):
+        return
+    for variable in interface.of("output"):
+        if port.variable in _needs(variable, interface):
+            yield Port(port.component, variable.name)
+
+
+def _inputs(interface: Interface) -> list[str]:
+    return [v.name for v in interface.of("input")]
+
+
+def _needs(variable: Variable, interface: Interface) -> Sequence[str]:
+    """Inputs that an output depends on directly: all where that is not declared."""
+    return _inputs(interface) if variable.dependencies is None else variable.dependencies

@@ -19,8 +19,8 @@ from ..report.caption import Caption, about, caption, changes
 from ..report.embed import LIMIT, Shown, fit
 from ..report.page import Scene, data_html, document, looks, moments, scripts, traces_html
 from ..report.tables import bullets, number, origin_rows, scaled, summary, table
+from .bands import Compared
 from .compare import Comparison
-from .judged import Compared
 from .qualify import Qualification
 from .side import Side
 from .tube import deviation, tube

@@ -8,32 +8,63 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 
-from ..base.checks import choice
+from ..base.checks import choice, known
 from ..base.errors import InputError, SimulationError
-from ..interface.interface import Value
-from ..interface.units import IDENTITY, Conversion
+from ..interface.expansion import values_of
+from ..interface.interface import Interface, Value
+from ..interface.read import describe
+from ..interface.units import IDENTITY, Conversion, conversion
 from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
+from ..system.conversions import between, output_units
 from ..system.description import System
 from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Isolation
 from ..system.structure import SCHEMES
-from .bands import SHARE, Bands, entry_for
+from ..system.swap import Replacement, converted, replaced
+from ..system.validity import transforms
+from .bands import FEWEST_STEPS, SHARE, Bands, Compared, Curves, Reference, every_second
 from .compare import Comparison
-from .interface_difference import Difference
-from .judged import FEWEST_STEPS, Compared, Curves, Reference, curves_of, every_second
-from .settings import differences
-from .side import side_of
-from .swap import Swap, prepare_swap
+from .interface_difference import (
+    SEVERITIES,
+    Difference,
+    feedthrough_differences,
+    interface_differences,
+    use_of,
+)
+from .side import differences, side_of
 from .tube import Curve
 
 END = Metric(
     "end_of_run", lambda run: float(run.time[-1]), "s", "where an FMU asked for the end, else stop"
 )
 """Compared where one of the runs ends before the stop time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Swap:
+    """The system with the original, and with the candidate unless a difference blocks that.
+
+    differences are the worst first. back converts outputs of the candidate to the units of the
+    original, by signal name, None where that cannot be. nominals are those of all signals.
+    """
+
+    system: System
+    component: str
+    candidate: Path
+    differences: tuple[Difference, ...]
+    swapped: System | None
+    back: Mapping[str, Conversion | None]
+    nominals: Mapping[str, float | None]
+
+    @property
+    def original(self) -> Path:
+        """The FMU that the candidate is to replace."""
+        return self.system.component(self.component, "swap").fmu
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,27 +109,23 @@ class Qualification:
         """Both runs as those of a comparison; None where the candidate did not run."""
         if self.results is None or not self.signals:
             return None
-        original, candidate = (side_of(r, str(r.settings["system"])) for r in self.results)
         names = (self.swap.original.name, self.swap.candidate.name)
-        a, b = (replace(s, name=n) for s, n in zip((original, candidate), names, strict=True))
-        end = float(min(a.time[-1], b.time[-1]))
-        compared = [c.name for c in self.signals]
-        curves = tuple({name: run[name] for name in compared} for run in self.runs)
+        a, b = (side_of(*of) for of in zip(self.results, names, strict=True))
+        curves, other = ({c.name: run[c.name] for c in self.signals} for run in self.runs)
         return Comparison(
             a,
             b,
             0.0,
-            end,
+            float(min(a.time[-1], b.time[-1])),
             self.signals,
             self.metrics,
-            (curves[0], curves[1]),
+            (curves, other),
             self.asked,
-            (self.uncompared, ()),
-            ((), ()),
             differences(*self.results),
             self.log,
             self.absent,
-            ("original", "candidate"),
+            only=(self.uncompared, ()),
+            names=("original", "candidate"),
         )
 
     @property
@@ -133,52 +160,43 @@ def qualify(
     system. InputError where the input is wrong or the original refuses,
     SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
-    bands = bands or Bands()
     choice("isolation", isolation, ISOLATIONS)
     new = candidate if isinstance(candidate, Component) else Path(candidate)
     swap = prepare_swap(system, component, new, rename or {}, values or {}, isolation, units)
     if swap.swapped is None:
         return Qualification(swap)
     asked = tuple(m for m in metrics_of(system.metrics, metrics) if not m.reason)
-    more = _conversions_of_candidate(swap.swapped, asked)
-    reference = _run(swap.system, progress and "original")
-    asked += (END,) if _ended_early(reference) else ()
-    original = _reference(swap, reference, asked, more)
-    signals, singles = original.entries(bands, metrics=(END.name,))
+    try:
+        more = in_si(swap.swapped, asked).conversions
+    except InputError as error:
+        how = "of the candidate: --set components.NAME.units.VARIABLE=UNIT"
+        raise InputError(f"{error}; {how}") from error
+    run = _run(swap.system, progress and "original")
+    asked += (END,) if _ended_early(run) else ()
+    side = side_of(run, swap.original.name)
+    side = replace(side, to_si={n: c for n, c in more.items() if n not in run} | dict(run.to_si))
+    original = Reference(side, asked, _shift(swap.system), bands or Bands(), swap.nominals)
+    original.check_bands(metrics=(END.name,))
     result, failure = _tried(swap.swapped, progress)
     again: list[Curves] = []
     numerics: list[str] = []
-    there = {n for n, v in original.values(original.curves).items() if v is not None}
-    asked_of = (*signals.values(), *(entry for n, entry in singles.items() if n in there))
-    if not all(entry and entry.wide for entry in asked_of):
+    if original.derives:
         again, numerics = _other_numerics(swap.system, original.curves, progress)
-    theirs = _converted(curves_of(result), swap) if result else {}
+    theirs = _converted(side_of(result, "").curves(), swap) if result else {}
     if result and _ended_early(result) and END not in asked:
         original = replace(original, asked=(*asked, END))
-        singles = {**singles, END.name: entry_for(bands.metrics, END.name)}
     singly = original.values(theirs)
     return Qualification(
         swap,
-        original.signals(theirs, again, signals),
-        () if failure else original.metrics(singly, again, singles),
+        original.signals(theirs, again),
+        () if failure else original.metrics(singly, again),
         failure,
         tuple(numerics),
         (original.curves, theirs),
-        _remarks(reference, result) if result else (),
+        _remarks(run, result) if result else (),
         original.asked,
         () if failure else original.absent(singly),
-        (reference, result) if result else None,
-    )
-
-
-def _reference(
-    swap: Swap, run: Result, asked: tuple[Metric, ...], more: Mapping[str, Conversion]
-) -> Reference:
-    """The run of the original to compare with; more are conversions of signals that it lacks."""
-    to_si = {n: c for n, c in more.items() if n not in run} | dict(run.to_si)
-    shift, roles = _shift(swap.system), swap.system.roles
-    return Reference(
-        curves_of(run), run.units, shift, asked, roles, to_si, swap.nominals, given=run.given
+        (run, result) if result else None,
     )
 
 
@@ -190,18 +208,6 @@ def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
         return error.result, str(error)
     except InputError as error:  # does not load, or refuses its initialisation
         return None, str(error)
-
-
-def _conversions_of_candidate(
-    swapped: System, metrics: Sequence[Metric]
-) -> Mapping[str, Conversion]:
-    """The conversions to SI of the system with the candidate; InputError if a unit is wrong."""
-    try:
-        return in_si(swapped, metrics).conversions
-    except InputError as error:
-        raise InputError(
-            f"{error}; of the candidate: --set components.NAME.units.VARIABLE=UNIT"
-        ) from error
 
 
 def _run(system: System, progress: str | bool) -> Result:
@@ -227,7 +233,8 @@ def _other_numerics(
     said = ["every second sample"]
     for name, other in _variants(system):
         try:
-            runs.append(curves_of(_run(other, progress and f"original, {name}")))
+            run = _run(other, progress and f"original, {name}")
+            runs.append(side_of(run, name).curves())
             said.append(name)
         except (InputError, SimulationError) as error:
             said.append(f"not {name}: {error}")
@@ -268,4 +275,111 @@ def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
         name: Curve(c.time, change(c.values), c.held)
         for name, c in curves.items()
         if (change := swap.back.get(name, IDENTITY)) is not None
+    }
+
+
+def prepare_swap(
+    system: System,
+    component: str,
+    candidate: Path | Component,
+    rename: Mapping[str, str],
+    values: Mapping[str, Value],
+    isolation: Isolation,
+    units: Mapping[str, str] | None = None,
+) -> Swap:
+    """The swap that qualify() describes; InputError where its arguments are wrong."""
+    place = system.component(component, f"--as {component}")
+    interfaces = {
+        c.name: c.sized(describe(c.fmu)).renamed(c.rename).in_units(c.units)
+        for c in system.components
+    }
+    ours = interfaces[component]
+    was = candidate if isinstance(candidate, Component) else replace(place, values={})
+    fmu = was.fmu if isinstance(candidate, Component) else candidate
+    now = replaced(was, Replacement(fmu, rename, units or {}), "")
+    theirs = now.sized(describe(fmu)).renamed(now.rename, "rename")
+    theirs = theirs.in_units(now.units, "units")
+    _check_renamed(rename, ours, theirs)
+    names = (*theirs.by_name, *(n for n in theirs.arrays if n not in ours.arrays))
+    extra = {f"{component}.{name}": name for name in names if name not in ours.by_name}
+    own = {n: v for n, v in now.values.items() if n not in ours.by_name}
+    own |= {extra[key]: value for key, value in values.items() if key in extra}
+    common = {key: value for key, value in values.items() if key not in extra}
+    system = system.with_settings(common, "--set ".__add__)
+    use = use_of(system, component)
+    differences = [
+        *interface_differences(ours, theirs, use, own),
+        *feedthrough_differences(system, component, interfaces, theirs, use),
+    ]
+    swapped = None
+    if not any(d.severity == "blocks" for d in differences):
+        given = {n: v for n, v in use.values.items() if n in theirs.by_name}
+        given = converted(given, ours, theirs) | dict(now.values)
+        for name, value in own.items():
+            text = f"--set {component}.{name}"
+            given |= values_of(theirs, text, name, value, text=True)
+        place = replace(now, name=component, values=given, isolation=isolation)
+        try:
+            components = [place if c.name == component else c for c in system.components]
+            swapped = replace(system, components=tuple(components))
+        except InputError as error:
+            differences.append(Difference("blocks", "system", component, str(error)))
+    differences.sort(key=lambda d: SEVERITIES.index(d.severity))
+    back = {
+        f"{component}.{v.name}": theirs.conversion(v.name, ours)
+        for v in ours.of("output")
+        if v.name in theirs.by_name
+    }
+    back |= _between(swapped, system, component) if swapped else {}
+    nominals = {
+        f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
+        for name, interface in interfaces.items()
+        for v in interface.of("output")
+    }
+    return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
+
+
+def component_of(found: System, name: str, system: System) -> Component:
+    """The component of that name in another system, as a candidate for the one in `system`.
+
+    It runs on the connections of `system`. InputError where one of its own passes on other values
+    than the same one does there, as by a factor: what the component puts out would be misread.
+    """
+    component = found.component(name, found.name)
+    connected = {port for c in system.connections for port in (c.source, c.target)}
+    there = {(c.source, c.target): c for c in system.connections}
+    passed = transforms(found)
+    for c in found.connections:
+        if not any(port.component == name and port in connected for port in (c.source, c.target)):
+            continue
+        place, same = f"{found.name}: {c}", there.get((c.source, c.target))
+        if same and (same.factor, same.offset) != (None, None):
+            factor, offset = same.factor or 1.0, same.offset or 0.0
+        else:
+            factor, offset = between(found, place, c.source, c.target)
+        own = passed[c.target]
+        if not (isclose(own[0], factor) and isclose(own[1], offset)):
+            raise InputError(
+                f"{place}: has factor = {own[0]:g}, offset = {own[1]:g}, which the connections of "
+                f"{system.name}, on which the candidate runs, do not have; must be units of its "
+                f"component instead, in [components.{name}] or --set"
+            )
+    return component
+
+
+def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface) -> None:
+    """InputError where the candidate's variables get names that the original does not have."""
+    for new, name in rename.items():
+        for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
+            entry = f"rename: {new!r} = {name!r}"
+            known(f"{entry}: the original has no variable", called, ours.by_name, see=ours.listing)
+
+
+def _between(source: System, target: System, name: str) -> dict[str, Conversion | None]:
+    """The conversions of the outputs of a component whose units both systems tell."""
+    ends = output_units(source), output_units(target)
+    return {
+        str(port): conversion(start, end)
+        for port in ends[0].keys() & ends[1].keys()
+        if port.component == name and (start := ends[0][port]) and (end := ends[1][port])
     }

@@ -1,11 +1,11 @@
-"""One of the two runs: a folder, or a log from elsewhere, CSV or ASAM MDF."""
+"""One of the two runs, a folder or a log from elsewhere, and where the settings of two differ."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +14,16 @@ from si_units import known_unit
 from ..base.errors import InputError
 from ..base.files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion
-from ..metrics.metric import Metric, Signals
+from ..metrics.metric import Signals
 from ..recording.load import ARROW, SETTINGS, SIGNALS, load_run, read_mdf
 from ..recording.result import Result
 from ..system.parts import NANOSECONDS
+from ..system.settings import given_values
 from ..system.stimuli import read_stimuli
-from .tube import ROUNDING, Curve, curve
+from .tube import ROUNDING, Curve
 
-Floats = npt.NDArray[np.float64]
+AS_IT_STARTS, NONE = "as the FMU starts", "none"
+"""In place of a value that was not given, and of what one run has not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,22 +31,21 @@ class Side:
     """The numbers that were recorded, by name, on `time` in s, which does not fall.
 
     A signal whose unit is not known has none in `units`. `to_si` are the conversions to SI of those
-    that are not in it. `texts` are the names of Strings.
+    that are not in it. `texts` are the names of Strings, `values` the start values that the system
+    of the run sets, `groups` those of metrics that it names.
     """
 
     name: str
-    time: Floats
+    time: npt.NDArray[np.float64]
     signals: Mapping[str, npt.NDArray[Any]]
     units: Mapping[str, str | None]
     to_si: Mapping[str, Conversion]
-    texts: tuple[str, ...] = ()
+    texts: Sequence[str] = ()
     result: Result | None = None
     """The run; None of a log from elsewhere."""
     roles: Mapping[str, str] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
-    """The start values that the system of the run sets."""
     groups: Sequence[str] = ()
-    """The groups of metrics that the system of the run names."""
     silent: tuple[str, ...] = ()
     """The signals of a log that told no unit, and got that of the other run."""
 
@@ -61,8 +62,11 @@ class Side:
         return replace(self, time=self.time[rows], signals=signals)
 
     def curves(self) -> dict[str, Curve]:
-        """The signals as curves."""
-        return {name: curve(self.time, column) for name, column in self.signals.items()}
+        """The signals as curves; Booleans and integers are held between samples."""
+        return {
+            name: Curve(self.time, column.astype(np.float64), column.dtype.kind != "f")
+            for name, column in self.signals.items()
+        }
 
     def by_role(self) -> Signals:
         """The signals as metrics take them."""
@@ -95,15 +99,14 @@ class Side:
         known = known_unit(theirs), known_unit(ours)
         return conversion(known[0], known[1]) if known[0] and known[1] else None
 
-    @property
-    def recorded_metrics(self) -> tuple[Metric, ...]:
-        """The metrics of the run's own file of metrics, as they were recorded."""
-        return self.result.more_metrics if self.result else ()
 
-
-def side_of(run: Result | str | Path, called: str) -> Side:
-    """The side of a result, which is `called` so, or of what read_side() takes."""
-    return _run(called, run) if isinstance(run, Result) else read_side(Path(run))
+def side_of(run: Result, called: str) -> Side:
+    """The side of a result, which is `called` so."""
+    texts = [name for name in run if name not in run.numbers]
+    return Side(
+        called, run.time, run.numbers, run.units, run.to_si, texts, run, run.roles, run.given,
+        run.groups,
+    )  # fmt: skip
 
 
 def read_side(path: Path) -> Side:
@@ -113,28 +116,16 @@ def read_side(path: Path) -> Side:
     """
     one_of_its = path.name in (SIGNALS, ARROW, SETTINGS) and path.with_name(SETTINGS).is_file()
     if path.is_dir() or one_of_its:
-        return _run(str(path), load_run(path))
+        return side_of(load_run(path), str(path))
+    what = "a folder that `run --out` wrote, a .csv or an .mf4 file"
     if not path.is_file():
-        raise InputError(
-            f"{path}: no such run; must be a folder that `run --out` wrote, a .csv or an .mf4 file"
-        )
+        raise InputError(f"{path}: no such run; must be {what}")
     if path.suffix.lower() == ".mf4":
-        time, columns, units = read_mdf(path)
-        return _log(path, time, columns, units)
+        return _log(path, *read_mdf(path))
     if path.suffix.lower() == ".csv":
         return _csv(path)
     check_nature(path, "run")
-    raise InputError(
-        f"{path}: must be a folder that `run --out` wrote, a .csv or an .mf4 file of signals"
-    )
-
-
-def _run(name: str, result: Result) -> Side:
-    texts = tuple(name for name in result if name not in result.numbers)
-    return Side(
-        name, result.time, result.numbers, result.units, result.to_si, texts, result,
-        result.roles, result.given, result.groups,
-    )  # fmt: skip
+    raise InputError(f"{path}: must be {what} of signals")
 
 
 def _csv(path: Path) -> Side:
@@ -147,18 +138,17 @@ def _csv(path: Path) -> Side:
             numbers[str(port)] = samples
         elif set(names) <= {"true", "false"}:
             numbers[str(port)] = np.array([name == "true" for name in names])[samples.astype(int)]
-    names = [str(port) for port in read.columns]
     units = {str(port): c.unit for port, c in read.columns.items() if str(port) in numbers}
-    time = np.asarray(read.times, np.float64) / NANOSECONDS
-    return _log(path, time, numbers, units, [n for n in names if n not in numbers])
+    texts = [name for name in map(str, read.columns) if name not in numbers]
+    return _log(path, np.asarray(read.times, np.float64) / NANOSECONDS, numbers, units, texts)
 
 
 def _log(
     path: Path,
-    time: Floats,
+    time: npt.NDArray[np.float64],
     columns: Mapping[str, npt.NDArray[Any]],
     units: Mapping[str, str | None],
-    texts: Iterable[str] = (),
+    texts: Sequence[str] = (),
 ) -> Side:
     """A log from elsewhere; InputError where a number is not finite, or the time falls."""
     for name, column in columns.items():
@@ -169,10 +159,76 @@ def _log(
         raise InputError(f"{path}: the time falls; must grow from row to row")
     known = {name: known_unit(unit or "1") for name, unit in units.items()}
     to_si = {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
-    return Side(str(path), time, columns, units, to_si, tuple(texts))
+    return Side(str(path), time, columns, units, to_si, texts)
 
 
 def _typed(column: npt.NDArray[Any], like: npt.NDArray[Any] | None) -> npt.NDArray[Any]:
     """The column in the element type of the other's, where that keeps its values."""
     typed = column if like is None else column.astype(like.dtype)
     return typed if np.array_equal(typed, column) else column
+
+
+class Difference(NamedTuple):
+    """A setting that differs between two runs, and its value in each of them, in words."""
+
+    what: str
+    a: str
+    b: str
+
+
+def differences(a: Result, b: Result) -> tuple[Difference, ...]:
+    """Where the settings of two runs, the FMUs and the versions differ."""
+    first, second = dict(_facts(a)), dict(_facts(b))
+    values = {name for run in (a, b) for name in given_values(run.settings)}
+    found = []
+    for what in dict.fromkeys((*first, *second)):
+        lacking = AS_IT_STARTS if what in values else NONE
+        pair = first.get(what, lacking), second.get(what, lacking)
+        if pair[0] != pair[1]:
+            found.append(Difference(what, *pair))
+    return tuple(found)
+
+
+def _facts(run: Result) -> Iterator[tuple[str, str]]:
+    """The settings, FMUs and versions of a run by name, each in words; equal for equal runs."""
+    settings, fmus = run.settings, run.origin.get("fmus", {})
+    yield from run.view.traits(run).items()
+    for key in ("system", "scheme", "step", "stop"):
+        yield key, _words(settings[key]) + (" s" if key in ("step", "stop") else "")
+    yield from _nested("initialisation ", settings["initialisation"])
+    yield "order of the components", ", ".join(settings["components"])
+    for name, component in settings["components"].items():
+        ran = fmus.get(name, {})
+        twin = ", native" if "native_twin_of" in ran else ""
+        guid = f" {ran['guid']}" if "guid" in ran else ""
+        yield f"FMU of {name}", f"{component['fmu']}{guid}{twin}"
+        for key in ("step", "isolation", "solver", "rename", "units"):
+            if isinstance(entry := component.get(key), Mapping):
+                yield from _nested(f"{key} of {name} ", entry)
+            elif entry is not None:
+                yield f"{key} of {name}", _words(entry)
+    yield from _nested("", given_values(settings))
+    yield from _nested("role ", settings.get("roles", {}))
+    for connection in settings["connections"]:
+        factor, offset = connection["factor"], connection["offset"]
+        scaled = "" if factor is None else f" x {_words(factor)}"
+        shifted = f" + {_words(offset)}" if offset else ""
+        yield f"source of {connection['to']}", f"{connection['from']}{scaled}{shifted}"
+    for kind in ("events", "faults"):
+        yield kind, "; ".join(map(_words, settings[kind])) or NONE
+    yield from _nested("input ", settings.get("input", {}))
+    yield from _nested("version of ", run.origin.get("versions", {}))
+
+
+def _nested(what: str, entries: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield from ((f"{what}{key}", _words(value)) for key, value in entries.items())
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} = {_words(v)}" for key, v in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_words, value))
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value) if isinstance(value, float) else str(value)

@@ -3,7 +3,7 @@
 Why so: docs/studies.md.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -51,15 +51,9 @@ class Curve(NamedTuple):
         )
 
 
-def curve(time: Array, values: npt.NDArray[Any]) -> Curve:
-    """The curve of a recorded signal; Booleans and integers are held between samples."""
-    return Curve(time, values.astype(np.float64), not np.issubdtype(values.dtype, np.floating))
-
-
 class Tube(NamedTuple):
-    """The least and the largest value of a curve within a shift of each time in s."""
+    """The least and the largest value of a curve within a shift of each time."""
 
-    time: Array
     low: Array
     high: Array
 
@@ -87,7 +81,7 @@ def tube(around: Curve, time: Array, shift: float) -> Tube:
     some = last > first
     low[some] = np.minimum(low[some], _least(around.values, first[some], last[some]))
     high[some] = np.maximum(high[some], -_least(-around.values, first[some], last[some]))
-    return Tube(time, low, high)
+    return Tube(low, high)
 
 
 def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:

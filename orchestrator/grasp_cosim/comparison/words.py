@@ -12,9 +12,9 @@ from ..base.errors import choices
 from ..base.numerals import significant
 from ..metrics.metric import Metric
 from ..system.parts import NANOSECONDS
+from .bands import Compared
 from .compare import Comparison
 from .interface_difference import SEVERITIES, Difference
-from .judged import Compared
 from .qualify import Qualification
 
 ROWS = 8

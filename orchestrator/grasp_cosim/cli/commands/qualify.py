@@ -9,8 +9,8 @@ import click
 from ...base.files import check_file
 from ...comparison.bands import read_bands
 from ...comparison.page import write_qualification
+from ...comparison.qualify import component_of
 from ...comparison.qualify import qualify as run_qualification
-from ...comparison.swap import component_of
 from ...comparison.words import qualification_json, qualification_text
 from ...interface.read import check_runs
 from ...system.description import FILES
