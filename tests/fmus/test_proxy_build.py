@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from grasp_cosim import cli, simulate
-from grasp_cosim.hil.protocol import link_signature
+from grasp_cosim.hil.proxy import link_signature
 from grasp_cosim.hil.served import Service
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system.description import System

@@ -1,38 +1,50 @@
-"""The grasp with a part of it behind a proxy: the same values, to the bit, in lockstep."""
+"""The grasp with parts of it behind proxies: to the bit in lockstep, and over a bad network."""
 
 from contextlib import ExitStack, contextmanager
+from itertools import count
 
 import numpy as np
 import pytest
 from grasp_cosim import simulate
+from grasp_cosim.hil.network import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.served import Service
 from support.marks import slow
-from support.proxies import ANY_PORT, build_proxy, serving
+from support.ports import kept_port
+from support.proxies import ANY_PORT, build_proxy, relaying, serving, wait_until
 
 ENGINE = "python"
 """The peers are threads of this process. The compiled loop keeps Python's lock to itself, where
 another FMU is a Python one, and a native proxy in it then waits for a peer that cannot run."""
 
-STEP, STOP = 4e-3, 2.0
-"""s; past the contacts, in steps as long as the grasp takes them."""
+LOCKSTEP = Service(lockstep=True)
+STEPS = 300
+SPARE = 20
+"""Steps that are left at the end, for a step whose answer is in time."""
+
+CLEAN = 12
+"""The datagrams at the beginning, which pass in both directions: HELLO and INITIALISE."""
 
 
-@pytest.fixture(scope="module")
-def stepped(grasp):
-    return grasp.with_experiment(step=STEP, stop=STOP)
+def proxied(system, name, folder, port):
+    """The system with a proxy of a component, whose peer is at a port of this machine."""
+    proxy = build_proxy(system.component(name, "test").fmu, folder / f"{name}_bench.fmu", ANY_PORT)
+    return system.swap(name, proxy).with_values({f"{name}.proxy.port": port})
 
 
 @contextmanager
-def on_the_bench(system, folder, names, how):
+def on_the_bench(system, folder, *names):
     """The system with these components as proxies, each with a peer in lockstep of its own."""
     with ExitStack() as stack:
         for name in names:
             fmu = system.component(name, "test").fmu
-            server = stack.enter_context(serving(fmu, how))
-            proxy = build_proxy(fmu, folder / f"{name}_bench.fmu", ANY_PORT)
-            port = {f"{name}.proxy.port": server.address[1]}
-            system = system.swap(name, proxy).with_values(port)
+            server = stack.enter_context(serving(fmu, LOCKSTEP))
+            system = proxied(system, name, folder, server.address[1])
         yield system
+
+
+def assert_same(direct, benched):
+    for signal, column in direct.items():
+        np.testing.assert_array_equal(column, benched[signal], signal)
 
 
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
@@ -41,59 +53,173 @@ def on_the_bench(system, folder, names, how):
     [slow(("plant", "sensor_1", "sensor_2", "controller")), ("controller",)],
     ids=["all", "controller"],
 )
-def test_a_part_on_the_bench_changes_no_bit(stepped, tmp_path, names, scheme):
-    values = {"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.93}
-    system = stepped.with_experiment(scheme=scheme).with_values(values)
+def test_a_part_on_the_bench_changes_no_bit(grasp, tmp_path, names, scheme):
+    """Past the contacts, in steps as long as the grasp takes them."""
+    system = grasp.with_experiment(step=4e-3, stop=2.0, scheme=scheme)
+    system = system.with_values(
+        {"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.93}
+    )
     direct = simulate(system)
-    with on_the_bench(system, tmp_path, names, Service(lockstep=True)) as benched:
-        proxied = simulate(benched, engine=ENGINE)
-    for signal, column in direct.items():
-        np.testing.assert_array_equal(column, proxied[signal], signal)
+    with on_the_bench(system, tmp_path, *names) as benched:
+        result = simulate(benched, engine=ENGINE)
+    assert_same(direct, result)
     for name in names:
-        assert not proxied[f"{name}.proxy.missed"].any()
-        assert set(proxied[f"{name}.proxy.state"]) == {1}
-        assert not proxied[f"{name}.proxy.age"].any()
-    assert direct.metrics["time_to_contact"] == proxied.metrics["time_to_contact"]
+        assert not result[f"{name}.proxy.missed"].any()
+        assert set(result[f"{name}.proxy.state"]) == {1}
+        assert not result[f"{name}.proxy.age"].any()
     assert None not in direct.metrics["time_to_contact"]
 
 
 @pytest.mark.slow
-def test_native_and_python_mixed(stepped, natives, tmp_path):
-    """Proxies of native and of Python FMUs, with peers that serve the other."""
-    system, direct = stepped, simulate(stepped)
+def test_native_and_python_mixed(grasp, natives, tmp_path):
+    """Proxies of native and of Python FMUs, with peers that serve the other; the bench is used
+    a second time.
+    """
+    system = grasp.with_experiment(step=4e-3, stop=2.0)
+    direct = simulate(system)
     for name in ("plant", "sensor_2"):
-        fmu = natives / system.component(name, "test").fmu.name
-        system = system.swap(name, fmu)
-    with ExitStack() as stack:
-        for name in ("plant", "sensor_1", "controller"):
-            one = on_the_bench(system, tmp_path, (name,), Service(lockstep=True))
-            system = stack.enter_context(one)
-        again = simulate(system, engine=ENGINE)
-    for signal, values in direct.items():
-        np.testing.assert_array_equal(values, again[signal], signal)
+        system = system.swap(name, natives / system.component(name, "test").fmu.name)
+    with on_the_bench(system, tmp_path, "plant", "sensor_1", "controller") as benched:
+        for _ in range(2):
+            assert_same(direct, simulate(benched, engine=ENGINE))
 
 
 def test_events_reach_the_bench(grasp, tmp_path):
     """A tunable parameter of a sensor on the bench, set on the way."""
     system = grasp.with_experiment(step=1e-3, stop=0.02)
-    with on_the_bench(system, tmp_path, ("sensor_1",), Service(lockstep=True)) as benched:
-        there, here = darkened(benched), darkened(system)
+    found = []
+    with on_the_bench(system, tmp_path, "sensor_1") as benched:
+        for each in (benched, system):
+            with simulate.session(each, engine=ENGINE) as session:
+                session.step(10)
+                session.set("sensor_1.reflectance", 0.57)
+                session.step(10)
+                found.append(session.result()["sensor_1.intensity"])
+    there, here = found
     np.testing.assert_array_equal(there, here)
     assert here[11] < 0.6 * here[10]
 
 
-def darkened(system):
-    """The intensity of a sensor before whose tenth step its side gets darker."""
-    with simulate.session(system, engine=ENGINE) as session:
-        session.step(10)
-        session.set("sensor_1.reflectance", 0.57)
-        session.step(10)
-        return session.result()["sensor_1.intensity"]
+@pytest.fixture
+def slow_grasp(grasp):
+    return grasp.with_experiment(step=0.01, stop=0.01 * (STEPS + SPARE))
+
+
+def simulated(system, name, folder, bad, values):
+    """With a proxy of a component, and these values, and a relay; to a step answered in time.
+
+    All answers that arrive have come by then. The result; by direction how many datagrams were
+    dropped, and how many came twice; the counters of the relay and of the peer.
+    """
+    log, fmu = [], system.component(name, "test").fmu
+    with (
+        serving(fmu, LOCKSTEP) as server,
+        relaying(server.address, bad, log=log.append) as relay,
+    ):
+        benched = proxied(system, name, folder, relay.address[1])
+        with simulate.session(benched.with_values(values), engine=ENGINE) as session:
+            session.step(STEPS)
+            while session[f"{name}.proxy.consecutive_missed"]:
+                assert session.step(1)
+            result = session.result()
+        wait_until(lambda: server.fmu.counters()["sessions"] == 1)
+        peer, counters = server.fmu.counters(), relay.counters
+    dropped, copies = (
+        {d: sum(wanted(e) for e in log if e.direction == d) for d in DIRECTIONS}
+        for wanted in (lambda e: e.delay is None, lambda e: e.copy == 1)
+    )
+    return result, dropped, copies, counters, peer
+
+
+def last(result, name):
+    return int(result[name][-1])
 
 
 @pytest.mark.slow
-def test_two_runs_one_after_the_other_use_the_same_bench(grasp, tmp_path):
-    system = grasp.with_experiment(step=1e-3, stop=0.05)
-    with on_the_bench(system, tmp_path, ("plant",), Service(lockstep=True)) as benched:
-        first, second = (simulate(benched, engine=ENGINE)["plant.position[1]"] for _ in range(2))
-    np.testing.assert_array_equal(first, second)
+@pytest.mark.parametrize("name", ["plant", "controller"])
+def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accounted_for(
+    slow_grasp, tmp_path, name
+):
+    """With a seed at which the session begins and ends without a loss."""
+    conditions = dict.fromkeys(DIRECTIONS, Conditions(jitter=0.002, loss=0.05, duplicate=0.02))
+    clean = (*range(1, CLEAN), *range(STEPS - 5, STEPS + SPARE + CLEAN))
+    networks = (Network(conditions, seed=seed) for seed in count(1))
+    bad = next(
+        n for n in networks if all(len(n.fate(d, k)) == 1 for d in DIRECTIONS for k in clean)
+    )
+    values = {f"{name}.proxy.timeout": 0.1, f"{name}.proxy.misses_tolerated": 1000}
+    result, dropped, copies, counters, peer = simulated(slow_grasp, name, tmp_path, bad, values)
+    steps = len(result.time) - 1
+    assert counters["request"].received - 1 - steps < CLEAN  # HELLO and INITIALISE, and END
+    assert min(dropped.values()) > 0
+    missed, late = last(result, f"{name}.proxy.missed"), last(result, f"{name}.proxy.late")
+    assert missed - late == sum(dropped.values())
+    assert last(result, f"{name}.proxy.duplicated") == copies["reply"]
+    assert last(result, f"{name}.proxy.rejected") == 0
+    assert peer["duplicated"] + peer["stale"] == copies["request"] + (
+        steps - dropped["request"] - peer["steps"]
+    )
+    for finger, force in ((1, 3.43), (2, -3.43)):
+        assert result[f"plant.contact[{finger}]"][-1]
+        assert result[f"plant.contact_force[{finger}]"][-1] == pytest.approx(force, rel=0.1)
+
+
+@pytest.mark.slow
+def test_the_peer_out_of_reach_for_a_while_and_back(slow_grasp, tmp_path):
+    """Twenty requests get nowhere; the peer makes up for them with what comes after."""
+    gone = Network(outages=(Outage(100, 120),))
+    values = {
+        "plant.proxy.timeout": 0.1,
+        "plant.proxy.on_loss": "hold",
+        "plant.proxy.resume": True,
+    }
+    result, dropped, *_ = simulated(slow_grasp, "plant", tmp_path, gone, values)
+    state, row = result["plant.proxy.state"], result["plant.proxy.consecutive_missed"]
+    lost = np.flatnonzero(state == 3)
+    assert len(lost) >= 17  # of the 20 the first three are tolerated
+    assert row[lost[0]] == 4
+    assert list(state[lost[0] - 4 : lost[0] + 1]) == [1, 2, 2, 2, 3]
+    position, late = result["plant.position[1]"], result["plant.proxy.late"]
+    kept = np.flatnonzero((row > 0) & (np.diff(late, prepend=0) == 0))  # a late answer is taken
+    assert (position[kept] == position[kept - 1]).all()
+    assert state[-1] == 1
+    assert result["plant.contact[1]"][-1]
+    # An answer that is late by a busy machine may fall into the outage as well
+    assert dropped["request"] == 20
+    missed = last(result, "plant.proxy.missed")
+    assert missed - last(result, "plant.proxy.late") == 20 + dropped["reply"]
+
+
+@pytest.mark.parametrize("resume", [slow(True), False])
+def test_the_peer_started_anew(slow_grasp, tmp_path, resume):
+    """It knows no session; a proxy that may resume begins another one, from the start values."""
+    fmu = slow_grasp.component("plant", "test").fmu
+    values = {
+        "plant.proxy.timeout": 0.05,
+        "plant.proxy.misses_tolerated": 2,
+        "plant.proxy.on_loss": "failsafe",
+        "plant.proxy.hold.gap[1]": True,
+        "plant.proxy.failsafe.gap[2]": 0.25,
+        "plant.proxy.resume": resume,
+    }
+    with kept_port() as port:
+        system = proxied(slow_grasp, "plant", tmp_path, port).with_values(values)
+        with serving(fmu, LOCKSTEP, ("127.0.0.1", port)):
+            session = simulate.session(system, engine=ENGINE)
+            session.step(20)
+        with session:
+            gap = session["plant.gap[1]"]
+            session.step(10)
+            assert session["plant.proxy.state"] == 3
+            assert (session["plant.gap[1]"], session["plant.gap[2]"]) == (gap, 0.25)
+            with serving(fmu, LOCKSTEP, ("127.0.0.1", port)):
+                session.step(5)
+                while resume and session["plant.proxy.state"] != 1:  # as a busy machine has it
+                    assert session.step(1)
+            result = session.result()
+    assert result["plant.proxy.state"][-1] == (1 if resume else 3)
+    assert (result["plant.gap[2]"][-1] == 0.25) != resume
+    sessions = result.metrics["proxies"]["plant"]["sessions"]
+    assert sessions >= 2 if resume else sessions == 1
+    assert any("plant: the peer was lost at t = " in line for line in result.log)
+    assert any("started anew" in line for line in result.log) == resume

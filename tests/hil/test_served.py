@@ -1,23 +1,31 @@
-"""A served FMU without its socket: stepped by requests or by a clock that the test moves."""
+"""A served FMU: stepped by requests or by a clock that the test moves, then at its port."""
 
+import json
 import math
-from contextlib import ExitStack, closing
+import os
+import re
+import signal
+import subprocess
+import sys
+import zipfile
+from contextlib import ExitStack
 
-import numpy as np
 import pytest
+from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.fmi.make_instance import load_here
 from grasp_cosim.hil.driven import DrivenFmu
-from grasp_cosim.hil.protocol import exchanged, link_signature
-from grasp_cosim.hil.served import ServedFmu, Service
+from grasp_cosim.hil.proxy import exchanged, link_signature
+from grasp_cosim.hil.served import BACKLOG, ServedFmu, Server, Service
 from grasp_cosim.interface.read import read_interface
 from grasp_fmus.link.message import STEP as STEP_REQUEST
 from grasp_fmus.link.peer import TOO_LONG
 from support import native_fmus
-from support.proxies import HandProxy, RefusedError
+from support.proxies import HandProxy, RefusedError, UdpAsk, serving, wait_until
 
 MS = 1_000_000
 STEP = 1e-3
+KEY = b"a key of 16 byte"
+LOCKSTEP = Service(lockstep=True)
 
 
 class Clocked:
@@ -44,12 +52,22 @@ def clocked():
     """Serves FMUs with a clock; closes them."""
     with ExitStack() as stack:
 
-        def make(fmu, serving):
+        def make(fmu, serving=LOCKSTEP):
             it = Clocked(fmu, serving)
             stack.callback(it.served.close)
             return it
 
         yield make
+
+
+@pytest.fixture
+def sensor(fmus):
+    return fmus / "ProximitySensor.fmu"
+
+
+@pytest.fixture
+def plant(fmus):
+    return fmus / "GripperPlant.fmu"
 
 
 def starts(fmu, **values):
@@ -63,167 +81,128 @@ def starts(fmu, **values):
     ]
 
 
-def directly(fmu, gaps, reflectance):
-    """The intensities of a sensor stepped in this process."""
-    interface = read_interface(fmu)
-    gap, intensity = interface.by_name["gap"], interface.by_name["intensity"]
-    found = []
-    with closing(load_here("sensor", interface)) as sensor:
-        sensor.enter_initialization({"reflectance": reflectance, "gap": gaps[0]}, None)
-        found += sensor.get([intensity])
-        sensor.exit_initialization()
-        clock = np.zeros(1)
-        advance = sensor.stepper(clock, STEP)
-        for k, value in enumerate(gaps[1:]):
-            clock[0] = k * STEP
-            sensor.set([gap], [value])
-            assert advance.python() == 0
-            found += sensor.get([intensity])
-    return found
+def pushed(fmu, force=-1.0):
+    return starts(fmu, **{"force[1]": force})
 
 
-def test_in_lockstep_the_values_are_those_of_the_fmu_to_the_bit(fmus, clocked):
-    fmu = fmus / "ProximitySensor.fmu"
-    gaps = [0.1 / 3 ** (k / 7) for k in range(40)]
-    it = clocked(fmu, Service(lockstep=True))
-    found = it.proxy.begin(1, starts(fmu, gap=gaps[0], reflectance=0.57))
-    for k, gap in enumerate(gaps[1:]):
-        found = found + it.proxy.step(k * STEP, STEP, starts(fmu, gap=gap, reflectance=0.57))
-    assert found == directly(fmu, gaps, 0.57)
+def test_it_initialises_steps_and_says_when_sessions_begin_and_end(sensor, clocked):
+    """In initialisation mode outputs follow inputs and parameters, on the way tunable ones."""
+    it = clocked(sensor)
+    it.proxy.begin(1, starts(sensor))
+    for gap in (0.01, 0.02):
+        (intensity,) = it.proxy.initialise(0.0, starts(sensor, gap=gap, gain=0.001))
+        assert intensity == pytest.approx(0.001 / (gap + 0.005) ** 1.1506, rel=1e-12)
+    (bright,) = it.proxy.step(0.0, STEP, starts(sensor, gain=0.001))
+    (dark,) = it.proxy.step(STEP, STEP, starts(sensor, gain=0.001, reflectance=0.5))
+    assert dark == pytest.approx(0.5 * bright)
     it.proxy.end()
-    assert it.served.counters()["steps"] == 39
+    it.proxy.begin(2, starts(sensor), time=2.5)
+    it.proxy.step(2.5, STEP, starts(sensor))
+    assert it.proxy.outputs_time == 2.5 + STEP
+    it.wait(1000.0)  # as long as a session may be silent before another one takes its place
+    it.proxy.begin(3, starts(sensor))
+    it.served.close()
     assert it.said == [
         "a session of test begins at t = 0 s",
-        "the session is over at t = 0.039 s: the proxy ended the session",
+        "the session is over at t = 0.002 s: the proxy ended the session",
+        "a session of test begins at t = 2.5 s",
+        "the session is over at t = 2.501 s: another session takes its place",
+        "a session of test begins at t = 0 s",
+        "the session is over at t = 0 s: the server is closed",
+    ]
+    counters = it.served.counters()
+    assert (counters["sessions"], counters["steps"], counters["failures"]) == (3, 3, 0)
+
+
+def test_of_a_server_that_was_started_anew_it_is_said(sensor, plant, clocked):
+    it, anew = clocked(sensor), clocked(sensor)
+    it.proxy.begin(1, starts(sensor))
+    plants = clocked(plant).proxy
+    for proxy, fmu in ((it.proxy, sensor), (it.proxy, sensor), (plants, plant)):
+        anew.served.answer(proxy.request(STEP_REQUEST, 0.0, starts(fmu), STEP), "test", anew.now)
+    assert anew.said == [
+        "a datagram from test of an unknown session was refused: it began before this server did",
+        "a datagram from test of another interface was refused: its proxy must be made of the FMU "
+        "served here",
     ]
 
 
-def test_of_a_server_that_was_started_anew_it_is_said(fmus, clocked):
-    fmu, other = fmus / "ProximitySensor.fmu", fmus / "GripperPlant.fmu"
-    it, anew = (clocked(fmu, Service(lockstep=True)) for _ in range(2))
-    it.proxy.begin(1, starts(fmu))
-    anew.served.answer(it.proxy.request(STEP_REQUEST, 0.0, starts(fmu), STEP), "test", anew.now)
-    line = "a datagram from test of an unknown session was refused: it began before this"
-    assert [said.startswith(line) for said in anew.said] == [True]
-    plant = clocked(other, Service(lockstep=True)).proxy
-    anew.served.answer(plant.request(STEP_REQUEST, 0.0, starts(other), STEP), "test", anew.now)
-    assert anew.said[1].startswith("a datagram from test of another interface was refused: its")
-
-
-def test_in_initialisation_mode_outputs_follow_the_inputs(fmus, clocked):
-    fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Service(lockstep=True))
-    it.proxy.begin(1, starts(fmu))
-    for gap in (0.01, 0.02):
-        (intensity,) = it.proxy.initialise(0.0, starts(fmu, gap=gap, gain=0.001))
-        expected = 0.001 / (gap + 0.005) ** 1.1506
-        assert intensity == pytest.approx(expected, rel=1e-12)
-
-
-def test_lost_requests_are_made_up_for_with_the_newest_values(fmus, clocked):
-    fmu = fmus / "GripperPlant.fmu"
-    push, rest = {"force[1]": 1.0, "force[2]": 0.0}, {"force[1]": 0.0, "force[2]": 0.0}
-    two, one = (clocked(fmu, Service(lockstep=True)) for _ in range(2))
+@pytest.mark.parametrize("steps", [1, 3.0004])
+def test_lost_requests_are_made_up_for_with_the_newest_values(plant, clocked, steps):
+    """The last one shorter where they are no whole number."""
+    two, one = clocked(plant), clocked(plant)
     for it in (two, one):
-        it.proxy.begin(1, starts(fmu, **rest))
-    for k in range(3):
-        whole = two.proxy.step(k * STEP, STEP, starts(fmu, **push))
-    assert one.proxy.step(2 * STEP, STEP, starts(fmu, **push)) == whole
+        it.proxy.begin(1, starts(plant))
+    for k in range(int(steps)):
+        two.proxy.step(k * STEP, STEP, pushed(plant))
+    if steps % 1:
+        two.proxy.step(int(steps) * STEP, steps % 1 * STEP, pushed(plant))
+    whole = two.proxy.step(steps * STEP, STEP, pushed(plant))
+    assert one.proxy.step(steps * STEP, STEP, pushed(plant)) == pytest.approx(whole, rel=1e-12)
 
 
-def test_lost_requests_are_not_made_up_for_when_the_end_has_come(fmus, clocked):
-    fmu = fmus / "ProximitySensor.fmu"
-    it, asked = clocked(fmu, Service(lockstep=True)), []
-
-    def over():
-        asked.append(1)
-        return len(asked) > 10
-
-    it.served.over = over
-    it.proxy.begin(1, starts(fmu))
-    with pytest.raises(RefusedError, match=r"the FMU ended it after 10 of 99000 lost steps"):
-        it.proxy.step(99000 * STEP, STEP, starts(fmu))
-    assert len(asked) == 11
+@pytest.mark.parametrize("time", [-STEP, 100_001 * STEP])
+def test_a_step_from_before_or_from_far_away_is_refused(sensor, clocked, time):
+    it = clocked(sensor)
+    it.proxy.begin(1, starts(sensor))
+    said = "must be from 0 s, or at most 100000 steps later"
+    with pytest.raises(RefusedError, match=rf"ProximitySensor\.fmu: step from .* s: {said}"):
+        it.proxy.step(time, STEP, starts(sensor))
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
-def test_a_step_that_is_too_long_ends_its_session_alone(fmus, clocked, lockstep):
-    fmu = fmus / "GripperPlant.fmu"
-    it = clocked(fmu, Service(lockstep=lockstep))
-    it.proxy.begin(1, starts(fmu))
+def test_a_step_that_is_too_long_ends_its_session_alone(plant, clocked, lockstep):
+    it = clocked(plant, Service(lockstep=lockstep))
+    it.proxy.begin(1, starts(plant))
     with pytest.raises(RefusedError, match="the step is too long: must be at most 3600 s"):
-        it.proxy.step(0.0, 1e300, starts(fmu))
+        it.proxy.step(0.0, 1e300, starts(plant))
     assert it.said[-1] == f"the session is over at t = 0 s: {TOO_LONG}"
-    it.proxy.begin(2, starts(fmu))
-    it.proxy.step(0.0, STEP, starts(fmu))
+    it.proxy.begin(2, starts(plant))
+    it.proxy.step(0.0, STEP, starts(plant))
     assert (it.served.counters()["failures"], it.served.counters()["steps"]) == (1, 1)
 
 
-def test_a_parameter_that_the_fmu_refuses_is_said(fmus, clocked):
-    fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Service())
+def test_what_the_fmu_refuses_is_said(sensor, clocked):
+    it = clocked(sensor, Service())
     with pytest.raises(RefusedError, match=r"offset_distance = -1\.0 m: must be from"):
-        it.proxy.begin(1, starts(fmu, offset_distance=-1.0))
+        it.proxy.begin(1, starts(sensor, offset_distance=-1.0))
+    it.proxy.begin(2, starts(sensor))
+    with pytest.raises(RefusedError, match="step of 1e-10 s: must be 1 ns or more, to be the own"):
+        it.proxy.step(0.0, 1e-10, starts(sensor))
 
 
-def test_a_tunable_parameter_changes_on_the_way(fmus, clocked):
-    fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Service(lockstep=True))
-    it.proxy.begin(1, starts(fmu))
-    (bright,) = it.proxy.step(0.0, STEP, starts(fmu))
-    (dark,) = it.proxy.step(STEP, STEP, starts(fmu, reflectance=0.5))
-    assert float(dark) == pytest.approx(0.5 * float(bright))
-
-
-def test_a_session_starts_at_its_own_time(fmus, clocked):
-    fmu = fmus / "GripperPlant.fmu"
-    it = clocked(fmu, Service(lockstep=True))
-    it.proxy.begin(1, starts(fmu), time=2.5)
-    it.proxy.step(2.5, STEP, starts(fmu))
-    assert it.proxy.outputs_time == 2.5 + STEP
-
-
-def test_by_its_own_clock_the_model_moves_between_requests(fmus, clocked):
-    fmu = fmus / "GripperPlant.fmu"
-    push = starts(fmu, **{"force[1]": -1.0})
-    it = clocked(fmu, Service())
-    it.proxy.begin(1, starts(fmu))
+def test_by_its_own_clock_the_model_moves_between_requests(plant, clocked):
+    it = clocked(plant, Service(watchdog_ns=10 * BACKLOG))
+    it.proxy.begin(1, starts(plant))
     it.wait(500.0)  # it does not start before the first step
-    first = it.proxy.step(0.0, STEP, push)
+    first = it.proxy.step(0.0, STEP, pushed(plant))
     assert it.proxy.outputs_time == 0.0
     it.wait(20.0)
-    later = it.proxy.step(0.02, STEP, push)
+    later = it.proxy.step(0.02, STEP, pushed(plant))
     assert it.proxy.outputs_time == pytest.approx(0.02)
-    assert it.served.counters()["own_steps"] == 20
-    moved = float(later[0]) - float(first[0])  # x = F t^2 / 2m
+    moved = later[0] - first[0]  # x = F t^2 / 2m
     assert moved == pytest.approx(-0.5 * 1.0 / 0.5 * 0.02**2, rel=1e-9)
+    assert (it.served.counters()["own_steps"], it.served.counters()["skipped"]) == (20, 0)
+    it.now += BACKLOG + 10 * MS  # held up for longer than it makes up for
+    it.served.look(it.now)
+    it.served.look(it.now)
+    assert (it.served.counters()["own_steps"], it.served.counters()["skipped"]) == (22, 1008)
 
 
-def test_its_own_step_may_be_shorter(fmus, clocked):
-    fmu = fmus / "GripperPlant.fmu"
-    it = clocked(fmu, Service(step_ns=MS // 4))
-    it.proxy.begin(1, starts(fmu))
-    it.proxy.step(0.0, STEP, starts(fmu))
-    it.wait(5.0)
-    assert it.served.counters()["own_steps"] == 20
-
-
-def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(fmus, clocked):
-    fmu = fmus / "GripperPlant.fmu"
-    push = starts(fmu, **{"force[1]": -1.0})
-    it = clocked(fmu, Service(watchdog_ns=50 * MS, failsafe={"force[1]": 0.25}))
-    it.proxy.begin(1, starts(fmu))
-    it.proxy.step(0.0, STEP, push)
+def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(plant, clocked):
+    it = clocked(plant, Service(watchdog_ns=50 * MS, failsafe={"force[1]": 0.25}))
+    it.proxy.begin(1, starts(plant))
+    it.proxy.step(0.0, STEP, pushed(plant))
     it.wait(49.0)
     assert it.served.counters()["watchdog"] == 0
     it.wait(51.0)
     assert it.served.counters()["watchdog"] == 1
     assert "no request for 0.05 s: the inputs went to their failsafe values" in it.said
-    velocity = it.proxy.step(0.1, STEP, push)[2]
+    velocity = it.proxy.step(0.1, STEP, pushed(plant))[2]
     expected = (-1.0 * 0.049 + 0.25 * 0.051) / 0.5  # the watchdog is before the step due with it
-    assert float(velocity) == pytest.approx(expected, rel=1e-9)
+    assert velocity == pytest.approx(expected, rel=1e-9)
     it.wait(10.0)
-    assert float(it.proxy.step(0.11, STEP, push)[2]) < float(velocity)
+    assert it.proxy.step(0.11, STEP, pushed(plant))[2] < velocity
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
@@ -241,23 +220,22 @@ def test_a_failure_of_the_fmu_is_said_to_the_proxy(tmp_path, lockstep, clocked):
     assert it.served.due() is None
 
 
-def test_every_type_there_and_back(tmp_path, clocked):
+def test_every_type_there_and_back(tmp_path, clocked, monkeypatch):
     fmu = native_fmus.build(tmp_path, "Native", "2.0")
-    values = {
-        "u_Real": 0.1,
-        "u_Integer": -7,
-        "u_Boolean": True,
-        "u_Enumeration": 2,
-    }
-    it = clocked(fmu, Service(lockstep=True))
+    values = {"u_Real": 0.1, "u_Integer": -7, "u_Boolean": True, "u_Enumeration": 2}
+    it = clocked(fmu)
     it.proxy.begin(1, starts(fmu))
+    names = [v.name for v in it.served.peer.signature.answer]
     for found in (
         it.proxy.initialise(0.0, starts(fmu, **values)),
         it.proxy.step(0.0, STEP, starts(fmu, **values)),
     ):
-        outputs = dict(zip([v.name for v in it.served.peer.signature.answer], found, strict=True))
+        outputs = dict(zip(names, found, strict=True))
         for name, value in values.items():
             assert (outputs[f"y{name[1:]}"], type(outputs[f"y{name[1:]}"])) == (value, type(value))
+    monkeypatch.setattr(DrivenFmu, "_get", lambda *_: [math.nan] * len(names))
+    with pytest.raises(RefusedError, match=r"= nan at t = 0\.002 s: must be finite"):
+        it.proxy.step(STEP, STEP, starts(fmu))
 
 
 def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path):
@@ -266,35 +244,112 @@ def test_what_a_proxy_cannot_exchange_is_refused_by_name(tmp_path):
         link_signature(exchanged(fmu))
 
 
-def test_an_output_that_is_not_finite_is_a_failure(tmp_path, clocked, monkeypatch):
-    fmu = native_fmus.build(tmp_path, "Native", "2.0")
-    it = clocked(fmu, Service(lockstep=True))
-    it.proxy.begin(1, starts(fmu))
-    nothing_finite = [math.nan] * len(it.served.peer.signature.answer)
-    monkeypatch.setattr(DrivenFmu, "_get", lambda *_: nothing_finite)
-    with pytest.raises(RefusedError, match=r"= nan at t = 0\.001 s: must be finite"):
-        it.proxy.step(0.0, STEP, starts(fmu))
-
-
-def test_a_server_that_is_closed_says_where_its_session_ended(fmus, clocked):
-    fmu = fmus / "ProximitySensor.fmu"
-    it = clocked(fmu, Service(lockstep=True))
-    it.proxy.begin(1, starts(fmu))
-    it.proxy.step(0.0, STEP, starts(fmu))
-    it.served.close()
-    assert it.said[-1] == "the session is over at t = 0.001 s: the server is closed"
-
-
-def test_wrong_failsafe_values_are_refused(fmus):
-    plant = read_interface(fmus / "GripperPlant.fmu")
-    with pytest.raises(
-        InputError, match=r"failsafe force: no such input .* did you mean force\[1\]"
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_session_over_udp(plant, lockstep):
+    """By its own clock it goes on without requests."""
+    signature, _ = link_signature(read_interface(plant))
+    with (
+        serving(plant, Service(lockstep=lockstep, key=KEY)) as server,
+        UdpAsk(server.address) as ask,
     ):
-        ServedFmu(plant, Service(failsafe={"force": 1.0}))
-    with pytest.raises(InputError, match=r"failsafe force\[1\]: force\[1\] = 'x': must be a"):
-        ServedFmu(plant, Service(failsafe={"force[1]": "x"}))
+        proxy = HandProxy(signature, ask, KEY)
+        assert server.address[0] == "127.0.0.1"
+        proxy.begin(1, starts(plant))
+        for k in range(20):
+            proxy.step(k * STEP, STEP, starts(plant))
+        if not lockstep:
+            wait_until(lambda: server.fmu.counters()["own_steps"] >= 20)
+            proxy.step(20 * STEP, STEP, starts(plant))
+            assert proxy.outputs_time >= 20 * STEP
+        proxy.end()
+        wait_until(lambda: server.fmu.counters()["sessions"] == 1)
+    assert server.fmu.counters()["steps"] == (20 if lockstep else 21)
 
 
-def test_a_key_that_is_too_short_is_refused(fmus):
-    with pytest.raises(InputError, match="key of 3 bytes: must have 16 or more"):
-        ServedFmu(read_interface(fmus / "GripperPlant.fmu"), Service(key=b"abc"))
+def test_the_port_is_one_that_is_free(sensor):
+    interface = read_interface(sensor)
+    refused = pytest.raises(InputError, match="cannot listen there: Address already in use; must")
+    with Server(ServedFmu(interface)) as server, refused:
+        Server(ServedFmu(interface), server.address)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_the_command_serves_until_it_is_interrupted(sensor):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "grasp_cosim", "serve", sensor, "--port", "0", "--lockstep"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    try:
+        said = re.match(
+            r"serving ProximitySensor\.fmu at 127\.0\.0\.1:(\d+),", process.stderr.readline()
+        )
+        signature, _ = link_signature(read_interface(sensor))
+        with UdpAsk(("127.0.0.1", int(said[1]))) as ask:
+            HandProxy(signature, ask).begin(1, starts(sensor))
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
+    assert (process.returncode, out) == (0, "initialisations 1\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("--watchdog -1", "--watchdog = -1.0 s: must be a number greater than 0"),
+        ("--failsafe gap", "--failsafe 'gap': must be INPUT=VALUE"),
+        ("--failsafe gap=wide", "failsafe gap: gap = 'wide': must be a finite number"),
+        (
+            "--failsafe gap[1]=1",
+            "failsafe gap[1]: no such input of ProximitySensor.fmu; did you me",
+        ),
+        ("--key-file {}", "key of 5 bytes: must have 16 or more"),
+        ("--host 192.0.2.1", "192.0.2.1:5501: cannot listen there"),
+        ("--host=", ":5501: no such host; must be an IPv4 address or a name that has one"),
+    ],
+)
+def test_wrong_input_is_one_line(sensor, tmp_path, capsys, arguments, message):
+    (tmp_path / "short").write_text("short", encoding="utf-8")
+    given = arguments.format(tmp_path / "short").split()
+    assert cli.main(["serve", str(sensor), *given]) == 2
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err.count("\n")) == ("", 1)
+    assert message in captured.err
+
+
+def test_an_fmu_that_does_not_load_is_not_offered(plant, tmp_path, capsys):
+    empty = tmp_path / "empty.fmu"
+    with zipfile.ZipFile(plant) as good, zipfile.ZipFile(empty, "w") as file:
+        file.writestr("modelDescription.xml", good.read("modelDescription.xml"))
+    assert cli.main(["serve", str(empty), "--port", "0"]) == 2
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err.count("\n")) == ("", 1)
+    assert f"GripperPlant: {empty} has no binary at all; " in captured.err
+
+
+@pytest.mark.parametrize(
+    ("host", "key", "who"),
+    [
+        ("localhost", False, "any program here"),
+        ("0.0.0.0", False, "whoever can reach it"),
+        ("0.0.0.0", True, ""),
+    ],
+)
+def test_it_says_who_may_take_part_and_what_is_left(
+    sensor, tmp_path, capsys, monkeypatch, host, key, who
+):
+    monkeypatch.setattr(Server, "serve", lambda *_: signal.raise_signal(signal.SIGINT))
+    (tmp_path / "key").write_bytes(KEY)
+    given = ["--host", host, *(["--key-file", str(tmp_path / "key")] if key else [])]
+    command = ["serve", str(sensor), "--port", "0", *given]
+    assert cli.main(command) == 0
+    out, err = capsys.readouterr()
+    said = f" without a key: {who} may take part, and take over a session that is silent for 1 s; "
+    assert err.count(said) == err.count("without a key") == bool(who)
+    assert out == "nothing came\n"
+    assert cli.main([*command, "--sessions", "1", "--json"]) == 130
+    out, err = capsys.readouterr()
+    assert json.loads(out)["sessions"] == 0
+    assert err.endswith("grasp-cosim: interrupted; 0 of 1 sessions served\n")

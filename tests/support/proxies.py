@@ -8,10 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 from grasp_cosim import cli
-from grasp_cosim.hil.protocol import exchanged
+from grasp_cosim.hil.proxy import exchanged
 from grasp_cosim.hil.relay import Relay
-from grasp_cosim.hil.served import ServedFmu
-from grasp_cosim.hil.server import Server
+from grasp_cosim.hil.served import ServedFmu, Server
 from grasp_fmus.link.message import (
     END,
     HELLO,

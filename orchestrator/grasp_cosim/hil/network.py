@@ -1,14 +1,17 @@
-"""The fate of a datagram in a nasty network: a pure function of seed, direction and number.
+"""A nasty network: the fate of each datagram, and those that are on their way through it.
 
-Nothing here knows of sockets or clocks, so the same seed gives the same fates on every machine,
-however fast the datagrams come.
+No socket and no clock: who calls says what arrived and what time it is, in ns of a clock that never
+goes back. A fate is a pure function of seed, direction and number, so the same seed gives the same
+fates on every machine, however fast the datagrams come.
 """
 
 import hashlib
+import heapq
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import Literal, NamedTuple, get_args
 
 from ..base.checks import number, whole
@@ -44,8 +47,9 @@ class Conditions:
     def __post_init__(self) -> None:
         for name in ("loss", "duplicate", "reorder"):
             number(name, getattr(self, name), 0.0, 1.0, must="a probability, from 0 to 1")
+        must = f"from 0 to {LONGEST:g} s"
         for name in ("delay", "jitter", "reorder_by"):
-            check_time(name, getattr(self, name))
+            number(name, getattr(self, name), 0.0, LONGEST, must=must, unit="s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +84,12 @@ class Outage:
             )
         return cls(float(found[1]), float(found[3]), "s" if found[2] else "requests")
 
-    def covers(self, requests: int, elapsed_ns: int) -> bool:
-        """Return True if it is on at this request, and so long after the first datagram."""
-        now = requests if self.by == "requests" else elapsed_ns / NANOSECONDS
-        return self.start <= now < self.until
+
+class Passage(NamedTuple):
+    """One way through the network: how long it takes, and whether reorder is in that."""
+
+    delay_ns: int
+    held_back: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +110,7 @@ class Network:
         for name, least in (("seed", 0), ("capacity", 1)):
             whole(name, getattr(self, name), least, must=f"a whole number, at least {least}")
 
-    def fate(self, direction: Direction, number: int) -> tuple["Passage", ...]:
+    def fate(self, direction: Direction, number: int) -> tuple[Passage, ...]:
         """Return the ways through of the datagram of a number, 1, 2, ...: none where it is lost.
 
         Two are the datagram and its copy. Outages are not in it.
@@ -117,18 +123,6 @@ class Network:
         if u[3] < conditions.duplicate:
             return first, _passage(conditions, u[4], u[5])
         return (first,)
-
-
-class Passage(NamedTuple):
-    """One way through the network: how long it takes, and whether reorder is in that."""
-
-    delay_ns: int
-    held_back: bool
-
-
-def check_time(name: str, value: float) -> None:
-    """InputError where a time in s is negative, longer than LONGEST, or no number."""
-    number(name, value, 0.0, LONGEST, must=f"from 0 to {LONGEST:g} s", unit="s")
 
 
 def _passage(conditions: Conditions, position: float, chance: float) -> Passage:
@@ -146,3 +140,110 @@ def _uniforms(seed: int, direction: Direction, number: int) -> list[float]:
     purpose = repr((seed, direction, number)).encode()
     digest = hashlib.blake2b(purpose, digest_size=48).digest()
     return [(int.from_bytes(digest[i : i + 8], "little") >> 11) * 2.0**-53 for i in range(0, 48, 8)]
+
+
+@dataclass(slots=True)
+class Counters:
+    """One direction, exact at any time: received + duplicated = delivered + dropped + held."""
+
+    received: int = 0
+    delivered: int = 0
+    """Copies included."""
+    duplicated: int = 0
+    reordered: int = 0
+    """Delivered after a datagram that had arrived later."""
+    lost: int = 0
+    outage: int = 0
+    overflow: int = 0
+    """There was no room: network.capacity datagrams were under way."""
+    unsent: int = 0
+    """This machine refused to send it."""
+    held: int = 0
+    """Still under way."""
+
+    @property
+    def dropped(self) -> int:
+        """All that did not and will not get through."""
+        return self.lost + self.outage + self.overflow + self.unsent
+
+
+class Entry(NamedTuple):
+    """The decision on a datagram, or on its copy, when it arrived."""
+
+    direction: Direction
+    number: int
+    """1, 2, 3, ... in its direction."""
+    copy: int
+    """0, of a copy 1."""
+    fate: Literal["passed", "held back", "lost", "outage", "overflow"]
+    delay: float | None
+    """In s; None where it does not get through."""
+
+
+Log = Callable[[Entry], object]
+
+
+class Traffic:
+    """The datagrams under way in both directions."""
+
+    def __init__(self, network: Network, log: Log | None = None) -> None:
+        self._counters = {direction: Counters() for direction in DIRECTIONS}
+        self._network = network
+        self._log: Log = log or (lambda _: None)
+        self._begin: int | None = None
+        self._newest = dict.fromkeys(DIRECTIONS, 0)
+        self._arrivals = count()  # makes the earlier one the first of two that are due at once
+        self._held: list[tuple[int, int, Direction, int, Callable[[], bool]]] = []
+
+    def snapshot(self) -> dict[Direction, Counters]:
+        """The counters as they are now."""
+        return {direction: replace(c) for direction, c in self._counters.items()}
+
+    def receive(self, direction: Direction, send: Callable[[], bool], now: int) -> None:
+        """A datagram has arrived: decide what becomes of it, and count and log that.
+
+        `send` sends it on, and says whether this machine took it.
+        """
+        self._begin = now if self._begin is None else self._begin
+        counters = self._counters[direction]
+        counters.received += 1
+        number = counters.received
+        since = {
+            "requests": self._counters["request"].received,
+            "s": (now - self._begin) / NANOSECONDS,
+        }
+        if any(o.start <= since[o.by] < o.until for o in self._network.outages):
+            counters.outage += 1
+            self._log(Entry(direction, number, 0, "outage", None))
+            return
+        passages = self._network.fate(direction, number)
+        if not passages:
+            counters.lost += 1
+            self._log(Entry(direction, number, 0, "lost", None))
+        counters.duplicated += len(passages) > 1
+        for copy, (delay_ns, held_back) in enumerate(passages):
+            if len(self._held) >= self._network.capacity:
+                counters.overflow += 1
+                self._log(Entry(direction, number, copy, "overflow", None))
+                continue
+            counters.held += 1
+            arrival = next(self._arrivals)
+            heapq.heappush(self._held, (now + delay_ns, arrival, direction, number, send))
+            fate: Literal["held back", "passed"] = "held back" if held_back else "passed"
+            self._log(Entry(direction, number, copy, fate, delay_ns / NANOSECONDS))
+
+    def next_due(self) -> int | None:
+        """The time at which the next datagram has to go on; None where none is under way."""
+        return self._held[0][0] if self._held else None
+
+    def send_due(self, now: int) -> None:
+        """Send on what is due by now, the earliest first."""
+        while self._held and self._held[0][0] <= now:
+            *_, direction, number, send = heapq.heappop(self._held)
+            counters, sent = self._counters[direction], send()
+            counters.held -= 1
+            counters.unsent += not sent
+            if sent:
+                counters.delivered += 1
+                counters.reordered += number < self._newest[direction]
+                self._newest[direction] = max(number, self._newest[direction])

@@ -1,29 +1,101 @@
-"""A proxy of an FMU, and the C header of its peer, made of the interface of the FMU."""
+"""A proxy of an FMU, and the C header of its peer: what the two exchange, from its interface."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from math import isfinite, isinf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from c_compilers import CompilerError
-from grasp_fmus.description import Experiment
-from grasp_fmus.variable import Enumeration
-from grasp_fmus.variable import Variable as ProxyVariable
+from grasp_fmus.link.message import check_size, exposed, read_key
+from grasp_fmus.link.peer import ALIVE
+from grasp_fmus.link.signature import ORDER, LinkVariable, Signature
 
 from ..base.errors import InputError, SimulationError
 from ..base.files import check_file, write_text
+from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value, Variable
-from .protocol import exchanged, link_signature
+from ..interface.read import read_interface
+from ..system.parts import NANOSECONDS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from grasp_fmus.native.targets import Version
     from grasp_fmus.package import Built
-    from grasp_fmus.proxy import Original, Settings
+    from grasp_fmus.proxy import Settings
+    from grasp_fmus.variable import Variable as ProxyVariable
+
+LONGEST_SILENCE = ALIVE / NANOSECONDS
+"""s after which another proxy may take over a session."""
+
+WIDE = ("UInt32", "Int64", "UInt64")
+"""Integer types that an Integer of FMI 2.0 does not hold."""
+
+TEXT = "a text, as the link has none"
+
+
+def exchanged(fmu: Path) -> Interface:
+    """Return the interface of an FMU, with elements in the place of arrays of numbers."""
+    interface = read_interface(fmu)
+    return interface if interface.sized_by is None else expanded(interface, {})
+
+
+def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
+    """Return the signature of an FMU, and notes on what is left out.
+
+    InputError where an input or output cannot be exchanged.
+    """
+    taken: list[LinkVariable] = []
+    left_out: dict[str, list[str]] = {}
+    for v in interface.of(*ORDER, "structuralParameter"):
+        reason = _obstacle(v)
+        if reason is None:
+            # no other kind and causality is left
+            taken.append(LinkVariable(v.name, v.kind, v.causality, v.unit))  # type: ignore[arg-type]
+        elif v.causality in ("input", "output") and reason != TEXT:
+            raise InputError(
+                f"{interface.path}: {v.causality} {v.name} is {reason}, which a proxy cannot "
+                "exchange; must be of 64 bit floating point, 32 bit, Boolean or an array of these"
+            )
+        else:
+            left_out.setdefault(reason, []).append(v.name)
+    file = interface.path.name
+    notes = [f"{file}: {', '.join(v)}: {reason}: left out" for reason, v in left_out.items()]
+    try:
+        signature = Signature(tuple(taken))
+        check_size(signature)
+    except ValueError as error:
+        raise InputError(f"{interface.path}: {error}") from error
+    return signature, notes
+
+
+def shared_key(path: Path, say: Callable[[str], None]) -> bytes:
+    """Return the key in a file, and say where others can read it.
+
+    InputError where it is too short to be one.
+    """
+    try:
+        key = read_key(path)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+    if said := exposed(path):
+        say(said)
+    return key
+
+
+def _obstacle(v: Variable) -> str | None:
+    if v.causality == "structuralParameter":
+        return "structural"
+    if not v.supported:
+        return f"of type {v.nature}"
+    if v.kind == "String":
+        return TEXT
+    if v.type in WIDE:
+        return f"of type {v.type}"
+    if v.kind == "Real" and v.start is not None and not isfinite(float(v.start)):
+        return f"{v.start} at the start"
+    return None
+
 
 KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool}
 
@@ -43,14 +115,23 @@ def write_proxy(
     InputError where the FMU or a setting does not permit it, SimulationError where the compiler
     fails.
     """
+    from c_compilers import CompilerError  # here, as below, what takes time to load
     from grasp_fmus.build import planned
+    from grasp_fmus.description import Experiment
     from grasp_fmus.native.targets import targets as found
-    from grasp_fmus.proxy import build_proxy
+    from grasp_fmus.proxy import Original, build_proxy
 
     _check_other(fmu, out)
     interface = exchanged(fmu)
     signature, notes = link_signature(interface)
-    original = _original(interface, [v.name for v in signature.variables])
+    known = {v.name for v in signature.request}
+    original = Original(
+        interface.path.name,
+        [_variable(interface, interface.by_name[v.name], known) for v in signature.variables],
+        interface.units,
+        Experiment(*(None if v is None else float(v) for v in interface.experiment.values())),
+        interface.can_vary_step,
+    )
     try:
         plan = planned(found(targets), fmi)
         with during(f"building for {', '.join(t.tuple for t in plan.places)}"):
@@ -67,13 +148,19 @@ def write_peer_header(fmu: Path, out: Path) -> list[str]:
 
     InputError where the FMU does not permit it.
     """
+    from grasp_fmus.native.bench_header import bench_header
+
     _check_other(fmu, out)
     interface = exchanged(fmu)
+    signature, notes = link_signature(interface)
+    starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
+    known = {name: start for name, start in starts.items() if start is not None}
+    said = {v.name: v.description or "" for v in interface.variables}
     try:
-        write_text(out, _header(interface))
+        write_text(out, bench_header(interface.identifier, signature, known, said))
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
-    return link_signature(interface)[1]
+    return notes
 
 
 def _check_other(fmu: Path, out: Path) -> None:
@@ -83,33 +170,11 @@ def _check_other(fmu: Path, out: Path) -> None:
     check_file(out)
 
 
-def _header(interface: Interface) -> str:
-    """The C header of the peer."""
-    from grasp_fmus.native.bench_header import bench_header
-
-    signature, _ = link_signature(interface)
-    starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
-    known = {name: start for name, start in starts.items() if start is not None}
-    said = {v.name: v.description or "" for v in interface.variables}
-    return bench_header(interface.identifier, signature, known, said)
-
-
-def _original(interface: Interface, names: list[str]) -> Original:
-    """What a proxy has from the FMU; names are the variables to exchange, in order."""
-    from grasp_fmus.proxy import Original
-
-    known = {name for name in names if interface.by_name[name].causality != "output"}
-    return Original(
-        interface.path.name,
-        [_variable(interface, interface.by_name[name], known) for name in names],
-        interface.units,
-        Experiment(*(None if v is None else float(v) for v in interface.experiment.values())),
-        interface.can_vary_step,
-    )
-
-
 def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariable:
     """The variable in the proxy: an output follows inputs and parameters at the start only."""
+    from grasp_fmus.variable import Enumeration
+    from grasp_fmus.variable import Variable as ProxyVariable
+
     limits = (v.low, v.high)
     initially: tuple[str, ...] = ()
     if v.causality == "output":
@@ -124,7 +189,7 @@ def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariab
         v.unit or "",
         _start(v),
         v.variability,
-        None if all(map(math.isinf, limits)) else limits,
+        None if all(map(isinf, limits)) else limits,
         v.description or "",
         None if v.kind != "Real" or v.nominal == 1.0 else v.nominal,
         v.relative,

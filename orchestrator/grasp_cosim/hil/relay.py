@@ -4,18 +4,20 @@ Knows nothing of what is in a datagram. Every client has a socket of its own tow
 that the peer can tell them apart; the peer sees the addresses of these.
 """
 
+import csv
 import socket
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from ..base.columns import columns
 from ..base.errors import InputError
-from .address import Address, connected, is_loopback, resolved, text
-from .event_loop import EventLoop, received
-from .network import Direction, Network
-from .traffic import Counters, Held, Log, Traffic
+from .network import Counters, Direction, Entry, Log, Network, Traffic
+from .sockets import Address, EventLoop, connected, is_loopback, received, resolved, text
 
 MOST_CLIENTS = 16
 """Clients remembered; a further one takes the place of the one that was silent for longest."""
@@ -24,18 +26,12 @@ ANY = "0.0.0.0"  # noqa: S104  compared with, not listened on
 """Stands for all addresses of this machine."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Client:
-    address: Address
-    towards_peer: socket.socket
-
-
 class Relay(EventLoop):
     """Relays between its port and a peer while it runs; what is under way at the end stays so.
 
     InputError where host or peer have no IPv4 address, the port is taken, the peer is out of reach
     or is the relay itself. `log` gets an Entry per datagram, and one per copy; what it raises ends
-    the relay. `clock` gives ns.
+    the relay.
     """
 
     def __init__(
@@ -46,21 +42,21 @@ class Relay(EventLoop):
         host: str = "127.0.0.1",
         port: int = 0,
         log: Log | None = None,
-        clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         network = network or Network()
         self._seed = network.seed
-        self._traffic = Traffic[_Client](network, log)
-        self._clients: dict[Address, _Client] = {}
+        self._traffic = Traffic(network, log)
+        self._clients: dict[Address, socket.socket] = {}  # and their sockets towards the peer
         self.peer = resolved(*peer, lowest_port=1)
-        super().__init__((host, port), self._traffic.next_due, self._send_due, clock)
-        self._stack.callback(self._forget_clients)
+        host, port = resolved(host, port)
+        with connected(self.peer) as probe:
+            source, to = probe.getsockname()[0], probe.getpeername()
+        here = to[0] == source or is_loopback(to)
+        if here and to[1] == port and host in (ANY, to[0]):  # it would send to itself for ever
+            raise InputError(f"{text(self.peer)}: is the relay itself; must be the peer")
+        super().__init__((host, port), self._traffic.next_due, self._traffic.send_due)
+        self._stack.callback(lambda: [*map(self._forget, [*self._clients])])
         self.register(self.port_socket, self._request)
-        try:
-            self._refuse_itself()
-        except InputError:
-            self._stack.close()
-            raise
 
     @property
     def counters(self) -> dict[Direction, Counters]:
@@ -79,66 +75,65 @@ class Relay(EventLoop):
 
     def as_text(self) -> str:
         """Its counters as a table, a line for each direction."""
-        rows = {direction: asdict(c) for direction, c in self.counters.items()}
-        names = list(rows["request"])
-        lines = columns(
-            [["", *names], *([d, *(str(r[n]) for n in names)] for d, r in rows.items())]
-        )
-        return "\n".join(lines)
-
-    def _send_due(self, now: int) -> None:
-        while held := self._traffic.take(now):
-            self._traffic.settle(held, self._sent(held))
+        rows = [[d, *map(str, asdict(c).values())] for d, c in self.counters.items()]
+        return "\n".join(columns([["", *asdict(Counters())], *rows]))
 
     def _request(self) -> None:
         """Take one request, so that no client keeps others waiting."""
         if found := received(self.port_socket):
             data, address = found
-            self._traffic.receive("request", data, self._client(address), self._clock())
+            send = partial(_sent, self._towards_peer(address), data)
+            self._traffic.receive("request", send, time.monotonic_ns())
 
-    def _client(self, address: Address) -> _Client:
-        """The client of an address, new where it is; it becomes the one heard last."""
-        client = self._clients.pop(address, None)
-        if client is None:
+    def _reply(self, towards_peer: socket.socket, client: Address) -> None:
+        if found := received(towards_peer):
+            send = partial(_sent, self.port_socket, found[0], client)
+            self._traffic.receive("reply", send, time.monotonic_ns())
+
+    def _towards_peer(self, client: Address) -> socket.socket:
+        """The socket of a client, new where it is; it becomes the one heard last."""
+        if client in self._clients:
+            found = self._clients.pop(client)
+        else:
             if len(self._clients) == MOST_CLIENTS:
                 self._forget(next(iter(self._clients)))
-            client = _Client(address, connected(self.peer))
+            found = connected(self.peer)
+            self.register(found, lambda: self._reply(found, client))
+        self._clients[client] = found
+        return found
 
-            def reply() -> None:
-                if found := received(client.towards_peer):
-                    self._traffic.receive("reply", found[0], client, self._clock())
+    def _forget(self, client: Address) -> None:
+        towards_peer = self._clients.pop(client)
+        del self._handlers[towards_peer]
+        towards_peer.close()
 
-            self.register(client.towards_peer, reply)
-        self._clients[address] = client
-        return client
 
-    def _forget(self, address: Address) -> None:
-        client = self._clients.pop(address)
-        del self._handlers[client.towards_peer]
-        client.towards_peer.close()
+def _sent(via: socket.socket, data: bytes, client: Address | None = None) -> bool:
+    """Send a datagram, to the peer where there is no client; False where this machine refuses."""
+    try:
+        if client:
+            via.sendto(data, client)
+        else:
+            # A connected socket reports here that nobody took an earlier datagram, and does not
+            # send this one then. Asked for the error before, it has forgotten it.
+            via.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+            via.send(data)
+    except OSError:  # too large for the way, no route, no room; or its client was forgotten
+        return False
+    return True
 
-    def _forget_clients(self) -> None:
-        for address in list(self._clients):
-            self._forget(address)
 
-    def _sent(self, held: Held[_Client]) -> bool:
-        client = held.route
-        try:
-            if held.direction == "reply":
-                self.port_socket.sendto(held.data, client.address)
-            else:
-                # A connected socket reports here that nobody took an earlier datagram, and does not
-                # send this one then. Asked for the error before, it has forgotten it.
-                client.towards_peer.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-                client.towards_peer.send(held.data)
-        except OSError:  # too large for the way, no route, no room; or its client was forgotten
-            return False
-        return True
-
-    def _refuse_itself(self) -> None:
-        """InputError where the peer is the relay, which would send to itself for ever."""
-        with connected(self.peer) as probe:
-            source, peer = probe.getsockname()[0], probe.getpeername()
-        here = peer[0] == source or is_loopback(peer)
-        if here and peer[1] == self.address[1] and self.address[0] in (ANY, peer[0]):
-            raise InputError(f"{text(self.peer)}: is the relay itself; must be the peer")
+@contextmanager
+def csv_log(path: Path | None) -> Iterator[Log | None]:
+    """A log that writes a row of a CSV file for each entry; None without a path."""
+    if path is None:
+        yield None
+        return
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow(Entry._fields)
+            yield table.writerow
+    except OSError as error:
+        error.filename = error.filename or str(path)  # a full disk does not say where
+        raise

@@ -1,19 +1,24 @@
-"""A served FMU without its socket: it does what the requests of a proxy say, or its own clock."""
+"""An FMU that is served at a UDP port: it does what a proxy's requests say, or its own clock."""
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
-from grasp_fmus.link.message import END, INITIALISE, VERSION
+from grasp_fmus.link.message import END, INITIALISE, PORT, VERSION
 from grasp_fmus.link.peer import TOO_LONG, Peer, Request
 
 from ..base.errors import InputError, SimulationError, nearest
 from ..interface.interface import Interface, Value
 from ..system.parts import NANOSECONDS
 from .driven import DrivenFmu
-from .protocol import link_signature
+from .proxy import link_signature
+from .sockets import Address, EventLoop, received, text
 
 BACKLOG = 1_000_000_000
 """ns by which the FMU's own clock may be late; beyond that it goes on from now."""
+
+DEFAULT_ADDRESS: Address = ("127.0.0.1", PORT)
+"""The address that a proxy looks at if nobody says otherwise."""
 
 Say = Callable[[str], None]
 
@@ -22,14 +27,13 @@ Say = Callable[[str], None]
 class Service:
     """The way in which an FMU is served.
 
-    `lockstep`: step on request; else by an own clock, in steps of `step_ns` or of the length that
-    the proxy asks for. `watchdog_ns`: without a request for so long the inputs go to what
-    `failsafe` says, else to their start values; an FMU that steps on request then stands still.
-    `key` is the one shared with the proxy, if any.
+    `lockstep`: step on request; else by an own clock, in steps of the length that the proxy asks
+    for. `watchdog_ns`: without a request for so long the inputs go to what `failsafe` says, else to
+    their start values; an FMU that steps on request then stands still. `key` is the one shared with
+    the proxy, if any.
     """
 
     lockstep: bool = False
-    step_ns: int | None = None
     watchdog_ns: int = 100_000_000
     failsafe: Mapping[str, Value] = field(default_factory=dict)
     key: bytes | None = None
@@ -80,7 +84,6 @@ class ServedFmu:
             raise InputError(str(error)) from error
         self._failsafe = _failsafe(interface, self.peer, service.failsafe)
         self._fmu = DrivenFmu(interface, signature)
-        self._fmu.try_out()  # rather now than in the first session, where the proxy waits
         self._values: list[Value] = []
         self._in_session = False
         self._deadline: int | None = None  # of the next own step
@@ -88,8 +91,6 @@ class ServedFmu:
         self._heard: int | None = None  # the last request, while the watchdog watches
         self._own_failure = ""
         self._unsaid = dict(DROPPED)
-        self.over: Callable[[], bool] = lambda: False
-        """Says when to give up what takes long; whoever serves sets it."""
 
     def close(self) -> None:
         """End the session under way, and free the FMU."""
@@ -142,23 +143,17 @@ class ServedFmu:
         if request.kind == INITIALISE:
             self._fmu.initialise(request.time, request.values, request.fresh)
         elif self._service.lockstep:
-            self._fmu.step(request.time, request.step, request.values, self.over)
+            self._fmu.step(request.time, request.step, request.values)
         else:
-            step_ns = self._own_step(request.step)
+            if request.step * NANOSECONDS < 1.0:
+                raise SimulationError(
+                    f"step of {request.step!r} s: must be 1 ns or more, to be the own step"
+                )
             self._heard = now
-            self._fmu.begin()
             self._fmu.set(request.values)
             if self._deadline is None:
-                self._step_ns = step_ns
-                self._deadline = now + step_ns
-
-    def _own_step(self, asked: float) -> int:
-        """The step of the own clock in ns, where the proxy asks for one in s."""
-        if self._service.step_ns is not None:
-            return self._service.step_ns
-        if asked * NANOSECONDS < 1.0:
-            raise SimulationError(f"step of {asked!r} s: must be 1 ns or more, to be the own step")
-        return round(asked * NANOSECONDS)
+                self._step_ns = round(request.step * NANOSECONDS)
+                self._deadline = now + self._step_ns
 
     def look(self, now: int) -> None:
         """Do what is due by the own clock."""
@@ -166,15 +161,13 @@ class ServedFmu:
             if self._heard is not None and now - self._heard >= self._service.watchdog_ns:
                 self._heard = None
                 self.counts.watchdog += 1
-                self._say(
-                    f"no request for {self._service.watchdog_ns / 1e9:g} s: the inputs went to "
-                    "their failsafe values"
-                )
+                silence = self._service.watchdog_ns / NANOSECONDS
+                self._say(f"no request for {silence:g} s: the inputs went to their failsafe values")
                 for i, value in self._failsafe.items():
                     self._values[i] = value
                 self._fmu.set(self._values)
             if self._deadline is not None and now >= self._deadline:
-                self._fmu.advance(self._fmu.time, self._step_ns / NANOSECONDS, self.over)
+                self._fmu.advance(self._fmu.time, self._step_ns / NANOSECONDS)
                 self.counts.own_steps += 1
                 self._deadline += self._step_ns
                 if now - self._deadline > BACKLOG:
@@ -211,3 +204,35 @@ def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> 
         chosen = values.get(name, zero[interface.by_name[name].kind] if start is None else start)
         found[place] = interface.parse(f"failsafe {name}", name, chosen, text=True)
     return found
+
+
+class Server(EventLoop):
+    """Serves an FMU, which it closes in the end."""
+
+    def __init__(
+        self, fmu: ServedFmu, address: Address = ("127.0.0.1", 0), say: Say = lambda _: None
+    ) -> None:
+        """Bind the port, 0 for any that is free; InputError where that is not possible."""
+        self.fmu = fmu
+        self._say = say
+        super().__init__(address, fmu.due, fmu.look)
+        self._stack.callback(fmu.close)
+        self.register(self.port_socket, self._receive)
+
+    def serve(self, sessions: int | None = None) -> None:
+        """Serve until `stop`, or so many sessions."""
+        counts = self.fmu.counts
+        self.run(lambda: sessions is not None and counts.sessions >= sessions)
+
+    def _receive(self) -> None:
+        """Take one datagram: after it the clock is looked at again."""
+        found = received(self.port_socket)
+        if found is None:  # an answer found nobody
+            return
+        datagram, source = found
+        answer = self.fmu.answer(datagram, text(source), time.monotonic_ns())
+        try:
+            if answer is not None:
+                self.port_socket.sendto(answer, source)
+        except OSError as error:  # to the proxy it is a lost datagram
+            self._say(f"{text(source)}: not sent: {error.strerror or error}")

@@ -1,29 +1,20 @@
 """Steps that an FMU rejects: it discards them, or ends them early."""
 
-from collections.abc import Callable
-
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, OK, WARNING, Instance
 
 SMALLEST = 1024
 """A step that is rejected is divided down to this part of it, then the run fails."""
 
 
-def finish_step(
-    instance: Instance,
-    status: int,
-    begin: float,
-    end: float,
-    over: Callable[[], bool] = lambda: False,
-) -> float | None:
+def finish_step(instance: Instance, status: int, begin: float, end: float) -> float | None:
     """Bring an instance to end, in s, that rejected the step from begin to there.
 
     Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
     1/1024 of the step. The time in s where the FMU asked for the end of the simulation, else None.
-    SimulationError where that does not help, or `over` says that there is no time left for it.
+    SimulationError where that does not help.
     """
     if (ended := instance.the_end()) is not None:
         return ended
@@ -41,7 +32,7 @@ def finish_step(
             length = end - float(clock[0])
         elif (length := length / 2) < smallest or clock[0] + length == clock[0]:
             raise instance.failure(status, float(clock[0]))
-        status, length = _go_on(instance, clock, end, length, smallest, over)
+        status, length = _go_on(instance, clock, end, length, smallest)
         if status <= WARNING:
             return None
         if status not in (DISCARD, EARLY):
@@ -57,7 +48,6 @@ def _go_on(
     end: float,
     length: float,
     smallest: float,
-    over: Callable[[], bool],
 ) -> tuple[int, float]:
     """Steps of a length in s from the time in clock[0] to end, or to one that is rejected.
 
@@ -65,11 +55,6 @@ def _go_on(
     """
     status = OK
     while clock[0] < end and status <= WARNING:
-        if over():
-            name, time = instance.interface.path.name, float(clock[0])
-            raise SimulationError(
-                f"{name}: the end came at t = {time:.9g} s of a step to {end:.9g} s, in parts"
-            )
         length = min(length, end - float(clock[0]))
         status = instance.stepper(clock, length).python()
         if status <= WARNING:

@@ -11,7 +11,6 @@ from numbers import Integral
 from typing import Any
 
 from ..base.errors import InputError, SimulationError, nearest
-from ..base.higher import higher
 from ..base.interruption import interruptible, interrupts
 from ..base.numerals import counted
 from ..base.progress import DELAY, Progress, phase
@@ -33,7 +32,8 @@ from ..metrics.metric import (
 from ..realtime.pacer import Pacer
 from ..realtime.privileges import Privileges, privileges
 from ..recording.memory import EveryRow, MemoryListener
-from ..recording.result import Known, Result, of_proxies, proxy_figures
+from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
+from ..recording.result import Known, Result
 from ..system.description import System
 from ..system.native import needed_twins
 from ..system.parts import NANOSECONDS, Component, Port
@@ -297,8 +297,7 @@ class Session:
             return []
         kept = self._whole if self._whole and not self._whole.lost else self._memory
         time, columns = kept.columns()
-        lines: list[str] = higher("hil.figures").proxy_lines(time, columns, step)
-        return lines
+        return proxy_lines(time, columns, step)
 
     def _known(self) -> Known | None:
         """What is worked out of every step, where fewer rows are recorded."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,7 @@ from .arrow import ArrowListener
 from .csv import CsvListener
 from .frames import as_pandas, as_xarray
 from .mdf import MdfListener
+from .proxies import proxy_figures
 from .view import OF_ANY, View
 
 if TYPE_CHECKING:
@@ -348,19 +349,6 @@ def _in_words(metric: Metric, value: Any) -> str:
         for v in values
     ]
     return f"{metric.name} {', '.join(texts)} {metric.display_unit}".rstrip()
-
-
-def of_proxies(names: Iterable[object]) -> frozenset[str]:
-    """Those of the names of signals that are diagnostics of a proxy."""
-    return frozenset(str(name) for name in names if ".proxy." in str(name))
-
-
-def proxy_figures(time: npt.NDArray[np.float64], signals: Mapping[str, Any]) -> dict[str, Any]:
-    """The figures of the proxies of a run by component, if it has any."""
-    if not of_proxies(signals):
-        return {}
-    found: dict[str, Any] = higher("hil.figures").proxy_figures(time, signals)
-    return found
 
 
 def conversions_entry(to_si: Mapping[str, Conversion]) -> dict[str, Any]:

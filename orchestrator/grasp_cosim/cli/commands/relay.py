@@ -8,10 +8,9 @@ import click
 
 from ...base.errors import InputError
 from ...base.interruption import interrupts
-from ...hil.address import is_loopback, read_address, text
 from ...hil.network import DIRECTIONS, Conditions, Network, Outage
-from ...hil.relay import Relay
-from ...hil.traffic import csv_log
+from ...hil.relay import Relay, csv_log
+from ...hil.sockets import is_loopback, read_address, text
 from ..frame import PATH, json_option, say, show
 
 

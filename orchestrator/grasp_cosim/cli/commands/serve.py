@@ -5,10 +5,9 @@ from pathlib import Path
 import click
 
 from ...base.interruption import interrupts
-from ...hil.address import is_loopback, text
-from ...hil.protocol import LONGEST_SILENCE, exchanged, shared_key
-from ...hil.served import ServedFmu, Service
-from ...hil.server import DEFAULT_ADDRESS, Server
+from ...hil.proxy import LONGEST_SILENCE, exchanged, shared_key
+from ...hil.served import DEFAULT_ADDRESS, ServedFmu, Server, Service
+from ...hil.sockets import is_loopback, text
 from ...system.parts import in_nanoseconds
 from ..frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
 

@@ -1,6 +1,6 @@
 """The proxies of a run, from the diagnostics that they put out at every step."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,11 @@ _LISTED = 5
 
 _AHEAD = 10
 """Steps that a peer's clock may be ahead of the run without a word."""
+
+
+def of_proxies(names: Iterable[object]) -> frozenset[str]:
+    """Those of the names of signals that are diagnostics of a proxy."""
+    return frozenset(str(name) for name in names if ".proxy." in str(name))
 
 
 def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:

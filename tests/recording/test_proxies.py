@@ -1,7 +1,7 @@
 """What is said of the proxies of a run, from made-up diagnostics."""
 
 import numpy as np
-from grasp_cosim.hil.figures import proxy_figures, proxy_lines
+from grasp_cosim.recording.proxies import proxy_figures, proxy_lines
 
 TIME = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 
