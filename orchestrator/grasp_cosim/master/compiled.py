@@ -19,7 +19,7 @@ from ..base.calls import PYTHON, Native
 from ..base.errors import InputError
 from ..base.scratch import ScratchFolder
 from ..fmi.instance import EARLY
-from ..realtime import meter, pacer
+from ..realtime import pacer, timing
 from ..system.parts import NANOSECONDS
 from . import loop
 from .plan import Plan
@@ -221,7 +221,7 @@ def _constants() -> list[str]:
         **{n: getattr(shapes, n) for n in ("TRANSFER_2", "TRANSFER_3", "STEP_2", "STEP_3")},
         **{n: getattr(shapes, n) for n in ("CLOCK", "PACE")},
         "EARLY": EARLY,
-        **{n: getattr(meter, n) for n in ("ARRIVED", "LATE", "DUE", "BEGIN")},
+        **{n: getattr(timing, n) for n in ("ARRIVED", "LATE", "DUE", "BEGIN")},
         "SLICE": pacer.SLICE_NS,
         "NAP": round(pacer.NAP * NANOSECONDS),
         **{name.upper(): code for code, name in enumerate(ELEMENTS)},

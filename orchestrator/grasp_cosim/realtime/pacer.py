@@ -16,9 +16,8 @@ import numpy.typing as npt
 from ..base.calls import CLOCK, PACE, Call, Native
 from ..system.description import System
 from ..system.realtime import Realtime
-from .meter import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
 from .privileges import check_cpu
-from .timing import Timing
+from .timing import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table, Timing
 
 SPIN_NS = 200_000
 """Before the deadline the pacer does not sleep any more: it may be woken too late."""
@@ -192,7 +191,13 @@ class Pacer:
         Hands their rows on, which counts as recording.
         """
         self._taken = int(steps[-1])
-        self._timed(self._taken - 1, lambda: self._take(steps - 1, rows, hand_on))
+        start = self._now()
+        try:
+            self.meter.add(steps - 1, rows)
+            hand_on()
+        finally:
+            self._recording = self._now() - start
+            self.meter.recorded(self._taken - 1, self._recording)
 
     def record_aside(self, steps: Steps, rows: Table) -> None:
         """Take steps as record() does, from another thread than that of the steps."""
@@ -214,12 +219,6 @@ class Pacer:
         self._settle()
         return self.meter.verdict()
 
-    def _take(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
-        start = self._now()
-        self.meter.add(steps, rows)
-        hand_on()
-        self._recording = self._now() - start
-
     def _settle(self) -> None:
         if self._end is not None:
             self.meter.end(*self._end)
@@ -240,14 +239,6 @@ class Pacer:
             start = self._now()
             if self.spare(2 * spare / 3):
                 self.meter.recorded(step - 1, self._now() - start)
-
-    def _timed(self, step: int, action: Callable[[], None]) -> None:
-        """Do it, and count the time that takes as recording after that step."""
-        start = self._now()
-        try:
-            action()
-        finally:
-            self.meter.recorded(step, self._now() - start)
 
     def _arrive(self, step: int, now: int | None = None) -> tuple[int, int]:
         """The time now, and by how much the step before ended late; negative where it did not."""

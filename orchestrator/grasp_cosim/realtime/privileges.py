@@ -16,6 +16,19 @@ ONLINE = Path("/sys/devices/system/cpu/online")
 """The file in which Linux lists its CPUs, as in 0-3,6."""
 
 
+SCHEDULING = (
+    "needs CAP_SYS_NICE, or a limit of real-time priorities that is high enough "
+    "(ulimit -r, rtprio in /etc/security/limits.conf)"
+)
+LOCKING = (
+    "needs CAP_IPC_LOCK, or a limit of locked memory that is high enough "
+    "(ulimit -l, memlock in /etc/security/limits.conf)"
+)
+
+THROTTLE = Path("/proc/sys/kernel")
+"""The folder in which Linux limits the share of a period for threads of a real-time priority."""
+
+
 @dataclass(frozen=True)
 class Privileges:
     """A line for each that was asked for: those that were granted, and those that were not."""
@@ -49,18 +62,23 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
     """
     found = Privileges()
     with ExitStack() as stack:
-        stack.enter_context(_no_garbage_collection())
-        thread = threading.get_native_id()
+        gc.collect()  # now, and then not before the end: it would take too long on the way
+        gc.freeze()
+        stack.callback(gc.unfreeze)
+        if gc.isenabled():
+            stack.callback(gc.enable)
+        gc.disable()
+        thread, there = threading.get_native_id(), cpus()
+        cpu, priority = realtime.cpu, realtime.priority
         wanted: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
-        if realtime.cpu is not None:
-            there = cpus()
+        if cpu is not None:
             remedy = f"must be one of {choices(there)}" if there else ""
-            wanted.append((f"CPU {realtime.cpu}", partial(pin, thread, realtime.cpu), remedy))
+            wanted.append((f"CPU {cpu}", partial(pin, thread, cpu), remedy))
         if realtime.lock_memory:
             wanted.append(("memory locked", lock_memory, LOCKING))
-        if realtime.priority is not None:
-            name = f"SCHED_FIFO, priority {realtime.priority}"
-            wanted.append((name, partial(put_first, thread, realtime.priority), SCHEDULING))
+        if priority is not None:
+            name = f"SCHED_FIFO, priority {priority}"
+            wanted.append((name, partial(put_first, thread, priority), SCHEDULING))
         for name, ask, remedy in wanted:
             try:
                 stack.callback(ask())
@@ -70,23 +88,9 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
                 found.refused.append(f"{name}: {error.strerror}; {remedy}")
             else:
                 found.granted.append(name)
-        if realtime.priority is not None and not sleeps:
+        if priority is not None and not sleeps:
             found.refused.extend(_throttled())
         yield found
-
-
-SCHEDULING = (
-    "needs CAP_SYS_NICE, or a limit of real-time priorities that is high enough "
-    "(ulimit -r, rtprio in /etc/security/limits.conf)"
-)
-LOCKING = (
-    "needs CAP_IPC_LOCK, or a limit of locked memory that is high enough "
-    "(ulimit -l, memlock in /etc/security/limits.conf)"
-)
-
-
-THROTTLE = Path("/proc/sys/kernel")
-"""The folder in which Linux limits the share of a period for threads of a real-time priority."""
 
 
 def _throttled() -> list[str]:
@@ -104,18 +108,3 @@ def _throttled() -> list[str]:
         f"such a thread for {(period - allowed) / 1e3:g} ms in every {period / 1e3:g} ms; "
         "sysctl kernel.sched_rt_runtime_us=-1 lifts that, or run without a priority"
     ]
-
-
-@contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    """Collect garbage now, and then not before the end: it would take too long on the way."""
-    collecting = gc.isenabled()
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-        if collecting:
-            gc.enable()
