@@ -1,9 +1,7 @@
 """The observed order of results over steps."""
 
 import pytest
-from grasp_cosim.sweeps.convergence import convergence, is_study, observed_order
-from grasp_cosim.sweeps.table import Table
-from grasp_cosim.sweeps.words import as_text
+from grasp_cosim.sweeps.table import Table, as_text, convergence, is_study, observed_order
 from hypothesis import given
 from hypothesis import strategies as st
 

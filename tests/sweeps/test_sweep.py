@@ -12,9 +12,8 @@ from types import SimpleNamespace
 import pytest
 from grasp_cosim import InputError, sweep
 from grasp_cosim.metrics.metric import load_metrics
-from grasp_cosim.sweeps.cluster import cluster
 from grasp_cosim.sweeps.rows import grid
-from grasp_cosim.sweeps.run import Task, packed, run_packed, run_row
+from grasp_cosim.sweeps.sweep import Task, cluster, packed, run_packed, run_row
 from support.integrator import integrator, write_integrator
 from support.native_fmus import needs_gcc
 from support.processes import ends
@@ -97,7 +96,7 @@ ARGUMENTS = ["sweep", "system.toml", "--vary", f"a.gain=1:2:{RUNS}", "--metrics"
 PROGRAM = """
 import os, signal, sys
 from grasp_cosim.cli import entry
-from grasp_cosim.sweeps.store import Store
+from grasp_cosim.sweeps.sweep import Store
 
 keep, kept = Store.keep, []
 
@@ -179,7 +178,7 @@ def test_kept_runs_are_bound_to_what_they_are_of(system, mine, tmp_path):
 
 
 def test_two_at_a_time_are_refused(system, mine, tmp_path):
-    from grasp_cosim.sweeps.store import opened
+    from grasp_cosim.sweeps.sweep import opened
 
     with opened(tmp_path / "t.csv.rows", "x"), pytest.raises(InputError, match="another process"):
         sweep(system, [{"a.gain": 1.0}], metrics=mine, out=tmp_path / "t.csv", workers=1)

@@ -7,8 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.sweeps.run import Outcome
-from grasp_cosim.sweeps.table import Table, made
+from grasp_cosim.sweeps.table import Outcome, Table, made
 
 
 @metric("reach", unit="m", entries=("left", "right"), factor=1e3, shown_unit="mm")

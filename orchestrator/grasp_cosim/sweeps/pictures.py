@@ -42,10 +42,8 @@ def draw_sweep(
         raise InputError(f"{path or 'sweep'}: nothing to draw; no run has a metric")
     if len(numbers) == 1:
         figure = _curves(table, numbers[0], metrics)
-    elif len(numbers) == 2:
-        figure = _maps(table, numbers[0], numbers[1], metrics)
     else:
-        figure = _distributions(table, metrics)
+        figure = _each_column(table, numbers, metrics)
     said = f"{counted(len(table), 'run')}, {len(table.errors)} of them failed"
     headed(figure, Caption(title or f"Sweep of {', '.join(table.varied)}", said))
     return kept(figure, None if path is None else Path(path))
@@ -65,20 +63,26 @@ def _curves(table: Table, over: str, metrics: Sequence[Metric]) -> Figure:
     return figure
 
 
-def _maps(table: Table, x: str, y: str, metrics: Sequence[Metric]) -> Figure:
-    """A panel for each column of the metrics: cells where the runs are a grid, else points."""
+def _each_column(table: Table, numbers: Sequence[str], metrics: Sequence[Metric]) -> Figure:
+    """A panel for each column of the metrics: a map over two numbers, else a histogram."""
     columns = [c for m in metrics for c in m.columns if c in table.metrics][:MOST]
     figure, panels = _grid(len(columns))
     for axes, column in zip(panels, columns, strict=True):
-        drawn = _map(axes, table, x, y, column)
-        axes.set_xlabel(_label(table, x))
-        axes.set_ylabel(_label(table, y))
-        figure.colorbar(drawn, ax=axes, label=_label(table, column))
+        values = table.shown(column)[1] * table[column]
+        if len(numbers) == 2:
+            drawn = _map(axes, table, numbers[0], numbers[1], values)
+            axes.set_xlabel(_label(table, numbers[0]))
+            axes.set_ylabel(_label(table, numbers[1]))
+            figure.colorbar(drawn, ax=axes, label=_label(table, column))
+        else:
+            axes.hist(values[np.isfinite(values)], bins="auto", color=BLUE)
+            finish(axes, "runs", legend=False)
+            axes.set_xlabel(_label(table, column))
     return figure
 
 
-def _map(axes: Axes, table: Table, x: str, y: str, column: str) -> Any:
-    values = table.shown(column)[1] * table[column]
+def _map(axes: Axes, table: Table, x: str, y: str, values: Any) -> Any:
+    """Cells where the runs are a grid, else points."""
     norm = _norm(values)
     across, along = np.unique(table[x]), np.unique(table[y])
     if len(across) * len(along) != len(table):
@@ -98,18 +102,6 @@ def _norm(values: Any) -> Any:
         return Normalize(0.0, 1.0)
     low, high = there.min(), there.max()
     return (LogNorm if 0.0 < low < high * 10.0**-DECADES else Normalize)(low, high)
-
-
-def _distributions(table: Table, metrics: Sequence[Metric]) -> Figure:
-    """A histogram for each column of the metrics."""
-    columns = [c for m in metrics for c in m.columns if c in table.metrics][:MOST]
-    figure, panels = _grid(len(columns))
-    for axes, column in zip(panels, columns, strict=True):
-        values = table.shown(column)[1] * table[column]
-        axes.hist(values[np.isfinite(values)], bins="auto", color=BLUE)
-        finish(axes, "runs", legend=False)
-        axes.set_xlabel(_label(table, column))
-    return figure
 
 
 def _grid(count: int) -> tuple[Figure, list[Axes]]:

@@ -93,15 +93,15 @@ def read_rows(path: Path) -> list[dict[str, Value]]:
     except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
         said = f"--table {path}: {reason(error)}"
         raise InputError(f"{said}; must be a CSV file whose first line has names") from error
-    columns = [_column(path, title.strip()) for title in head]
+    columns = [_column(f"--table {path}: column", title.strip()) for title in head]
     rows = []
     for number, line in enumerate(lines, 2):
         if len(line) not in (0, len(head)):
             raise InputError(
                 f"--table {path}: line {number} has {len(line)} cells; must be {len(head)}"
             )
-        cells = zip(columns, line, strict=False)
-        rows.append({p: _in_si(plain(c.strip()), to_si) for (p, to_si), c in cells if c.strip()})
+        cells = zip(columns, map(str.strip, line), strict=False)
+        rows.append({p: _converted(plain(text), to_si) for (p, to_si), text in cells if text})
     return [row for row in rows if row]
 
 
@@ -110,9 +110,12 @@ def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
 
     InputError where a unit is not defined, or the first row does not fit the system.
     """
-    places = dict.fromkeys(place for row in rows for place in row)
-    changes = {place: _to_si(system, place) for place in places}
-    found = [{p: _from_si(v, changes[p]) for p, v in row.items()} for row in rows]
+    back: dict[str, Any] = {}
+    for place in dict.fromkeys(place for row in rows for place in row):
+        port = _port(system, place)
+        to_si = parameter_in_si(system, place, port) if port else IDENTITY
+        back[place] = IDENTITY if to_si == IDENTITY else to_si.back
+    found = [{p: _converted(v, back[p]) for p, v in row.items()} for row in rows]
     system.with_settings(found[0], "sweep: {}".format)
     return found
 
@@ -130,13 +133,13 @@ def unit_of(system: System, place: str) -> str | None:
     return variable.unit if unit is None or unit.si else unit.base
 
 
-def _column(path: Path, title: str) -> tuple[str, Conversion]:
-    place, bracket, name = title.partition(" [")
-    name = name.removesuffix("]") if bracket else ""
+def _column(where: str, title: str) -> tuple[str, Conversion]:
+    place, _, name = title.partition(" [")
+    name = name.removesuffix("]")
     unit = known_unit(name) if name else None
     if name and unit is None:
-        raise InputError(f"--table {path}: column {title!r}: {name!r} is no known unit")
-    return place, Conversion(unit.factor, unit.offset) if unit else IDENTITY
+        raise InputError(f"{where} {title!r}: {name!r} is no known unit")
+    return place, Conversion(unit.factor, unit.offset) if unit and not unit.si else IDENTITY
 
 
 def _number(value: Any) -> Value | None:
@@ -146,17 +149,9 @@ def _number(value: Any) -> Value | None:
     return None if missing else plain_value
 
 
-def _in_si(value: Value, to_si: Conversion) -> Value:
-    return value if to_si == IDENTITY else to_si(float(value))
-
-
-def _from_si(value: Value, to_si: Conversion) -> Value:
-    return value if to_si == IDENTITY else to_si.back(float(value))
-
-
-def _to_si(system: System, place: str) -> Conversion:
-    port = _port(system, place)
-    return parameter_in_si(system, place, port) if port else IDENTITY
+def _converted(value: Value, change: Any) -> Value:
+    changed: Value = value if change is IDENTITY else change(float(value))
+    return changed
 
 
 def _port(system: System, place: str) -> Port | None:

@@ -1,10 +1,16 @@
-"""A table of runs: what varied and what came out, with the unit of each column; CSV and Parquet."""
+"""A table of runs: what varied and what came out, with the unit of each column.
+
+As CSV and Parquet, as text and JSON. Of a study of the step size it says how metrics tend to those
+of the finest step: three results with steps h1 < h2 < h3 that err by C h^p determine p (Roache,
+Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Engineering
+116(3), 1994).
+"""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +19,12 @@ import numpy.typing as npt
 from one_piece import in_one_piece
 
 from ..base.checks import extra_module
+from ..base.columns import columns
 from ..base.errors import InputError, nearest
+from ..base.numerals import counted, significant
+from ..interface.interface import Value
 from ..metrics.metric import Metric
 from .rows import Row
-from .run import Outcome
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,6 +33,20 @@ STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
 """The statistics of a metric, besides how many runs have one."""
 
 SUFFIXES = (".csv", ".parquet")
+
+STEP = "experiment.step"
+
+LOWEST, HIGHEST = 0.25, 4.0
+"""Orders outside are none: the results do not settle, or what is seen is noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of the run with an index: the metrics by column, or the error, one line."""
+
+    index: int
+    metrics: Mapping[str, Value | None]
+    error: str | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +93,15 @@ class Table:
         """For each metric: how many runs have a finite one, its least and greatest, its mean, and
         the values below which 5 %, 50 % and 95 % lie.
         """
-        return {name: _summarized(self[name]) for name in self.metrics}
+        found: dict[str, dict[str, float | int | None]] = {}
+        for name in self.metrics:
+            there = self[name][np.isfinite(self[name])]
+            found[name] = {"runs": len(there), **dict.fromkeys(STATISTICS)}
+            if len(there):
+                middle = np.percentile(there, (5.0, 50.0, 95.0))
+                values = (there.min(), *middle, there.max(), there.mean())
+                found[name] |= zip(STATISTICS, map(float, values), strict=True)
+        return found
 
     def to_pandas(self) -> pd.DataFrame:
         """The table as a DataFrame, with the units in its `attrs`; InputError without pandas."""
@@ -161,9 +191,103 @@ def _array(arrow: Any, name: str, column: Sequence[Any]) -> Any:
     return arrow.array(numbers, type=arrow.float64())
 
 
-def _summarized(values: npt.NDArray[np.float64]) -> dict[str, float | int | None]:
-    there = values[np.isfinite(values)]
-    if not len(there):
-        return {"runs": 0, **dict.fromkeys(STATISTICS)}
-    found = (there.min(), *np.percentile(there, (5.0, 50.0, 95.0)), there.max(), there.mean())
-    return {"runs": len(there), **dict(zip(STATISTICS, map(float, found), strict=True))}
+@dataclass(frozen=True, slots=True)
+class Convergence:
+    """How far a metric is from that of the finest step, for each of the coarser `steps` in s.
+
+    errors and finest are in the metric's SI unit, None where a run has no value. order is that of
+    the three finest steps; None where they show none, or there are fewer.
+    """
+
+    steps: tuple[float, ...]
+    finest: float | None
+    errors: tuple[float | None, ...]
+    order: float | None
+
+
+def is_study(table: Table) -> bool:
+    """True if the communication step is all that varies, and there are several."""
+    return table.varied == (STEP,) and len(set(table.columns[STEP])) == len(table) > 1
+
+
+def convergence(table: Table) -> Mapping[str, Convergence]:
+    """How each metric of a study of the step tends to that of the finest, by column."""
+    rising = np.argsort(table[STEP])
+    steps = table[STEP][rising]
+    found = {}
+    for name in table.metrics:
+        values = [None if np.isnan(v) else float(v) for v in table[name][rising]]
+        finest = values[0]
+        errors = tuple(None if v is None or finest is None else v - finest for v in values[1:])
+        order = observed_order(steps[:3].tolist(), values[:3]) if len(steps) > 2 else None
+        found[name] = Convergence(tuple(map(float, steps[1:])), finest, errors, order)
+    return found
+
+
+def observed_order(steps: Sequence[float], results: Sequence[float | None]) -> float | None:
+    """The p of three results that err by C h^p, for rising steps h in s.
+
+    None where there is none from LOWEST to HIGHEST.
+    """
+    y_1, y_2, y_3 = results
+    if y_1 is None or y_2 is None or y_3 is None or y_2 == y_1:
+        return None
+    h_1, h_2, h_3 = (h / steps[0] for h in steps)
+
+    def excess(p: float) -> float:
+        """Of (h3^p - h2^p) / (h2^p - h1^p), which rises with p, over what was seen."""
+        ratio: float = (h_3**p - h_2**p) / (h_2**p - h_1**p)
+        return ratio - (y_3 - y_2) / (y_2 - y_1)
+
+    if not excess(LOWEST) <= 0.0 <= excess(HIGHEST):
+        return None
+    from scipy.optimize import brentq  # only here: it takes time to load
+
+    return float(brentq(excess, LOWEST, HIGHEST))
+
+
+def as_json(table: Table) -> dict[str, Any]:
+    """The object of `sweep --json`: the summary of each metric, and the orders of a study."""
+    study = convergence(table) if is_study(table) else {}
+    return {
+        "runs": len(table),
+        "failed": len(table.errors),
+        "errors": {str(i): text for i, text in table.errors.items()},
+        "varied": list(table.varied),
+        "metrics": table.summary(),
+        "convergence": {name: asdict(c) for name, c in study.items()},
+        "units": dict(table.units),
+    }
+
+
+def as_text(table: Table) -> str:
+    """How many runs there are, what failed, and a line for each metric."""
+    lines = [f"{counted(len(table), 'run')}, {len(table.errors)} failed"]
+    for index, error in list(table.errors.items())[:1]:
+        lines.append(f"the first that failed, {index}: {error}")
+    if is_study(table):
+        return "\n".join([*lines, *_study_lines(table)])
+    rows = [["", "", "runs", *STATISTICS]]
+    for name, row in table.summary().items():
+        title, factor, unit = table.shown(name)
+        numbers = [_scaled(row[head], factor) for head in STATISTICS]
+        rows.append([title, unit, str(row["runs"]), *numbers])
+    return "\n".join([*lines, *columns(rows, (0, 1))])
+
+
+def _study_lines(table: Table) -> list[str]:
+    """The errors of each metric against the finest step, by step, and the observed order."""
+    found = convergence(table)
+    first = next(iter(found.values()))
+    finest = 1e3 * min(table["experiment.step"])
+    heads = [f"{1e3 * step:.4g} ms" for step in first.steps]
+    rows = [[f"error against {finest:g} ms", "", "value", *heads, "order"]]
+    for name, c in found.items():
+        title, factor, unit = table.shown(name)
+        numbers = [_scaled(x, factor) for x in (c.finest, *c.errors)]
+        rows.append([title, unit, *numbers, significant(c.order, 3, "-")])
+    return columns(rows, (0, 1))
+
+
+def _scaled(value: float | None, factor: float) -> str:
+    return significant(None if value is None else factor * value, 4, "-")

@@ -8,14 +8,12 @@ import click
 
 from ...base.errors import InputError
 from ...interface.interface import Value
-from ...sweeps.cluster import cluster
 from ...sweeps.pictures import draw_sweep
 from ...sweeps.rows import as_rows, grid, varied
-from ...sweeps.sweep import kept_runs
+from ...sweeps.sweep import cluster, kept_runs
 from ...sweeps.sweep import sweep as run_sweep
-from ...sweeps.table import check_format
-from ...sweeps.words import as_json as in_json
-from ...sweeps.words import as_text
+from ...sweeps.table import as_json as in_json
+from ...sweeps.table import as_text, check_format
 from ..frame import (
     INTERRUPTED,
     NEGATIVE,
