@@ -77,7 +77,6 @@ def test_names_of_the_gaps_that_need_no_check(plant, pair, turned):
         (("gapA", "gapB"), "which is 1, which 2"),
         (("distanceToWall1", "distanceToWall2"), "by its name"),
         (("gapOne", "gapTwo"), "which is 1, which 2"),
-        (("gapr", "gapl"), "which is 1, which 2"),
         (("surfaceDistance1", "surfaceDistance2"), "by its description"),
     ],
 )
@@ -95,13 +94,8 @@ def test_a_description_is_to_be_checked(plant):
     assert {m.doubt for m in chosen.values()} == {"by its description"}
 
 
-def test_the_only_ones_of_a_unit_are_to_be_checked(plant):
-    chosen = found(plant, output("alpha", "mm/s"), output("beta", "mm/s"), output("n1", "mm/s"))
-    assert chosen == {}
-    pair = [output(f"rate{j}", "mm/s") for j in (1, 2)]
-    speed = found(plant, *pair)
-    assert [m.variable.name for m in speed.values()] == ["rate1", "rate2"]
-    assert {m.doubt for m in speed.values()} == {"the only one of its unit and type"}
+def test_by_its_unit_alone_nothing_is_found(plant):
+    assert found(plant, output("rate1", "mm/s"), output("rate2", "mm/s")) == {}
 
 
 def test_unit_type_and_causality_decide(plant):

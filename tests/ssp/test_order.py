@@ -4,7 +4,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
-from grasp_cosim.ssp.execution_order import flow_order
+from grasp_cosim.ssp.decisions import flow_order
 from hypothesis import given
 from hypothesis import strategies as st
 

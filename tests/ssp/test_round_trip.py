@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.ssp.archive import Notes
 from grasp_cosim.ssp.document import parse
-from grasp_cosim.ssp.remarks import Notes
 from grasp_cosim.ssp.to_archive import SET, write_ssp
 from grasp_cosim.system.parts import (
     Component,

@@ -8,7 +8,7 @@ that are taken have the greatest sum of scores (scipy.optimize.linear_sum_assign
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from typing import NamedTuple
@@ -17,27 +17,28 @@ import numpy as np
 
 from ..interface.interface import Interface, Variable
 
-CERTAIN = 1.0
-"""From this score of a name on it needs no check."""
-
 LEAST = 0.3
 """Below this score nothing is proposed."""
 
 OF_UNIT = 0.3
-"""The score of units that convert, on top of that of the names."""
+"""The score of units that convert, on top of that of the names, of which 1 needs no check."""
 
-_SIDES = (
-    (("right", "left"), True),
-    (("r", "l"), True),
-    (("rh", "lh"), True),
-    (("first", "second"), False),
-    (("one", "two"), False),
-    (("a", "b"), False),
-)
-"""Words for 1 and 2; if that needs no check."""
+_NUMBERS = {
+    "right": 1,
+    "r": 1,
+    "rh": 1,
+    "one": 1,
+    "a": 1,
+    "left": 2,
+    "l": 2,
+    "lh": 2,
+    "two": 2,
+    "b": 2,
+}
+"""Words for 1 and 2."""
 
-_GLUED = ("r", "l")
-"""Letters for 1 and 2 at the end of a word, as in gapr and gapl."""
+_UNSURE = ("one", "two", "a", "b")
+"""Those of which which is which needs a check."""
 
 _SAME = {
     "gap": "distance dist clearance separation spacing proximity",
@@ -86,120 +87,74 @@ class _Reading(NamedTuple):
     many: int = 1
 
 
-class _Score(NamedTuple):
-    """How much a variable is like another, from 0 on, and why that is to be checked."""
+Score = tuple[float, str]
+"""How much a variable is like another, from 0 on, and why that is to be checked."""
 
-    value: float
-    doubt: str
-
-
-NOTHING = _Score(0.0, "")
+NOTHING: Score = (0.0, "")
 
 
 def matches(ours: Interface, wanted: Collection[str], theirs: Interface) -> dict[str, Match]:
     """For variables of ours, by name, those of another FMU that are meant; each at most once.
 
-    None where two are as much alike as each other, and by its unit alone only where all of an
-    array are found so.
+    None where two are as much alike as each other.
     """
-    left, others = [*_usable(ours)], [*_usable(theirs)]
-    read = _readings(left), _readings(others)
-    scores = [
-        [_score(ours, v, read[0][v.name][-1:], theirs, w, read[1][w.name]) for w in others]
-        for v in left
-    ]
-    values = np.array([[score.value for score in row] for row in scores]).reshape(
-        len(left), len(others)
-    )
-    found = {
-        left[i].name: Match(others[j], scores[i][j].doubt)
-        for i, j in _assigned(values)
-        if values[i, j] >= LEAST and _is_alone(values, i, j)
-    }
-    return {n: m for n, m in _whole(left, found).items() if n in wanted}
-
-
-def _assigned(values: np.ndarray) -> Iterator[tuple[int, int]]:
-    """The pairs with the greatest sum."""
     from scipy.optimize import linear_sum_assignment  # only here: it takes time to load
 
-    yield from zip(
-        *map(np.ndarray.tolist, linear_sum_assignment(values, maximize=True)), strict=True
-    )
+    left, others = _usable(ours), _usable(theirs)
+    mine, its = _readings(left), _readings(others)
+    scores = [
+        [_score(ours, v, mine[v.name][-1], theirs, w, its[w.name]) for w in others] for v in left
+    ]
+    values = np.array([[score[0] for score in row] for row in scores])
+    values = values.reshape(len(left), len(others))
+    found = {}
+    for i, j in zip(*linear_sum_assignment(values, maximize=True), strict=True):
+        same = np.isclose(values, values[i, j])
+        alone = same[i].sum() + same[:, j].sum() == 2
+        if left[i].name in wanted and values[i, j] >= LEAST and alone:
+            found[left[i].name] = Match(others[j], scores[i][j][1])
+    return found
 
 
-def _is_alone(values: np.ndarray, i: int, j: int) -> bool:
-    """True if nothing else is as much alike."""
-    same = np.isclose(values, values[i, j])
-    return int(same[i].sum() + same[:, j].sum()) == 2
-
-
-def _whole(left: Iterable[Variable], found: Mapping[str, Match]) -> dict[str, Match]:
-    """Without what only its unit tells, unless all of its name but the number are found so."""
-    stems = {v.name: _words(v.name) for v in left}
-    several = {n: [m for m in stems if _stem(stems[m]) == _stem(stems[n])] for n in found}
-    return {
-        name: match
-        for name, match in found.items()
-        if match.doubt != BY_UNIT or all(other in found for other in several[name])
-    }
-
-
-BY_UNIT = "the only one of its unit and type"
-
-
-def _stem(words: Iterable[str]) -> tuple[str, ...]:
-    return tuple(w for w in words if not w.isdigit())
-
-
-def _usable(interface: Interface) -> Iterator[Variable]:
+def _usable(interface: Interface) -> list[Variable]:
     """The variables that can be connected, set or recorded."""
-    for v in interface.of("input", "output", "parameter"):
-        if v.supported and not v.alias:
-            yield v
+    variables = interface.of("input", "output", "parameter")
+    return [v for v in variables if v.supported and not v.alias]
 
 
 def _score(
-    ours: Interface, v: Variable, mine: Iterable[_Reading], theirs: Interface, w: Variable,
+    ours: Interface, v: Variable, mine: _Reading, theirs: Interface, w: Variable,
     readings: Iterable[_Reading],
-) -> _Score:  # fmt: skip
-    """The best score of two variables over the ways to read their names."""
+) -> Score:  # fmt: skip
+    """The best score of two variables over the ways to read the name of the second."""
     units = ours.unit(v), theirs.unit(w)
     if (v.kind, v.causality) != (w.kind, w.causality):
         return NOTHING
     if units[0] and units[1] and not units[0].measures(units[1]):
         return NOTHING
     known = bool(units[0] and units[1]) or v.kind != "Real"
-    pairs = ((a, b) for a in mine for b in readings if (a.number, a.many) == (b.number, b.many))
-    found = (_of_names(a, b, v, w, known) for a, b in pairs)
-    return max(found, key=lambda s: (s.value, not s.doubt), default=NOTHING)
+    fitting = (r for r in readings if (r.number, r.many) == (mine.number, mine.many))
+    found = (_of_names(mine, reading, v, w, known) for reading in fitting)
+    return max(found, key=lambda s: (s[0], not s[1]), default=NOTHING)
 
 
-def _of_names(a: _Reading, b: _Reading, v: Variable, w: Variable, known: bool) -> _Score:
+def _of_names(a: _Reading, b: _Reading, v: Variable, w: Variable, known: bool) -> Score:
     """The score of two readings; `known` says that their units, or types, speak for it."""
     meant, other = _meaning(a.words), _meaning(b.words)
     more = OF_UNIT if known else 0.0
     unsure = "" if b.certain else "which is 1, which 2"
     if _plural(a.words) == _plural(b.words):
-        return _Score(1.1 + more, unsure)
+        return 1.1 + more, unsure
     if meant == other:
-        return _Score(CERTAIN + more, unsure)
-    symbol = _symbol(v) == "".join(word for word in b.words if word not in _NOISE)
-    if symbol:
-        return _Score(0.95 + more, unsure if known else "by its name")
+        return 1.0 + more, unsure
+    if _symbol(v) == "".join(word for word in b.words if word not in _NOISE):
+        return 0.95 + more, unsure if known else "by its name"
     name = 0.7 * SequenceMatcher(None, sorted(meant), sorted(other)).ratio()
-    told = [m for m, of in ((meant, w), (other, v)) if m <= _told(of)]
+    told = [m for m, of in ((meant, w), (other, v)) if m <= _meaning(_words(of.description or ""))]
     text = max((0.3 + 0.1 * len(m) for m in told), default=0.0)
-    if max(name, text) > 0.0:
-        doubt = "by its name" if name >= text else "by its description"
-        return _Score(max(name, text) + more, doubt)
-    means_another = bool(other & _SAME.keys())
-    return NOTHING if means_another else _Score(more, BY_UNIT)
-
-
-def _told(v: Variable) -> frozenset[str]:
-    """The words of a description, by their meaning."""
-    return _meaning(_words(v.description or ""))
+    if name == text == 0.0:
+        return NOTHING
+    return max(name, text) + more, "by its name" if name >= text else "by its description"
 
 
 def _symbol(v: Variable) -> str:
@@ -217,22 +172,33 @@ def _readings(variables: Collection[Variable]) -> dict[str, list[_Reading]]:
     numbered = {v.name: [*_numbered(v)] for v in variables}
     numbers: dict[str, set[int]] = {}
     for found in numbered.values():
-        for rest, reading in found:
-            numbers.setdefault(rest, set()).add(reading.number or 0)
+        for rest, number, _ in found:
+            numbers.setdefault(rest, set()).add(number)
 
-    def meant(rest: str, reading: _Reading) -> _Reading:
-        least, many = min(numbers[rest]), len(numbers[rest])
-        if least:
-            return reading._replace(many=many)
-        return reading._replace(number=(reading.number or 0) + 1, certain=False, many=many)
+    def readings(v: Variable) -> Iterator[_Reading]:
+        words = _words(v.name)
+        yield _Reading(words, None, True)
+        for rest, number, certain in numbered[v.name]:
+            from_0, many = 0 in numbers[rest], len(numbers[rest])
+            if many > 1:
+                words = _words(v.name if rest.startswith("text: ") else rest)
+                yield _Reading(words, number + from_0, certain and not from_0, many)
 
-    return {
-        v.name: [
-            _Reading(_words(v.name), None, True),
-            *(meant(rest, r) for rest, r in numbered[v.name] if len(numbers[rest]) > 1),
-        ]
-        for v in variables
-    }
+    return {v.name: [*readings(v)] for v in variables}
+
+
+def _numbered(variable: Variable) -> Iterator[tuple[str, int, bool]]:
+    """The numbers in a name or description: what is left of that, the number, if it is for sure."""
+    name, text = variable.name, variable.description or ""
+    for match in _WORD.finditer(text):
+        if number := _NUMBERS.get(match[0].lower()):
+            yield f"text: {text[: match.start()]} {text[match.end() :]}", number, False
+    for match in _WORD.finditer(name):
+        word, rest = match[0].lower(), f"{name[: match.start()]} {name[match.end() :]}"
+        if number := _NUMBERS.get(word):
+            yield rest, number, word not in _UNSURE
+        if word.isdecimal() and len(word) < 6:
+            yield rest, int(word), True
 
 
 def candidates(
@@ -258,26 +224,6 @@ def _may_be(variable: Variable, other: Variable) -> bool:
     """False where the name of another variable, of no unit, is that of another quantity."""
     ours, theirs = (_meaning(_words(v.name)) & _SAME.keys() for v in (variable, other))
     return not theirs or bool(ours & theirs) or not ours
-
-
-def _numbered(variable: Variable) -> Iterator[tuple[str, _Reading]]:
-    """The ways to read a name or description as a numbered one, after what is left of it."""
-    name, text = variable.name, variable.description or ""
-    for match in _WORD.finditer(text):
-        for sides, _ in _SIDES:
-            if (word := match[0].lower()) in sides:
-                said = f"{text[: match.start()]} {text[match.end() :]}"
-                yield f"text: {said}", _Reading(_words(name), 1 + sides.index(word), False)
-    for match in _WORD.finditer(name):
-        word, rest = match[0].lower(), f"{name[: match.start()]} {name[match.end() :]}"
-        if len(word) > 1 and word[-1] in _GLUED:
-            glued = f"{name[: match.end() - 1]} {name[match.end() :]}"
-            yield glued, _Reading(_words(glued), 1 + _GLUED.index(word[-1]), False)
-        for sides, certain in _SIDES:
-            if word in sides:
-                yield rest, _Reading(_words(rest), 1 + sides.index(word), certain)
-        if word.isdecimal() and len(word) < 6:
-            yield rest, _Reading(_words(rest), int(word), True)
 
 
 def _words(name: str) -> tuple[str, ...]:

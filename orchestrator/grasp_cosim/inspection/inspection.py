@@ -67,7 +67,7 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
         "sources": "yes, in C" if report["sources"] else "no",
         "Python": "needed, made with pythonfmu" if report["python"] else "not needed",
         "capabilities": ", ".join(able) or "none",
-        **({"of several variables": choices(several)} if (several := report["ambiguous"]) else {}),
+        **({"several of one name": choices(several)} if (several := report["ambiguous"]) else {}),
     }
     lines = [f"{label:20s}{text}" for label, text in head.items()]
     return "\n".join([*lines, "", *_table([_row(v) for v in report["variables"]], width)])

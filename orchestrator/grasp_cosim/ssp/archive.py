@@ -1,4 +1,4 @@
-"""The archive: entries read, FMUs extracted for as long as the process lives, written in one piece.
+"""An archive, read and written in one piece, its FMUs as files meanwhile, and the notes on it.
 
 The interface and the instances of an FMU need a file. Extracted FMUs go to a folder of this process
 that is removed at its end, so that runs side by side do not meet. There they are filed by the hash
@@ -9,7 +9,8 @@ an archive read twice is extracted once.
 import hashlib
 import posixpath
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -20,12 +21,40 @@ from one_piece import in_one_piece
 from ..base.errors import InputError, nearest
 from ..base.scratch import ScratchFolder
 from ..interface.document import check_size
-from .remarks import Notes
 
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources/"
 _MODE = 0o644 << 16
 _extracting = Lock()
+
+
+class Notes:
+    """What was decided or passed over, and where; the same text of several places is one line."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, list[str]] = {}
+
+    def add(self, place: str, text: str) -> None:
+        """Note `text` of a place, once."""
+        places = self._places.setdefault(text, [])
+        if place not in places:
+            places.append(place)
+
+    @contextmanager
+    def off(self) -> Iterator[None]:
+        """Note nothing meanwhile."""
+        kept = {text: list(places) for text, places in self._places.items()}
+        try:
+            yield
+        finally:
+            self._places = kept
+
+    def lines(self) -> list[str]:
+        """The notes in the order of their first places."""
+        return [
+            f"{places[0]}: {text}" + (f" ({len(places)} such)" if len(places) > 1 else "")
+            for text, places in self._places.items()
+        ]
 
 
 class Archive:

@@ -18,8 +18,8 @@ from si_units import Unit
 
 from ..base.errors import InputError, nearest
 from ..interface.interface import Interface, Variable
+from .document import change, same
 from .elements import Element, Hop, Node, Path
-from .unit_tables import change, same
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,17 +1,25 @@
-"""XML of SSP: read without entities and network, checked against the official schemas."""
+"""XML of SSP: read without entities and network, checked against the official schemas; its units.
 
+SSP 2.0 is read as 1.0: it has the same namespaces, and most of what it adds has a form in 1.0.
+Types with a width are Real or Integer, structural parameters are parameters; meta data and
+signatures are left out. Arrays, clocks and the new kinds of connectors that are connected are
+refused by name. After: the schemas of SSP 2.0 (2024-12-20), compared with those of 1.0.
+"""
+
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
+from si_units import BASE, Unit
 
 from ..base.errors import InputError
 from ..fmi import fmpy
-from .remarks import Notes
-from .version2 import as_version_1
+from ..interface.units import conversion
+from .archive import Notes
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
 NAMESPACES = {
@@ -44,6 +52,14 @@ _LAST = (
 
 _LISTS = ("Connectors", "ParameterBindings", "Elements", "Connections", "Annotations", "Units")
 """Elements that the schemas want either to have content or to be left out."""
+
+_TYPES = {
+    **dict.fromkeys(("Float64", "Float32"), "Real"),
+    **{f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)},
+}
+_LEFT_OUT = ("MetaData", "Signature")
+_REFUSED = {"Dimension": "arrays", "Clock": "clocks"}
+_KINDS = ("local", "constant", "unspecified")
 
 
 def qualified(name: str) -> str:
@@ -138,6 +154,69 @@ def _place(element: Any) -> int:
     return _LAST.index(name) if name in _LAST else -1
 
 
+def as_version_1(place: str, root: Any, notes: Notes) -> None:
+    """Change a document of SSP 2.0 into one of 1.0; InputError where it has no form there."""
+    connected = {
+        element.get(end)
+        for element in root.iter("{*}Connection")
+        for end in ("startConnector", "endConnector")
+    }
+    for element in list(root.iter()):
+        tag = etree.QName(element)
+        where = f"{place}:{element.sourceline}"
+        if tag.localname in _LEFT_OUT:
+            notes.add(where, f"{tag.localname} is not used")
+            element.getparent().remove(element)
+        elif tag.localname in _REFUSED and "SystemStructure" in (tag.namespace or ""):
+            raise InputError(
+                f"{where}: {element.getparent().get('name')!r}: {tag.localname}: "
+                f"{_REFUSED[tag.localname]} of SSP 2.0 are not supported; must be scalar"
+            )
+        elif tag.localname in _TYPES:
+            element.tag = f"{{{tag.namespace}}}{_TYPES[tag.localname]}"
+        elif tag.localname == "Connector":
+            _change_connector(where, element, connected, notes)
+        elif tag.localname == "Connection":
+            _check_connection(where, element)
+        elif tag.localname == "ConnectorGeometry":
+            for attribute in ("systemInnerX", "systemInnerY"):
+                element.attrib.pop(attribute, None)
+        elif tag.localname == "Value":
+            _change_value(where, element)
+
+
+def _change_connector(where: str, element: Any, connected: set[Any], notes: Notes) -> None:
+    name, kind = element.get("name"), element.get("kind")
+    if kind == "structuralParameter":
+        element.set("kind", "parameter")
+    elif kind in _KINDS and name in connected:
+        raise InputError(
+            f"{where}: connector {name!r}: kind {kind!r} of SSP 2.0 is not supported on a "
+            "connection; must be input, output or parameter"
+        )
+    elif kind in _KINDS:
+        notes.add(f"{where}: {name!r}", f"a connector of kind {kind!r} is not used")
+        element.getparent().remove(element)
+
+
+def _check_connection(where: str, element: Any) -> None:
+    for attribute in ("startIndices", "endIndices"):
+        if attribute in element.attrib:
+            raise InputError(
+                f"{where}: {attribute}: elements of arrays of SSP 2.0 are not supported; "
+                "must connect scalar variables"
+            )
+
+
+def _change_value(where: str, element: Any) -> None:
+    """One Value below a String or Enumeration is its value."""
+    parent = element.getparent()
+    if len(parent) > 1:
+        raise InputError(f"{where}: arrays of SSP 2.0 are not supported; must be one Value")
+    parent.set("value", element.get("value", ""))
+    parent.remove(element)
+
+
 def at(place: str, element: Any) -> str:
     """Return the place of an element, file and line."""
     return f"{place}:{element.sourceline}"
@@ -180,3 +259,56 @@ def _schema(form: str) -> Any:
     """The official schema, version 1.0, as FMPy brings it along."""
     name = re.sub(".*/", "", NAMESPACES[form])
     return etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp/schema" / f"{name}.xsd"))
+
+
+def read_units(file: str, parent: Any, prefix: str) -> Mapping[str, Unit]:
+    """The units below an element of the format with that prefix; file is for error messages."""
+    entries = children(parent, f"{prefix}:Units", "ssc:Unit")
+    return {entry.get("name"): _unit(file, entry) for entry in entries}
+
+
+def write_units(parent: Any, prefix: str, units: Iterable[Unit]) -> None:
+    """The reverse; nothing where there are none."""
+    listed = list(units)
+    if not listed:
+        return
+    element = add(parent, f"{prefix}:Units")
+    for unit in listed:
+        exponents = zip(BASE, unit.exponents, strict=True)
+        base = {name: str(exponent) for name, exponent in exponents if exponent}
+        if unit.factor != 1.0:
+            base["factor"] = repr(unit.factor)
+        if unit.offset != 0.0:
+            base["offset"] = repr(unit.offset)
+        add(add(element, "ssc:Unit", name=unit.name), "ssc:BaseUnit", **base)
+
+
+def same(a: Unit, b: Unit) -> bool:
+    """Return True if they mean the same, whatever they are called."""
+    return (a.exponents, a.factor, a.offset) == (b.exponents, b.factor, b.offset)
+
+
+def change(place: str, source: Unit, target: Unit) -> tuple[float, float]:
+    """(factor, offset) such that target value = factor * source value + offset.
+
+    Exactly (1.0, 0.0) where they mean the same; InputError where they are of different quantities.
+    """
+    found = conversion(source, target)
+    if found is None:
+        raise InputError(
+            f"{place}: {source.name} cannot be converted to {target.name}; "
+            "units must be of the same quantity, or suppressUnitConversion set"
+        )
+    return found
+
+
+def _unit(file: str, element: Any) -> Unit:
+    base = child(element, "ssc:BaseUnit")
+    factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
+    if not factor or not math.isfinite(factor) or not math.isfinite(offset):
+        raise InputError(
+            f"{at(file, base)}: unit {element.get('name')!r}: factor = {factor:g}, "
+            f"offset = {offset:g}: must be finite, and the factor other than 0"
+        )
+    exponents = tuple(int(base.get(name, "0")) for name in BASE)
+    return Unit(element.get("name"), exponents, factor, offset)

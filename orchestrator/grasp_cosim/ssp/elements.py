@@ -16,9 +16,8 @@ from ..base.errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface
 from .archive import STRUCTURE, Archive
-from .document import at, child, children, is_true, qualified, short
+from .document import at, child, children, is_true, qualified, same, short
 from .origin import Origin, open_structure
-from .unit_tables import same
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"

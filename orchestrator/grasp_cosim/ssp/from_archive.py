@@ -16,18 +16,14 @@ from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Component, Connection, Port, in_nanoseconds
 from ..system.stimuli import Stimuli
-from .annotation import TYPE, Extras, no_extras, read_extras
-from .archive import STRUCTURE, Archive
+from .annotations import FOREIGN, TYPE, Extras, Steps, no_extras, read_extras, read_steps
+from .archive import STRUCTURE, Archive, Notes
 from .connectors import Carried, Connectors, Part
+from .decisions import Called, component_names, flow_order, renamed, step_time, times
 from .document import at, child, children, qualified
 from .elements import Element, Hop, Path, read_system
-from .execution_order import flow_order
-from .experiment import step_time, times
-from .foreign import FOREIGN, Steps, read_steps
-from .names import Called, component_names, renamed
 from .origin import Origin, open_structure
 from .parameters import read_settings, read_sizes
-from .remarks import Notes
 
 
 def read_ssp(

@@ -9,10 +9,8 @@ from si_units import Unit, known_unit
 
 from ..base.checks import known
 from ..base.errors import InputError
-from .archive import STRUCTURE, Archive
-from .document import ROOTS, checked, child, parse
-from .remarks import Notes
-from .unit_tables import read_units
+from .archive import STRUCTURE, Archive, Notes
+from .document import ROOTS, checked, child, parse, read_units
 
 _KINDS = {
     "ssv": "parameter-set",

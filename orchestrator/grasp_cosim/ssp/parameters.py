@@ -23,10 +23,9 @@ from si_units import Unit
 from ..base.errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
 from .connectors import Carried, Connectors
-from .document import at, child, children, is_true, short
+from .document import at, change, child, children, is_true, same, short
 from .elements import Element, Hop, Node, Path, linear, transformation
 from .origin import Origin
-from .unit_tables import change, same
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
     "Real": float,

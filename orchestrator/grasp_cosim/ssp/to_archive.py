@@ -1,6 +1,6 @@
 """From a system to an SSP 1.0 archive, as docs/system_files.md describes it.
 
-The same system gives the same bytes. What SSP has no form for: annotation.py.
+The same system gives the same bytes. What SSP has no form for: annotations.py.
 """
 
 import re
@@ -19,12 +19,10 @@ from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Connection, Port
-from .annotation import extras_of, write_extras
+from .annotations import PREFIXES, extras_of, write_extras, write_hint, write_steps
 from .archive import RESOURCES, STRUCTURE, write_archive
-from .document import VERSION, add, new, to_bytes
+from .document import VERSION, add, change, new, same, to_bytes, write_units
 from .elements import FMU
-from .foreign import PREFIXES, write_hint, write_steps
-from .unit_tables import change, same, write_units
 
 SET = "initialValues"
 """The name of all parameter sets: Ecos takes those of one name, EcosSimulation.init(...)."""

@@ -14,14 +14,14 @@ import click
 from ...base.errors import InputError
 from ...base.files import check_file, write_text
 from ...base.numerals import counted
-from ...inspection.text import with_paths
+from ...inspection.draft import with_paths
 from ...interface.read import read_interface
 from ...system.description import System
 from ...system.toml import to_do
 from ..frame import PATH, json_option, pair, say, show
 
 if TYPE_CHECKING:
-    from ...inspection.component import Draft
+    from ...inspection.draft import Draft
 
 NAME = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -77,7 +77,7 @@ def init(
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
-        from ...inspection.alone import alone
+        from ...inspection.draft import alone
 
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
     elif hand:
@@ -172,7 +172,7 @@ def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Dr
     """The text of the built-in grasp, with foreign FMUs in the place of components."""
     from ...grasp.presets import SYSTEM, built_in_presets
     from ...grasp.system import built
-    from ...inspection.component import replacing
+    from ...inspection.draft import replacing
 
     fmus = built(folder)
     built_in = System.load(SYSTEM, fmus)

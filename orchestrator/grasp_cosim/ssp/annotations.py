@@ -1,0 +1,259 @@
+"""The annotations of an archive: ours, and those in which other tools keep the step.
+
+Ours has all that SSP 1.0 has no form for, so that our run is the same: the communication step, the
+scheme, the components' own steps, processes, renamed variables and units, the initialisation,
+events, faults, roles, presets, stimuli and the pacing. Where it is, the elements are in the order
+of execution. Its content is JSON: the dataclasses of the system as objects, a port as a string.
+
+Those of others are read, and written for them to run our archives. OSP (libcosim):
+com.opensimulationplatform in the default experiment, and a hint on components with a step of their
+own. It takes prefixes for names and their declarations for content, so that they must be osp, and
+declared by the root. OMSimulator: org.openmodelica on the top system, which its command line needs,
+first of the annotations there. Both let all components take a step at once.
+"""
+
+import json
+import math
+from array import array
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from lxml import etree  # type: ignore[import-untyped]
+
+from ..base.checks import check_values, real
+from ..base.errors import InputError, choices, nearest
+from ..system.description import System
+from ..system.parts import (
+    NANOSECONDS,
+    Event,
+    Fault,
+    Initialisation,
+    Isolation,
+    Port,
+    Solver,
+    in_nanoseconds,
+)
+from ..system.realtime import Realtime
+from ..system.stimuli import Stimuli
+from ..system.structure import Diverging, Scheme
+from .document import add, at, children
+
+TYPE = "grasp-cosim"
+_TAG = "{grasp-cosim:system}System"
+
+_OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
+_OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
+PREFIXES = {"osp": _OSP, "oms": _OMS}
+_OSP_TYPE, _OMS_TYPE = "com.opensimulationplatform", "org.openmodelica"
+FOREIGN = (_OSP_TYPE, "org.open-simulation-platform", _OMS_TYPE)
+"""The types of the annotations that are read here; the second is an earlier one of OSP."""
+
+_BASE = {"FixedStepAlgorithm": "baseStepSize", "FixedStepMaster": "stepSize"}
+"""The elements that name a step, in any namespace, and in which attribute."""
+
+_TOP: tuple[tuple[str, ...], ...] = (("ssd:DefaultExperiment",), ("ssd:System",), ())
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The steps that other tools' annotations name in ns; base_ns is 0 where there is none.
+
+    said tells whose it is, own_ns are those of components with a step of their own, by name.
+    """
+
+    base_ns: int = 0
+    said: str = ""
+    own_ns: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """The attributes of a component that SSP has no form for; earlier ones lack the last two."""
+
+    rename: Mapping[str, str]
+    step_ns: int | None
+    isolation: Isolation
+    units: Mapping[str, str] = field(default_factory=dict)
+    solver: Solver | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Extras:
+    """The attributes of a system that SSP has no form for; earlier archives lack the last five."""
+
+    step_ns: int
+    scheme: Scheme
+    components: Mapping[str, Beside]
+    initialisation: Initialisation
+    events: tuple[Event, ...]
+    faults: tuple[Fault, ...]
+    roles: Mapping[str, str] = field(default_factory=dict)
+    presets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    diverging: Diverging = "stop"
+    input: Stimuli | None = None
+    realtime: Realtime = Realtime()
+    metrics: tuple[str, ...] = ()
+
+
+def no_extras(components: Iterable[str], steps: Steps) -> Extras:
+    """The extras of an archive without our annotation; steps are those of other tools.
+
+    Who names a step means that all components take it at once.
+    """
+    beside = {name: Beside({}, steps.own_ns.get(name), "none") for name in components}
+    scheme: Scheme = "jacobi" if steps.base_ns else "sequential"
+    return Extras(steps.base_ns, scheme, beside, Initialisation(), (), ())
+
+
+def extras_of(system: System) -> Extras:
+    """The extras of a system."""
+    shared = {f.name: getattr(system, f.name) for f in fields(Extras)}
+    beside = {
+        c.name: Beside(dict(c.rename), c.step_ns, c.isolation, dict(c.units), c.solver)
+        for c in system.components
+    }
+    return Extras(**{**shared, "components": beside})
+
+
+def write_extras(annotations: Any, extras: Extras) -> None:
+    """Add the annotation."""
+    element = etree.SubElement(
+        add(annotations, "ssc:Annotation", type=TYPE), _TAG, nsmap={"grasp": "grasp-cosim:system"}
+    )
+    element.text = json.dumps(_plain(extras), indent=1)
+
+
+def read_extras(place: str, annotation: Any) -> Extras:
+    """The extras of our annotation; InputError where it is not as we write it."""
+    element = annotation.find(_TAG)
+    try:
+        extras: Extras = _typed(Extras, json.loads("" if element is None else element.text or ""))
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
+        raise InputError(f"{place}: annotation {TYPE!r}: not as it was written: {error}") from error
+    for name, values in extras.presets.items():
+        check_values(f"{place}: annotation {TYPE!r}: preset {name!r}", values)
+    return extras
+
+
+def _plain(value: Any) -> Any:
+    """A value of the system as JSON has it."""
+    if isinstance(value, Port):
+        return str(value)
+    if is_dataclass(value):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {_plain(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(entry) for entry in value]
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return value
+
+
+def _typed(kind: Any, value: Any) -> Any:
+    """The reverse: a value of the given type; ValueError or TypeError where it is none."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return value
+    if kind is Port:
+        return Port(*_typed(str, value).split(".", 1))
+    if is_dataclass(kind) and isinstance(kind, type):
+        hints = get_type_hints(kind)
+        unknown = [key for key in _typed(dict, value) if key not in hints]
+        if unknown:
+            raise ValueError(f"unknown entry {unknown[0]!r}; {nearest(unknown[0], hints)}")
+        return kind(**{key: _typed(hints[key], entry) for key, entry in value.items()})
+    if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
+        return {
+            _typed(arguments[0], key): _typed(arguments[1], entry)
+            for key, entry in _typed(dict, value).items()
+        }
+    if origin is Sequence:
+        return array("d" if arguments[0] is float else "q", _typed(list, value))
+    if origin is tuple:
+        return tuple(_typed(arguments[0], entry) for entry in _typed(list, value))
+    if origin in (Union, UnionType):
+        fitting = [alternative for alternative in arguments if alternative is type(value)]
+        return _typed((fitting or arguments)[0], value)
+    if origin is Literal:
+        if value not in arguments:
+            raise ValueError(f"{value!r}: must be one of {choices(arguments)}")
+        return value
+    if type(value) is not kind and (kind, type(value)) != (float, int):
+        raise ValueError(f"{value!r}: must be of type {kind.__name__}")
+    return value
+
+
+def read_steps(file: str, root: Any, given_ns: int | None) -> Steps:
+    """The steps that an archive names for other tools; a given one goes before them.
+
+    InputError where they contradict each other.
+    """
+    found: dict[int, str] = {}
+    for step, place in _named(file, root):
+        found.setdefault(step, place)
+    if not found:
+        return Steps()
+    if len(found) > 1 and given_ns is None:
+        listed = choices(f"{step / NANOSECONDS:g} s" for step in found)
+        raise InputError(
+            f"{file}: its annotations name several steps, {listed}; give one: "
+            "--set experiment.step=..."
+        )
+    base, said = next(iter(found.items()))
+    return Steps(base, said, _hints(file, root, given_ns or base))
+
+
+def _named(file: str, root: Any) -> Iterator[tuple[int, str]]:
+    """Yield the steps that are named for the whole system, and where."""
+    for parent in _TOP:
+        for annotation in children(root, *parent, "ssd:Annotations", "ssc:Annotation"):
+            if annotation.get("type") not in FOREIGN:
+                continue
+            for name, attribute in _BASE.items():
+                for element in annotation.iter(f"{{*}}{name}"):
+                    place = f"{at(file, element)}: annotation {annotation.get('type')!r}"
+                    yield _time(f"{place}: step", element.get(attribute)), place
+
+
+def write_steps(experiment: Any, system: Any, step_ns: int) -> None:
+    """Name the step in annotations of the default experiment and of the top system."""
+    step = repr(step_ns / NANOSECONDS)
+    algorithm = _add(add(experiment, "ssc:Annotation", type=_OSP_TYPE), _OSP, "Algorithm")
+    _add(algorithm, _OSP, "FixedStepAlgorithm", baseStepSize=step)
+    tool = _add(add(system, "ssc:Annotation", type=_OMS_TYPE), _OMS, "Annotations")
+    information = _add(tool, _OMS, "SimulationInformation")
+    master = {"description": "oms-ma", "stepSize": step, "relativeTolerance": "1e-4"}
+    _add(information, _OMS, "FixedStepMaster", **master)
+
+
+def write_hint(component: Any, step_ns: int) -> None:
+    """Name the step of a component of its own."""
+    annotation = add(add(component, "ssd:Annotations"), "ssc:Annotation", type=_OSP_TYPE)
+    _add(annotation, _OSP, "StepSizeHint", value=repr(step_ns / NANOSECONDS))
+
+
+def _add(parent: Any, namespace: str, name: str, **attributes: str) -> Any:
+    return etree.SubElement(parent, f"{{{namespace}}}{name}", attributes)
+
+
+def _time(place: str, text: str | None) -> int:
+    try:
+        return in_nanoseconds(place, real(text or ""))
+    except ValueError:
+        raise InputError(f"{place} = {text!r}: must be a number of s") from None
+
+
+def _hints(file: str, root: Any, base: int) -> dict[str, int]:
+    """The components' own steps: the multiples of the base step that are nearest to the hints."""
+    own: dict[str, int] = {}
+    path = ("ssd:System", "ssd:Elements", "ssd:Component")
+    for component in children(root, *path):
+        for hint in component.iter("{*}StepSizeHint"):
+            hinted = _time(f"{at(file, hint)}: StepSizeHint", hint.get("value"))
+            multiple = max(1, math.floor(hinted / base + 0.5)) * base
+            if multiple != base:
+                own[component.get("name").replace(".", "_")] = multiple
+    return own
