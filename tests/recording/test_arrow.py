@@ -7,7 +7,7 @@ import pytest
 from grasp_cosim import InputError, SimulationError, compare, load_run, simulate
 from grasp_cosim.exchange.listener import Signal, Texts
 from grasp_cosim.recording import arrow as module
-from grasp_cosim.recording import load
+from grasp_cosim.recording import csv
 from grasp_cosim.recording.arrow import ArrowListener, read_arrow
 from grasp_cosim.recording.folder import RunFolder
 from recording.rows import EXPERIMENT, full_disk
@@ -103,7 +103,7 @@ def test_a_large_csv_has_the_same_bits_whoever_reads_it(grasp, tmp_path, monkeyp
     result = simulate(grasp, step=1e-3)
     result.to_csv(tmp_path / "signals.csv")
     result.to_json(tmp_path / "run.json")
-    monkeypatch.setattr(load, "LARGE", 0)
+    monkeypatch.setattr(csv, "LARGE", 0)
     fast = load_run(tmp_path)
     assert {n: c.tobytes() for n, c in fast.items()} == {n: c.tobytes() for n, c in result.items()}
     with (tmp_path / "signals.csv").open("a") as file:

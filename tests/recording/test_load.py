@@ -98,7 +98,7 @@ def test_damaged_signals_are_refused_in_one_line(tmp_path, csv, reason):
 @pytest.mark.parametrize(
     ("settings", "reason"),
     [
-        ("{", "is damaged, not JSON: "),
+        ("{", "is damaged, not JSON in UTF-8: "),
         ([], "is list; must be a JSON object"),
         ({}, "no entry 'system'; must be as `grasp-cosim run --out` writes it"),
         (JSON | {"units": 1}, "units = 1; must be a JSON object"),

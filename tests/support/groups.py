@@ -4,7 +4,7 @@ import sys
 from types import SimpleNamespace
 
 from grasp_cosim.metrics import metric
-from grasp_cosim.recording.view import OF_ANY
+from grasp_cosim.recording.result import OF_ANY
 from grasp_cosim.system import description
 
 

@@ -15,7 +15,8 @@ from ..base.errors import InputError
 from ..base.files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Signals
-from ..recording.load import ARROW, SETTINGS, SIGNALS, load_run, read_mdf
+from ..recording.load import ARROW, SETTINGS, SIGNALS, load_run
+from ..recording.mdf import read_mdf
 from ..recording.result import Result
 from ..system.parts import NANOSECONDS
 from ..system.settings import given_values

@@ -1,6 +1,6 @@
 """How the result of a grasp is shown: the fingers and the object, the case of the paper."""
 
-from ..recording.view import View
+from ..recording.result import View
 from .metrics import is_grasp
 from .pictures import draw_grasp
 from .presets import case_of, words_of

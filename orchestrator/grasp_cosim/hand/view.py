@@ -1,7 +1,7 @@
 """How the result of a hand is shown: the fingers on their rays around the object."""
 
 from ..grasp.presets import case_of, words_of
-from ..recording.view import View
+from ..recording.result import View
 from .metrics import is_hand
 from .pictures import draw_hand
 from .scene import hand_scene

@@ -5,10 +5,8 @@ metadata. Until its end is written it is a stream of whole batches behind eight 
 read that a kill left behind.
 """
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,7 @@ from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..exchange.listener import Experiment, Signal
-from .memory import TYPES, typed
+from .memory import TYPES, Rows, typed
 
 BATCH = 4096
 """Rows that are written together, if they do not take longer than LONG to come."""
@@ -55,7 +53,7 @@ class ArrowListener:
             about = {"unit": s.unit or "", "description": s.description}
             fields.append(arrow.field(s.name, types[s.kind], metadata=about))
         self._schema = arrow.schema(fields)
-        self._waiting: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = []
+        self._waiting: list[Rows] = []
         self._rows, self._since = 0, time.monotonic()
         try:
             self._file = self._path.open("wb")
@@ -106,7 +104,8 @@ def read_arrow(path: Path) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArr
                 table = arrow.ipc.open_file(file).read_all()
             except arrow.ArrowInvalid:
                 file.seek(MAGIC)
-                table = _whole_batches(arrow, file)
+                stream = arrow.ipc.open_stream(file)
+                table = arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
         columns = {
             name: column.to_numpy() for name, column in zip(table.column_names, table, strict=True)
         }
@@ -116,10 +115,9 @@ def read_arrow(path: Path) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArr
         raise InputError(f"{path}: is damaged, or no Arrow file of a run: {said}") from error
 
 
-def _whole_batches(arrow: Any, file: Any) -> Any:
-    stream, batches = arrow.ipc.open_stream(file), []
+def _whole_batches(arrow: Any, stream: Any) -> Iterator[Any]:
     while True:
         try:
-            batches.append(stream.read_next_batch())
+            yield stream.read_next_batch()
         except (StopIteration, OSError, arrow.ArrowInvalid):  # the last one is not whole
-            return arrow.Table.from_batches(batches, stream.schema)
+            return

@@ -21,13 +21,11 @@ from ..base.locks import SUFFIX, Lock
 from ..exchange.listener import Experiment, Signal
 from ..metrics.in_si import in_si
 from ..system.description import System
-from ..system.parts import Component
 from .arrow import ArrowListener
 from .csv import CsvListener
 from .load import ARROW, SETTINGS, SIGNALS, TEXT
-from .memory import TYPES
-from .result import Result, conversions_entry
-from .view import OF_ANY
+from .memory import TYPES, Rows
+from .result import OF_ANY, Result, conversions_entry
 
 DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
 """The files that may be made of a run in its folder, beside its picture."""
@@ -69,13 +67,13 @@ class RunFolder:
         self._folder, self._paced = folder, paced
         self._origin = {**origin(system, command), **({"title": title} if title else {})}
         self._to_si = in_si(system, ()).conversions
-        self._file: CsvListener | ArrowListener = (
-            ArrowListener(folder / ARROW)
-            if form == "arrow"
-            else CsvListener(folder / SIGNALS, in_place=True)
-        )
+        self._file: CsvListener | ArrowListener
+        if form == "arrow":
+            self._file = ArrowListener(folder / ARROW)
+        else:
+            self._file = CsvListener(folder / SIGNALS, in_place=True)
         self._begun, self._broken = False, False
-        self._waiting: deque[tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]] = deque()
+        self._waiting: deque[Rows] = deque()
         self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
         self._lock = Lock(folder / SUFFIX)
 
@@ -146,7 +144,11 @@ class RunFolder:
         settings = self._folder / SETTINGS
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            self._keep_others_out()
+            if not self._lock.taken():  # for as long as this process lives
+                raise InputError(
+                    f"{self._folder}: another process records a run in it; must end first, or --out"
+                    " be another folder"
+                )
             if settings.is_file() and any((self._folder / name).is_file() for name in FILES):
                 remove(self._folder, *DRAWN, *of_any_format(OF_ANY.stem, *groups()))
             remove(self._folder, SETTINGS, *FILES)
@@ -158,27 +160,18 @@ class RunFolder:
         except OSError as error:
             raise InputError(unwritable(Path(error.filename or self._folder), error)) from error
 
-    def _keep_others_out(self) -> None:
-        """Lock the folder, for as long as this process lives; InputError where another one has."""
-        if not self._lock.taken():
-            raise InputError(
-                f"{self._folder}: another process records a run in it; must end first, or --out be "
-                "another folder"
-            )
-
     def _unfinished(self) -> dict[str, Any]:
         """The run.json of a run that goes on: see Result.to_json()."""
+        types = {kind: str(np.dtype(own)) for kind, own in TYPES.items()}
+        signals = self._signals
         return {
             "wall_time": None,
             "complete": False,
             **self._experiment.settings,
-            "units": {s.name: s.unit for s in self._signals},
+            "units": {s.name: s.unit for s in signals},
             "to_si": conversions_entry(self._to_si),
-            "types": {
-                s.name: str(np.dtype(TYPES[s.kind])) if s.kind in TYPES else TEXT
-                for s in self._signals
-            },
-            "descriptions": {s.name: s.description for s in self._signals},
+            "types": {s.name: types.get(s.kind, TEXT) for s in signals},
+            "descriptions": {s.name: s.description for s in signals},
             "metric_units": {},
             "missing_metrics": [],
             "log": [],
@@ -203,18 +196,16 @@ def now() -> datetime:
 
 def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
     """The date now, the versions of what makes the run, which FMUs those are, and the command."""
+    fmus = {c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool} for c in system.components}
+    for c in system.components:
+        if c.native:  # the FMU whose place it takes
+            fmus[c.name]["native_twin_of"] = c.interface.guid
     return {
         "date": now().isoformat(timespec="seconds"),
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in ("grasp-cosim", "numpy", "fmpy")},
         },
-        "fmus": {c.name: _ran(c) for c in system.components},
+        "fmus": fmus,
         "command": list(command),
     }
-
-
-def _ran(component: Component) -> dict[str, Any]:
-    """Which FMU a component runs; of a native one also the FMU whose place it takes."""
-    ran = {"guid": component.loaded.guid, "tool": component.loaded.tool}
-    return ran | ({"native_twin_of": component.interface.guid} if component.native else {})

@@ -1,8 +1,9 @@
-"""Writes a run as ASAM MDF 4 while it goes on, with asammdf (the optional extra `mdf`)."""
+"""ASAM MDF 4 by asammdf (the optional extra `mdf`): written while a run goes on, and read."""
 
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -19,7 +20,7 @@ from ..base.files import unwritable
 from ..exchange.listener import Experiment, Signal
 
 if TYPE_CHECKING:
-    import asammdf
+    from .memory import Rows
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8, "String": np.uint32}
 """The element type of a channel by its signal's kind."""
@@ -29,6 +30,11 @@ TRANSPOSED_DEFLATE: Final = 2
 
 PIECE = 8192
 """Rows handed to asammdf at once: it keeps a few hundred bytes about each piece."""
+
+
+def check_mdf() -> None:
+    """InputError without asammdf."""
+    extra_module("asammdf", "it writes MDF files", "mdf")
 
 
 class MdfListener:
@@ -49,13 +55,13 @@ class MdfListener:
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Describe the channels; InputError where there are none or the folder is not writable."""
         from asammdf import MDF
+        from asammdf import Signal as Channel
 
         if not signals:
             raise InputError(f"{self._said}: nothing to record; must be a system with outputs")
-        self._experiment, self._signals = experiment, signals
-        self._types = [TYPES[s.kind] for s in signals]
-        self._steps, self._rows = np.empty(PIECE, np.int64), np.empty((PIECE, len(signals)))
-        self._filled = 0
+        self._experiment, self._signals, none = experiment, signals, np.empty(0)
+        self._waiting: list[Rows] = []
+        self._count = 0
         folder = self._path.parent
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -63,18 +69,18 @@ class MdfListener:
             self._mdf = MDF(version="4.10", temporary_folder=str(folder))
         except OSError as error:
             raise InputError(unwritable(self._said, error)) from error
-        self._mdf.append([_channel(s) for s in signals], comment="", common_timebase=True)
+        channels = [
+            Channel(none.astype(TYPES[s.kind]), none, s.unit or "", s.name, comment=s.description)
+            for s in signals
+        ]
+        self._mdf.append(channels, comment="", common_timebase=True)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Take the rows; SimulationError where they cannot be written."""
-        first = 0
-        while first < len(steps):
-            last = min(len(steps), first + PIECE - self._filled)
-            piece = slice(self._filled, self._filled + last - first)
-            self._steps[piece], self._rows[piece] = steps[first:last], rows[first:last]
-            self._filled, first = piece.stop, last
-            if self._filled == PIECE:
-                self._flush()
+        self._waiting.append((steps.copy(), rows.copy()))
+        self._count += len(steps)
+        if self._count >= PIECE:
+            self._flush()
 
     def end(self, complete: bool) -> None:
         """Make the file; SimulationError where that fails, and there is none."""
@@ -101,31 +107,16 @@ class MdfListener:
                 channel.conversion = from_dict(table)
 
     def _flush(self) -> None:
-        rows = self._rows[: self._filled].T
-        time = self._experiment.times(self._steps[: self._filled])
-        channels = [c.astype(element) for c, element in zip(rows, self._types, strict=True)]
+        if not self._waiting:
+            return
+        steps, rows = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
+        self._waiting, self._count = [], 0
+        pairs = zip(rows.T, self._signals, strict=True)
+        own = (column.astype(TYPES[signal.kind]) for column, signal in pairs)
         try:
-            self._mdf.extend(0, [(samples, None) for samples in (time, *channels)])
+            self._mdf.extend(0, [(c, None) for c in (self._experiment.times(steps), *own)])
         except OSError as error:
             raise SimulationError(unwritable(self._said, error)) from error
-        self._filled = 0
-
-
-def check_mdf() -> None:
-    """InputError without asammdf."""
-    extra_module("asammdf", "it writes MDF files", "mdf")
-
-
-def _channel(signal: Signal) -> asammdf.Signal:
-    from asammdf import Signal as Channel
-
-    return Channel(
-        samples=np.empty(0, TYPES[signal.kind]),
-        timestamps=np.empty(0),
-        name=signal.name,
-        unit=signal.unit or "",
-        comment=signal.description,
-    )
 
 
 def _comment(experiment: Experiment, complete: bool) -> str:
@@ -137,3 +128,29 @@ def _comment(experiment: Experiment, complete: bool) -> str:
         if not isinstance(value, dict | list):
             ElementTree.SubElement(properties, "e", name=name).text = json.dumps(value)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def read_mdf(
+    path: Path,
+) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[np.float64]], dict[str, str]]:
+    """Every channel of the first group that has samples, on its master in s, and their units.
+
+    InputError without asammdf, or where it is damaged or has none.
+    """
+    check_mdf()
+    from asammdf import MDF
+
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what is wrong is ours to say
+    try:
+        with MDF(path) as mdf:
+            channels = [c for c in mdf.iter_channels() if len(c.samples)]
+    except Exception as error:  # of a damaged file it raises whatever it stumbles over
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"{path}: is damaged, not an MDF file: {said}") from error
+    if not channels:
+        raise InputError(f"{path}: no channel has samples; must be a recorded log")
+    time, found, units = channels[0].timestamps, {}, {}
+    for c in channels:
+        if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub":
+            found[c.name], units[c.name] = c.samples.astype(np.float64), str(c.unit)
+    return time, found, units

@@ -1,7 +1,6 @@
 """Keeps a run in memory, as NumPy columns."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryFile, gettempdir
 from typing import Any
@@ -17,7 +16,6 @@ from ..exchange.listener import Experiment, Signal
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 """The element type of a column of numbers by its signal's kind."""
-
 
 Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 """Steps, and their rows of values."""
@@ -46,7 +44,9 @@ class MemoryListener:
         rows = total // self._every + 2  # t = 0, and the last one besides every n-th
         try:
             self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
-            self._table = _table(*shape) if self._paced else np.empty(shape)
+            own = self._paced and signals
+            buffer = memory(FLOAT * len(signals) * rows) if own else None
+            self._table = np.ndarray(shape, np.float64, buffer)
         except (MemoryError, ValueError, OverflowError, OSError):  # more bytes than there can be
             raise InputError(
                 f"{experiment.name}: {total} steps do not fit into memory; "
@@ -116,14 +116,10 @@ class EveryRow:
     def columns(self) -> Columns:
         """All communication points in s so far, and the columns by name.
 
-        They are in memory only from when they are asked for until they are let go.
+        Reals are mapped from the file, in memory only as far as they are looked at.
         """
-        return self._column(0), _Mapped(
-            {s.name: partial(self._typed, k, s) for k, (_, s) in enumerate(self._chosen, 1)}
-        )
-
-    def _typed(self, place: int, signal: Signal) -> npt.NDArray[Any]:
-        return typed(signal, self._column(place))
+        signals = enumerate(self._chosen, 1)
+        return self._column(0), {s.name: typed(s, self._column(k)) for k, (_, s) in signals}
 
     def _column(self, place: int) -> npt.NDArray[np.float64]:
         return np.memmap(self._file, np.float64, "r", self._place(place, 0), (self._rows,))
@@ -132,30 +128,8 @@ class EveryRow:
         return FLOAT * (column * (self._experiment.total_steps + 1) + row)
 
 
-class _Mapped(Mapping[str, npt.NDArray[Any]]):
-    """Columns by name, each made whenever it is asked for."""
-
-    def __init__(self, made: Mapping[str, Callable[[], npt.NDArray[Any]]]) -> None:
-        self._made = made
-
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        return self._made[name]()
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._made)
-
-    def __len__(self) -> int:
-        return len(self._made)
-
-
 def typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
     """The values of a signal in rows in its own type, Strings as str objects."""
     if signal.kind == "String":
         return signal.texts.column(column)
     return column.astype(TYPES[signal.kind], copy=False)
-
-
-def _table(columns: int, rows: int) -> npt.NDArray[np.float64]:
-    if not columns * rows:
-        return np.empty((columns, rows))
-    return np.frombuffer(memory(columns * rows * FLOAT), np.float64).reshape(columns, rows)

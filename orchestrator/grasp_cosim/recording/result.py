@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from one_piece import in_one_piece
 
-from ..base.checks import is_number
+from ..base.checks import extra_module, is_number
 from ..base.errors import UnknownNameError, choices
 from ..base.files import write_json
 from ..base.higher import higher
@@ -25,10 +25,8 @@ from ..system.parts import NANOSECONDS
 from ..system.settings import given_values
 from .arrow import ArrowListener
 from .csv import CsvListener
-from .frames import as_pandas, as_xarray
 from .mdf import MdfListener
 from .proxies import proxy_figures
-from .view import OF_ANY, View
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,6 +55,29 @@ class Rejection:
 
     count: int
     first: float
+
+
+class View(NamedTuple):
+    """How a result is shown beyond its numbers: a picture, which is drawn and may be written to a
+    path, by the stem of its file, and whether it fits a result.
+
+    `scene` makes what the page of such a result has besides (`report.page.Scene`), or None;
+    `traits` are what such a result is beside its settings, in words, like {"case": "2"}; `words`
+    are those that a title has of it, like "case 2".
+    """
+
+    stem: str
+    fits: Callable[[Any], bool]
+    draw: Callable[[Any, Path | None], Any]
+    scene: Callable[[Any], Any] = lambda _: None
+    traits: Callable[[Any], Mapping[str, str]] = lambda _: {}
+    words: Callable[[Any], Sequence[str]] = lambda _: ()
+
+
+OF_ANY = View(
+    "signals", lambda _: True, lambda run, path: higher("report.plot").plot_signals(run, path)
+)
+"""Of a result of any system."""
 
 
 class Figures(dict[str, Any]):
@@ -141,8 +162,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @property
     def roles(self) -> Mapping[str, str]:
         """The component that plays a role, where its name does not say it."""
-        roles: Mapping[str, str] = self.settings.get("roles", {})
-        return roles
+        found: Mapping[str, str] = self.settings.get("roles", {})
+        return found
 
     @property
     def groups(self) -> Sequence[str]:
@@ -215,7 +236,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
         with in_one_piece(Path(path)) as part:
-            self._play(CsvListener(part, path))
+            self._play(CsvListener(part, path, in_place=True))
 
     def to_arrow(self, path: str | Path) -> None:
         """Write an Arrow file (Feather 2), with the units; InputError without pyarrow."""
@@ -272,13 +293,25 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
         InputError without pandas.
         """
-        return as_pandas(self.time, self.signals, self.units, self._about)
+        module = extra_module("pandas", "it makes the table", "pandas")
+        index = module.Index(self.time, name="time")
+        frame: pd.DataFrame = module.DataFrame(dict(self.signals), index=index)
+        frame.attrs = {"units": {"time": "s", **self.units}, **self._about}
+        return frame
 
     def to_xarray(self) -> xr.Dataset:
         """The signals as a Dataset over time in s, each with its `units`, and its description as
         `long_name`. InputError without xarray.
         """
-        return as_xarray(self.time, self.signals, self.units, self.descriptions, self._about)
+        module = extra_module("xarray", "it makes the data set", "xarray")
+        variables = {}
+        for name, column in self.signals.items():
+            said = {"units": self.units.get(name), "long_name": self.descriptions.get(name)}
+            # what there is none of is left out, as netCDF has it
+            variables[name] = "time", column, {key: text for key, text in said.items() if text}
+        coordinate = {"time": ("time", self.time, {"units": "s", "long_name": "time"})}
+        data: xr.Dataset = module.Dataset(variables, coords=coordinate, attrs=self._about)
+        return data
 
     @property
     def _about(self) -> dict[str, Any]:
@@ -320,10 +353,9 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def _play(self, listener: Listener) -> None:
         """Have a listener hear the recorded run again."""
+        said = self.descriptions
         signals = [
-            Signal(
-                name, self.units[name], KINDS[column.dtype.kind], self.descriptions.get(name, "")
-            )
+            Signal(name, self.units[name], KINDS[column.dtype.kind], said.get(name, ""))
             for name, column in self.signals.items()
         ]
         listener.begin(Experiment.of(self.settings), signals)
