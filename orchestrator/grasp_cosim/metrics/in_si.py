@@ -43,8 +43,19 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     units = {str(port): unit for port, unit in system.once(output_units).items()}
     expected = _expected(system, asked)
     for name, expects in expected.items():
-        if name in units:
-            _check(system, name, recorded[name].unit, units[name], expects)
+        declared, unit = recorded[name].unit, units.get(name)
+        if (
+            name in units
+            and declared is not None
+            and not (unit and unit.measures(expects.quantity))
+        ):
+            undefined = "" if unit else ", which its FMU does not define in SI units"
+            component, _, variable = name.partition(".")
+            raise InputError(
+                f"{system.name}: {name} is in {unit.name if unit else repr(declared)}{undefined}; "
+                f"{expects.purpose} must know its unit, one like {expects.unit}: "
+                f"{naming(component, [variable])}"
+            )
     free = any(not m.expects for m in asked)
     silent = [n for n, v in recorded.items() if v.kind == "Real" and v.unit is None]
     read = [name for name in silent if free or name in expected]
@@ -55,43 +66,26 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     )
 
 
-def _check(
-    system: Structure, name: str, declared: str | None, unit: Unit | None, expects: _Expected
-) -> None:
-    """InputError where a signal has a unit that is of another quantity, or not defined."""
-    if declared is None or (unit and unit.measures(expects.quantity)):
-        return
-    undefined = "" if unit else ", which its FMU does not define in SI units"
-    component, _, variable = name.partition(".")
-    raise InputError(
-        f"{system.name}: {name} is in {unit.name if unit else repr(declared)}{undefined}; "
-        f"{expects.purpose} must know its unit, one like {expects.unit}: "
-        f"{naming(component, [variable])}"
-    )
-
-
 def _expected(system: Structure, metrics: Iterable[Metric]) -> dict[str, _Expected]:
     """What is expected of signals by their names, by the first metric that does."""
     recorded = {str(port) for port in system.recorded}
     found: dict[str, _Expected] = {}
-    first_with: dict[int, Metric] = {}  # metrics of a group share what they need
     for metric in available(metrics, recorded, system.roles)[0]:
-        first_with.setdefault(id(metric.needs), metric)
-    for metric in first_with.values():
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
         for name, unit in metric.expects.items():
-            if unit is not None:
-                quantity = known_unit(unit)
-                if quantity is None or not quantity.si:
-                    raise InputError(
-                        f"{purpose}: needs {name} in {unit!r}; must be a unit of SI like 'm' or "
-                        "'N.s/m', as signals come in these"
-                    )
-                own = _Expected(unit, purpose, quantity)
-                first = found.setdefault(resolved(name, system.roles), own)
-                if not first.quantity.measures(quantity):
-                    raise InputError(
-                        f"{purpose}: needs {name} in {unit}, {first.purpose} in {first.unit}; must "
-                        "be of one quantity"
-                    )
+            if unit is None:
+                continue
+            quantity = known_unit(unit)
+            if quantity is None or not quantity.si:
+                raise InputError(
+                    f"{purpose}: needs {name} in {unit!r}; must be a unit of SI like 'm' or "
+                    "'N.s/m', as signals come in these"
+                )
+            own = _Expected(unit, purpose, quantity)
+            first = found.setdefault(resolved(name, system.roles), own)
+            if not first.quantity.measures(quantity):
+                raise InputError(
+                    f"{purpose}: needs {name} in {unit}, {first.purpose} in {first.unit}; must "
+                    "be of one quantity"
+                )
     return found

@@ -306,24 +306,21 @@ def chosen(
     """Those of `wanted` that are not in groups anyway: metrics, functions, names of metrics.
 
     A function is a metric of its own name, without a unit; a name is one of those in the groups.
-    InputError where there is none of that name, or the signals of these `names` do
-    not permit it.
+    InputError where there is none of that name, or the signals of these `names` do not permit it.
     """
-    wanted, usual = tuple(wanted), {m.name: m for m in metrics_of(of_groups)}
-    for name in (item for item in wanted if isinstance(item, str)):
-        if name not in usual:
-            raise InputError(f"metrics: {name!r}: no such metric; {nearest(name, usual)}")
-        reason = lacking(usual[name].needs, names, roles)
-        if reason:
-            raise InputError(f"metrics: {name}: is not available: {reason}")
-    own = (item for item in wanted if not isinstance(item, str))
-    return tuple(m if isinstance(m, Metric) else metric(_name(m))(m) for m in own)
-
-
-def _name(function: Function) -> str:
-    if not callable(function):
-        raise InputError(f"metrics: {function!r}: must be a metric, a function or a name")
-    return str(getattr(function, "__name__", type(function).__name__))
+    usual, own = {m.name: m for m in metrics_of(of_groups)}, []
+    for item in wanted:
+        if isinstance(item, Metric):
+            own.append(item)
+        elif callable(item):
+            own.append(metric(str(getattr(item, "__name__", type(item).__name__)))(item))
+        elif not isinstance(item, str):
+            raise InputError(f"metrics: {item!r}: must be a metric, a function or a name")
+        elif item not in usual:
+            raise InputError(f"metrics: {item!r}: no such metric; {nearest(item, usual)}")
+        elif reason := lacking(usual[item].needs, names, roles):
+            raise InputError(f"metrics: {item}: is not available: {reason}")
+    return tuple(own)
 
 
 def check_portable(metrics: Iterable[Metric]) -> None:
@@ -340,8 +337,7 @@ def check_portable(metrics: Iterable[Metric]) -> None:
 
 def _place(function: Function, error: Exception) -> str:
     """The file and line of a function that failed, to begin a message with."""
-    code = getattr(inspect.unwrap(function), "__code__", None)
-    if code is None:
+    if (code := getattr(inspect.unwrap(function), "__code__", None)) is None:
         return ""
     line = [code.co_firstlineno, *_lines(error, code.co_filename)][-1]
     return f"{Path(code.co_filename).name}, line {line}: "
@@ -385,10 +381,8 @@ def available(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> tuple[list[Metric], list[str]]:
     """The metrics that signals of these `names` permit, and a line for each reason against one."""
-    metrics = _sized(metrics, names, roles)
-    distinct = {id(m.needs): m.needs for m in metrics}  # those of a group share theirs
-    lacks = {key: lacking(needs, names, roles) for key, needs in distinct.items()}
-    reasons = [(m, lacks[id(m.needs)]) for m in metrics]
+    sized = [m.of(names, roles) for m in metrics]
+    reasons = [(m, lacking(m.needs, names, roles)) for m in sized]
     there = [m for m, reason in reasons if not reason]
     in_part = {m.group for m in there}
     missing: dict[str, str] = {}
@@ -397,18 +391,6 @@ def available(
             whole = m.group and m.group not in in_part
             missing.setdefault(f"metrics of the {m.group}" if whole else m.name, reason)
     return there, [f"no {what}: {reason}" for what, reason in missing.items()]
-
-
-def _sized(
-    metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
-) -> tuple[Metric, ...]:
-    """The metrics with so many elements as there are; those that share their needs still do."""
-    shared: dict[int, Collection[str]] = {}
-    sized = [(m, m.of(names, roles)) for m in metrics]
-    return tuple(
-        m if m is was else replace(m, needs=shared.setdefault(id(was.needs), m.needs))
-        for was, m in sized
-    )
 
 
 def needed(
@@ -432,10 +414,12 @@ def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, st
             continue
         role, _, variable = need.partition(".")
         component = roles.get(role, role)
-        if not _plays(component, names):
-            able = next(iter(_able(role, needs, names)), "...")
-            return f'no component is the {role}; name it under [roles]: {role} = "{able}"'
-        return f"{component} lacks {variable}"
+        there = {name.partition(".")[0] for name in names}
+        if component in there:
+            return f"{component} lacks {variable}"
+        wanted = [need.removeprefix(role) for need in needs if need.startswith(f"{role}.")]
+        able = [c for c in sorted(there) if all(f"{c}{variable}" in names for variable in wanted)]
+        return f'no component is the {role}; name it under [roles]: {role} = "{[*able, "..."][0]}"'
     return None
 
 
@@ -443,17 +427,6 @@ def resolved(name: str, roles: Mapping[str, str]) -> str:
     """The name of a signal whose first part may be a role."""
     role, dot, variable = name.partition(".")
     return f"{roles.get(role, role)}{dot}{variable}"
-
-
-def _plays(component: str, names: Iterable[str]) -> bool:
-    return any(name.startswith(f"{component}.") for name in names)
-
-
-def _able(role: str, needs: Iterable[str], names: Collection[str]) -> list[str]:
-    """The components that have all that is needed of a role, sorted."""
-    wanted = [need.removeprefix(f"{role}.") for need in needs if need.startswith(f"{role}.")]
-    components = sorted({name.partition(".")[0] for name in names})
-    return [c for c in components if all(f"{c}.{variable}" in names for variable in wanted)]
 
 
 def _plain(m: Metric, found: Any) -> Any:
