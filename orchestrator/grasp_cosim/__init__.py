@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .metrics.metric import Metric, metric
     from .recording.load import load_run
     from .recording.result import Result
-    from .report.written import write_report
+    from .report.page import write_report
     from .ssp.to_archive import write_ssp
     from .sweeps.sweep import sweep
     from .system.description import System
@@ -78,7 +78,7 @@ _HOMES = {
     "qualify": "comparison.qualify",
     "simulate": "master.simulation",
     "sweep": "sweeps.sweep",
-    "write_report": "report.written",
+    "write_report": "report.page",
     "write_ssp": "ssp.to_archive",
 }
 

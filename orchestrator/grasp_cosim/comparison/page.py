@@ -88,7 +88,7 @@ def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[st
         sections,
         _state(c, shown, ids, scene, texts),
         data_html(shown.time, {ids[key]: values for key, values in shown.signals.items()}),
-        [scripts("main", "save", "pairs")],
+        [scripts("save", "pairs")],
         scene.style if scene else "",
     )
 

@@ -10,6 +10,7 @@ so a copy would have to be kept here, and neither keeps extremes over millions o
 from __future__ import annotations
 
 import json
+import logging
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,18 +23,24 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from one_piece import is_stream
 
-from ..base.files import write_text
+from ..base.errors import InputError
+from ..base.files import check_file, of_any_format, remove_parts, write_text
 from ..base.numerals import grouped
 from ..exchange.listener import Texts
 from ..recording.csv import quoted
+from ..recording.load import load_run, run_folder
 from ..recording.result import Result
 from .caption import Caption, caption
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter
 from .tables import metrics_table, number, settings_html, summary, svg_button
+from .timing import TIMING, draw_result
 from .timing_html import timing_html
+
+LOGGER = logging.getLogger(__name__)
 
 AT_FIRST = 6
 """So many signals are shown first where no scene says which."""
@@ -77,6 +84,31 @@ class Scene:
     zooms: Sequence[Zoom] = ()
 
 
+def write_report(run: str | Path, out: str | Path | None = None, title: str = "") -> list[Path]:
+    """Write the page of a run, by its folder, and the pictures that there are; where they are.
+
+    The page is `out`, by default report.html in the folder, under the title that the run has or
+    another one. With matplotlib a picture is beside it, and one of the timing of a run in real
+    time. InputError where the folder has no run, or the page cannot be written.
+    """
+    folder = run_folder(Path(run))
+    page = Path(out) if out else folder / "report.html"
+    recorded = load_run(folder).titled(title)
+    if recorded.wall_time is None:
+        LOGGER.warning("%s: unfinished, to t = %.6g s", folder, recorded.time[-1])
+    check_file(page)
+    remove_parts(page.parent, page.name, *of_any_format(recorded.view.stem, TIMING))
+    write_page(recorded, page, scene=recorded.view.scene(recorded))
+    written = [page]
+    if is_stream(page):
+        return written
+    try:
+        written += draw_result(recorded, page.parent)
+    except InputError as error:
+        LOGGER.warning("no picture: %s", error)
+    return written
+
+
 def write_page(
     result: Result, path: Path, *, scene: Scene | None = None, limit: int = LIMIT
 ) -> None:
@@ -106,7 +138,7 @@ def page_html(result: Result, *, scene: Scene | None = None, limit: int = LIMIT)
         {name: section for name, section in sections.items() if section},
         _state(result, shown, scene) | {"about": said.about},
         data_html(shown.time, {f"signal{k}": v for k, v in enumerate(shown.signals.values())}),
-        [scripts("main", "save", "panels"), scene.scripts if scene else ""],
+        [scripts("save", "panels"), scene.scripts if scene else ""],
         scene.style if scene else "",
     )
 
@@ -123,8 +155,8 @@ def document(
     """Return a page with traces as text.
 
     `summary` and `data` are HTML, `sections` are by their ids, each its head and its HTML; `state`
-    is what the scripts take as `page`, `script` what comes between those of the traces and the
-    start, and `style` what comes after that of the page.
+    is what the scripts take as `page`, `script` what comes between those of the traces and
+    main.js, and `style` what comes after that of the page.
     """
     return Template(_text("page.html")).substitute(
         title=escape(said.title),
@@ -139,7 +171,7 @@ def document(
         version=escape(version("grasp-cosim")),
         page=_json(state),
         data=data,
-        script="\n".join([traces_script(), *script, scripts("start")]),
+        script="\n".join([traces_script(), *script, scripts("main")]),
     )
 
 

@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from io import StringIO
+from io import BytesIO, StringIO
 from itertools import cycle
 from pathlib import Path
 from textwrap import wrap
@@ -117,7 +117,16 @@ def _panels(run: Result, names: Sequence[str]) -> list[tuple[str, list[str]]]:
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure, sizes in inches; InputError without matplotlib."""
     extra_module("matplotlib.figure", "it draws the figures", "plot")
-    from .picture import Picture
+    from matplotlib.figure import Figure
+
+    class Picture(Figure):
+        """A figure without pyplot: no window, and it is freed with its last name."""
+
+        def _repr_png_(self) -> bytes:
+            """As a notebook shows it."""
+            file = BytesIO()
+            self.savefig(file, format="png")
+            return file.getvalue()
 
     return Picture(figsize=(width, height), dpi=DPI, layout="constrained")
 

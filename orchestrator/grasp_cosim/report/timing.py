@@ -1,4 +1,4 @@
-"""The chart of a paced run's timing: how long the parts of a step took, and its overruns.
+"""The timing of a paced run as a chart and in words: the parts of a step, and its overruns.
 
 A curve is the share of the steps that took longer than a time, over that time, both logarithmic:
 the tail, which decides whether a loop keeps its period, takes as much room as the bulk. A histogram
@@ -18,21 +18,22 @@ from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
 from .caption import Caption, caption
 from .plot import GREY, RED, as_svg, finish, headed, new_figure, save
-from .timing_words import (
-    BACKLOG,
-    QUANTILES,
-    culprits,
-    duration,
-    kept,
-    label,
-    percent,
-    quantiles,
-    unlisted,
-)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+QUANTILES = {"median": 0.5, "p99": 0.01, "p99.9": 0.001}
+"""The share of the steps that took longer, by the name of a quantile."""
+
+NAMES = {"step": "whole step", "start": "late start", "between": "between steps"}
+"""Labels of the parts of a step whose name does not say enough."""
+
+BACKLOG = "backlog"
+"""The culprit of a step that began late because of those before."""
+
+BLAMED = 3
+"""So many other culprits are named in a sentence."""
 
 COLORS = (
     "#1b7f79", "#b26b00", "#7a4fa3", "#4c7a1f", "#a83279", "#5b6470", "#2f6fb3", "#8c4a2f",
@@ -125,6 +126,56 @@ def _figure(timing: Timing, end: float) -> Figure:
     _draw_distributions(above, timing)
     _draw_overruns(below, timing, end)
     return figure
+
+
+def label(part: str) -> str:
+    """Return the label of a part of a step: a component is called by its name."""
+    return NAMES.get(part, part)
+
+
+def quantiles(spread: Spread) -> dict[str, float]:
+    """Return the figures of a part by name: the quantiles, then the worst."""
+    return {**dict(zip(QUANTILES, spread, strict=False)), "worst": spread.worst}
+
+
+def culprits(timing: Timing) -> list[tuple[str, int]]:
+    """Return what made steps late, and how many of them; the most frequent first."""
+    return sorted(timing.culprits.items(), key=lambda entry: -entry[1])
+
+
+def kept(timing: Timing) -> str:
+    """A sentence: the period was kept, or how often it was not, by how much, and through what."""
+    steps, period = grouped(timing.steps), duration(timing.period)
+    if not timing.overruns:
+        return f"All {steps} steps ended within their period of {period}."
+    blamed = [
+        f"{label(name)} ({grouped(times)})" for name, times in culprits(timing) if name != BACKLOG
+    ]
+    rest = len(blamed) - BLAMED
+    names = blamed[:BLAMED] + ([f"{rest} other{'s' if rest > 1 else ''}"] if rest > 0 else [])
+    if BACKLOG in timing.culprits:  # it follows from what the others did
+        names.append(f"{label(BACKLOG)} ({grouped(timing.culprits[BACKLOG])})")
+    listed = len(timing.listed)
+    some = f" of the first {grouped(listed)}" if listed < timing.overruns else ""
+    return (
+        f"{grouped(timing.overruns)} of {steps} steps ({percent(timing.overruns / timing.steps)}) "
+        f"ended after their period of {period}. The worst{some} was "
+        f"{duration(max(overrun.late for overrun in timing.listed))} late; "
+        f"to blame: {', '.join(names)}."
+    )
+
+
+def duration(seconds: float) -> str:
+    """A time for the eye, with three figures: like 41.2 µs or 1.1 ms."""
+    for factor, unit in ((1e9, "ns"), (1e6, "µs"), (1e3, "ms")):
+        if factor * abs(seconds) < 999.5 and seconds:
+            return f"{factor * seconds:.3g} {unit}"
+    return f"{seconds:.3g} s" if abs(seconds) < 999.5 else f"{seconds:.0f} s"
+
+
+def percent(share: float) -> str:
+    """A share for the eye, with three figures: like 100 % or 0.0123 %."""
+    return f"{100.0 * share:.3g} %"
 
 
 def looks(timing: Timing) -> dict[str, Look]:
@@ -264,7 +315,9 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
     axes.set(yscale="log", ylim=(low, high))
     axes.yaxis.set_major_formatter(lambda seconds, _: duration(seconds))
     axes.minorticks_off()
-    if rest := unlisted(timing):  # shade the part of the run whose overruns were counted only
+    if rest := timing.overruns - len(
+        listed
+    ):  # shade the part of the run whose overruns were counted only
         axes.axvspan(listed[-1].time, end, color=GREY, alpha=0.15, linewidth=0.0)
         text = f"grey: {grouped(rest)} more, counted only"
         axes.set_title(text, fontsize=9, loc="right", color=GREY)

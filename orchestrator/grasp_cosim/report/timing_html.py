@@ -8,8 +8,7 @@ from ..base.errors import InputError
 from ..base.numerals import grouped
 from ..realtime.timing import Timing
 from .tables import bullets, number, svg_button, table
-from .timing import timing_svg
-from .timing_words import QUANTILES, duration, kept, label, quantiles
+from .timing import QUANTILES, duration, kept, label, quantiles, timing_svg
 
 MOST_ROWS = 50
 """So many overruns are in the table."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from ...report.written import write_report
+from ...report.page import write_report
 from ..frame import PATH, json_option, show, title_option, waiting
 
 
