@@ -23,7 +23,7 @@ from grasp_cosim.base.system_calls import pin, put_first
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.interface.interface import Value
-from grasp_cosim.system.realtime import Realtime
+from grasp_cosim.system.parts import Realtime
 
 from benchmarks.harness import Program, by_turns, spread
 

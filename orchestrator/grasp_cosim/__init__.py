@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from .ssp.to_archive import write_ssp
     from .sweeps.sweep import sweep
     from .system.description import System
-    from .system.realtime import Realtime
+    from .system.parts import Realtime
 
 __all__ = [
     "InputError",
@@ -63,7 +63,7 @@ __all__ = [
 
 _HOMES = {
     "Metric": "metrics.metric",
-    "Realtime": "system.realtime",
+    "Realtime": "system.parts",
     "Result": "recording.result",
     "Session": "master.simulation",
     "System": "system.description",

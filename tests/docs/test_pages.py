@@ -13,7 +13,7 @@ from grasp_cosim.base.higher import groups
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.served import Server
-from grasp_cosim.master.compiled import has_compiler
+from grasp_cosim.master.engine import has_compiler
 from grasp_cosim.ssp.to_archive import write_ssp
 from support.marks import needs_compiler, slow
 

@@ -11,7 +11,7 @@ import pytest
 from c_compilers import find_compiler
 from grasp_cosim import InputError, simulate
 from grasp_cosim.base.calls import STEP_2, Call, Native
-from grasp_cosim.master import compiled, loop
+from grasp_cosim.master import engine, loop
 from grasp_cosim.master.engine import make_loop
 from grasp_cosim.master.plan import Plan
 from support.marks import needs_compiler
@@ -29,8 +29,8 @@ def cache(tmp_path, monkeypatch):
 
 
 def forget():
-    compiled.library.cache_clear()
-    compiled._file.cache_clear()
+    engine.library.cache_clear()
+    engine._file.cache_clear()
 
 
 def kept(cache):
@@ -52,27 +52,27 @@ def counts(steps=3):
 
 
 def test_it_is_built_once_and_kept(cache, monkeypatch):
-    assert not compiled.is_there()
+    assert not engine.is_there()
     assert counts() == 3
     (file,) = kept(cache)
     assert file.parent == cache / "grasp-cosim/compiled"
     forget()
-    assert compiled.is_there()
-    monkeypatch.setattr(compiled, "compile_all", None)
+    assert engine.is_there()
+    monkeypatch.setattr(engine, "compile_all", None)
     assert counts() == 3
 
 
 def test_what_was_built_from_other_constants_is_not_taken(monkeypatch):
-    before = compiled._job().kept_as
-    monkeypatch.setattr(compiled, "EARLY", 7)
-    assert compiled._job().kept_as != before
+    before = engine._job().kept_as
+    monkeypatch.setattr(engine, "EARLY", 7)
+    assert engine._job().kept_as != before
 
 
 @pytest.mark.slow
 def test_processes_that_build_it_at_once_all_run(cache):
     code = (
-        "from grasp_cosim.master import compiled; import sys; sys.stdin.read(1)\n"
-        "print(compiled.library(True).run.argtypes is not None, compiled.is_there())"
+        "from grasp_cosim.master import engine; import sys; sys.stdin.read(1)\n"
+        "print(engine.library(True).run.argtypes is not None, engine.is_there())"
     )
     started = [
         subprocess.Popen([sys.executable, "-c", code], stdin=-1, stdout=-1, stderr=-1, text=True)
@@ -106,8 +106,8 @@ def test_a_compiler_that_is_none_is_one_line_and_auto_goes_on(grasp, monkeypatch
 def test_it_compiles_without_warnings(tmp_path):
     strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
     for level in ("-O0", "-O2", "-O3"):
-        macros = [f"-D{macro}" for macro in compiled._constants()]
-        command = [*find_compiler().command, *strict, level, *macros, compiled.SOURCE]
+        macros = [f"-D{macro}" for macro in engine._constants()]
+        command = [*find_compiler().command, *strict, level, *macros, engine.SOURCE]
         subprocess.run([*command, "-o", tmp_path / "loop.so"], check=True)
 
 

@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from grasp_cosim import SimulationError, simulate
-from grasp_cosim.master import compiled
 from grasp_cosim.master import engine as engines
 from grasp_cosim.master.plan import Plan
 from grasp_cosim.recording.result import Rejection
@@ -132,9 +131,9 @@ def test_a_value_that_is_not_finite_at_t_0_is_kept_too(tmp_path, engine, monkeyp
 def test_auto_takes_it_where_it_is_there_and_builds_it_for_long_runs(
     monkeypatch, there, compiler, steps
 ):
-    monkeypatch.setattr(compiled, "is_there", lambda: there)
-    monkeypatch.setattr(compiled, "has_compiler", lambda: compiler)
-    monkeypatch.setattr(compiled, "CompiledLoop", lambda plan: "in C")
+    monkeypatch.setattr(engines, "is_there", lambda: there)
+    monkeypatch.setattr(engines, "has_compiler", lambda: compiler)
+    monkeypatch.setattr(engines, "CompiledLoop", lambda plan: "in C")
     found = engines.make_loop(Plan(np.zeros(1), np.zeros(2)), "auto", steps)
     long = steps in (engines.LONG, None)
     assert (found == "in C") is (there or (long and compiler))

@@ -7,8 +7,7 @@ from grasp_cosim import System, simulate
 from grasp_cosim.cli.entry import main
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.system.parts import Component, Connection, Port
-from grasp_cosim.system.realtime import Realtime
+from grasp_cosim.system.parts import Component, Connection, Port, Realtime
 from support.marks import ENGINES
 from support.models import build_model, needs_cvode
 from support.native_fmus import needs_gcc

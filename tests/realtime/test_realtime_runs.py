@@ -13,8 +13,8 @@ import threading
 import pytest
 from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
 from grasp_cosim.base.calls import CLOCK, PACE
-from grasp_cosim.master import master, side_thread
-from grasp_cosim.master.compiled import has_compiler
+from grasp_cosim.master import engine, master
+from grasp_cosim.master.engine import has_compiler
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.privileges import check_cpu
 from grasp_cosim.realtime.timing import Timing
@@ -196,7 +196,7 @@ def test_it_has_the_bits_of_a_free_run_in_its_folder_too(two, tmp_path, version,
 def test_rows_go_round_in_their_room(two, monkeypatch):
     system = two()
     monkeypatch.setattr(master, "ROOM", 7)
-    monkeypatch.setattr(side_thread, "PAUSE", 1e-6)
+    monkeypatch.setattr(engine, "PAUSE", 1e-6)
     monkeypatch.setattr(master, "LONG", 0.0)
     assert same_bits(simulate(system), simulate(system, realtime=FAST))
 

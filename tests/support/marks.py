@@ -3,7 +3,7 @@
 import importlib.util
 
 import pytest
-from grasp_cosim.master.compiled import has_compiler
+from grasp_cosim.master.engine import has_compiler
 from hypothesis import settings
 
 needs_zig = pytest.mark.skipif(not importlib.util.find_spec("ziglang"), reason="NO ziglang")

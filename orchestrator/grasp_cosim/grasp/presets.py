@@ -16,10 +16,10 @@ from ..base.checks import known
 from ..interface.interface import Value
 from ..interface.units import IDENTITY
 from ..metrics.metric import resolved
-from ..system.conversions import parameter_in_si
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import given_values
+from ..system.structure import parameter_in_si
 
 SYSTEM = Path(__file__).parent / "grasp.toml"
 """The built-in system: the published grasp."""

@@ -1,16 +1,37 @@
 """The two engines: the loop as plain Python, and the same loop in C.
 
+That in C is compiled by the user's compiler at the first need, kept, and loaded; what is kept
+serves every later process: a file for each state of the source and the compiler. Where no component
+is Python it runs without Python's lock (the GIL), which callbacks take for themselves.
+
 Which one "auto" takes is known before the run: that in C where it is there already, which it is
 once it was built on this machine; a long run, or one in real time, builds it.
 """
 
+import ctypes
 import logging
-from collections.abc import Callable, Sequence
-from typing import Any, Literal, get_args
+import signal
+import socket
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from functools import lru_cache, partial
+from pathlib import Path
+from threading import Thread
+from typing import Any, Literal, Self, get_args
 
+import numpy as np
+from c_compilers import CompilerError, Job, cache, compile_all, find_compiler
+
+from ..base import calls as shapes
+from ..base.calls import PYTHON, Native
 from ..base.checks import choice
 from ..base.errors import InputError
-from . import compiled, loop
+from ..base.scratch import ScratchFolder
+from ..base.system_calls import be_ordinary
+from ..fmi.instance import EARLY
+from ..realtime import pacer, timing
+from ..system.parts import NANOSECONDS
+from . import loop
 from .plan import Plan
 
 Engine = Literal["auto", "python", "compiled"]
@@ -19,13 +40,115 @@ LOGGER = logging.getLogger(__name__)
 
 ENGINES: tuple[str, ...] = get_args(Engine)
 
-Loop = Callable[[Any, int, int, int, int, int], tuple[int, int, int]] | compiled.CompiledLoop
-"""loop.run() over a plan: takes rows, operation, start, stop, start_ns and step_ns."""
-
 LONG = 20_000
 """Steps of a run for which the loop is built in C where it is not there: that takes 0.1 to 0.3 s
 once on a machine, and saves about 20 us a step of the grasp.
 """
+
+SOURCE = Path(__file__).with_name("loop.c")
+
+ELEMENTS = (
+    *("float32", "bool", "int8", "uint8", "int16", "uint16"),
+    *("int32", "uint32", "int64", "uint64"),
+)
+"""The element types of buffers; the source has them in capitals."""
+
+REMEDY = "engine python needs no compiler"
+
+PAUSE = 0.02
+"""s between two times that rows are handed on beside the loop."""
+
+_OVER = 0
+"""Through the sockets of Aside comes the number of a signal, or this."""
+
+
+class _Call(ctypes.Structure):
+    """As Native."""
+
+    _fields_ = [
+        (name, ctypes.c_double if name == "step" else ctypes.c_int64) for name in Native._fields
+    ]
+
+
+class _Plan(ctypes.Structure):
+    _fields_ = [
+        ("operations", ctypes.c_void_p),
+        ("size", ctypes.c_int64),
+        *((n, ctypes.c_void_p) for n in ("connections", "casts", "buffers", "drives", "calls")),
+        ("values", ctypes.c_void_p),
+        ("width", ctypes.c_int64),
+        ("clock", ctypes.c_void_p),
+    ]
+
+
+class _Shared(ctypes.Structure):
+    _fields_ = [
+        (n, ctypes.c_int64) for n in ("operation", "status", "done", "taken", "halt", "ended")
+    ]
+
+
+class CompiledLoop:
+    """The compiled loop over a plan.
+
+    alone says that it makes no call of Python at all. It then may run while another thread looks
+    at shared.done, the number of the steps whose rows are there, sets shared.taken once it does
+    not need the rows of so many any more, or sets shared.halt. shared.ended is the wall time in ns
+    at which the last step ended.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        """InputError as of library()."""
+        callbacks = [ctypes.CFUNCTYPE(ctypes.c_int)(call.python) for call in plan.calls]
+        calls = [
+            call.native or Native(PYTHON, ctypes.cast(callback, ctypes.c_void_p).value or 0, 0)
+            for call, callback in zip(plan.calls, callbacks, strict=True)
+        ]
+        buffers = [(ELEMENTS.index(b.dtype.name), b.ctypes.data) for b in plan.buffers]
+        drives = [
+            (d.slot, d.linear, len(d.times), 0, *(a.buffer_info()[0] for a in (d.times, d.samples)))
+            for d in plan.drives
+        ]
+        tables = [
+            np.array(plan.operations, np.int64),
+            np.array(plan.connections, "i8, i8, f8, f8"),
+            *(np.array(table, np.int64) for table in (plan.casts, buffers, drives)),
+        ]
+        operations, *others = (table.ctypes.data for table in tables)
+        bound = (_Call * len(calls))(*(_Call(*call) for call in calls))
+        self._kept = plan, callbacks, tables, bound
+        self._tables = _Plan(
+            operations, len(plan.operations), *others, ctypes.addressof(bound),
+            plan.values.ctypes.data, len(plan.values), plan.clock.ctypes.data,
+        )  # fmt: skip
+        self.shared = _Shared()
+        self.alone = all(call.native and not call.keeps_lock for call in plan.calls)
+        self._places = ctypes.addressof(self._tables), ctypes.addressof(self.shared)
+        self._run = library(any(call.keeps_lock for call in plan.calls)).run
+
+    def __call__(
+        self,
+        rows: Any,
+        operation: int,
+        start: int,
+        stop: int,
+        start_ns: int,
+        step_ns: int,
+        row: int | None = None,
+    ) -> tuple[int, int, int]:
+        """As loop.run(). Given the row of the first step, rows are filled round and round."""
+        tables, shared = self._places
+        self.shared.done = start
+        if row is None:
+            self.shared.taken, row = start, 0
+        place, room = rows.ctypes.data, len(rows)
+        step = self._run(
+            tables, place, room, row, operation, start, stop, start_ns, step_ns, shared
+        )
+        return step, self.shared.operation, self.shared.status
+
+
+Loop = Callable[[Any, int, int, int, int, int], tuple[int, int, int]] | CompiledLoop
+"""loop.run() over a plan: takes rows, operation, start, stop, start_ns and step_ns."""
 
 
 def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
@@ -34,44 +157,153 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     InputError where it is to be compiled and cannot be.
     """
     choice("engine", engine, ENGINES)
-    why = "as asked"
-    if engine == "compiled":
-        return _compiled(plan, why)
+    there, why = engine == "auto" and is_there(), "as asked"
     if engine == "auto":
-        there = compiled.is_there()
         why = "as the run is short, or there is no compiler"
-        if there or ((steps is None or steps >= LONG) and compiled.has_compiler()):
-            try:
-                return _compiled(plan, "built before" if there else "as the run is long enough")
-            except InputError as error:  # of a compiler that does not work
-                why = str(error)
+    long = there or ((steps is None or steps >= LONG) and has_compiler())
+    if engine == "compiled" or (engine == "auto" and long):
+        try:
+            made = CompiledLoop(plan)
+        except InputError as error:  # of a compiler that does not work
+            if engine == "compiled":
+                raise
+            why = str(error)
+        else:
+            reason = "built before" if there else "as the run is long enough"
+            LOGGER.info("engine: the loop in C, %s", reason if engine == "auto" else why)
+            return made
     LOGGER.info("engine: the loop in Python, %s", why)
     return _interpreted(plan)
 
 
-def _compiled(plan: Plan, why: str) -> Loop:
-    made = compiled.CompiledLoop(plan)
-    LOGGER.info("engine: the loop in C, %s", why)
-    return made
-
-
 def _interpreted(plan: Plan) -> Loop:
-    program = loop.Program(*_columns(plan.operations, 5))
-    connections = loop.Connections(*_columns(plan.connections, 4))
-    casts = loop.Casts(*_columns(plan.casts, 3))
-    calls = [call.python for call in plan.calls]
     buffers = [memoryview(b) for b in plan.buffers]  # type: ignore[arg-type]
     values, clock = memoryview(plan.values), memoryview(plan.clock)  # type: ignore[arg-type]
-    tables = program, connections, casts, plan.drives, calls, buffers, values, clock
-
-    def run(
-        rows: Any, operation: int, start: int, stop: int, start_ns: int, step_ns: int
-    ) -> tuple[int, int, int]:
-        flat = memoryview(rows.reshape(-1))
-        return loop.run(*tables, flat, operation, start, stop, start_ns, step_ns)
-
-    return run
+    tables = plan.operations, plan.connections, plan.casts, plan.drives
+    over = partial(loop.run, *tables, [c.python for c in plan.calls], buffers, values, clock)
+    return lambda rows, *where: over(memoryview(rows.reshape(-1)), *where)
 
 
-def _columns(table: Sequence[Sequence[Any]], width: int) -> list[list[Any]]:
-    return [[row[i] for row in table] for i in range(width)]
+@lru_cache(maxsize=1)
+def _file() -> tuple[Path, ScratchFolder | None]:
+    """The library on disk, built where it is not kept; InputError as of library().
+
+    With a folder that ends with this process, in which it is where nothing can be kept.
+    """
+    try:
+        if kept := cache.kept(_job().kept_as):
+            return kept, None
+        scratch = ScratchFolder()
+        (made,) = compile_all([_job()], Path(scratch.name))
+        return made, scratch
+    except (ValueError, CompilerError) as error:
+        raise InputError(f"engine compiled: {error}; {REMEDY}") from error
+
+
+@lru_cache(maxsize=2)
+def library(locked: bool) -> ctypes.CDLL:
+    """The compiled loop, which runs with Python's lock held (the GIL) or without.
+
+    InputError where it has to be built and there is no compiler, or it fails.
+    """
+    path, _ = _file()
+    try:
+        found: ctypes.CDLL = (ctypes.PyDLL if locked else ctypes.CDLL)(str(path))
+    except OSError as error:
+        raise InputError(f"{path}: the compiled loop does not load: {error}; {REMEDY}") from error
+    found.run.restype = ctypes.c_int64
+    whole, place = ctypes.c_int64, ctypes.c_void_p
+    found.run.argtypes = [place, place, *[whole] * 7, place]
+    return found
+
+
+def is_there() -> bool:
+    """Return True if the compiled loop need not be built."""
+    with suppress(ValueError):
+        return bool(library.cache_info().currsize or cache.kept(_job().kept_as))
+    return False
+
+
+def has_compiler() -> bool:
+    """Return True if there is a C compiler."""
+    with suppress(ValueError):
+        return bool(find_compiler())
+    return False
+
+
+def _job() -> Job:
+    """What the library is made of; ValueError where there is no compiler."""
+    return Job("loop", {SOURCE.name: SOURCE.read_bytes()}, find_compiler(), defined=_constants())
+
+
+def _constants() -> list[str]:
+    """The numbers that the source shares with the other modules, as macros of a compiler."""
+    where = {
+        loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE CALL STEP TOO_LONG EXACT WORST FULL HALTED "
+        "OVERRUN",
+        shapes: "TRANSFER_2 TRANSFER_3 STEP_2 STEP_3 CLOCK PACE",
+        timing: "ARRIVED LATE DUE BEGIN",
+    }
+    shared = {
+        **{n: getattr(module, n) for module, names in where.items() for n in names.split()},
+        "EARLY": EARLY,
+        "SLICE": pacer.SLICE_NS,
+        "NAP": round(pacer.NAP * NANOSECONDS),
+        **{name.upper(): code for code, name in enumerate(ELEMENTS)},
+    }
+    return [f"{name}={value!r}" for name, value in shared.items()]
+
+
+class Aside:
+    """A context in which another thread acts from time to time, at no special priority.
+
+    So rows are handed on while the loop runs without Python's lock. halt is called where a signal
+    arrives, whose handler could not run before the loop ends, or where `act` fails; its error is
+    raised at the end.
+    """
+
+    def __init__(
+        self, act: Callable[[], None], halt: Callable[[], None], cpus: Collection[int]
+    ) -> None:
+        """Cpus are those that the thread may run on."""
+        self._act, self._halt, self._cpus = act, halt, cpus
+        self._thread = Thread(target=self._run, daemon=True)
+        self.error: BaseException | None = None
+
+    def __enter__(self) -> Self:
+        self._reader, self._writer = socket.socketpair()
+        self._writer.setblocking(False)
+        self._reader.settimeout(PAUSE)
+        self._before: int | None = None
+        with suppress(ValueError):  # in another thread than the main one there are no signals
+            self._before = signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Have it end; raises the error of `act`."""
+        if self._before is not None:
+            signal.set_wakeup_fd(self._before)
+        self._writer.send(bytes([_OVER]))
+        self._thread.join()
+        self._writer.close()
+        self._reader.close()
+        if self.error is not None:
+            raise self.error
+
+    def _run(self) -> None:
+        be_ordinary(self._cpus)  # the loop's own would be inherited
+        while True:
+            came = b""
+            with suppress(TimeoutError):
+                came = self._reader.recv(64)
+            if _OVER in came:
+                return
+            if came:
+                self._halt()
+            if self.error is None:
+                try:
+                    self._act()
+                except BaseException as error:
+                    self.error = error
+                    self._halt()

@@ -1,7 +1,7 @@
 /* The hot loop in C: the same as run() of loop.py, which says what each part means.
  *
  * It makes the calls of a plan by their addresses, without Python's lock unless a callback takes it
- * (see compiled.py, which builds and loads this file). The names in capitals that are not defined
+ * (see engine.py, which builds and loads this file). The names in capitals that are not defined
  * here are the numbers of loop.py and fmi/instance.py, handed over as -DNAME=NUMBER.
  */
 

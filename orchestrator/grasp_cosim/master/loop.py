@@ -1,14 +1,12 @@
-"""The hot loop: every step of every run goes through run(), interpreted or compiled.
+"""The hot loop: every step of every run goes through run() here, or through its twin, loop.c.
 
 The plan turns a system into a program, a short list of operations that make up one macro step. The
-loop knows nothing of components or FMI; it moves numbers in one vector and makes calls. The same
-source is interpreted on lists and memory views, and compiled on arrays (compiled.py), where the
-four functions below it have counterparts of the same meaning. Keep it in that subset.
+loop knows nothing of components or FMI; it moves numbers in one vector and makes calls.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ctypes import c_float
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..base import checks
 
@@ -34,40 +32,13 @@ WORST = 1
 """The highest status, an FMI warning, with which the loop goes on."""
 
 
-class Program(NamedTuple):
-    """Operations: kind, range in its table, and the steps k it runs in: k % period == phase."""
-
-    kind: Any
-    first: Any
-    last: Any
-    period: Any
-    phase: Any
-
-
-class Connections(NamedTuple):
-    """values[target] = factor * values[source] + offset."""
-
-    source: Any
-    target: Any
-    factor: Any
-    offset: Any
-
-
-class Casts(NamedTuple):
-    """values[slot] is element index of a buffer of another type than float64."""
-
-    buffer: Any
-    index: Any
-    slot: Any
-
-
 def run(
-    program: Program,
-    connections: Connections,
-    casts: Casts,
-    drives: Any,
-    calls: Any,
-    buffers: Any,
+    operations: Sequence[tuple[int, int, int, int, int]],
+    connections: Sequence[tuple[int, int, float, float]],
+    casts: Sequence[tuple[int, int, int]],
+    drives: Sequence[Any],
+    calls: Sequence[Callable[[], int]],
+    buffers: Sequence[Any],
     values: Any,
     clock: Any,
     rows: Any,
@@ -79,45 +50,43 @@ def run(
 ) -> tuple[int, int, int]:
     """Do the steps from start to stop, the first from the given operation on.
 
-    Step 0 begins at start_ns.
-    After step k the values go into rows, one row of len(values) after the other. clock holds the
-    time in s at which the component that steps now begins, and the step number. Returns the step
-    reached, and where a call's status is a bad one, the operation and the status (else 0 and 0).
+    The tables are those of a plan; values, clock, buffers and rows are memory views. Step 0 begins
+    at start_ns. After step k the values go into rows, one row of len(values) after the other. clock
+    holds the time in s at which the component that steps now begins, and the step number. Returns
+    the step reached, and where a call's status is a bad one, the operation and the status (else 0
+    and 0).
     """
-    kind, first, last, period, phase = program
-    source, target, factor, offset = connections
-    buffer, index, slot = casts
-    width, size = len(values), len(kind)
+    width, size = len(values), len(operations)
     for k in range(start, stop):
         clock[1] = k
         while operation < size:
-            if k % period[operation] == phase[operation]:
-                what, begin = kind[operation], first[operation]
+            what, begin, end, period, phase = operations[operation]
+            if k % period == phase:
                 if what >= CALL:
                     if what == STEP:
-                        clock[0] = (start_ns + (k + 1 - period[operation]) * step_ns) / 1e9
-                    status = invoke(calls, begin, clock)
+                        clock[0] = (start_ns + (k + 1 - period) * step_ns) / 1e9
+                    status = calls[begin]()
                     if status > WORST:
                         return k, operation, status
                 elif what == COPY:
-                    for i in range(begin, last[operation]):
-                        values[target[i]] = values[source[i]]
+                    for source, target, _, _ in connections[begin:end]:
+                        values[target] = values[source]
                 elif what == SCALE:
-                    for i in range(begin, last[operation]):
-                        values[target[i]] = factor[i] * values[source[i]] + offset[i]
+                    for source, target, factor, offset in connections[begin:end]:
+                        values[target] = factor * values[source] + offset
                 elif what == STORE:
-                    for i in range(begin, last[operation]):
-                        store(buffers, buffer[i], index[i], values[slot[i]])
-                elif what != DRIVE:
-                    for i in range(begin, last[operation]):
-                        value = load(buffers, buffer[i], index[i])
+                    for buffer, index, slot in casts[begin:end]:
+                        store(buffers[buffer], index, values[slot])
+                elif what == DRIVE:
+                    time = start_ns + (k - phase) * step_ns
+                    for drive in drives[begin:end]:
+                        values[drive.slot] = drive.at(time)
+                else:
+                    for buffer, index, slot in casts[begin:end]:
+                        value = float(buffers[buffer][index])
                         if what == LOAD_LONG and (value >= EXACT or value <= -EXACT):
                             return k, operation, TOO_LONG
-                        values[slot[i]] = value
-                else:
-                    time = start_ns + (k - phase[operation]) * step_ns
-                    for i in range(begin, last[operation]):
-                        drive(drives, i, time, values)
+                        values[slot] = value
             operation += 1
         operation = 0
         row = (k - start) * width
@@ -125,22 +94,6 @@ def run(
     return stop, 0, 0
 
 
-def invoke(calls: Sequence[Any], i: int, clock: Any) -> int:
-    """Make call i; its FMI status."""
-    return calls[i]()  # type: ignore[no-any-return]
-
-
-def drive(drives: Sequence[Any], i: int, time: int, values: Any) -> None:
-    """Put the value that drive i has at a time in ns into its place."""
-    values[drives[i].slot] = drives[i].at(time)
-
-
-def load(buffers: Sequence[Any], i: int, index: int) -> float:
-    """An element of buffer i as a float."""
-    return float(buffers[i][index])
-
-
-def store(buffers: Sequence[Any], i: int, index: int, value: float) -> None:
-    """Put a number into buffer i, in its type."""
-    buffer = buffers[i]
+def store(buffer: Any, index: int, value: float) -> None:
+    """Put a number into a buffer, in its type."""
     buffer[index] = c_float(value).value if buffer.format == "f" else int(value)

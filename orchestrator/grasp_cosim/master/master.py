@@ -21,14 +21,11 @@ from ..recording.result import Rejection
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port, seconds
 from . import loop
-from .compiled import CompiledLoop
-from .driven_inputs import at_start, drives_of
-from .engine import Engine, make_loop
+from .engine import Aside, CompiledLoop, Engine, make_loop
 from .initialisation import Propagation
 from .plan import Planner, slots_of
 from .rejection import finish_step
-from .scenario import Scenario
-from .side_thread import Aside
+from .scenario import Scenario, at_start, drives_of
 
 CHUNK = 4096
 """The most steps between two times that rows are handed on."""
@@ -268,7 +265,7 @@ class Master:
                     if status == loop.OVERRUN:
                         raise OverrunError
                     if status == loop.HALTED:
-                        if pacer.halted() or aside.failed:
+                        if pacer.halted() or aside.error:
                             raise HaltError
                         shared.halt = 0
                     elif status == loop.FULL:

@@ -22,9 +22,8 @@ from ..system.description import System
 from ..system.parts import NANOSECONDS, Connection, Port
 from ..system.stimuli_checks import driven
 from ..system.validity import transforms
-from .driven_inputs import Drive
 from .loop import CALL, COPY, DRIVE, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
-from .scenario import Scenario
+from .scenario import Drive, Scenario
 
 Operation = tuple[int, int, int, int, int]
 """Kind, first and last of its range, period and phase."""

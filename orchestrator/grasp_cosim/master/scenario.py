@@ -1,9 +1,18 @@
-"""Events at run time: what happens at which communication point."""
+"""What acts on a run from outside: events, faults of connections, stimuli.
+
+Which kinds of faults there are: system/faults.py.
+"""
+
+from __future__ import annotations
 
 import math
 import operator
+from array import array
+from bisect import bisect_right
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +21,13 @@ from ..base.checks import exact
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System
+from ..system.faults import FAULTS, INITIAL, Draws
 from ..system.parts import Condition, Event, Fault, Port, first_step, literal, seconds
-from ..system.scenario_checks import check_setting
-from .fault_windows import Window, fault_functions
+from ..system.scenario import check_setting
+from ..system.stimuli_checks import driven, is_linear, samples_of
+
+FaultFunction = Callable[[float, int], float]
+"""Changes a value passed at a step number."""
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -30,7 +43,7 @@ class Scenario:
     """The events and faults of one run.
 
     log says what happened, a line each, in order. fault_functions are those of the connections that
-    have faults, by target: see fault_windows.py.
+    have faults, by target.
     """
 
     def __init__(
@@ -185,3 +198,126 @@ class _PendingEvent:
         if self.event.when is not None:
             return f"{self.event.when} never held"
         return f"no step began at or after t = {seconds(self.event.at_ns or 0)}"
+
+
+class Window:
+    """The steps in which a fault acts. With a condition they are only known when it begins."""
+
+    def __init__(self, name: str, fault: Fault, step_ns: int, start_ns: int = 0) -> None:
+        self.name = name
+        self.fault = fault
+        self.begun = False
+        self._ended = False
+        self._earliest = first_step(fault.start_ns, step_ns, start_ns)
+        self._end: float = math.inf
+        if fault.end_ns is not None:
+            self._end = first_step(fault.end_ns, step_ns, start_ns)
+        self._first: float = self._earliest or INITIAL
+        if fault.when is not None:
+            self._first = math.inf
+
+    def __str__(self) -> str:
+        return f"{self.fault.target}: {self.fault.kind}"
+
+    def acts(self, step: int) -> bool:
+        """Return True if the fault acts on the values passed in this step."""
+        return self._first <= step < self._end
+
+    def may_begin(self, step: int) -> bool:
+        """Return True if it begins at this step, provided that its condition holds."""
+        return not self.begun and self._earliest <= step < self._end
+
+    def begin(self, step: int) -> None:
+        """Act from this step on, at the latest."""
+        self.begun = True
+        self._first = min(self._first, step)
+
+    def must_end(self, step: int) -> bool:
+        """Return True if it has begun, and this step is behind its last one."""
+        return self.begun and not self._ended and step >= self._end
+
+    def end(self) -> None:
+        """Note that it is over."""
+        self._ended = True
+
+    def next_step(self, step: int) -> int | None:
+        """Return the first step from this one on at which it may begin or must end, or None."""
+        if not self.begun:
+            earliest = max(step, self._earliest)
+            return earliest if earliest < self._end else None
+        return None if self._ended or self._end == math.inf else max(step, int(self._end))
+
+
+def fault_functions(windows: Sequence[Window], step_ns: int) -> Mapping[Port, FaultFunction]:
+    """Return for each connection that has faults, by target, all of them one after the other."""
+    chains: dict[Port, list[FaultFunction]] = {}
+    kinds: Counter[tuple[Port, str]] = Counter()
+    for window in windows:
+        fault = window.fault
+        key = (fault.target, fault.kind)
+        chains.setdefault(fault.target, []).append(_function(window, kinds[key], step_ns))
+        kinds[key] += 1
+    return {target: partial(_in_turn, chain) for target, chain in chains.items()}
+
+
+def _function(window: Window, count: int, step_ns: int) -> FaultFunction:
+    """Return the fault of a window, before which the connection has `count` of its kind."""
+    fault = window.fault
+    act = FAULTS[fault.kind].start(fault.parameters, Draws(fault, count), step_ns)
+    return lambda value, step: act(value, step, window.acts(step))
+
+
+def _in_turn(functions: Sequence[FaultFunction], value: float, step: int) -> float:
+    for function in functions:
+        value = function(value, step)
+    return value
+
+
+@dataclass(slots=True)
+class Drive:
+    """The samples of an input at times in ns, and its slot; row is the last one until now.
+
+    The compiled loop has the same in a table, with the same bits.
+    """
+
+    slot: int
+    times: array[int]
+    samples: array[float]
+    linear: bool
+    row: int = 0
+
+    def at(self, time: int) -> float:
+        """The value at a time, which is not before that of the last call."""
+        times, samples, row = self.times, self.samples, self.row
+        if row + 1 < len(times) and times[row + 1] <= time:
+            row = self.row = bisect_right(times, time, row + 1) - 1
+        if not self.linear or time <= times[row] or row + 1 == len(times):
+            return samples[row]
+        share = float(times[row + 1] - time) / float(times[row + 1] - times[row])
+        return share * samples[row] + (1.0 - share) * samples[row + 1]
+
+
+def drives_of(system: System, slots: dict[Port, int]) -> dict[Port, Drive]:
+    """The drive of each input that stimuli drive."""
+    found: dict[Port, Drive] = {}
+    if system.input is None:
+        return found
+    times = array("q", system.input.times)
+    for port in driven(system):
+        variable = system.component(port.component, str(port)).interface.by_name[port.variable]
+        linear, samples = is_linear(system.input, variable), samples_of(system, port)
+        found[port] = Drive(slots[port], times, samples, linear)
+    return found
+
+
+def at_start(system: System, drives: dict[Port, Drive], name: str) -> dict[str, Value]:
+    """The values at the start of the inputs of a component that are driven."""
+    found: dict[str, Value] = {}
+    for port, drive in drives.items():
+        if port.component == name:
+            kind = system.component(name, name).interface.by_name[port.variable].kind
+            value = drive.at(system.start_ns)
+            found[port.variable] = (
+                value if kind == "Real" else int(value) if kind == "Integer" else value != 0.0
+            )
+    return found

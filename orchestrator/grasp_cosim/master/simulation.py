@@ -36,8 +36,7 @@ from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.result import Known, Result
 from ..system.description import System
 from ..system.native import needed_twins
-from ..system.parts import NANOSECONDS, Component, Port
-from ..system.realtime import Realtime
+from ..system.parts import NANOSECONDS, Component, Port, Realtime
 from ..system.settings import start_values
 from ..system.validity import remarks
 from .engine import Engine

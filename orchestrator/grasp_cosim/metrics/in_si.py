@@ -9,8 +9,7 @@ from si_units import Unit, known_unit
 
 from ..base.errors import InputError, choices
 from ..interface.units import Conversion
-from ..system.conversions import naming, output_units
-from ..system.structure import Structure
+from ..system.structure import Structure, naming, output_units
 from .metric import Metric, available, resolved
 
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from ..base.calls import CLOCK, PACE, Call, Native
 from ..system.description import System
-from ..system.realtime import Realtime
+from ..system.parts import Realtime
 from .privileges import check_cpu
 from .timing import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table, Timing
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..base.errors import InputError, choices
 from ..base.system_calls import NotPossible, cpus, lock_memory, pin, put_first
-from ..system.realtime import Realtime
+from ..system.parts import Realtime
 
 ONLINE = Path("/sys/devices/system/cpu/online")
 """The file in which Linux lists its CPUs, as in 0-3,6."""

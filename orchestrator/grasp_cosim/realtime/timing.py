@@ -19,8 +19,7 @@ import numpy.typing as npt
 
 from ..base.errors import InputError
 from ..system.description import System
-from ..system.parts import NANOSECONDS
-from ..system.realtime import Realtime
+from ..system.parts import NANOSECONDS, Realtime
 
 
 class Overrun(NamedTuple):

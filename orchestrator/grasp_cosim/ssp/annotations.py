@@ -32,10 +32,10 @@ from ..system.parts import (
     Initialisation,
     Isolation,
     Port,
+    Realtime,
     Solver,
     in_nanoseconds,
 )
-from ..system.realtime import Realtime
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
 from .document import add, at, children

@@ -1,13 +1,15 @@
-"""Connections and values of whole arrays, as those of their elements."""
+"""Values that a component is given, and connections and values of whole arrays: as of elements."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import replace
 
 from ..base.checks import known
 from ..base.errors import InputError, choices
 from ..interface.arrays import shape_text
+from ..interface.expansion import values_of
+from ..interface.interface import Given, Value
 from .parts import Component, Connection, Port
 from .stimuli_checks import driven
 from .structure import Structure
@@ -101,3 +103,42 @@ def unsourced(system: Structure, component: Component) -> Iterator[str]:
             free += [name] if len(without) == len(array.names) else without
     if free:
         yield f"{component.name}: no source for {choices(free, 6)}: kept as the FMU starts with"
+
+
+def with_given(
+    component: Component,
+    place: Callable[[str], str],
+    given: Mapping[str, Given],
+    text: bool = False,
+) -> Component:
+    """The component with more values, structural parameters first: they decide sizes.
+
+    place says for a name where its value comes from. InputError where one does not fit. A value of
+    a whole array takes the place of all that were given for its elements.
+    """
+    interface = component.interface
+    sizes = {
+        name: value
+        for name, value in given.items()
+        if name in interface.by_name and interface.by_name[name].causality == "structuralParameter"
+    }
+    for name, value in sizes.items():
+        values = {**component.values, **values_of(interface, place(name), name, value, text)}
+        component = replace(component, values=values)
+    before, interface = interface, component.interface
+    anew = [before.arrays[name].names for name in given if name in before.arrays]
+    dropped = {element for names in anew for element in names}
+    kept = {name: value for name, value in component.values.items() if name not in dropped}
+    lost = next((n for n in kept if n in before.by_name and n not in interface.by_name), None)
+    if lost is not None:
+        array = next(name for name, a in before.arrays.items() if lost in a.names)
+        name, value = next(iter(sizes.items()))
+        raise InputError(
+            f"{place(name)} = {value!r}: there is then no {lost}, which has a value; {array} must "
+            "be given anew, too"
+        )
+    parsed: dict[str, Value] = {}
+    for name, value in given.items():
+        if name not in sizes:
+            parsed |= values_of(interface, place(name), name, value, text)
+    return replace(component, values={**kept, **parsed})

@@ -14,7 +14,7 @@ from .arrays import as_written, by_element, check_arrays
 from .native import natives
 from .parts import Component
 from .places import SECTIONS, as_file, changed, plain
-from .scenario_checks import check_scenario
+from .scenario import check_scenario
 from .settings import made_of
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli

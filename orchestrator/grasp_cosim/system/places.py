@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 from ..base.checks import as_table, check_keys, integer, known, real
 from ..base.errors import InputError, nearest
 from ..interface.interface import SETTABLE
-from .parts import Initialisation
-from .realtime import Realtime
+from .parts import Initialisation, Realtime
 from .structure import Structure
 
 Options = TypeVar("Options")

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from .parts import NANOSECONDS
-from .realtime import Realtime
+from .parts import NANOSECONDS, Realtime
 from .scenario import event_entry, fault_entry
 from .stimuli import input_entry
 from .structure import Structure

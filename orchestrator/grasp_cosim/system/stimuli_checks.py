@@ -10,10 +10,9 @@ from ..base.checks import exact, known
 from ..base.errors import InputError, choices
 from ..interface.interface import Interface, Value, Variable
 from ..interface.units import IDENTITY, Conversion, conversion
-from .conversions import unit_of
 from .parts import Port
 from .stimuli import Column, Stimuli
-from .structure import Structure
+from .structure import Structure, unit_of
 
 
 def driven(system: Structure) -> tuple[Port, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import quote
@@ -14,12 +14,10 @@ from ..base.errors import InputError, choices, nearest
 from ..interface.interface import Interface, Value, Variable
 from ..interface.read import describe
 from ..interface.units import IDENTITY
-from .conversions import unit_of
+from .arrays import with_given
 from .parts import ISOLATIONS, Component, Port, Solver, in_nanoseconds, literal
 from .places import changed, plain
-from .structure import Structure
-from .validity import check_items
-from .values import with_given
+from .structure import Structure, unit_of
 
 LOGGER = logging.getLogger(__name__)
 
@@ -106,8 +104,23 @@ def with_fmu(
             place, new.fmu.name, choices(silent, 6), was.fmu.name,
         )  # fmt: skip
     now = replace(now, values={**given, **converted(kept, before, after)})
-    check_items(was, now, [name for name in now.values if name not in anew], place)
+    _check_items(was, now, [name for name in now.values if name not in anew], place)
     return now, notes
+
+
+def _check_items(was: Component, now: Component, variables: Sequence[str], place: str) -> None:
+    """InputError where a value that a component keeps stands for another item in its new FMU."""
+    before, after = was.interface.by_name, now.interface.by_name
+    for name in variables:
+        value = now.values[name]
+        items = [v[name].items if name in v else {} for v in (before, after)]
+        label, meant = (next((k for k, n in i.items() if n == value), None) for i in items)
+        if all(items) and label != meant:
+            raise InputError(
+                f"{place}: {name} = {value!r} is {label} in {was.fmu.name} and "
+                f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
+                f"{choices(items[1])}"
+            )
 
 
 def _silent(variable: Variable, before: Interface) -> bool:

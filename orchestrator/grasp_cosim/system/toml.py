@@ -9,14 +9,22 @@ from ..base.checks import as_table, check_keys, check_values, choice, is_number,
 from ..base.errors import InputError
 from ..interface.interface import Given
 from ..interface.read import read_interface
+from .arrays import with_given
 from .description import System
-from .parts import ISOLATIONS, Component, Connection, Initialisation, Port, Solver, in_nanoseconds
+from .parts import (
+    ISOLATIONS,
+    Component,
+    Connection,
+    Initialisation,
+    Port,
+    Realtime,
+    Solver,
+    in_nanoseconds,
+)
 from .places import ENTRIES, PLACES, SECTIONS, changed
-from .realtime import Realtime
 from .scenario import read_events, read_faults
 from .stimuli import Stimuli, read_stimuli
 from .structure import experiment
-from .values import with_given
 
 TODO = re.compile(r"""(?:[^#"']|"(?!TODO\b)(?:[^"\\]|\\.)*"|'(?!TODO\b)[^']*')*["']TODO\b""")
 """A line with a value that is left to do; a # in quotes begins no comment."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from ..interface.capabilities import KINDS
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion
 from .arrays import as_written, unsourced
-from .parts import LOOPS, NANOSECONDS, Component, Connection, Port, seconds
+from .parts import LOOPS, NANOSECONDS, Connection, Port, seconds
 from .stimuli_checks import check_stimuli, driven, stimuli_remarks
 from .structure import Structure
 
@@ -73,21 +73,6 @@ def check_solvers(system: Structure) -> None:
             must = "a number greater than 0"
             longest = chosen.maximum_step
             number(f"{place}: maximum_step", longest, 0.0, above=True, must=must, unit="s")
-
-
-def check_items(was: Component, now: Component, variables: Sequence[str], place: str) -> None:
-    """InputError where a value that a component keeps stands for another item in its new FMU."""
-    before, after = was.interface.by_name, now.interface.by_name
-    for name in variables:
-        value = now.values[name]
-        items = [v[name].items if name in v else {} for v in (before, after)]
-        label, meant = (next((k for k, n in i.items() if n == value), None) for i in items)
-        if all(items) and label != meant:
-            raise InputError(
-                f"{place}: {name} = {value!r} is {label} in {was.fmu.name} and "
-                f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
-                f"{choices(items[1])}"
-            )
 
 
 def check_connections(system: Structure) -> None:
