@@ -10,8 +10,7 @@ from comparison.made import write_fmu
 from grasp_cosim import System
 from grasp_cosim.cli.commands.init import shown
 from grasp_cosim.grasp.presets import SYSTEM
-from support.models import build_model
-from support.native_fmus import needs_gcc
+from support.native_fmus import build_model, needs_gcc
 
 FOREIGN = {
     "ForceRight": 'causality="input" | Real start="0" unit="N"',

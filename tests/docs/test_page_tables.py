@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from grasp_cosim import cli, simulate
 from grasp_cosim.recording.load import load_run
-from support.native_fmus import needs_gcc
+from support.native_fmus import needs_gcc, vendor_plant
 from support.pictures import assert_same_picture
-from support.vendor import vendor_plant
 
 DOCS = Path(__file__).parents[2] / "docs"
 BLOCKS = re.compile(r"```(console|toml|python)\n(.*?)```", re.DOTALL)

@@ -1,14 +1,12 @@
 """What the page says of commands: which run the code of an FMU, and which only read it."""
 
 import os
-import subprocess
 import zipfile
 from pathlib import Path
 
-import fmpy
 import pytest
 from grasp_cosim.cli import main
-from support.native_fmus import TYPES, build, needs_gcc
+from support.native_fmus import TYPES, build, library_of, needs_gcc
 
 PAGE = (Path(__file__).parents[2] / "docs/what_an_fmu_may_do.md").read_text("utf-8")
 STARTS = {"Boolean": "false", "String": "''", "Enumeration": "1"}
@@ -31,12 +29,8 @@ def folder(tmp_path, monkeypatch):
     with zipfile.ZipFile(fmu) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     binary = next(name for name in files if name.startswith("binaries/") and name[-1] != "/")
-    (tmp_path / "tell.c").write_text(TELL_TALE.replace("LOG", str(tmp_path / "log")))
-    source = Path(__file__).parents[1] / "fmi/native/fmi2.c"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    command = ["gcc", "-shared", "-fPIC", f"-I{headers}", str(source), "tell.c", "-o", "all.so"]
-    subprocess.run(command, check=True)
-    files[binary] = (tmp_path / "all.so").read_bytes()
+    tell_tale = TELL_TALE.replace("LOG", str(tmp_path / "log"))
+    files[binary] = library_of("native", "2.0", code=tell_tale)
     with zipfile.ZipFile(fmu, "w") as archive:
         for name, data in files.items():
             archive.writestr(name, data)

@@ -5,7 +5,7 @@ from ctypes import c_double
 import numpy as np
 import pytest
 from grasp_cosim.system.parts import Solver
-from support.models import needs_cvode
+from support.native_fmus import needs_cvode
 
 pytestmark = needs_cvode
 

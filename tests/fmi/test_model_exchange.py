@@ -10,9 +10,7 @@ from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.system.parts import Component, Connection, Event, Port, Solver
 from scipy.integrate import solve_ivp
 from support.marks import ENGINES
-from support.models import build_model, needs_cvode
-from support.native_fmus import needs_gcc
-from support.state_space import state_space
+from support.native_fmus import build_model, needs_cvode, needs_gcc, state_space
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,8 +7,7 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 from grasp_cosim.cli import main
-from support.models import KINDS, MODELS, build_model, needs_cvode
-from support.native_fmus import needs_gcc
+from support.native_fmus import KINDS, MODELS, build_model, needs_cvode, needs_gcc
 
 pytestmark = needs_gcc
 VERSIONS = ("2.0", "3.0")

@@ -21,8 +21,8 @@ from grasp_fmus.native.bench_header import bench_header
 from grasp_fmus.page import icon
 from support import native_fmus
 from support.marks import platforms, slow
+from support.native_fmus import state_space
 from support.proxies import ANY_PORT, build_proxy, serving
-from support.state_space import state_space
 
 Proxy = Callable[..., Path]
 

@@ -17,7 +17,7 @@ from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.loading import Finding, unpack
 from support import native_fmus
 from support.marks import slow
-from support.models import build_model
+from support.native_fmus import build_model
 
 SCRIPT = """\
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real

@@ -5,7 +5,8 @@ from grasp_cosim import InputError
 from grasp_cosim.interface.arrays import MOST_ELEMENTS, Element
 from grasp_cosim.interface.expansion import expanded, values_of
 from grasp_cosim.interface.read import read_interface
-from support.state_space import TYPES, state_space
+from support.native_fmus import ARRAY_TYPES as TYPES
+from support.native_fmus import state_space
 
 MATRIX = ("A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]")
 FIXED = '<Float64 name="{}" valueReference="300" causality="{}" {}>{}</Float64>'

@@ -5,8 +5,7 @@ from tempfile import gettempdir
 import pytest
 from grasp_cosim.interface.obstacles import of_loading
 from grasp_cosim.interface.read import describe
-from support.models import build_model
-from support.native_fmus import needs_gcc
+from support.native_fmus import build_model, needs_gcc
 
 
 @needs_gcc

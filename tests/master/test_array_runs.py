@@ -10,10 +10,9 @@ from grasp_cosim.cli.entry import main
 from grasp_cosim.recording.load import load_run
 from scipy.linalg import expm
 from support.marks import engines
-from support.models import needs_cvode
-from support.native_fmus import needs_gcc
+from support.native_fmus import ARRAY_TYPES as TYPES
+from support.native_fmus import needs_cvode, needs_gcc, state_space
 from support.packages import skip_where_fmpy_runs_none
-from support.state_space import TYPES, state_space
 
 
 def isolated(system, isolation="process"):

@@ -13,8 +13,7 @@ from grasp_cosim.system.stimuli import read_stimuli
 from support.marks import engines
 from support.mocks import Mock, make_system
 from support.mocks import Run as MockRun
-from support.models import KINDS, build_model, needs_cvode
-from support.native_fmus import needs_gcc
+from support.native_fmus import KINDS, build_model, needs_cvode, needs_gcc
 
 START, STEP, STOP = 5.3, 0.1, 7.9
 TIMES = np.array([(5_300_000_000 + k * 100_000_000) / 1e9 for k in range(27)])

@@ -9,8 +9,7 @@ from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.recording.load import load_run
 from grasp_cosim.system.parts import Component, Connection, Port, Realtime
 from support.marks import ENGINES
-from support.models import build_model, needs_cvode
-from support.native_fmus import needs_gcc
+from support.native_fmus import build_model, needs_cvode, needs_gcc
 
 pytestmark = needs_gcc
 KINDS = [pytest.param("ModelExchange", marks=needs_cvode), "CoSimulation"]

@@ -18,8 +18,7 @@ from ssp.hand_made import (
     structure,
     system,
 )
-from support.models import build_model
-from support.native_fmus import needs_gcc
+from support.native_fmus import build_model, needs_gcc
 
 pytestmark = [needs_gcc, pytest.mark.slow]
 

@@ -1,67 +1,267 @@
-"""Builds the C test FMUs of tests/fmi/native: every scalar type, and failures on demand.
+"""Builds the C test FMUs of tests/support/models, for FMI 2.0 and 3.0, of either kind.
 
-Both versions have inputs u_T and outputs y_T = u_T for each type T of theirs, the outputs x (the
-integral of gain * u_Real or u_Float64), now and steps, and the parameters gain and, as times in s
-in a step that then goes wrong: crash_at, exit_at, hang_at, error_at, discard_at (no part of the
-step is done), early_at, terminate_at (the step ends there) and interrupt_at (SIGINT for the process
-whose number is the parameter interrupted).
+The equations are in MODEL.c; fmi.c makes an FMU of them, which refuses a call in the wrong mode.
+The value reference of a variable is its place in the lists here, where it names no other one.
 """
 
 import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
 
+import fmpy
 import pytest
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from .compiled import pack, shared_library
 
-SOURCES = Path(__file__).parents[1] / "fmi" / "native"
+SOURCES = Path(__file__).with_name("models")
+KINDS = ("ModelExchange", "CoSimulation")
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+needs_cvode = pytest.mark.skipif(
+    not Path(fmpy.__file__).with_name("sundials").joinpath(fmpy.platform_tuple).is_dir(),
+    reason="NO CVode: FMPy has none for this machine",
+)
+ARRAY_TYPES = (
+    *("Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64"),
+    *("UInt64", "Boolean", "Enumeration"),
+)
+"""The types of the arrays u_T and y_T = u_T, of 2 x k, of the state-space model."""
 
 TYPES = {
     "2.0": {"Real": 0, "Integer": 6, "Boolean": 10, "Enumeration": 11, "String": 12},
-    "3.0": {
-        "Float64": 0,
-        "Float32": 1,
-        "Int8": 2,
-        "UInt8": 3,
-        "Int16": 4,
-        "UInt16": 5,
-        "Int32": 6,
-        "UInt32": 7,
-        "Int64": 8,
-        "UInt64": 9,
-        "Boolean": 10,
-        "Enumeration": 11,
-        "String": 12,
-    },
+    "3.0": {name: place for place, name in enumerate((*ARRAY_TYPES, "String"))},
 }
 """By version, the types and what is added to 100 (u_T) or 200 (y_T) as value reference."""
 
 PARAMETERS = (
-    "crash_at",
-    "exit_at",
-    "hang_at",
-    "error_at",
-    "discard_at",
-    "early_at",
-    "terminate_at",
-    "gain",
-    "interrupt_at",
-    "interrupted",
+    *("crash_at", "exit_at", "hang_at", "error_at", "discard_at", "early_at", "terminate_at"),
+    *("gain", "interrupt_at", "interrupted"),
 )
 UNITS = {
-    "m": 'm="1"',
-    "mm": 'm="1" factor="0.001"',
-    "N": 'kg="1" m="1" s="-2"',
-    "K": 'K="1"',
-    "degC": 'K="1" offset="273.15"',
-    "degF": 'K="1" factor="0.5555555555555556" offset="255.3722222222222"',
+    "m": {"m": 1},
+    "mm": {"m": 1, "factor": 0.001},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "mN": {"kg": 1, "m": 1, "s": -2, "factor": 0.001},
+    "K": {"K": 1},
+    "degC": {"K": 1, "offset": 273.15},
+    "degF": {"K": 1, "factor": 0.5555555555555556, "offset": 255.3722222222222},
 }
-"""The units the FMUs define, in SI base units."""
+"""The units the FMUs define, in SI base units; and one that is none of these."""
 
 CAPABLE = {"canHandleVariableCommunicationStepSize": "true"}
 EARLY = {**CAPABLE, "mightReturnEarlyFromDoStep": "true"}
+
+
+class Variable(NamedTuple):
+    """A variable; what it has not is None, or empty. Sizes are references, or "=2" for a fixed one.
+
+    derivative names the state; depends what an output depends on, initially that at the start.
+    """
+
+    name: str
+    type: str = "Float64"
+    causality: str = "local"
+    variability: str | None = "continuous"
+    start: float | str | bool | None = None
+    derivative: str = ""
+    depends: Sequence[str] | None = None
+    initially: Sequence[str] | None = None
+    reference: int | None = None
+    sizes: str = ""
+    unit: str | None = None
+    description: str | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """What the model description says: variables, and event indicators by name.
+
+    completed says that the solver has to tell of each of its steps.
+    """
+
+    variables: Sequence[Variable]
+    indicators: Sequence[str] = ()
+    completed: bool = False
+    stop: float | None = 1.0
+    step: float = 0.01
+    choices: tuple[str, str] = ("one", "two")
+
+
+_TIME = Variable("time", causality="independent")
+
+
+def _state(name, start):
+    state = Variable(name, causality="output", start=start)
+    return state, Variable(f"der({name})", derivative=name)
+
+
+def _parameter(name, start, tunable=False, type_="Float64"):
+    return Variable(name, type_, "parameter", "tunable" if tunable else "fixed", start)
+
+
+def _pair(name, type_, discrete=None):
+    """An input and an output of a type that passes it on."""
+    discrete = type_[:5] not in ("Real", "Float") if discrete is None else discrete
+    varies = "discrete" if discrete else "continuous"
+    starts = {"Boolean": False, "String": "", "Binary": "00", "Enumeration": 1}
+    return (
+        Variable(f"u_{name}", type_, "input", varies, starts.get(type_, 0)),
+        Variable(f"y_{name}", type_, "output", varies, depends=[f"u_{name}"]),
+    )
+
+
+def _feedthrough(version):
+    first = "Real" if version == "2.0" else "Float64"
+    types = [t for t in TYPES[version] if t not in (first, "Enumeration")]
+    types += ["Enumeration"] if version == "2.0" else ["Binary", "Enumeration"]
+    pairs = [_pair(first, first), _pair("Discrete", first, True), *(_pair(t, t) for t in types)]
+    return Model((_TIME, *(v for pair in pairs for v in pair)))
+
+
+def _native(version, strings=True):
+    """Both versions have u_T and y_T = u_T for each type T of theirs, and see models/native.c."""
+    real, whole = ("Real", "Integer") if version == "2.0" else ("Float64", "UInt64")
+    variables = []
+    for fmi_type, place in TYPES[version].items():
+        u, y = _pair(fmi_type, fmi_type)
+        variables.append(u._replace(reference=100 + place))
+        if strings or fmi_type != "String":
+            variables.append(y._replace(reference=200 + place))
+    for place, name in enumerate(PARAMETERS, 1):
+        parameter = _parameter(name, "1" if name == "gain" else "1e9", name == "gain", real)
+        variables.append(parameter._replace(reference=place))
+    ends = [("x", real, 20), ("now", real, 21), ("steps", whole, 30)]
+    if version == "3.0":
+        size = Variable("size", whole, "structuralParameter", "fixed", 3, reference=40)
+        variables.append(size)
+        ends.append(("size_out", whole, 41))
+    for name, fmi_type, place in ends:
+        varies = "continuous" if fmi_type == real else "discrete"
+        output = Variable(name, fmi_type, "output", varies, depends=(), reference=place)
+        variables.append(output)
+    if version == "3.0":
+        variables += (
+            Variable("u_Binary", "Binary", "input", None, "00", reference=150),
+            Variable("y_array", "String", "output", None, reference=151, sizes="=3"),
+            Variable("y_clock", "Clock", "output", None, reference=152),
+            _TIME._replace(reference=153),
+        )
+    return Model(variables, stop=None)
+
+
+def _state_space(types):
+    unit = "1 0 0 0 1 0 0 0 1"
+    variables = [
+        _TIME,
+        *(Variable(name, "UInt64", "structuralParameter", "tunable", 3) for name in "mnrk"),
+        *(
+            _parameter(name, unit, tunable=True)._replace(sizes=sizes)
+            for name, sizes in {"A": "2 2", "B": "2 1", "C": "3 2", "D": "3 1"}.items()
+        ),
+        _parameter("x0", 0)._replace(sizes="2"),
+        Variable("u", causality="input", start="1 2 3", sizes="1"),
+        Variable("y", "Float64", "output", "continuous", None, "", "CDux", ("C", "D", "x0", "u"),
+                 sizes="3"),
+        Variable("x", sizes="2"),
+    ]  # fmt: skip
+    for place, fmi_type in enumerate(ARRAY_TYPES if types else ()):
+        u, y = _pair(fmi_type, fmi_type)
+        variables.append(u._replace(reference=100 + place, sizes="=2 4"))
+        variables.append(y._replace(reference=200 + place, sizes="=2 4"))
+    return Model(variables, stop=None, choices=("slow", "fast"))
+
+
+MODELS = {
+    "bouncing_ball": Model(
+        (
+            _TIME,
+            *_state("h", 1.0),
+            *_state("v", 0.0),
+            _parameter("g", -9.81),
+            _parameter("e", 0.7, tunable=True),
+            _parameter("v_min", 0.1),
+        ),
+        indicators=("h",),
+        stop=3.0,
+    ),
+    "van_der_pol": Model(
+        (_TIME, *_state("x0", 2.0), *_state("x1", 0.0), _parameter("mu", 1.0, tunable=True)),
+        stop=20.0,
+    ),
+    "dahlquist": Model(
+        (
+            _TIME,
+            *_state("x", 1.0),
+            _parameter("k", 1.0, tunable=True),
+            Variable("u", causality="input", start=0.0),
+            _parameter("d", 0.0),
+            Variable("y", causality="output", depends=("x", "u")),
+        ),
+        stop=10.0,
+        step=0.1,
+    ),
+    "stair": Model(
+        (
+            _TIME,
+            Variable("counter", "Int32", "output", "discrete", 1),
+            _parameter("width", 1.0),
+            _parameter("last", 10, type_="Int32"),
+        ),
+        stop=10.0,
+        step=0.2,
+    ),
+    "odd": Model(
+        (
+            _TIME,
+            *_state("x", 0.0),
+            Variable("rate", start=1.0),
+            _parameter("kind", 0, type_="Int32"),
+            Variable("events", "Int32", "output", "discrete", 0),
+            Variable("u", "Boolean", "input", "discrete", False),
+        ),
+        indicators=("x",),
+        completed=True,
+    ),
+    "sine": Model(
+        (_TIME, Variable("count", "Int32", "output", "discrete", -1), _parameter("f", 1.0)),
+        indicators=("count",),
+    ),
+    "feedthrough": None,
+}
+"""By the name of their C file; the feedthrough has u_T and y_T for each type T of its version."""
+
+BRAKE = "share of the force that is lost"
+_VENDOR = Model(
+    (
+        _TIME,
+        Variable("ForceRight", causality="input", start=0, unit="mN"),
+        Variable("ForceLeft", causality="input", start=0, unit="mN"),
+        Variable("Brake", causality="input", start=0, description=BRAKE),
+        *(
+            Variable(name, causality="output", depends=(), reference=place, sizes=sizes, unit=unit)
+            for name, place, unit, sizes in (
+                ("Gaps", 10, "mm", "=2"),
+                ("Fingers.Right.Position", 11, "mm", ""),
+                ("Fingers.Left.Position", 12, "mm", ""),
+                ("SpeedRight", 13, None, ""),
+                ("SpeedLeft", 14, None, ""),
+                ("LoadRight", 15, "mN", ""),
+                ("LoadLeft", 16, "mN", ""),
+                ("PartPosition", 17, "mm", ""),
+            )
+        ),
+        _parameter("PartStart", 30)._replace(reference=30, unit="mm"),
+        Variable("TouchRight", "Boolean", "output", "discrete", depends=(), reference=20),
+        Variable("TouchLeft", "Boolean", "output", "discrete", depends=(), reference=21),
+    ),
+    stop=3.0,
+    step=0.001,
+)
 
 
 def build(
@@ -74,129 +274,157 @@ def build(
     complete=False,
     strings=True,
 ):
-    """The FMU name.fmu in folder; units by variable, capabilities as attributes (else CAPABLE).
+    """The FMU of models/native.c as NAME.fmu in folder: every scalar type, and failures on demand.
 
-    It has outputs that are Strings only with strings.
-    It loads with the right token only. With complete, it has the functions of FMI 3.0 for other
-    kinds of FMUs, too, without which FMPy does not load it.
+    Units by variable, capabilities as attributes (else CAPABLE). It has outputs that are Strings
+    only with strings. It loads with the right token only. With complete, it has the functions of
+    FMI 3.0 for other kinds of FMUs, too, without which FMPy does not load it.
     """
-    capabilities = CAPABLE if capabilities is None else capabilities
-    describe = _description_2 if version == "2.0" else _description_3
-    xml = describe(dict(units or {}), dict(capabilities), strings).replace("{native}", token)
-    source, asked = SOURCES / f"fmi{version[0]}.c", FMU3Slave if complete else None
-    library = shared_library(source, asked=asked)
+    model = _native(version, strings)
+    units = units or {}
+    variables = [v._replace(unit=units.get(v.name)) for v in model.variables]
+    xml = description("native", version, Model(variables, stop=None), ["CoSimulation"],
+                      CAPABLE if capabilities is None else capabilities, token)  # fmt: skip
+    library = library_of("native", version, complete=complete or version == "2.0")
     return pack(folder / f"{name}.fmu", version, "native", xml, library)
 
 
-def _attributes(values):
-    return "".join(f' {key}="{value}"' for key, value in values.items())
+def build_model(name, folder, version="2.0", kinds=KINDS, file=""):
+    """The FMU of one of MODELS, for the kinds given, as folder/FILE.fmu (by default NAME.fmu)."""
+    model = MODELS[name] or _feedthrough(version)
+    library = library_of(name, version, "CoSimulation" in kinds)
+    xml = description(name, version, model, kinds)
+    return pack(folder / f"{file or name}.fmu", version, name, xml, library)
 
 
-def _unit_definitions():
-    units = "".join(f'<Unit name="{n}"><BaseUnit {base}/></Unit>' for n, base in UNITS.items())
-    return f'<UnitDefinitions>{units}<Unit name="bare"/></UnitDefinitions>'
+def state_space(
+    folder, name="ss", types=False, more="", kind="CoSimulation", binary=True, complete=False
+):
+    """The FMU name.fmu in folder: m inputs u, n states x, r outputs y, 3 of each at the start.
+
+    With types it has u_T and y_T for all types; more are further variables of its description. kind
+    is CoSimulation or ModelExchange. One without a binary needs no compiler.
+    """
+    library = library_of("state_space", "3.0", complete=complete) if binary else b""
+    xml = description("state_space", "3.0", _state_space(types), [kind], more=more)
+    return pack(folder / f"{name}.fmu", "3.0", "state_space", xml, library)
 
 
-def _variables(version, strings):
-    """Name, type, value reference, causality and variability."""
-    real, whole = ("Real", "Integer") if version == "2.0" else ("Float64", "UInt64")
-    rows = []
-    for fmi_type, number in TYPES[version].items():
-        varies = "continuous" if fmi_type in ("Real", "Float64", "Float32") else "discrete"
-        rows.append((f"u_{fmi_type}", fmi_type, 100 + number, "input", varies))
-        rows.append((f"y_{fmi_type}", fmi_type, 200 + number, "output", varies))
-    for number, name in enumerate(PARAMETERS, 1):
-        varies = "tunable" if name == "gain" else "fixed"
-        rows.append((name, real, number, "parameter", varies))
-    rows += [("x", real, 20, "output", "continuous"), ("now", real, 21, "output", "continuous")]
-    rows.append(("steps", whole, 30, "output", "discrete"))
-    return [row for row in rows if strings or row[1] != "String" or row[3] != "output"]
+def vendor_plant(path):
+    """The gripper plant of another vendor, in mm and mN, with names of its own."""
+    from grasp_cosim import cli  # here, as what is below it is tested without
+
+    with tempfile.TemporaryDirectory() as folder:
+        assert cli.main(["build", "--native", "--c-only", folder, "GripperPlant"]) == 0
+        more = str(Path(folder, "GripperPlant.c")), f"-I{folder}", "-lm"
+        library = library_of("vendor", "3.0", more=more)
+    xml = description("vendor", "3.0", _VENDOR, ["CoSimulation"])
+    return pack(path, "3.0", "vendor", xml, library)
 
 
-def _start(name, fmi_type):
-    if name.startswith("u_") or name in PARAMETERS:
-        texts = {"Boolean": "false", "String": "", "Enumeration": "1"}
-        return texts.get(fmi_type, "1" if name == "gain" else "1e9" if name in PARAMETERS else "0")
-    return ""
-
-
-def _description_2(units, capabilities, strings):
-    rows = _variables("2.0", strings)
-    index = {name: number for number, (name, *_) in enumerate(rows, 1)}
-    variables = ""
-    for name, fmi_type, reference, causality, variability in rows:
-        values = {"unit": units[name]} if name in units else {}
-        if fmi_type == "Enumeration":
-            values["declaredType"] = "Choice"
-        if causality != "output":
-            values["start"] = _start(name, fmi_type)
-        variables += (
-            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="{causality}" '
-            f'variability="{variability}"><{fmi_type}{_attributes(values)}/></ScalarVariable>'
-        )
-    outputs = initial = ""
-    for name, _, _, causality, _ in rows:
-        if causality == "output":
-            needs = [f"u_{name[2:]}"] if name.startswith("y_") else []
-            listed = " ".join(str(index[n]) for n in needs)
-            unknown = f'<Unknown index="{index[name]}" dependencies="{listed}"/>'
-            outputs, initial = outputs + unknown, initial + unknown
-    return (
-        '<?xml version="1.0"?><fmiModelDescription fmiVersion="2.0" modelName="native" '
-        f'guid="{{native}}"><CoSimulation modelIdentifier="native"{_attributes(capabilities)}/>'
-        f"{_unit_definitions()}"
-        '<TypeDefinitions><SimpleType name="Choice"><Enumeration><Item name="one" value="1"/>'
-        '<Item name="two" value="2"/></Enumeration></SimpleType></TypeDefinitions>'
-        f"<ModelVariables>{variables}</ModelVariables><ModelStructure><Outputs>{outputs}</Outputs>"
-        f"<InitialUnknowns>{initial}</InitialUnknowns></ModelStructure></fmiModelDescription>"
+def library_of(name, version, steps=True, complete=True, more=("-lm",), code=""):
+    """The binary of a model; only with steps it can do any, as in build() if it is complete."""
+    asked = (FMU3Slave if steps else FMU3Model) if version == "3.0" else FMU2Slave
+    asked = FMU2Model if version == "2.0" and not steps else asked
+    options = [f"-DFMI={version[0]}", f'-DNAME="{name}"', *["-DNO_STEPS"][steps:], *more]
+    return shared_library(
+        SOURCES / f"{name}.c", code=code, options=(*options,), asked=asked if complete else None
     )
 
 
-def _description_3(units, capabilities, strings):
-    rows = [
-        *_variables("3.0", strings),
-        ("size", "UInt64", 40, "structuralParameter", "fixed"),
-        ("size_out", "UInt64", 41, "output", "discrete"),
-    ]
-    references = {name: reference for name, _, reference, _, _ in rows}
-    variables = ""
-    for name, fmi_type, reference, causality, variability in rows:
-        values = {"unit": units[name]} if name in units else {}
-        if fmi_type == "Enumeration":
-            values["declaredType"] = "Choice"
-        start = "3" if name == "size" else _start(name, fmi_type)
-        child = ""
-        if fmi_type == "String" and causality == "input":
-            child = f'<Start value="{start}"/>'
-        elif causality != "output":
-            values["start"] = start
-        variables += (
-            f'<{fmi_type} name="{name}" valueReference="{reference}" causality="{causality}" '
-            f'variability="{variability}"{_attributes(values)}>{child}</{fmi_type}>'
-        )
-    variables += (
-        '<Binary name="u_Binary" valueReference="150" causality="input"><Start value="00"/>'
-        "</Binary>"
-        '<String name="y_array" valueReference="151" causality="output"><Dimension start="3"/>'
-        '</String><Clock name="y_clock" valueReference="152" causality="output" '
-        'intervalVariability="triggered"/><Float64 name="time" valueReference="153" '
-        'causality="independent" variability="continuous"/>'
-    )
-    outputs = initial = ""
-    for name, _, reference, causality, _ in rows:
-        if causality == "output":
-            needs = [f"u_{name[2:]}"] if name.startswith("y_") else []
-            listed = " ".join(str(references[n]) for n in needs)
-            known = f'valueReference="{reference}" dependencies="{listed}"/>'
-            outputs, initial = outputs + f"<Output {known}", initial + f"<InitialUnknown {known}"
-    outputs += '<Output valueReference="151"/><Output valueReference="152"/>'
-    return (
-        '<?xml version="1.0"?><fmiModelDescription fmiVersion="3.0" modelName="native" '
-        'instantiationToken="{native}">'
-        f'<CoSimulation modelIdentifier="native"{_attributes(capabilities)}/>'
-        f"{_unit_definitions()}"
-        '<TypeDefinitions><EnumerationType name="Choice"><Item name="one" value="1"/>'
-        '<Item name="two" value="2"/></EnumerationType></TypeDefinitions>'
-        f"<ModelVariables>{variables}</ModelVariables>"
-        f"<ModelStructure>{outputs}{initial}</ModelStructure></fmiModelDescription>"
-    )
+def description(name, version, model, kinds, capabilities=CAPABLE, token=None, more=""):
+    """The text of modelDescription.xml."""
+    three = version == "3.0"
+    root = ElementTree.Element("fmiModelDescription", fmiVersion=version, modelName=name)
+    root.set("instantiationToken" if three else "guid", token or f"{{{name}}}")
+    if not three:
+        root.set("numberOfEventIndicators", str(len(model.indicators)))
+    silent = {"completedIntegratorStepNotNeeded": not model.completed}
+    tells = {"needsCompletedIntegratorStep": model.completed} if three else silent
+    for kind in KINDS:
+        if kind in kinds:
+            _add(root, kind, modelIdentifier=name, **(tells if kind == KINDS[0] else capabilities))
+    units = _add(root, "UnitDefinitions")
+    for unit, base in UNITS.items():
+        _add(_add(units, "Unit", name=unit), "BaseUnit", **base)
+    _add(units, "Unit", name="bare")
+    types = _add(root, "TypeDefinitions")
+    if three:
+        choice = _add(types, "EnumerationType", name="Choice")
+    else:
+        choice = _add(_add(types, "SimpleType", name="Choice"), "Enumeration")
+    for value, item in enumerate(model.choices, 1):
+        _add(choice, "Item", name=item, value=value)
+    if model.stop is not None:
+        experiment = {"stopTime": model.stop, "stepSize": model.step}
+        _add(root, "DefaultExperiment", startTime=0.0, **experiment)
+    variables = _add(root, "ModelVariables")
+    keys = [v.reference if three and v.reference is not None else place + (not three)
+            for place, v in enumerate(model.variables)]  # fmt: skip
+    named = {v.name: key for v, key in zip(model.variables, keys, strict=True)}
+    for place, v in enumerate(model.variables):
+        _declare(variables, v, place, named, three)
+    variables.extend(ElementTree.fromstring(f"<more>{more}</more>"))
+    _structure(_add(root, "ModelStructure"), model, named, three)
+    return '<?xml version="1.0"?>' + ElementTree.tostring(root, "unicode")
+
+
+def _declare(variables, v, place, named, three):
+    calculated = "calculated" if v.start is None else "exact"
+    own = {
+        "name": v.name,
+        "valueReference": place if v.reference is None else v.reference,
+        "causality": v.causality,
+        "variability": v.variability,
+        "description": v.description,
+        "initial": calculated if v.causality in ("output", "local") else None,
+    }
+    typed = {
+        "declaredType": "Choice" if v.type == "Enumeration" else None,
+        "derivative": named[v.derivative] if v.derivative else None,
+        "unit": v.unit,
+        "intervalVariability": "triggered" if v.type == "Clock" else None,
+    }
+    if not three:
+        kind = {"Float64": "Real", "Int32": "Integer"}.get(v.type, v.type)
+        _add(_add(variables, "ScalarVariable", **own), kind, **typed, start=v.start)
+        return
+    if v.type in ("Clock", "Binary") or v.sizes:
+        del own["initial"]
+    text = v.type in ("String", "Binary")
+    element = _add(variables, v.type, **own, **typed, start=None if text else v.start)
+    for size in v.sizes.split():
+        fixed = size.startswith("=")
+        _add(element, "Dimension", **{"start" if fixed else "valueReference": size.lstrip("=")})
+    if text and v.start is not None:
+        _add(element, "Start", value=v.start)
+
+
+def _structure(structure, model, named, three):
+    """Outputs, derivatives, what follows from others at the start, and event indicators."""
+    outputs = [v for v in model.variables if v.causality == "output"]
+    derivatives = [v for v in model.variables if v.derivative]
+    known = ("local", "output")
+    initial = [v for v in model.variables if v.causality in known and v.start is None]
+    initial = [v for v in initial if v.depends is not None or (not v.sizes and v.type != "Clock")]
+    indicators = [v for v in model.variables if v.name in model.indicators and three]
+    for group, element, listed in (
+        ("Outputs", "Output", outputs),
+        ("Derivatives", "ContinuousStateDerivative", derivatives),
+        ("InitialUnknowns", "InitialUnknown", initial),
+        ("", "EventIndicator", indicators),
+    ):
+        into = structure if three or not listed else _add(structure, group)
+        for v in listed:
+            first = element == "InitialUnknown" and v.initially is not None
+            depends = v.initially if first else v.depends
+            of = None if depends is None else " ".join(str(named[n]) for n in depends)
+            key = "valueReference" if three else "index"
+            _add(into, element if three else "Unknown", **{key: named[v.name], "dependencies": of})
+
+
+def _add(parent, tag, **attributes):
+    """An element more, with the attributes that are not None."""
+    given = {key: v for key, v in attributes.items() if v is not None}
+    lower = {key: str(v).lower() if isinstance(v, bool) else str(v) for key, v in given.items()}
+    return ElementTree.SubElement(parent, tag, lower)

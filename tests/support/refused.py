@@ -5,8 +5,8 @@ import zipfile
 
 import fmpy
 
-from .compiled import binary, shared_library
-from .native_fmus import SOURCES, build
+from .compiled import binary
+from .native_fmus import build, library_of
 
 Files = dict[str, bytes]
 
@@ -95,29 +95,16 @@ def changed(fmu, out, change):
 def linked(folder, missing=False):
     """An FMU whose binary leaves libm undefined, as Dymola's do; or also what is nowhere."""
     options = ("-fno-builtin", "-nostdlib", "-Wl,--unresolved-symbols=ignore-all", "-lc")
-    code = CODE + MISSING if missing else CODE
-    return _with_library(folder, code, SOURCES / "fmi2.c", options=options)
+    return _with_library(folder, options, CODE + MISSING * missing)
 
 
 def licensed(folder):
     """An FMU that logs that it finds no licence, with the path of its resources, and gives up."""
-    text = (SOURCES / "fmi2.c").read_text("utf-8")
-    found = re.search(r"fmi2Component fmi2Instantiate\((.*?)\)\s*\{", text, re.DOTALL)
-    assert found
-    names = [part.split()[-1].lstrip("*") for part in found[1].split(",")]
-    refusal = f"""
-    char said[4096];
-    snprintf(said, 4096, "No license for feature X in %s/key", {names[3]});
-    {names[4]}->logger(0, {names[0]}, fmi2Error, "error", said);
-    return 0;
-    """
-    return _with_library(
-        folder, "#include <stdio.h>\n" + text.replace(found[0], found[0] + refusal)
-    )
+    return _with_library(folder, ["-DNO_LICENCE"])
 
 
-def _with_library(folder, code, *sources, options=()):
-    library = shared_library(*sources, code=code, options=options)
-    whole = build(folder, "whole", "2.0")
+def _with_library(folder, options, code=""):
+    library = library_of("native", "2.0", more=options, code=code)
     place = binary("2.0", "native")
+    whole = build(folder, "whole", "2.0")
     return changed(whole, folder / "x.fmu", lambda files: files | {place: library})

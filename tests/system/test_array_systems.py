@@ -5,7 +5,7 @@ from grasp_cosim import InputError, System
 from grasp_cosim.cli import main
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.validity import remarks
-from support.state_space import state_space
+from support.native_fmus import state_space
 
 TABLES = '[components.a]\nfmu = "ss.fmu"\n{}\n[components.b]\nfmu = "ss.fmu"\n{}\n'
 

@@ -7,8 +7,7 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Solver
 from grasp_cosim.system.validity import remarks
-from support.models import build_model
-from support.native_fmus import needs_gcc
+from support.native_fmus import build_model, needs_gcc
 
 pytestmark = needs_gcc
 HEAD = '[experiment]\nstep = 0.1\nstop = 1.0\n[components.x]\nfmu = "dahlquist.fmu"\n'

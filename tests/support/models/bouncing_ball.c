@@ -4,9 +4,8 @@
 enum { TIME, H, DER_H, V, DER_V, G, E, V_MIN, VARIABLES };
 #define STATES 2
 #define INDICATORS 1
-#define INPUT(r) false
+#define EVENTS
 #define TUNABLE(r) ((r) == E)
-static const int state[] = {H, V}, derivative[] = {DER_H, DER_V};
 #include "model.h"
 
 static void start(Model *m) {
@@ -21,9 +20,9 @@ static void equations(Model *m) {
     *real(m, DER_V) = *real(m, G);
 }
 
-static void indicators(const Model *m, double z[]) {
-    bool rests = m->v[H].Float64 == 0.0 && m->v[V].Float64 == 0.0;
-    z[0] = rests ? 1.0 : m->v[H].Float64;
+static void indicators(Model *m, double z[]) {
+    bool rests = *real(m, H) == 0.0 && *real(m, V) == 0.0;
+    z[0] = rests ? 1.0 : *real(m, H);
 }
 
 static void event(Model *m) {
@@ -34,6 +33,4 @@ static void event(Model *m) {
     m->states_changed = true;
 }
 
-static bool completed(Model *m) { (void)m; return false; }
-
-#include FMI
+#include "fmi.c"

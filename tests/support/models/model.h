@@ -1,16 +1,14 @@
-/* What a model file defines, and what fmi2.c and fmi3.c make an FMU of.
+/* What the file of a model defines, and what fmi.c makes an FMU of.
  *
- * A model file has an enum of its variables, which are also the value references, TIME first and
- * VARIABLES last; the number of its STATES and INDICATORS; the two lists of states and their
- * derivatives; which variables are inputs or tunable; and four functions. It includes this header
- * between the numbers and the functions, and FMI (fmi2.c or fmi3.c) at its end.
+ * A model file has an enum of its variables, which are also the value references, TIME among them and
+ * VARIABLES last; its number of STATES, which come first, each with its derivative behind it; which
+ * variables are INPUTs or TUNABLE; and the functions start() and equations(). It includes this header
+ * between the numbers and the functions, and fmi.c at its end. A model may have INDICATORS, EVENTS,
+ * COMPLETED, REFUSAL or OWN_STEPS as well, see below: it defines these, then the function.
  *
  * Model exchange integrates nothing here. Co-simulation takes Runge-Kutta steps of SUBSTEP at most,
  * and halves them at an event.
  */
-#ifndef MODEL_H
-#define MODEL_H
-
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -18,8 +16,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SUBSTEP 1e-3 /* s */
-#define ROOM (STATES + INDICATORS + 1)
+#ifndef TEXT
+#define TEXT 256            /* bytes of a String */
+#endif
 
 typedef union { /* of any type of FMI; in FMI 2.0 Float64, Int32, Boolean, String */
     double Float64;
@@ -33,18 +32,47 @@ typedef union { /* of any type of FMI; in FMI 2.0 Float64, Int32, Boolean, Strin
     int64_t Int64;
     uint64_t UInt64;
     bool Boolean;
-    char String[128];
+    char String[TEXT];
 } Value;
 
-typedef enum { INSTANTIATED, INITIALIZATION, EVENT, CONTINUOUS, STEP, TERMINATED } Mode;
+typedef enum { INSTANTIATED, CONFIGURING, INITIALIZATION, EVENT, CONTINUOUS, STEP, TERMINATED } Mode;
+
+#ifndef LARGEST
+#define LARGEST 1           /* elements of an array */
+#endif
+#ifndef SIZE
+#define SIZE(r) 1           /* elements of a variable */
+#endif
+#ifndef INPUT
+#define INPUT(r) false
+#endif
+#ifndef TUNABLE
+#define TUNABLE(r) false
+#endif
+#ifndef STRUCTURAL
+#define STRUCTURAL(r) false /* parameters that are set in configuration mode alone */
+#endif
+#ifndef STATE
+#define STATE(i) real(m, 1 + 2 * (i))
+#define DERIVATIVE(i) real(m, 2 + 2 * (i))
+#endif
+#ifndef OWN
+#define OWN                 /* further members of a model */
+#endif
+#ifndef SUBSTEP
+#define SUBSTEP 1e-3        /* s */
+#endif
+#define ROOM 32             /* for states, or indicators */
 
 typedef struct {
-    Value v[VARIABLES];
+    Value v[VARIABLES][LARGEST];
     double time, next;                /* s; of the next time event, INFINITY where there is none */
     bool again;                       /* the event needs another iteration */
     bool states_changed, nominals_changed, ended;
+    bool early;                       /* a step may end early */
     double nominal[ROOM];             /* of the states */
-    int status;                       /* of the equations, as FMI has it */
+    int status;                       /* of the equations, or of a step, as FMI has it, */
+    const char *reason;               /* and why */
     int steps;                        /* of the solver */
     Mode mode;
     bool exchange;                    /* model exchange, else co-simulation */
@@ -52,30 +80,49 @@ typedef struct {
     void *host;
     void *log;
     char name[128];
+    OWN
 } Model;
 
-/* Of the model file. */
-static void start(Model *m);                        /* start values */
-static void equations(Model *m);                    /* what follows from time, states, inputs */
-static void indicators(const Model *m, double z[]); /* an event is where one leaves z > 0, or enters */
-static void event(Model *m);                        /* one iteration of an event */
-static bool completed(Model *m);                    /* a step of the solver; true for an event there */
+static double *real(Model *m, int variable) { return &m->v[variable]->Float64; }
 
-static double *real(Model *m, int variable) { return &m->v[variable].Float64; }
+static void start(Model *m);     /* start values, also for new sizes */
+static void equations(Model *m); /* what follows from time, states, inputs */
+
+#ifdef INDICATORS
+static void indicators(Model *m, double z[]); /* an event is where one leaves z > 0, or enters */
+#else
+#define INDICATORS 0
+static void indicators(Model *m, double z[]) { (void)m; (void)z; }
+#endif
+#ifdef EVENTS
+static void event(Model *m); /* one iteration of an event */
+#else
+static void event(Model *m) { (void)m; }
+#endif
+#ifdef COMPLETED
+static bool completed(Model *m); /* a step of the solver; true for an event there */
+#else
+static bool completed(Model *m) { (void)m; return false; }
+#endif
+#ifdef REFUSAL
+static const char *refusal(Model *m); /* why sizes, or start values, are refused */
+#else
+static const char *refusal(Model *m) { (void)m; return NULL; }
+#endif
 
 static void set_time(Model *m, double time) { m->time = *real(m, TIME) = time; }
 
 static void put_states(Model *m, const double x[]) {
-    for (int i = 0; i < STATES; i++) *real(m, state[i]) = x[i];
+    for (int i = 0; i < STATES; i++) *STATE(i) = x[i];
 }
 
 static void get_states(Model *m, double x[]) {
-    for (int i = 0; i < STATES; i++) x[i] = *real(m, state[i]);
+    for (int i = 0; i < STATES; i++) x[i] = *STATE(i);
 }
 
 static void slopes(Model *m, double dx[]) {
     equations(m);
-    for (int i = 0; i < STATES; i++) dx[i] = *real(m, derivative[i]);
+    for (int i = 0; i < STATES; i++) dx[i] = *DERIVATIVE(i);
 }
 
 /* Iterate an event at the current time until nothing changes. */
@@ -87,6 +134,9 @@ static void settle(Model *m) {
     equations(m);
 }
 
+#ifdef OWN_STEPS
+static void advance(Model *m, double end);
+#else
 /* From the states x at a time over a step of h seconds, by the classical Runge-Kutta method. */
 static void integrate(Model *m, double time, const double x[], double h) {
     static const double at[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
@@ -106,7 +156,7 @@ static void integrate(Model *m, double time, const double x[], double h) {
 }
 
 /* True if an indicator is on another side of 0 than in z. */
-static bool crossed(const Model *m, const double z[]) {
+static bool crossed(Model *m, const double z[]) {
     double now[ROOM];
 
     indicators(m, now);
@@ -139,24 +189,14 @@ static void advance(Model *m, double end) {
         if (at_event || m->time >= m->next) settle(m);
     }
 }
-
-static Model *made(const char *name, bool exchange) {
-    Model *m = calloc(1, sizeof(Model));
-
-    snprintf(m->name, sizeof m->name, "%s", name);
-    m->exchange = exchange;
-    m->next = INFINITY;
-    for (int i = 0; i < ROOM; i++) m->nominal[i] = 1.0;
-    start(m);
-    return m;
-}
+#endif
 
 /* True if a variable may be set now. */
-static bool may_set(const Model *m, unsigned variable, bool continuous) {
+static bool may_set(Model *m, unsigned variable, bool continuous) {
     if (variable == TIME || variable >= VARIABLES) return false;
+    if (STRUCTURAL(variable) || m->mode == CONFIGURING)
+        return STRUCTURAL(variable) && m->mode == CONFIGURING;
     if (m->mode == INSTANTIATED || m->mode == INITIALIZATION) return true;
     if (m->mode == CONTINUOUS) return INPUT(variable) && continuous;
     return (m->mode == EVENT || m->mode == STEP) && (INPUT(variable) || TUNABLE(variable));
 }
-
-#endif

@@ -6,21 +6,18 @@
  * event names the next one for now. PAST, NOWHERE: that at 0.5 s names one before it, or
  * at NaN. FAILS, DISCARDS: no slope from x = 0.5 on. NO_NUMBER: it is none from there.
  */
-enum { TIME, X, DER_X, RATE, KIND, EVENTS, U, VARIABLES };
+enum { TIME, X, DER_X, RATE, KIND, EVENT_COUNT, U, VARIABLES };
 enum { RELAY = 1, STEPS, ENDLESS, ITERATES, STANDS, FAILS, DISCARDS, NO_NUMBER, PAST, NOWHERE };
 #define STATES 1
 #define INDICATORS 1
+#define EVENTS
+#define COMPLETED
 #define INPUT(r) ((r) == U)
-#define TUNABLE(r) false
-static const int state[] = {X}, derivative[] = {DER_X};
 #include "model.h"
 
-static int kind(const Model *m) { return m->v[KIND].Int32; }
+static int kind(Model *m) { return m->v[KIND]->Int32; }
 
-static void start(Model *m) {
-    *real(m, RATE) = 1.0;
-    m->v[U].Boolean = false;
-}
+static void start(Model *m) { *real(m, RATE) = 1.0; }
 
 static void equations(Model *m) {
     bool beyond = *real(m, X) > 0.5;
@@ -29,25 +26,25 @@ static void equations(Model *m) {
     *real(m, DER_X) = beyond && kind(m) == NO_NUMBER ? NAN : *real(m, RATE);
 }
 
-static void indicators(const Model *m, double z[]) {
-    z[0] = kind(m) == RELAY ? m->v[X].Float64 : 1.0;
+static void indicators(Model *m, double z[]) {
+    z[0] = kind(m) == RELAY ? *real(m, X) : 1.0;
 }
 
 static void event(Model *m) {
     bool half = m->time == 0.5;
 
-    m->v[EVENTS].Int32++;
+    m->v[EVENT_COUNT]->Int32++;
     if (kind(m) == RELAY) *real(m, RATE) = *real(m, X) > 0.0 ? -1.0 : 1.0;
     if (kind(m) == STANDS) m->next = m->time;
     if (kind(m) == PAST) m->next = half ? 0.25 : 0.5;
     if (kind(m) == NOWHERE) m->next = half ? NAN : 0.5;
     if (kind(m) == STEPS && m->steps == 5) *real(m, X) += 1.0;
     if (kind(m) == ENDLESS || kind(m) == ITERATES) m->next = half ? INFINITY : 0.5;
-    m->again = half && (kind(m) == ENDLESS || (kind(m) == ITERATES && m->v[EVENTS].Int32 < 4));
+    m->again = half && (kind(m) == ENDLESS || (kind(m) == ITERATES && m->v[EVENT_COUNT]->Int32 < 4));
     if (half && kind(m) == ITERATES) *real(m, X) += 1.0;
     m->states_changed = m->again;
 }
 
 static bool completed(Model *m) { return ++m->steps == 5 && kind(m) == STEPS; }
 
-#include FMI
+#include "fmi.c"

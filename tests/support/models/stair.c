@@ -3,30 +3,24 @@
  */
 enum { TIME, COUNTER, WIDTH, LAST, VARIABLES };
 #define STATES 0
-#define INDICATORS 0
-#define INPUT(r) false
-#define TUNABLE(r) false
-static const int state[] = {0}, derivative[] = {0};
+#define EVENTS
 #include "model.h"
 
 static void start(Model *m) {
-    m->v[COUNTER].Int32 = 1;
+    m->v[COUNTER]->Int32 = 1;
     *real(m, WIDTH) = 1.0;
-    m->v[LAST].Int32 = 10;
+    m->v[LAST]->Int32 = 10;
 }
 
 static void equations(Model *m) { (void)m; }
-static void indicators(const Model *m, double z[]) { (void)m; (void)z; }
 
 static void event(Model *m) {
     if (isinf(m->next)) m->next = m->time + *real(m, WIDTH); /* the first one, of initialisation */
     if (m->time >= m->next) {
-        m->v[COUNTER].Int32++;
+        m->v[COUNTER]->Int32++;
         m->next += *real(m, WIDTH);
     }
-    m->ended = m->v[COUNTER].Int32 >= m->v[LAST].Int32;
+    m->ended = m->v[COUNTER]->Int32 >= m->v[LAST]->Int32;
 }
 
-static bool completed(Model *m) { (void)m; return false; }
-
-#include FMI
+#include "fmi.c"
