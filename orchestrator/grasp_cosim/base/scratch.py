@@ -1,7 +1,7 @@
-"""Temporary folders that do not outlive their process, however it ends.
+"""Locks on files, and temporary folders: both go with their process, however it ends.
 
-Its process has locked each, before it made it. A lock goes with its process: a folder that is not
-locked has been left behind by a kill, and the next process that needs one removes it.
+A process has locked each of its folders, before it made it: one that is not locked has been left
+behind by a kill, and the next process that needs one removes it.
 """
 
 import os
@@ -15,11 +15,52 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Self
 
-from .locks import SUFFIX, Lock
 from .system_calls import is_mine
+
+SUFFIX = ".lock"
+"""So the names of such files end."""
 
 PREFIX = "grasp_scratch_"
 """So the names of our folders begin."""
+
+
+class Lock:
+    """A lock that this process has from taken() to release(). Its file is there so long.
+
+    After a kill the file stays, and is the next one's.
+    """
+
+    def __init__(self, file: Path) -> None:
+        from filelock import FileLock  # only now: it takes time to load
+
+        self._file = file
+        self._lock = FileLock(file, timeout=0, thread_local=False, fallback_to_soft=False)
+
+    def taken(self) -> bool:
+        """Take it, or return False where another process has it.
+
+        Where files cannot be locked, or not be made, everybody may take it, and none is `sure`.
+        """
+        from filelock import Timeout
+
+        try:
+            self._lock.acquire()
+        except Timeout:
+            return False
+        except OSError:
+            pass
+        return True
+
+    @property
+    def sure(self) -> bool:
+        """True while no other process can have it."""
+        return self._lock.is_locked
+
+    def release(self) -> None:
+        """Let others have it."""
+        with suppress(OSError):  # Windows, where release() removes it, and what was never made
+            self._file.unlink()
+        self._lock.release()
 
 
 def without_scratch(text: str) -> str:

@@ -15,8 +15,8 @@ import click
 
 from ..base.errors import InputError
 from ..base.files import check_folder
-from ..base.plain_text import on_one_line
 from ..base.progress import Progress, phase, write
+from ..base.text import on_one_line
 
 if TYPE_CHECKING:
     from ..metrics.metric import Metric

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import Any, NoReturn
 
-from ..base.plain_text import printable
 from ..base.system_calls import flush_c
+from ..base.text import printable
 
 OUTPUT = "standard output"
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.files import write_text
-from ..base.numerals import counted, grouped
+from ..base.text import counted, grouped
 from ..metrics.metric import Metric
 from ..recording.result import Result
 from ..report.caption import Caption, about, caption, changes

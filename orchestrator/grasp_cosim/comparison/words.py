@@ -7,9 +7,8 @@ from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
 
-from ..base.columns import columns
 from ..base.errors import choices
-from ..base.numerals import significant
+from ..base.text import columns, significant
 from ..metrics.metric import Metric
 from ..system.parts import NANOSECONDS
 from .bands import Compared

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..base.numerals import in_milli
+from ..base.text import in_milli
 from ..metrics.metric import Metric, Signals, Value, metric
 
 Floats = npt.NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.numerals import fixed
+from ..base.text import fixed
 from ..recording.result import Result
 from ..report.caption import caption
 from ..report.plot import (

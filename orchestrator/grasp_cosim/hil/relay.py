@@ -14,8 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..base.columns import columns
 from ..base.errors import InputError
+from ..base.text import columns
 from .network import Counters, Direction, Entry, Log, Network, Traffic
 from .sockets import Address, EventLoop, connected, is_loopback, received, resolved, text
 

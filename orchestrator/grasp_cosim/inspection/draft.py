@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..base.errors import choices
-from ..base.plain_text import on_one_line
+from ..base.text import on_one_line
 from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable
 from ..system.parts import NANOSECONDS, Component
 from ..system.structure import Structure

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import InputError, choices
-from ..base.numerals import counted
+from ..base.text import counted
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System

@@ -12,8 +12,8 @@ from typing import Any
 
 from ..base.errors import InputError, SimulationError, nearest
 from ..base.interruption import interruptible, interrupts
-from ..base.numerals import counted
 from ..base.progress import DELAY, Progress, phase
+from ..base.text import counted
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener
 from ..fmi.make_instance import load

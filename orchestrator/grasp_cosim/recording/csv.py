@@ -16,8 +16,7 @@ from one_piece import in_one_piece
 from ..base.checks import extra_module, real
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
-from ..base.numerals import counted
-from ..base.plain_text import from_cell, to_cell
+from ..base.text import counted, from_cell, to_cell
 from ..exchange.listener import Experiment, Signal
 from .arrow import pyarrow
 
@@ -34,7 +33,7 @@ class CsvListener:
     The file has a temporary name beside path until the run ends, in whatever way: what was
     recorded is kept, in whole lines. There is no file where nothing was. A Real is the shortest
     text that reads back as the same number, a Boolean is 0 or 1, names and Strings are quoted texts
-    as plain_text.to_cell() makes them. In place, the file has its name from the start: whoever
+    as base.text.to_cell() makes them. In place, the file has its name from the start: whoever
     wants that sees to it that it gets rows.
     """
 

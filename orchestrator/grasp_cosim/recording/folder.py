@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ..base.errors import InputError
 from ..base.files import of_any_format, remove, unwritable, write_json
 from ..base.higher import groups
-from ..base.locks import SUFFIX, Lock
+from ..base.scratch import SUFFIX, Lock
 from ..exchange.listener import Experiment, Signal
 from ..metrics.in_si import in_si
 from ..system.description import System

@@ -16,7 +16,7 @@ from ..base.checks import extra_module, is_number
 from ..base.errors import UnknownNameError, choices
 from ..base.files import write_json
 from ..base.higher import higher
-from ..base.plain_text import on_one_line
+from ..base.text import on_one_line
 from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of

@@ -27,7 +27,7 @@ from one_piece import is_stream
 
 from ..base.errors import InputError
 from ..base.files import check_file, of_any_format, remove_parts, write_text
-from ..base.numerals import grouped
+from ..base.text import grouped
 from ..exchange.listener import Texts
 from ..recording.csv import quoted
 from ..recording.load import load_run, run_folder

@@ -19,7 +19,7 @@ from one_piece import in_one_piece
 from ..base.checks import extra_module
 from ..base.errors import InputError
 from ..base.files import PICTURES
-from ..base.numerals import in_milli
+from ..base.text import in_milli
 from ..recording.result import Result
 from .caption import Caption, caption
 from .embed import fit

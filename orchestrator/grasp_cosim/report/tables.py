@@ -8,7 +8,7 @@ from dataclasses import asdict
 from html import escape
 from typing import Any
 
-from ..base.numerals import counted, fixed, grouped, significant
+from ..base.text import counted, fixed, grouped, significant
 from ..metrics.metric import Metric
 from ..recording.result import Result
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ..base.numerals import counted, fixed, significant
+from ..base.text import counted, fixed, significant
 from ..realtime.timing import Timing
 from ..recording.result import Result
 

@@ -13,7 +13,7 @@ from math import ceil, floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..base.numerals import grouped
+from ..base.text import grouped
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
 from .caption import Caption, caption

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from ..base.errors import InputError
-from ..base.numerals import grouped
+from ..base.text import grouped
 from ..realtime.timing import Timing
 from .tables import bullets, number, svg_button, table
 from .timing import QUANTILES, duration, kept, label, quantiles, timing_svg

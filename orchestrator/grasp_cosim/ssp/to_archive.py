@@ -13,7 +13,7 @@ from typing import Any
 from si_units import Unit
 
 from ..base.errors import InputError
-from ..base.numerals import counted
+from ..base.text import counted
 from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface

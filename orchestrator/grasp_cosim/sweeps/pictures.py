@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.numerals import counted
+from ..base.text import counted
 from ..metrics.metric import Metric
 from ..report.caption import Caption
 from ..report.plot import BLUE, COLORS, STYLES, finish, headed, kept, new_figure

@@ -23,11 +23,10 @@ from typing import Any
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
-from ..base.locks import SUFFIX, Lock
-from ..base.numerals import counted
 from ..base.parallel import Crew, Lost
 from ..base.progress import Progress, phase
-from ..base.scratch import ScratchFolder
+from ..base.scratch import SUFFIX, Lock, ScratchFolder
+from ..base.text import counted
 from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of

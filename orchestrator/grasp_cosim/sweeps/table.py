@@ -19,9 +19,8 @@ import numpy.typing as npt
 from one_piece import in_one_piece
 
 from ..base.checks import extra_module
-from ..base.columns import columns
 from ..base.errors import InputError, nearest
-from ..base.numerals import counted, significant
+from ..base.text import columns, counted, significant
 from ..interface.interface import Value
 from ..metrics.metric import Metric
 from .rows import Row

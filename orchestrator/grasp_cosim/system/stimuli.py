@@ -24,8 +24,7 @@ from si_units import known_unit
 
 from ..base.checks import choice, real
 from ..base.errors import InputError
-from ..base.numerals import counted
-from ..base.plain_text import from_cell
+from ..base.text import counted, from_cell
 from ..interface.units import conversion
 from .parts import LONGEST, NANOSECONDS, Port
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ..base.checks import choice, known, number, whole
 from ..base.errors import InputError, choices
-from ..base.numerals import counted
+from ..base.text import counted
 from ..interface.capabilities import KINDS
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.units import conversion

@@ -13,7 +13,7 @@ import click
 
 from ...base.errors import InputError
 from ...base.files import check_file, write_text
-from ...base.numerals import counted
+from ...base.text import counted
 from ...inspection.draft import with_paths
 from ...interface.read import read_interface
 from ...system.description import System

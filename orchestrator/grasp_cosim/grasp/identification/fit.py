@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...base.errors import InputError, SimulationError
-from ...base.numerals import counted
+from ...base.text import counted
 
 Vector = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...base.errors import InputError, nearest
-from ...base.numerals import counted
+from ...base.text import counted
 from ...recording.load import load_log
 from ...system.description import System
 from ..metrics import FINGERS

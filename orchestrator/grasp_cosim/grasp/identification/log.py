@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import InputError, nearest
-from ...base.numerals import counted
+from ...base.text import counted
 from ...metrics.metric import Signals
 from ...system.description import System
 from ..metrics import FINGERS

@@ -7,7 +7,7 @@ from html import escape
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from ...base.numerals import fixed
+from ...base.text import fixed
 from ...report.caption import about
 from ...report.page import page_style
 from ...report.plot import as_svg, new_figure, one_legend

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 
-from ...base.plain_text import to_cell
+from ...base.text import to_cell
 from ..metrics import FINGERS
 
 Source = Literal["simulation", "experiment"]
