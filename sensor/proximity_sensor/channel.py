@@ -11,18 +11,8 @@ from typing import Annotated, NamedTuple
 
 from block_variables import Parameter
 
-from . import (
-    ambient_light,
-    clock,
-    converter,
-    gaussian_noise,
-    low_pass,
-    mrg32k3a,
-    optics,
-    sliding_median,
-    stripes,
-    surfaces,
-)
+from . import electronics, optics
+from . import noise as random_noise
 from .optics import outputs as seen
 
 Inputs = optics.Inputs
@@ -39,17 +29,17 @@ WARM_UP = 100
 class Params(optics.Params):
     """The parameters of the optics and of the stages."""
 
-    pattern: stripes.Params = stripes.Params()
-    ambient: ambient_light.Params = ambient_light.Params()
-    noise: gaussian_noise.Params = gaussian_noise.Params()
-    adc: converter.Params = converter.Params()
-    filter: low_pass.Params = low_pass.Params()
-    median: sliding_median.Params = sliding_median.Params()
-    sampling: clock.Params = clock.Params()
+    pattern: optics.Pattern = optics.Pattern()
+    ambient: electronics.Ambient = electronics.Ambient()
+    noise: random_noise.Noise = random_noise.Noise()
+    adc: electronics.Adc = electronics.Adc()
+    filter: electronics.Filter = electronics.Filter()
+    median: electronics.Median = electronics.Median()
+    sampling: electronics.Sampling = electronics.Sampling()
     surface: Annotated[
-        surfaces.Surface,
+        optics.Surface,
         Parameter("a surface by name wins over reflectance; custom leaves it", tunable=True),
-    ] = surfaces.Surface.CUSTOM
+    ] = optics.Surface.CUSTOM
 
     def __post_init__(self) -> None:
         optics.Params.__post_init__(self)
@@ -63,7 +53,7 @@ class Params(optics.Params):
     @cached_property
     def alpha(self) -> float:
         """The reflectance of the surface named, or the one given."""
-        return surfaces.REFLECTANCE.get(self.surface, self.reflectance)
+        return optics.REFLECTANCE.get(self.surface, self.reflectance)
 
     @cached_property
     def sampled(self) -> bool:
@@ -77,9 +67,9 @@ class Params(optics.Params):
         return not (self.sampled or self.pattern.enabled)
 
     @cached_property
-    def coefficients(self) -> low_pass.Coefficients:
+    def coefficients(self) -> electronics.Coefficients:
         """Those of the filter."""
-        return low_pass.coefficients(self.filter.cutoff, self.sampling.rate)
+        return electronics.coefficients(self.filter.cutoff, self.sampling.rate)
 
 
 class Chain(NamedTuple):
@@ -87,11 +77,11 @@ class Chain(NamedTuple):
 
     number: float
     """That of the next sample, counted from the start."""
-    generator: mrg32k3a.State
+    generator: random_noise.State
     deviation: float
     """The noise of the next sample, in standard deviations."""
-    memory: low_pass.Memory
-    window: sliding_median.Window
+    memory: electronics.Memory
+    window: electronics.Window
 
 
 class State(NamedTuple):
@@ -114,7 +104,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Take the samples within h seconds (h > 0), the gap held."""
     if not p.sampled:
         return x
-    n, wait = clock.samples(p.sampling, x.wait, h)
+    n, wait = electronics.samples(p.sampling, x.wait, h)
     chain = x.chain
     if n:
         light = _light(p, u)
@@ -131,9 +121,9 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     if not p.sampled:
         return Outputs(light)
     window = x.chain.window
-    if clock.due(x.wait):
+    if electronics.due(x.wait):
         _, window = _measured(p, x.chain, light)
-    volts = sliding_median.median(window) if p.median.enabled else window[-1]
+    volts = electronics.median(window) if p.median.enabled else window[-1]
     return Outputs(volts - p.ambient.offset if p.ambient.enabled else volts)
 
 
@@ -142,20 +132,20 @@ def _light(p: Params, u: Inputs) -> float:
     xi = seen(p, u).intensity
     if not p.pattern.enabled:
         return xi
-    return xi * stripes.factor(p.pattern, 0.0 if u.gap < 0.0 else u.gap)
+    return xi * optics.striped(p.pattern, 0.0 if u.gap < 0.0 else u.gap)
 
 
-def _measured(p: Params, c: Chain, light: float) -> tuple[low_pass.Memory, sliding_median.Window]:
+def _measured(p: Params, c: Chain, light: float) -> tuple[electronics.Memory, electronics.Window]:
     """What the filter and the median hold after a sample of xi = light."""
     volts, memory = light, c.memory
     if p.ambient.enabled:
-        volts += ambient_light.voltage(p.ambient, c.number / p.sampling.rate)
+        volts += electronics.ambient_voltage(p.ambient, c.number / p.sampling.rate)
     if p.noise.enabled:
         volts += p.noise.standard_deviation * c.deviation
     if p.adc.enabled:
-        volts = converter.converted(p.adc, volts)
+        volts = electronics.converted(p.adc, volts)
     if p.filter.enabled:
-        volts, memory = low_pass.filtered(p.coefficients, memory, volts)
+        volts, memory = electronics.filtered(p.coefficients, memory, volts)
     return memory, (*c.window[1:], volts)
 
 
@@ -164,20 +154,20 @@ def _sampled(p: Params, c: Chain, light: float) -> Chain:
     memory, window = _measured(p, c, light)
     deviation, generator = c.deviation, c.generator
     if p.noise.enabled:
-        deviation, generator = gaussian_noise.normal(generator)
+        deviation, generator = random_noise.normal(generator)
     return Chain(c.number + 1.0, generator, deviation, memory, window)
 
 
 def _settled(p: Params, light: float) -> Chain:
     """After xi = light for ever, and the noise of WARM_UP samples."""
-    volts = light + ambient_light.voltage(p.ambient, 0.0) if p.ambient.enabled else light
+    volts = light + electronics.ambient_voltage(p.ambient, 0.0) if p.ambient.enabled else light
     if p.adc.enabled:
-        volts = converter.converted(p.adc, volts)
-    memory = low_pass.settled(p.coefficients, volts) if p.filter.enabled else SILENT.memory
+        volts = electronics.converted(p.adc, volts)
+    memory = electronics.settled(p.coefficients, volts) if p.filter.enabled else SILENT.memory
     chain = SILENT._replace(memory=memory, window=(volts,) * 10)
     if not p.noise.enabled:
         return chain
-    deviation, generator = gaussian_noise.normal(mrg32k3a.stream(float(p.noise.seed)))
+    deviation, generator = random_noise.normal(random_noise.stream(float(p.noise.seed)))
     chain = chain._replace(number=-float(WARM_UP), generator=generator, deviation=deviation)
     for _ in range(WARM_UP):
         chain = _sampled(p, chain, light)

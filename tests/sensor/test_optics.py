@@ -1,80 +1,57 @@
-"""The proximity sensor, Eq. (9)."""
+"""The proximity sensor, Eq. (9), the surfaces by name and the striped one."""
 
 from math import exp, isnan, log, nan
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from proximity_sensor import optics
-from proximity_sensor.optics import Inputs, Params
-from support.declared import parameters
+from proximity_sensor.optics import REFLECTANCE, Inputs, Params, Pattern, Surface, striped
 from support.marks import examples
 
-PARAMETERS = parameters(Params)
-
-QUICK = examples(100)
-
-GAPS = st.floats(0.0, 10.0)
-
 SENSORS = st.builds(
-    Params,
-    reflectance=st.floats(1e-3, 10.0),
-    gain=st.floats(1e-6, 1e6),
-    diffusion_exponent=st.floats(0.1, 10.0),
-    offset_distance=st.floats(1e-6, 1.0),
+    Params, st.floats(1e-3, 10.0), st.floats(1e-6, 1e6), st.floats(0.1, 10.0), st.floats(1e-6, 1.0)
 )
+PATTERN = Pattern(True, ratio=0.5, period=0.02, phase=0.003, edge=0.002)
 
 
 def intensity(p, gap):
     return optics.outputs(p, Inputs(gap)).intensity
 
 
-@QUICK
-@given(SENSORS, GAPS)
+@examples(100)
+@given(SENSORS, st.floats(-1.0, 10.0))
 def test_the_intensity_is_eq_9(p, gap):
     """The logarithm is at most 14 and n at most 10: the exponential costs 140 roundings."""
-    distance = gap + p.offset_distance
+    distance = max(gap, 0.0) + p.offset_distance
     expected = exp(-p.diffusion_exponent * log(distance)) * p.gain * p.reflectance
     assert intensity(p, gap) == pytest.approx(expected, rel=140 * 2.3e-16, abs=0.0)
 
 
-@QUICK
-@given(GAPS, st.floats(0.01, 1.0), st.floats(1.0, 1e6))
-def test_the_intensity_is_proportional_to_reflectance_and_gain(gap, reflectance, gain):
-    one = intensity(Params(reflectance=1.0, gain=1.0), gap)
-    dark = intensity(Params(reflectance=reflectance, gain=1.0), gap)
-    loud = intensity(Params(reflectance=1.0, gain=gain), gap)
-    assert dark == pytest.approx(reflectance * one, rel=1e-15, abs=0.0)
-    assert loud == pytest.approx(gain * one, rel=1e-15, abs=0.0)
-
-
-@pytest.mark.parametrize("change", [{"reflectance": 0.0}, {"gain": 0.0}])
-def test_a_surface_that_reflects_nothing_is_not_seen(change):
-    assert intensity(Params(**change), 0.0) == 0.0
-
-
-@QUICK
-@given(SENSORS, st.floats(-10.0, 0.0))
-def test_a_gap_below_zero_reads_as_zero(p, gap):
-    assert intensity(p, gap) == intensity(p, 0.0)
-
-
-def test_a_gap_that_is_no_number_is_not_taken_for_contact():
+def test_nothing_is_seen_of_what_reflects_nothing_and_no_number_is_no_contact():
+    assert intensity(Params(reflectance=0.0), 0.0) == 0.0
     assert isnan(intensity(Params(), nan))
 
 
-@pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda p: p.name)
-def test_every_range_is_enforced(parameter):
-    for number, value in parameter.invalid():
-        with pytest.raises(ValueError, match=r"^\w+ = ") as caught:
-            Params(**{parameter.name: value})
-        assert str(caught.value) == (
-            f"{parameter.name} = {number!r} {parameter.unit}: {parameter.valid}"
-        )
-    for bound in (parameter.low, parameter.high):
-        assert getattr(Params(**{parameter.name: bound}), parameter.name) == bound
+def test_the_published_surfaces():
+    found = {surface.name.lower(): alpha for surface, alpha in REFLECTANCE.items()}
+    assert found == {"white": 1.0, "blue": 0.93, "red": 0.92, "brown": 0.86, "black": 0.57}
+    assert Params().reflectance == REFLECTANCE[Surface.WHITE]
 
 
-def test_every_number_has_a_range():
-    names = {"reflectance", "gain", "diffusion_exponent", "offset_distance"}
-    assert {p.name for p in PARAMETERS} == names
+@pytest.mark.parametrize(
+    ("gap", "factor"),
+    [(0.003, 1.0), (0.007, 1.0), (0.008, 0.75), (0.0085, 0.625), (0.009, 0.5), (0.013, 0.5),
+     (0.017, 0.5), (0.018, 0.75), (0.019, 1.0), (0.023, 1.0), (-0.002, 0.75)],
+)  # fmt: skip
+def test_two_stripes_and_their_edges(gap, factor):
+    assert striped(PATTERN, gap) == pytest.approx(factor, abs=1e-12)
+
+
+def test_stripes_repeat_and_nothing_jumps():
+    gaps = np.linspace(0.0, 0.1, 5_001)
+    factors = np.array([striped(PATTERN, gap) for gap in gaps.tolist()])
+    assert np.abs(np.diff(factors)).max() == pytest.approx(0.5 / PATTERN.edge * 2e-5, rel=1e-6)
+    assert factors[1000:] == pytest.approx(factors[:-1000], abs=1e-10)
+    assert factors[:-1].mean() == pytest.approx(0.75, abs=1e-4)
