@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from block_variables import Input, Output, Parameter, check
 
 from . import contact_force as layer_1
-from . import hand_impact_reduction as layer_2
+from . import impact_reduction as layer_2
 from . import impedance
 from . import simultaneous_contact as layer_3
 from .impedance import Motion
@@ -35,6 +35,19 @@ else:
 ZEROS: Each = (0.0,) * FINGERS
 
 
+@dataclass(frozen=True, slots=True)
+class ImpactReduction(layer_2.Gains, name="impact_reduction"):
+    """Layer 2 with one viscosity, as all fingers count their way as they open."""
+
+    viscosity: Annotated[
+        float,
+        Parameter(
+            "D_p, viscosity of the virtual force", unit="N.s", low=-1e3, high=1e3, tunable=True
+        ),
+    ] = 0.6
+    intensity_floor: layer_2.Floor = 1e-6
+
+
 @dataclass(frozen=True)
 class Params:
     """The weights of the fingers, and the parameters of the three layers."""
@@ -49,7 +62,7 @@ class Params:
         ),
     ] = (1.0,) * FINGERS
     simultaneous_contact: layer_3.Params = layer_3.Params()
-    impact_reduction: layer_2.Params = layer_2.Params()
+    impact_reduction: ImpactReduction = ImpactReduction()
     contact_force: layer_1.Params = layer_1.Params()
 
     def __post_init__(self) -> None:

@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Parameter
 
-from . import contact_laws, hand_fingers, hand_object
+from . import contact_laws, hand_fingers
 from . import substeps as own
 from .box import GRAVITY
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .friction import NONE, move
-from .hand_fingers import FINGERS, Each, Rays, Touches
+from .hand_fingers import FAR, FINGERS, Each, Normal, Pose, Rays, Touches
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
-from .hand_object import FAR, Normal, Pose
 from .movable import ITERATIONS
 
 LONGEST_STEP = own.LONGEST_STEP
@@ -134,7 +133,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """
     pose, rays = x.body.pose, p.rays
     normals = _normals(p, rays, x)
-    begins = tuple(hand_object.surface(p.shape, p.object_radius, ray, pose) for ray in rays)
+    begins = tuple(hand_fingers.surface(p.shape, p.object_radius, ray, pose) for ray in rays)
     gaps = tuple(
         0.0 if at.depth >= 0.0 else FAR if at.depth <= -FAR else min(FAR, max(0.0, s - begin))
         for at, s, begin in zip(normals, x.position, begins, strict=True)
@@ -165,7 +164,7 @@ def _normals(p: Params, rays: Rays, x: State) -> Normals:
 
 def _raw_normals(p: Params, rays: Rays, x: State) -> Normals:
     return tuple(
-        hand_object.normal(p.shape, p.object_radius, p.face_length, ray, x.body.pose, s)
+        hand_fingers.normal(p.shape, p.object_radius, p.face_length, ray, x.body.pose, s)
         for ray, s in zip(rays, x.position, strict=True)
     )
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from gripper_plant import hand, hand_movable
-from gripper_plant.hand_object import Pose, Ray, Shape, normal, surface
+from gripper_plant.hand_fingers import Pose, Ray, Shape, normal, surface
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
