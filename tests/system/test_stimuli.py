@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.system.parts import Port
-from grasp_cosim.system.stimuli import PIECE, read_stimuli
+from grasp_cosim.system.stimuli import read_stimuli
 from grasp_cosim.system.stimuli_checks import samples_of
 from hypothesis import given
 from hypothesis import strategies as st
@@ -63,7 +63,7 @@ def test_numbers_are_read_as_they_are_written(values):
         ("time,a.u,a.v\n0,1,one\n1,1, \n", "line 3, column 3, a.v: missing"),
         ("time,a.u\n0,1,2\n", "line 2, column 3 = '2': has no name"),
         ("time,a.u\n0,inf\n", "line 2, column 2, a.u = inf: must be a finite number"),
-        ("time,a.u\nnow,0\n", "line 2, column 1, time = 'now': must be a number"),
+        ("time,a.u\n0,0\nnow,0\n", "line 3, column 1, time = 'now': must be a number"),
         ("time,a.u\n0,0\nnan,0\n", "line 3, column 1, time = nan: must be a finite number"),
         ("time,a.u\n0,0\n2,0\n1,0\n", "line 4, column 1, time = 1.0: is before 2.0 of line 3"),
         ("time,a.u\n1_0,0\n", "line 2, column 1, time = '1_0': must be a number"),
@@ -127,8 +127,8 @@ def test_a_whole_number_that_float64_may_not_have_is_refused(tmp_path):
 
 
 def test_numbers_before_the_first_text_are_texts_too(tmp_path):
-    mixed = read(tmp_path, "time,a.u\n0,2.0\n" + "0,1\n" * PIECE + "0,red\n")
-    assert mixed.columns[Port("a", "u")].texts == ("2", "1", "red")
+    mixed = read(tmp_path, "time,a.u\n0,2.0\n0, 1\n0,red\n")
+    assert mixed.columns[Port("a", "u")].texts == ("2.0", "1", "red")
 
 
 @needs_gcc

@@ -12,7 +12,7 @@ from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
 from ..fmi.make_instance import load_here
 from ..interface.interface import Interface, Value, Variable
-from ..master.rejection import finish_step
+from ..master.master import finish_step
 
 MOST_LOST = 100_000
 """The most steps that are made up for at once."""

@@ -1,5 +1,7 @@
 """The fixed-step master: initialise, then run the loop in chunks and hand its rows on.
 
+A step that an FMU rejects, since it discards it or ends it early, is finished in parts.
+
 The schemes, components with a longer step and time are in docs/system_files.md.
 """
 
@@ -14,7 +16,7 @@ from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
 from ..base.system_calls import cpus
 from ..exchange.listener import Texts
-from ..fmi.instance import DISCARD, EARLY, Instance
+from ..fmi.instance import DISCARD, EARLY, OK, WARNING, Instance
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.result import Rejection
@@ -24,7 +26,6 @@ from . import loop
 from .engine import Aside, CompiledLoop, Engine, make_loop
 from .initialisation import Propagation
 from .plan import Planner, slots_of
-from .rejection import finish_step
 from .scenario import Scenario, at_start, drives_of
 
 CHUNK = 4096
@@ -41,6 +42,9 @@ LONG = 0.1
 
 SPARE = 5e7
 """ns that this thread may take at a time for what listeners have put off."""
+
+SMALLEST = 1024
+"""A step that is rejected is divided down to this part of it, then the run fails."""
 
 RowReceiver = Callable[[npt.NDArray[np.int64], npt.NDArray[np.float64]], None]
 """Takes step numbers and rows of all values; the rows are reused afterwards."""
@@ -305,3 +309,56 @@ class Master:
             value = int(self.plan.buffers[buffer][index])
             exact(str(port), value, f"{value} at step {step + 1}", SimulationError)
         raise AssertionError("no value is too long")  # pragma: no cover
+
+
+def finish_step(instance: Instance, status: int, begin: float, end: float) -> float | None:
+    """Bring an instance to end, in s, that rejected the step from begin to there.
+
+    Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
+    1/1024 of the step. The time in s where the FMU asked for the end of the simulation, else None.
+    SimulationError where that does not help.
+    """
+    if (ended := instance.the_end()) is not None:
+        return ended
+    if not instance.interface.can_vary_step:
+        raise instance.failure(status, begin)
+    clock = np.array([begin])
+    smallest = (end - begin) / SMALLEST
+    length = end - begin
+    for _ in range(2 * SMALLEST):
+        reached = instance.last_successful_time()
+        if reached is None:
+            raise instance.failure(status, float(clock[0]))
+        if reached > clock[0]:
+            clock[0] = reached
+            length = end - float(clock[0])
+        elif (length := length / 2) < smallest or clock[0] + length == clock[0]:
+            raise instance.failure(status, float(clock[0]))
+        status, length = _go_on(instance, clock, end, length, smallest)
+        if status <= WARNING:
+            return None
+        if status not in (DISCARD, EARLY):
+            raise instance.failure(status, float(clock[0]))
+        if (ended := instance.the_end()) is not None:
+            return ended
+    raise instance.failure(status, float(clock[0]))
+
+
+def _go_on(
+    instance: Instance,
+    clock: npt.NDArray[np.float64],
+    end: float,
+    length: float,
+    smallest: float,
+) -> tuple[int, float]:
+    """Steps of a length in s from the time in clock[0] to end, or to one that is rejected.
+
+    The last status, and the length of that step. A rest below half of the smallest is none.
+    """
+    status = OK
+    while clock[0] < end and status <= WARNING:
+        length = min(length, end - float(clock[0]))
+        status = instance.stepper(clock, length).python()
+        if status <= WARNING:
+            clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
+    return status, length

@@ -1,7 +1,7 @@
 """The kinds of faults of a connection: what each makes of a value, and its parameters.
 
 FAULTS is the one table of them. The checks, the system file and the run take from it what they need
-of a kind; the table in docs/system_files.md has the same words.
+of a kind; what it makes of a value is in the table of docs/system_files.md.
 
 At run time a fault gets each value that its connection passes, units converted, with the number of
 the base step in which it does so, INITIAL in initialisation mode, and whether the fault acts in it.
@@ -175,10 +175,8 @@ def _quantisation(given: Parameters, *_: object) -> Act:
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
-    """One kind of fault. `makes` and `takes` say in words what it does and its parameters."""
+    """One kind of fault."""
 
-    makes: str
-    takes: str
     start: Callable[[Parameters, Draws, int], Act]
     """Make a fault from its parameters, its random numbers and the base step in ns."""
     parameters: Mapping[str, Range | None]
@@ -194,50 +192,21 @@ class FaultKind:
 
 FAULTS: Mapping[str, FaultKind] = MappingProxyType(
     {
-        "stuck": FaultKind(
-            "`value`, or the first value since the fault began",
-            "value",
-            _stuck,
-            {"value": None},
-            discrete=True,
-        ),
+        "stuck": FaultKind(_stuck, {"value": None}, discrete=True),
         "dropout": FaultKind(
-            "the last value that got through, where this one is lost",
-            "probability, from 0 to 1",
-            _dropout,
-            {"probability": Range(0.0, 1.0)},
-            discrete=True,
-            random=True,
+            _dropout, {"probability": Range(0.0, 1.0)}, discrete=True, random=True
         ),
-        "bias": FaultKind("value + `value`", "value", _bias, {"value": Range()}),
-        "noise": FaultKind(
-            "value + a Gaussian random number of mean 0",
-            "standard_deviation",
-            _noise,
-            {"standard_deviation": Range(0.0)},
-            random=True,
-        ),
+        "bias": FaultKind(_bias, {"value": Range()}),
+        "noise": FaultKind(_noise, {"standard_deviation": Range(0.0)}, random=True),
         "delay": FaultKind(
-            "the value of `time` ago, at first the first one",
-            "time in s, a whole number of steps",
-            _delay,
-            {"time": Range(0.0, LONGEST)},
-            discrete=True,
-            check=_check_delay,
+            _delay, {"time": Range(0.0, LONGEST)}, discrete=True, check=_check_delay
         ),
         "saturation": FaultKind(
-            "low, or high, where it is below or above",
-            "low, high, or one of them",
             _saturation,
             {"low": Range(needed=False), "high": Range(needed=False)},
             check=_check_saturation,
         ),
-        "quantisation": FaultKind(
-            "the nearest whole multiple of `step`, of two the even one",
-            "step",
-            _quantisation,
-            {"step": Range(0.0, above=True)},
-        ),
+        "quantisation": FaultKind(_quantisation, {"step": Range(0.0, above=True)}),
     }
 )
 """The kinds of faults by name."""

@@ -25,7 +25,7 @@ FEW = 3
 def natives(system: Structure, native: bool | None) -> dict[str, Path | None]:
     """The native twins by component that run in the place of FMUs; see System.natively()."""
     if native is False:
-        if needy := next(filter(_needs_twin, system.components), None):
+        if needy := next((c for c in system.components if c.needs_native), None):
             raise InputError(f"{needy.name}: {_lacking(needy)}; its native twin must run")
         return {c.name: None for c in system.components}
     found, failure = _twins([c for c in system.components if not c.native])
@@ -44,7 +44,7 @@ def natives(system: Structure, native: bool | None) -> dict[str, Path | None]:
 
 def needed_twins(system: Structure) -> dict[str, Path | None]:
     """The twins of FMUs in Python that have no binary for this machine, by component."""
-    return {**_twins([c for c in system.components if _needs_twin(c)])[0]}
+    return {**_twins([c for c in system.components if c.needs_native])[0]}
 
 
 def _lacking(component: Component) -> str:
@@ -58,7 +58,7 @@ def _users_twins(component: Component) -> list[Path]:
     if not _is_ours(component):
         return []
     folders = NATIVE_FOLDER, component.fmu.parent.parent / NATIVE_FOLDER.name
-    return [folder / _file(component) for folder in folders]
+    return [folder / f"{component.interface.identifier}.fmu" for folder in folders]
 
 
 def _twins(components: list[Component]) -> tuple[dict[str, Path], str]:
@@ -85,13 +85,9 @@ def _twins(components: list[Component]) -> tuple[dict[str, Path], str]:
     found = {c.name: twin for c in ours if (twin := _twin(c, built.get(c.name)))}
     missing = [c for c in ours if c.name in shipped and c.name not in found]
     for component in missing:
-        if failure and _needs_twin(component):
+        if failure and component.needs_native:
             raise InputError(f"{component.name}: {_lacking(component)}; {failure}")
     return found, failure if missing else ""
-
-
-def _needs_twin(component: Component) -> bool:
-    return component.needs_native
 
 
 def _is_ours(component: Component) -> bool:
@@ -104,13 +100,9 @@ def _twin(component: Component, shipped: Path | None) -> Path | None:
     """The native FMU of the same content as the component's, of those built and of the user's."""
     from grasp_fmus.build import is_twin
 
-    places = [*([shipped / _file(component)] if shipped else []), *_users_twins(component)]
+    built = [shipped / f"{component.interface.identifier}.fmu"] if shipped else []
+    places = (*built, *_users_twins(component))
     return next((p for p in places if is_twin(p, component.interface.guid)), None)
-
-
-def _file(component: Component) -> str:
-    """The name of the FMU as it was built, whatever it is called now."""
-    return f"{component.interface.identifier}.fmu"
 
 
 def _why(component: Component) -> str:

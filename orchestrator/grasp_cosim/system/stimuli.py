@@ -32,8 +32,6 @@ Interpolation = Literal["linear", "held"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 _Reader = Iterator[list[str]]
-PIECE = 4096
-"""Rows that are read at once."""
 
 _UNIT = re.compile(r"(.*\S)\s+\[([^\[\]]*)\]")
 _TIME = re.compile(r"time\s*(?:\[([^\[\]]*)\])?", re.IGNORECASE)
@@ -135,27 +133,45 @@ def _read(path: Path, reader: _Reader, interpolation: Interpolation) -> Stimuli:
         raise InputError(f"{file}: is empty; must begin with names: time,component.variable")
     names = [from_cell(name.strip()) for name in names]
     ports, units, factor = _header(file, names)
-    columns = [_Cells(file, i, name) for i, name in enumerate(names, 1)]
     lines: array[int] = array("q")
-    while piece := [*islice(rows, PIECE)]:
-        here = [line for line, _ in piece]
-        lines.extend(here)
-        for column, cells in zip(
-            columns, zip(*(row for _, row in piece), strict=True), strict=True
-        ):
-            column.extend(here, cells)
+    cells: list[list[str]] = [[] for _ in names]
+    for line, row in rows:
+        lines.append(line)
+        for column, cell in zip(cells, row, strict=True):
+            column.append(cell)
     if not lines:
         raise InputError(f"{file}: has no row after the names; must have one at least")
+    columns = [
+        _column(file, i, name, lines, cells[i - 1], unit)
+        for i, (name, unit) in enumerate(zip(names, [None, *units], strict=True), 1)
+    ]
     return Stimuli(
         file,
-        _times(columns[0], factor, lines),
-        {
-            port: Column(column.samples, unit, tuple(column.texts))
-            for port, unit, column in zip(ports, units, columns[1:], strict=True)
-        },
+        _times(file, columns[0], factor, lines),
+        dict(zip(ports, columns[1:], strict=True)),
         interpolation,
         array("q") if lines[-1] == len(lines) + 1 else lines,
     )
+
+
+def _column(
+    file: str, number: int, name: str, lines: Sequence[int], cells: list[str], unit: str | None
+) -> Column:
+    """The numbers of a column, or its texts; InputError at the first cell without a value."""
+    texts: dict[str, int] = {}
+    try:
+        samples = array("d", map(real, cells))
+        good = map(math.isfinite, samples)
+    except ValueError:
+        stripped = [*map(str.strip, cells)]
+        samples, good = array("d"), map(bool, stripped)
+        samples.extend(texts.setdefault(cell, len(texts)) for cell in stripped)
+    for line, fine, cell in zip(lines, good, cells, strict=True):
+        if not fine:
+            place, said = _place(file, line, number, name), cell.strip()
+            what = f" = {said}: must be a finite number" if said else ": missing; must be a value"
+            raise InputError(f"{place}{what}")
+    return Column(samples, unit, tuple(texts))
 
 
 def _rows(file: str, reader: _Reader) -> Iterator[tuple[int, list[str]]]:
@@ -209,22 +225,26 @@ def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | Non
     return ports, [unit for _, unit in others], change.factor
 
 
-def _times(column: _Cells, factor: float, lines: Sequence[int]) -> array[int]:
+def _times(file: str, column: Column, factor: float, lines: Sequence[int]) -> array[int]:
     """The times in ns."""
-    for i, text in enumerate(column.texts):
-        line = lines[column.samples.index(i)]
-        raise InputError(f"{_place(column.file, line, 1, 'time')} = {text!r}: must be a number")
-    span = max(map(abs, column.samples)) * factor
+    samples = column.samples
+    for row in range(len(lines) if column.texts else 0):
+        try:
+            real(column.text(row))
+        except ValueError:
+            place = _place(file, lines[row], 1, "time")
+            raise InputError(f"{place} = {column.text(row)!r}: must be a number") from None
+    span = max(map(abs, samples)) * factor
     if span > LONGEST:
-        raise InputError(f"{column.file}: time to {span:g} s; must be at most {LONGEST:g} s")
+        raise InputError(f"{file}: time to {span:g} s; must be at most {LONGEST:g} s")
     scale = factor * NANOSECONDS
-    times = array("q", (round(scale * t) for t in column.samples))
-    if not all(map(le, times, islice(times, 1, None))):
-        row = next(i for i in range(1, len(times)) if times[i] < times[i - 1])
-        raise InputError(
-            f"{_place(column.file, lines[row], 1, 'time')} = {column.samples[row]!r}: is before "
-            f"{column.samples[row - 1]!r} of line {lines[row - 1]}; must not fall"
-        )
+    times = array("q", (round(scale * t) for t in samples))
+    for row in range(1, len(times)):
+        if times[row] < times[row - 1]:
+            raise InputError(
+                f"{_place(file, lines[row], 1, 'time')} = {samples[row]!r}: is before "
+                f"{samples[row - 1]!r} of line {lines[row - 1]}; must not fall"
+            )
     return times
 
 
@@ -239,45 +259,6 @@ def input_entry(stimuli: Stimuli) -> dict[str, str]:
         "interpolation": stimuli.interpolation,
         "sha256": made_of.hexdigest(),
     }
-
-
-class _Cells:
-    """A column as far as it is read: numbers, or from its first text on texts."""
-
-    def __init__(self, file: str, number: int, name: str) -> None:
-        self.file, self.number, self.name = file, number, name
-        self.samples: array[float] = array("d")
-        self.texts: dict[str, int] = {}
-
-    def extend(self, lines: Sequence[int], cells: Sequence[str]) -> None:
-        """Take more cells, of these lines; InputError at one without a value."""
-        before = len(self.samples)
-        if not self.texts:
-            try:
-                self.samples.extend(map(real, cells))
-            except ValueError:
-                del self.samples[before:]
-                self.samples = array("d", map(self._text, map(_text, self.samples)))
-            else:
-                new = self.samples[before:]
-                if not math.isfinite(sum(new)):
-                    self._check(lines, map(math.isfinite, new), cells)
-                return
-        self._check(lines, map(str.strip, cells), cells)
-        self.samples.extend(self._text(cell.strip()) for cell in cells)
-
-    def _text(self, text: str) -> int:
-        return self.texts.setdefault(text, len(self.texts))
-
-    def _check(self, lines: Sequence[int], good: Iterator[object], cells: Sequence[str]) -> None:
-        """InputError at the first cell that is not good."""
-        for line, fine, cell in zip(lines, good, cells, strict=True):
-            if not fine:
-                place = _place(self.file, line, self.number, self.name)
-                what = (
-                    f" = {cell.strip()}: must be a finite number" if cell.strip() else ": missing"
-                )
-                raise InputError(f"{place}{what}{'' if cell.strip() else '; must be a value'}")
 
 
 def _text(sample: float) -> str:
