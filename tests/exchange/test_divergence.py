@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from grasp_cosim.exchange.divergence import DECADES, FAR, Divergence, Runaway, largest
+from grasp_cosim.exchange.dispatch import DECADES, FAR, Divergence, Runaway, largest
 from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.system.parts import Connection, Port

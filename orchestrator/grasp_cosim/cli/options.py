@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 from ..base.errors import InputError
+from ..system.changes import plain
 from ..system.description import System
-from ..system.places import plain
 from ..system.stimuli import read_stimuli
 from ..system.structure import SCHEMES
 from .frame import (

@@ -18,9 +18,9 @@ from ..base.errors import choices, nearest
 from ..interface.capabilities import KINDS
 from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
 from ..interface.units import IDENTITY, Conversion
+from ..system.changes import stated
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Port, literal
-from ..system.swap import stated
 
 Severity = Literal["blocks", "warns", "notes"]
 SEVERITIES: tuple[Severity, ...] = ("blocks", "warns", "notes")

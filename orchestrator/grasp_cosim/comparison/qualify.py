@@ -21,10 +21,10 @@ from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
+from ..system.changes import Replacement, converted, replaced
 from ..system.description import System
 from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Isolation
 from ..system.structure import SCHEMES, between, output_units
-from ..system.swap import Replacement, converted, replaced
 from ..system.validity import transforms
 from .bands import FEWEST_STEPS, SHARE, Bands, Compared, Curves, Reference, every_second
 from .compare import Comparison

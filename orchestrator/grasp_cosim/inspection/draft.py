@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 from ..base.errors import choices
 from ..base.text import on_one_line
 from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable
+from ..system.changes import converted, stated
 from ..system.parts import NANOSECONDS, Component
 from ..system.structure import Structure
-from ..system.swap import converted, stated
 from .alike import Match, candidates, matches
 
 FEW = 6

@@ -21,7 +21,7 @@ from ..base.checks import exact
 from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System
-from ..system.faults import FAULTS, INITIAL, Draws
+from ..system.faults import FAULTS, INITIAL, Act, Draws
 from ..system.parts import Condition, Event, Fault, Port, first_step, literal, seconds
 from ..system.scenario import check_setting
 from ..system.stimuli_checks import driven, is_linear, samples_of
@@ -58,8 +58,7 @@ class Scenario:
         self._system, self._instances = system, instances
         self._slots, self._values = slots, values
         self._events = [
-            _PendingEvent(f"events[{i}]", event, system, instances, slots, values)
-            for i, event in enumerate(system.events)
+            self._pending(f"events[{i}]", event) for i, event in enumerate(system.events)
         ]
         self._windows = [
             Window(f"faults[{i}]", self._in_numbers(fault), system.step_ns, system.start_ns)
@@ -85,7 +84,7 @@ class Scenario:
                 window.begin(step)
                 self._note(step, [f"{window} begins"])
             elif window.must_end(step):
-                window.end()
+                window.ended = True
                 self._note(step, [f"{window} ends"])
         self._due = self.next_step(step + 1)
 
@@ -100,15 +99,10 @@ class Scenario:
         if port not in self._settable:
             check_setting(self._system, port, value, place)
             self._settable.add(port)
-        event = _PendingEvent(
-            place,
-            Event({port: value}),
-            self._system,
-            self._instances,
-            self._slots,
-            self._values,
-        )
-        self._note(step, event.happen())
+        self._note(step, self._pending(place, Event({port: value})).happen())
+
+    def _pending(self, name: str, event: Event) -> _PendingEvent:
+        return _PendingEvent(name, event, self._system, self._instances, self._slots, self._values)
 
     def next_step(self, step: int) -> int | None:
         """The first step from this one on that needs before_step, as things are; None: none does.
@@ -207,7 +201,7 @@ class Window:
         self.name = name
         self.fault = fault
         self.begun = False
-        self._ended = False
+        self.ended = False
         self._earliest = first_step(fault.start_ns, step_ns, start_ns)
         self._end: float = math.inf
         if fault.end_ns is not None:
@@ -234,42 +228,31 @@ class Window:
 
     def must_end(self, step: int) -> bool:
         """Return True if it has begun, and this step is behind its last one."""
-        return self.begun and not self._ended and step >= self._end
-
-    def end(self) -> None:
-        """Note that it is over."""
-        self._ended = True
+        return self.begun and not self.ended and step >= self._end
 
     def next_step(self, step: int) -> int | None:
         """Return the first step from this one on at which it may begin or must end, or None."""
         if not self.begun:
             earliest = max(step, self._earliest)
             return earliest if earliest < self._end else None
-        return None if self._ended or self._end == math.inf else max(step, int(self._end))
+        return None if self.ended or self._end == math.inf else max(step, int(self._end))
 
 
 def fault_functions(windows: Sequence[Window], step_ns: int) -> Mapping[Port, FaultFunction]:
     """Return for each connection that has faults, by target, all of them one after the other."""
-    chains: dict[Port, list[FaultFunction]] = {}
+    chains: dict[Port, list[tuple[Act, Window]]] = {}
     kinds: Counter[tuple[Port, str]] = Counter()
     for window in windows:
-        fault = window.fault
-        key = (fault.target, fault.kind)
-        chains.setdefault(fault.target, []).append(_function(window, kinds[key], step_ns))
+        fault, key = window.fault, (window.fault.target, window.fault.kind)
+        act = FAULTS[fault.kind].start(fault.parameters, Draws(fault, kinds[key]), step_ns)
+        chains.setdefault(fault.target, []).append((act, window))
         kinds[key] += 1
     return {target: partial(_in_turn, chain) for target, chain in chains.items()}
 
 
-def _function(window: Window, count: int, step_ns: int) -> FaultFunction:
-    """Return the fault of a window, before which the connection has `count` of its kind."""
-    fault = window.fault
-    act = FAULTS[fault.kind].start(fault.parameters, Draws(fault, count), step_ns)
-    return lambda value, step: act(value, step, window.acts(step))
-
-
-def _in_turn(functions: Sequence[FaultFunction], value: float, step: int) -> float:
-    for function in functions:
-        value = function(value, step)
+def _in_turn(chain: Sequence[tuple[Act, Window]], value: float, step: int) -> float:
+    for act, window in chain:
+        value = act(value, step, window.acts(step))
     return value
 
 

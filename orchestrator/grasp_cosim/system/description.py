@@ -11,15 +11,14 @@ from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
 from .arrays import as_written, by_element, check_arrays
+from .changes import SECTIONS, as_file, changed, plain, with_entries
 from .native import natives
 from .parts import Component
-from .places import SECTIONS, as_file, changed, plain
 from .scenario import check_scenario
 from .settings import made_of
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli
 from .structure import Structure, experiment
-from .swap import with_entries
 from .validity import (
     check_components,
     check_connections,

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from ..base.checks import number
 from ..base.errors import InputError
 from .parts import LONGEST, NANOSECONDS, Fault, seconds
 
@@ -43,10 +42,6 @@ class Range:
     above: bool = False
     """True if `low` itself is too low."""
     needed: bool = True
-
-    def check(self, place: str, value: Any) -> None:
-        """InputError where the value is no finite number in this range."""
-        number(place, value, self.low, self.high, above=self.above, must=str(self))
 
     def __str__(self) -> str:
         if math.isfinite(self.high):

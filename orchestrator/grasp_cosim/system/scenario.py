@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..base.checks import as_table, check_keys, choice, exact, known, real, whole
+from ..base.checks import as_table, check_keys, choice, exact, known, number, real, whole
 from ..base.errors import InputError, choices, nearest
 from ..interface.interface import Interface, Value
 from .faults import FAULTS, RANDOM
@@ -278,7 +278,8 @@ def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
             )
     for name, valid in kind.parameters.items():
         if valid is not None and (valid.needed or name in fault.parameters):
-            valid.check(f"{place}: {name}", fault.parameters.get(name))
+            at, given = f"{place}: {name}", fault.parameters.get(name)
+            number(at, given, valid.low, valid.high, above=valid.above, must=str(valid))
         elif valid is None and name in fault.parameters:
             at, given = f"{place}: {name}", fault.parameters[name]
             exact(at, interface.parse(at, fault.target.variable, given))

@@ -10,6 +10,7 @@ from ..base.errors import InputError
 from ..interface.interface import Given
 from ..interface.read import read_interface
 from .arrays import with_given
+from .changes import ENTRIES, PLACES, SECTIONS, changed
 from .description import System
 from .parts import (
     ISOLATIONS,
@@ -21,7 +22,6 @@ from .parts import (
     Solver,
     in_nanoseconds,
 )
-from .places import ENTRIES, PLACES, SECTIONS, changed
 from .scenario import read_events, read_faults
 from .stimuli import Stimuli, read_stimuli
 from .structure import experiment

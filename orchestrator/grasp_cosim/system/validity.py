@@ -30,10 +30,6 @@ class _End(NamedTuple):
     interface: Interface
     variable: Variable
 
-    @property
-    def limits(self) -> tuple[float, float]:
-        return limits(self.variable.type, self.interface.version)
-
 
 def check_components(system: Structure) -> None:
     """InputError where an FMU that a process can have once is in it twice."""
@@ -264,8 +260,9 @@ def _check_types(place: _Place, source: _End, target: _End) -> None:
     def types() -> str:
         return f"{place}: {source.port} is {given.type} and {target.port} is {taken.type}"
 
-    low, high = target.limits
-    least, most = source.limits
+    (least, most), (low, high) = (
+        limits(end.variable.type, end.interface.version) for end in (source, target)
+    )
     if (given.kind, taken.kind) == ("Integer", "Real"):
         if taken.type == "Float32" and not -(2**24) <= least <= most <= 2**24:
             raise InputError(f"{types()}, which does not hold all its values; must be Float64")

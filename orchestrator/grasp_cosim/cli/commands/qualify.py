@@ -13,8 +13,8 @@ from ...comparison.qualify import component_of
 from ...comparison.qualify import qualify as run_qualification
 from ...comparison.words import qualification_json, qualification_text
 from ...interface.read import check_runs
+from ...system.changes import SECTIONS
 from ...system.description import FILES
-from ...system.places import SECTIONS
 from ..frame import (
     NEGATIVE,
     PATH,
