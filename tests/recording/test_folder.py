@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, simulate
-from grasp_cosim.recording.folder import RunFolder
+from grasp_cosim.recording.folder import FORMS, RunFolder
 from grasp_cosim.recording.load import load_run
 from recording.rows import EXPERIMENT, SIGNALS, rows
-
-STOP = 0.05
 
 DRAWN = ("grasp.png", "timing.png", "report.html", "signals.mf4")
 
@@ -23,27 +21,36 @@ def run(grasp, tmp_path):
         yield folder
 
 
-def test_it_ends_as_a_result_writes_it(grasp, tmp_path):
-    with RunFolder(tmp_path / "on", grasp) as folder:
-        result = simulate(grasp, stop=STOP, listeners=[folder])
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("realtime", [False, Realtime()])
+def test_it_ends_as_a_result_writes_it_and_is_read_back_as_it_was(grasp, tmp_path, form, realtime):
+    """Paced or not, in the place of a run of the other form."""
+    if form == "arrow":
+        pytest.importorskip("pyarrow")
+    system, on = grasp.with_experiment(step=1e-3, stop=0.1), tmp_path / "on"
+    on.mkdir()
+    for name in ("run.json", "signals.csv", "signals.arrow"):
+        (on / name).touch()
+    with RunFolder(on, system, ["run"], paced=bool(realtime), form=form) as folder:
+        result = simulate(system, realtime=realtime, listeners=[folder], diverging="continue")
         folder.finish(result)
-    result.to_csv(tmp_path / "signals.csv")
+    (result.to_csv if form == "csv" else result.to_arrow)(tmp_path / f"signals.{form}")
     result.to_json(tmp_path / "run.json")
-    on, after = ((p / "signals.csv").read_bytes() for p in (tmp_path / "on", tmp_path))
-    assert on == after
-    written, plain = (json.loads((p / "run.json").read_text()) for p in (tmp_path / "on", tmp_path))
+    assert sorted(p.name for p in on.iterdir()) == ["run.json", f"signals.{form}"]
+    if form == "csv":
+        assert (on / "signals.csv").read_bytes() == (tmp_path / "signals.csv").read_bytes()
+    written, plain = (json.loads((p / "run.json").read_text()) for p in (on, tmp_path))
     assert {*written} - {*plain} == {"date", "versions", "fmus", "command"}
     assert {key: written[key] for key in plain} == plain
-
-
-def test_a_paced_run_writes_the_same(grasp, tmp_path):
-    system = grasp.with_experiment(step=1e-3, stop=0.3)
-    with RunFolder(tmp_path / "paced", system, paced=True) as folder:
-        result = simulate(system, realtime=Realtime(), listeners=[folder])
-        folder.finish(result)
-    result.to_csv(tmp_path / "signals.csv")
-    paced = (tmp_path / "paced/signals.csv").read_bytes()
-    assert paced == (tmp_path / "signals.csv").read_bytes()
+    for place in (on / f"signals.{form}", tmp_path):
+        back = load_run(place)
+        assert list(back) == list(result)
+        assert back.time.tobytes() == result.time.tobytes()
+        for name, column in result.items():
+            assert (back[name].dtype, back[name].tobytes()) == (column.dtype, column.tobytes())
+        assert (back.units, back.settings) == (dict(result.units), result.settings)
+        assert back.settings["diverging"] == "continue"
+        assert back.metrics == result.metrics
 
 
 def test_what_waits_is_written_in_spare_time(grasp, tmp_path):

@@ -1,17 +1,21 @@
-"""What a run leaves behind, and the files that it writes."""
+"""A result as Python users meet it: in a console, in a notebook, as files, as tables of others."""
 
-import errno
 import json
+import pickle
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, SimulationError, simulate
-from grasp_cosim.base.files import in_one_piece
-from grasp_cosim.recording.load import load_run
+from grasp_cosim import InputError, load_run, simulate
+from grasp_cosim.base.checks import extra_module
+from grasp_cosim.recording.mdf import read_mdf
 from grasp_cosim.recording.result import Rejection
 from grasp_cosim.system.settings import run_settings
-from recording.rows import full_disk
+from report.runs import grasp_run, ring_run, write_run
+
+GAP = "plant.gap[1]"
 
 
 @pytest.fixture(scope="module")
@@ -20,89 +24,48 @@ def result(grasp):
     return simulate(grasp, stop=0.1)
 
 
-def decimated(result, every):
-    """Every n-th communication point, and the last."""
-    kept = sorted({*range(0, len(result.time), every), len(result.time) - 1})
-    return replace(
-        result,
-        time=result.time[kept],
-        signals={name: column[kept] for name, column in result.items()},
-    )
-
-
-def test_csv_is_each_value_as_python_prints_it(result, tmp_path):
-    result.to_csv(tmp_path / "s.csv")
-    columns = [result.time, *result.signals.values()]
-    expected = [",".join(f'"{name}"' for name in ("time", *result))]
-    for row in zip(*(column.tolist() for column in columns), strict=True):
-        expected.append(",".join(repr(v) if isinstance(v, float) else str(int(v)) for v in row))
-    assert (tmp_path / "s.csv").read_text() == "\n".join(expected) + "\n"
-
-
-def test_a_decimated_result_keeps_its_times(result, tmp_path):
-    few = decimated(result, 300)
+def test_a_decimated_result_keeps_its_times_in_every_format(result, tmp_path):
+    kept, texts = [0, 300, 600, 900, 1000], np.array(list("abbab"), object)
+    signals = {
+        GAP: result[GAP][kept],
+        "a.n": np.array(kept),
+        "a.s": np.array(list("abbab"), object),
+    }
+    units = {GAP: "m", "a.n": None, "a.s": None}
+    few = replace(result, time=result.time[kept], signals=signals, units=units)
     assert few.metrics["steps"] == result.metrics["steps"] == 1000
     few.to_csv(tmp_path / "signals.csv")
     few.to_json(tmp_path / "run.json")
-    run = load_run(tmp_path)
-    assert run.time.tolist() == [0.0, 0.03, 0.06, 0.09, 0.1]
-    assert run.signals["plant.gap[1]"].tolist() == few["plant.gap[1]"].tolist()
-
-
-def test_mdf_has_the_columns_and_whether_the_run_was_complete(result, tmp_path):
-    asammdf = pytest.importorskip("asammdf")
-    described = replace(result, complete=False, descriptions={"plant.gap[1]": "to the object"})
-    described.to_mdf(tmp_path / "s.mf4")
-    assert [path.name for path in tmp_path.iterdir()] == ["s.mf4"]
-    with asammdf.MDF(tmp_path / "s.mf4") as file:
-        assert [c.name for c in file.groups[0].channels] == ["time", *result]
-        for name, column in result.items():
-            channel = file.get(name)
-            assert channel.samples.tolist() == column.tolist()
-            assert channel.timestamps.tolist() == result.time.tolist()
-            assert channel.unit == (result.units[name] or "")
-        assert file.get("plant.gap[1]").comment == "to the object"
-        assert '<e name="complete">false</e>' in file.header.comment
+    few.to_mdf(tmp_path / "s.mf4")
+    back, (time, columns, found) = load_run(tmp_path), read_mdf(tmp_path / "s.mf4")
+    assert back.time.tolist() == time.tolist() == [0.0, 0.03, 0.06, 0.09, 0.1]
+    assert back[GAP].tolist() == columns[GAP].tolist() == few[GAP].tolist()
+    assert back["a.n"].tolist() == columns["a.n"].tolist() == kept
+    assert back["a.s"].tolist() == list("abbab")
+    assert list(back.numbers) == list(found) == [GAP, "a.n"]
+    assert found[GAP] == "m"
 
 
 def test_json_has_the_metrics_and_what_led_to_them(grasp, result, tmp_path):
     told = replace(
         result,
-        descriptions={"plant.gap[1]": "to the object"},
+        descriptions={GAP: "to the object"},
         log=("the plant rejected a step",),
         rejections={"plant": Rejection(3, 0.25)},
     )
     told.to_json(tmp_path / "run.json")
-    found = json.loads((tmp_path / "run.json").read_text())
-    assert found == {
+    assert json.loads((tmp_path / "run.json").read_text()) == {
         **json.loads(json.dumps(dict(result.metrics))),
         **run_settings(grasp.with_experiment(stop=0.1)),
         "units": dict(result.units),
         "to_si": {},
-        "types": {
-            name: {"f": "float64", "b": "bool"}[column.dtype.kind]
-            for name, column in result.items()
-        },
-        "descriptions": {"plant.gap[1]": "to the object"},
+        "types": {n: {"f": "float64", "b": "bool"}[c.dtype.kind] for n, c in result.items()},
+        "descriptions": {GAP: "to the object"},
         "metric_units": result.metric_units,
         "missing_metrics": [],
         "log": ["the plant rejected a step"],
         "rejections": {"plant": {"count": 3, "first": 0.25}},
     }
-
-
-def test_a_full_disk_leaves_the_file_that_was_there(result, tmp_path):
-    path = tmp_path / "s.csv"
-    path.write_text("before")
-    with full_disk(10_000), pytest.raises(SimulationError, match="cannot be written: File too"):
-        result.to_csv(path)
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("s.csv", "before")]
-
-
-def test_a_result_of_integers_is_written_as_integers(result, tmp_path):
-    counts = np.arange(len(result.time), dtype=np.int64)
-    replace(result, signals={"a.n": counts}, units={"a.n": None}).to_csv(tmp_path / "s.csv")
-    assert (tmp_path / "s.csv").read_text().splitlines()[-1] == "0.1,1000"
 
 
 def test_a_result_without_signals_has_nothing_to_draw(result, tmp_path):
@@ -111,15 +74,89 @@ def test_a_result_without_signals_has_nothing_to_draw(result, tmp_path):
         bare.plot(tmp_path / "s.png")
 
 
-def test_a_file_that_cannot_be_written_is_named_and_not_left_behind(tmp_path):
-    """A write to a full disk fails without saying which file it was."""
+def test_its_repr_is_five_short_lines():
+    lines = repr(grasp_run()).splitlines()
+    assert len(lines) == 5
+    assert max(map(len, lines)) <= 100
+    assert lines[0] == "Result of grasp.toml"
+    assert "2 s in steps of 1 ms, sequential, took 1.5 s" in lines[1]
+    assert "16, of 2001 rows: plant.position[1], " in lines[2]
+    assert "time_to_contact 1, 1.2 s" in lines[3]
+    assert "t = 0.5 s: sensor_1.reflectance = 0.6" in lines[4]
 
-    def fill():
-        with in_one_piece(tmp_path / "a.json") as part:
-            part.write_text("half")
-            raise OSError(errno.ENOSPC, "No space left on device")
 
-    with pytest.raises(OSError, match="No space left on device") as caught:
-        fill()
-    assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, str(tmp_path / "a.json"))
-    assert list(tmp_path.iterdir()) == []
+def test_what_was_read_back_looks_and_works_like_what_was_run(tmp_path, monkeypatch):
+    run = grasp_run()
+    monkeypatch.chdir(tmp_path)
+    write_run(Path("run"), run)
+    back = load_run("run")
+    first, *rest = repr(back).splitlines()
+    fresh, *same = repr(run).splitlines()
+    assert first == f"{fresh}, read from run"
+    assert rest == same
+    assert back.metrics == run.metrics
+    html = run._repr_html_()
+    assert back._repr_html_().replace(", read from run", "") == html
+    assert "time to contact" in html
+    assert "16 signals" in html
+    assert "<b>" not in ring_run(["<b>", "c"])._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("asked", "near"),
+    [("plant.gap1", GAP), ("gap[1]", GAP), ("Plant.Gap[2]", "plant.gap[2]")],
+)
+def test_a_wrong_name_is_a_key_error_with_the_nearest_ones(asked, near):
+    run = grasp_run()
+    with pytest.raises(KeyError) as raised:
+        run[asked]
+    said = str(raised.value)
+    assert said.startswith(f"{asked!r}: no such signal; did you mean ")
+    assert near in said.partition("did you mean ")[2].rstrip("?").split(", ")
+    assert str(pickle.loads(pickle.dumps(raised.value))) == said
+    with pytest.raises(KeyError, match=r"'time_to_contat': no such metric; did you mean time_to_c"):
+        run.metrics["time_to_contat"]
+    assert run.metrics.get("time_to_contat") is None
+    assert json.loads(json.dumps(run.metrics))["scheme"] == run.metrics["scheme"]
+
+
+@pytest.mark.slow
+def test_plot_returns_a_figure_that_a_notebook_shows_and_writes_it_where_asked(tmp_path):
+    figure_module = pytest.importorskip("matplotlib.figure")
+    figure = ring_run(["a", "b"]).plot(tmp_path / "own.png")
+    assert isinstance(figure, figure_module.Figure)
+    assert (tmp_path / "own.png").read_bytes().startswith(b"\x89PNG")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_tables_have_the_same_numbers_types_units_and_descriptions():
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    run = grasp_run()
+    frame, data = run.to_pandas(), run.to_xarray()
+    assert frame.index.name == "time"
+    assert list(frame.columns) == list(data.data_vars) == list(run)
+    assert frame["plant.contact[1]"].dtype == data["plant.contact[1]"].dtype == bool
+    assert frame.attrs["units"] == {"time": "s", **run.units}
+    assert frame.attrs["system"] == "grasp.toml"
+    for table, time in ((frame, frame.index.to_numpy()), (data, data["time"])):
+        assert np.array_equal(time, run.time)
+        assert all(np.array_equal(table[name], run[name]) for name in run)
+    assert data["time"].attrs["units"] == "s"
+    assert data[GAP].attrs == {"units": "m", "long_name": "l_1, distance"}
+    assert data["plant.contact[1]"].attrs == {}
+    assert data.attrs == {"system": "grasp.toml", "scheme": "sequential", "step": 1e-3, "stop": 2.0}
+
+
+def test_without_the_extra_it_is_one_line_that_says_how_to_get_it(monkeypatch):
+    for method in ("to_pandas", "to_xarray"):
+        monkeypatch.setitem(sys.modules, method.removeprefix("to_"), None)
+        with pytest.raises(InputError, match=r"-m pip install ('pandas>=[0-9.]+'|xarray)$"):
+            getattr(grasp_run(), method)()
+    with pytest.raises(InputError) as raised:
+        extra_module("no_such_package", "it makes the table", "pandas")
+    assert str(raised.value) == (
+        "no_such_package is not installed, it makes the table; install it with: "
+        f"{sys.executable} -m pip install 'pandas>=2.2'"
+    )

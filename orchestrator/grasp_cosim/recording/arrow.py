@@ -72,9 +72,9 @@ class ArrowListener:
     def end(self, complete: bool) -> None:
         """Write what is left, and the end of the file; SimulationError where that fails."""
         try:
-            self._flush()
-            self._writer.close()
-            self._file.close()
+            with self._file:  # closed even where that fails
+                self._flush()
+                self._writer.close()
         except OSError as error:
             raise SimulationError(unwritable(self._said, error)) from error
 
