@@ -18,8 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from grasp_cosim import Realtime, System, simulate
 from grasp_cosim.grasp.system import grasp_system
-from grasp_cosim.realtime.pacer import Pacer
-from grasp_cosim.realtime.privileges import privileges
+from grasp_cosim.realtime.pacer import Pacer, privileges
 from grasp_cosim.realtime.timing import BEGIN, DUE
 from grasp_cosim.report.terminal import timing_lines
 

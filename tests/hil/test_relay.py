@@ -14,8 +14,7 @@ from functools import partial
 import pytest
 from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.hil.network import DIRECTIONS, Conditions, Counters, Network
-from grasp_cosim.hil.relay import MOST_CLIENTS, Relay
+from grasp_cosim.hil.relay import DIRECTIONS, MOST_CLIENTS, Conditions, Counters, Network, Relay
 from support.ports import kept_port
 from support.proxies import relaying, wait_until
 

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 from grasp_cosim import Realtime
-from grasp_cosim.realtime.privileges import privileges
+from grasp_cosim.realtime.pacer import privileges
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has these")
 

@@ -25,12 +25,9 @@ def result(grasp):
 
 
 def test_a_decimated_result_keeps_its_times_in_every_format(result, tmp_path):
-    kept, texts = [0, 300, 600, 900, 1000], np.array(list("abbab"), object)
-    signals = {
-        GAP: result[GAP][kept],
-        "a.n": np.array(kept),
-        "a.s": np.array(list("abbab"), object),
-    }
+    kept = [0, 300, 600, 900, 1000]
+    texts = np.array(list("abbab"), object)
+    signals = {GAP: result[GAP][kept], "a.n": np.array(kept), "a.s": texts}
     units = {GAP: "m", "a.n": None, "a.s": None}
     few = replace(result, time=result.time[kept], signals=signals, units=units)
     assert few.metrics["steps"] == result.metrics["steps"] == 1000

@@ -29,8 +29,7 @@ from ..metrics.metric import (
     metrics_of,
     needed,
 )
-from ..realtime.pacer import Pacer
-from ..realtime.privileges import Privileges, privileges
+from ..realtime.pacer import Pacer, Privileges, privileges
 from ..recording.memory import EveryRow, MemoryListener
 from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.result import Known, Result

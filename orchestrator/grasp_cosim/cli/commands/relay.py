@@ -8,8 +8,7 @@ import click
 
 from ...base.errors import InputError
 from ...base.interruption import interrupts
-from ...hil.network import DIRECTIONS, Conditions, Network, Outage
-from ...hil.relay import Relay, csv_log
+from ...hil.relay import DIRECTIONS, Conditions, Network, Outage, Relay, csv_log
 from ...hil.sockets import is_loopback, read_address, text
 from ..frame import PATH, json_option, say, show
 

@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.hil.network import (
+from grasp_cosim.hil.relay import (
     DIRECTIONS,
     Conditions,
     Counters,
