@@ -1,5 +1,6 @@
-"""Two runs compared: what is in both, over the time that both have, each in its band."""
+"""Two runs compared, over the time that both have; logs from elsewhere; settings."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,16 +8,19 @@ import pytest
 from grasp_cosim import InputError, metric, simulate
 from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import compare
+from grasp_cosim.comparison.side import differences, read_side
 from grasp_cosim.comparison.words import as_json, as_text
 from grasp_cosim.grasp.presets import SYSTEM
-from report.runs import grasp_run, write_run
+from report.runs import component, grasp_run, rounded, write_run
 
 GAP = "plant.gap[1]"
+ALL = {"*": Given(absolute=1e9)}
 
 
-def changed(run, **signals):
-    """The run with other signals, by the last parts of their names."""
-    return replace(run, signals={**run.signals, **{f"plant.{k}": v for k, v in signals.items()}})
+def changed(run, **more):
+    """The run with other signals, by the last parts of their names, and units."""
+    signals = {f"plant.{k}": v for k, v in more.items()}
+    return replace(run, signals={**run.signals, **signals})
 
 
 def cut(run, rows):
@@ -40,27 +44,39 @@ def test_a_run_is_like_itself(folders):
     assert found.alike
     assert {s.name for s in found.signals} == set(grasp_run())
     assert {s.deviation for s in found.signals} == {0.0}
-    assert len(found.metrics) > 8
     assert as_text(found).startswith("ALIKE: 0 of 16 signals and 0 of ")
     assert "the settings of the runs are the same" in as_text(found)
 
 
-def test_results_are_compared_as_they_are():
-    found = compare(grasp_run(), cut(grasp_run(), slice(0, 1001)))
-    assert found.alike
-    assert (found.a.name, found.b.name, found.end) == ("A", "B", 1.0)
+def test_text_and_json_of_runs_that_differ(snapshot):
+    """In a signal, in length and step, in settings, in a unit, in what they have."""
+    run = grasp_run()
+    less = {n: c for n, c in run.items() if n != "controller.target_position"}
+    other = replace(
+        cut(replace(run, signals={**less, GAP: run[GAP] * 1e3 + 5.0}), slice(200, 1801, 4)),
+        units={**run.units, GAP: "mm", "plant.gap[2]": "N"},
+        settings={**run.settings, "scheme": "jacobi", "faults": []},
+    )
+    found = compare(run, other)
+    assert found.only == (("controller.target_position",), ())
+    assert as_text(found) == snapshot
+    report = json.loads(json.dumps(rounded(as_json(found)), allow_nan=False))
+    assert {
+        **report,
+        "signals": report["signals"][:1],
+        "metrics": report["metrics"][:2],
+    } == snapshot
 
 
 def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not():
     run = grasp_run()
     late = np.concatenate([run[GAP][:1].repeat(5), run[GAP][:-5]])
-    moved = replace(run, signals={**run.signals, GAP: late})
-    given = {GAP: Given(absolute=1e-9, time=5e-3)}
-    others = {"*": Given(absolute=1e9)}
-    wide = Bands(signals={**given, **others}, metrics=others)
+    moved = changed(run, **{"gap[1]": late})
+    wide = Bands(signals={GAP: Given(absolute=1e-9, time=5e-3), **ALL}, metrics=ALL)
     assert compare(run, moved, bands=wide).alike
-    tight = replace(wide, signals={GAP: Given(absolute=1e-9, time=4e-3), **others})
-    found = compare(run, moved, bands=tight)
+    found = compare(
+        run, moved, bands=replace(wide, signals={GAP: Given(absolute=1e-9, time=4e-3), **ALL})
+    )
     assert not found.alike
     assert [s.name for s in found.signals if not s.inside] == [GAP]
 
@@ -73,68 +89,26 @@ def test_runs_of_unlike_length_and_step_are_compared_where_both_are(folders):
     assert by_name[GAP].inside
     assert by_name["controller.target_position"].deviation < 1e-6
     same = {m.name: (m.original, m.candidate) for m in found.metrics}
-    assert same["object_shift"][0] == same["object_shift"][1]
     assert same["target_position"][0] == pytest.approx(run["controller.target_position"][1800])
-    note = "compared from 0.2 to 1.8 s, where both are: A is 0 to 2 s, B is 0.2 to 1.8 s"
-    assert note in found.notes
 
 
-def test_runs_at_other_times_are_refused_in_one_line(folders):
-    run = grasp_run()
-    later = replace(run, time=run.time + 5.0)
-    with pytest.raises(InputError, match=r"a: 0 to 2 s; .*b: 5 to 7 s: must have some time in"):
-        folders(run, later)
-
-
-def test_a_metric_that_one_run_only_has_a_value_of_is_out(folders):
-    run = grasp_run()
-    less = {name: c for name, c in run.items() if name != "controller.target_position"}
-    found = folders(run, replace(run, signals=less, units={n: run.units[n] for n in less}))
-    assert not found.alike
-    assert found.only == (("controller.target_position",), ())
-    assert "time_to_contact[1]" in found.only_metrics[0]
-    outside = {m.name for m in found.metrics if not m.inside}
-    assert "time_to_contact[1]" in outside
-    assert {m.candidate for m in found.metrics} == {None}
-    assert "signals only in A: controller.target_position" in as_text(found)
-
-
-def test_signals_in_another_unit_are_converted_and_of_another_quantity_left_out(folders):
-    run = grasp_run()
-    names = (GAP, "plant.gap[2]")
-    other = replace(
-        run,
-        signals={**run.signals, GAP: 1e3 * run[GAP]},
-        units={**run.units, GAP: "mm", "plant.gap[2]": "N"},
-    )
-    found = folders(run, other)
-    signals = {s.name: s for s in found.signals}
-    assert signals[GAP].inside
-    assert signals[GAP].unit == "m"
-    assert names[1] not in signals
-    assert "not compared, as the units do not convert: plant.gap[2] (m, N)" in found.notes
-
-
-def test_a_metric_that_is_off_makes_the_runs_differ(folders):
+def test_a_metric_that_is_off_or_that_only_one_has_makes_the_runs_differ(folders):
     @metric("farthest", unit="m")
     def farthest(run):
-        return float(run[GAP].max())
+        return float(run[GAP].max()) if run[GAP][0] < 0.07 else None
 
     run = grasp_run()
-    spike = run[GAP].copy()
-    spike[0] += 0.01
-    found = folders(
-        run,
-        changed(run, **{"gap[1]": spike}),
-        bands=Bands(signals={"*": Given(absolute=np.inf)}, metrics={"farthest": Given(relative=0)}),
-        metrics=[farthest],
-    )
-    off = {m.name: m for m in found.metrics}["farthest"]
-    assert off.deviation == pytest.approx(0.01)
-    assert not found.alike
-    report = as_json(found)
-    entry = next(m for m in report["metrics"] if m["name"] == "farthest")
-    assert (entry["a"], entry["b"], entry["inside"]) == (run[GAP][0], spike[0], False)
+    bands = Bands(signals={"*": Given(absolute=np.inf)}, metrics={"farthest": Given(relative=0)})
+    for by, apart in ((0.001, pytest.approx(0.001)), (0.01, np.inf)):
+        spike = run[GAP].copy()
+        spike[0] += by
+        for runs in ((run, changed(run, **{"gap[1]": spike})),):
+            found = compare(*runs, bands=bands, metrics=[farthest])
+            off = {m.name: m for m in found.metrics}["farthest"]
+            assert off.deviation == apart
+            assert not found.alike
+    back = {m.name: m for m in compare(*runs[::-1], metrics=[farthest]).metrics}["farthest"]
+    assert (back.deviation, back.original, back.candidate) == (np.inf, None, run[GAP][0])
 
 
 def test_recorded_metrics_of_a_users_file_are_compared_as_they_were(folders, tmp_path):
@@ -152,15 +126,8 @@ def test_recorded_metrics_of_a_users_file_are_compared_as_they_were(folders, tmp
     assert "grip" not in {m.name for m in compare(tmp_path / "a", short).metrics}
 
 
-def test_a_band_for_nothing_is_refused(folders):
-    bands = Bands("own.toml", signals={"plant.gp*": Given(absolute=1.0)})
-    with pytest.raises(InputError, match=r"own.toml: \[signals\]: nothing is called 'plant.gp\*'"):
-        folders(grasp_run(), grasp_run(), bands=bands)
-
-
-def test_a_run_that_did_not_come_to_its_end_is_not_alike(folders):
-    run = grasp_run()
-    found = folders(run, replace(run, complete=False))
+def test_a_run_that_did_not_come_to_its_end_is_not_alike():
+    found = compare(grasp_run(), replace(grasp_run(), complete=False))
     assert not found.alike
     assert as_text(found).startswith("DIFFERENT: B did not come to its end; 0 of ")
 
@@ -177,8 +144,136 @@ def test_metrics_without_a_value_on_both_sides_are_not_inside(grasp):
 def test_a_system_is_run_as_long_as_the_other_run(grasp, fmus, tmp_path):
     text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
     (tmp_path / "grasp.toml").write_text(text, "utf-8")
-    run = simulate(grasp, stop=0.05)
-    found = compare(tmp_path / "grasp.toml", run)
+    found = compare(tmp_path / "grasp.toml", simulate(grasp, stop=0.05))
     assert found.alike
     assert (found.begin, found.end) == (0.0, 0.05)
     assert {s.deviation for s in found.signals} == {0.0}
+
+
+# ------------------------------------------------------------------------- logs from elsewhere
+
+
+@pytest.fixture
+def run(tmp_path):
+    write_run(tmp_path / "run", grasp_run())
+    return tmp_path / "run"
+
+
+def log(folder, text):
+    path = folder / "log.csv"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_a_csv_with_other_units_and_without_a_last_line_break_is_the_run(run, tmp_path):
+    result = grasp_run()
+    columns = (result.time, result[GAP], result["plant.contact[1]"])
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    lines = [f"{1e3 * t!r},{1e3 * gap!r},{touches}" for t, gap, touches in rows]
+    heads = f"\ufefftime [ms],{GAP} [mm],plant.contact[1]"
+    path = log(tmp_path, "\n".join([heads, *lines]))
+    found = compare(run, path)
+    assert found.alike
+    assert {s.name: s.unit for s in found.signals} == {GAP: "m", "plant.contact[1]": None}
+    assert found.signals[0].deviation < 1e-12
+    assert "B tells no units of plant.contact[1]: taken as in the other" in found.notes
+    assert found.differences == ()
+    assert compare(path, run).alike
+
+
+def test_a_whole_log_has_the_units_and_metrics_of_the_run(run, tmp_path):
+    path = tmp_path / "copied.csv"
+    path.write_bytes((run / "signals.csv").read_bytes())
+    for found in (compare(run, path), compare(path, run)):
+        assert found.alike
+        assert {m.name for m in found.metrics} >= {"time_to_contact[1]", "steady_contact_force[2]"}
+        assert {c.deviation for c in (*found.signals, *found.metrics)} == {0.0}
+    for name in ("signals.csv", "run.json"):
+        assert read_side(run / name).result
+
+
+@pytest.mark.slow
+def test_an_mdf_file_is_read_with_its_units(run, tmp_path):
+    pytest.importorskip("asammdf")
+    path = tmp_path / "signals.mf4"
+    grasp_run().to_mdf(path)
+    assert read_side(path).units[GAP] == "m"
+    assert compare(run, path).alike
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,plant.gap[1]\n0,1\n1,abc\n", "has texts; must be numbers, as in "),
+        ("time,plant.gap[1]\n1,1\n0,1\n", "must not fall"),
+        ("time,plant.gap[1]\n0,1\n1,\n", "missing; must be a value"),
+        ("time,plant.gap[1] [kg]\n0,1\n1,1\n", "must have a signal of one name and quantity"),
+        ("time,plant.nothing\n0,1\n1,1\n", "must have a signal of one name and quantity"),
+        ("time,plant.gap[1]\n0,nan\n1,1\n", "must be a finite number"),
+        ("time,plant.gap[1]\n5,1\n7,1\n", "run: 0 to 2 s; {}: 5 to 7 s: must have some time in"),
+        ("time,plant.gap[1]\n-1,1\n7,1\n", "{}: has no row from 0 to 2 s; must have one"),
+        ("t,plant.gap[1]\n0,1\n1,1\n", "must be time"),
+        ("", "is empty"),
+    ],
+)
+def test_a_wrong_log_is_one_line(run, tmp_path, text, said):
+    path = log(tmp_path, text)
+    with pytest.raises(InputError) as raised:
+        compare(run, path)
+    assert said.format(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_no_run_and_no_log(tmp_path):
+    with pytest.raises(InputError, match="no such run; must be a folder"):
+        read_side(tmp_path / "nothing")
+    (tmp_path / "page.html").write_text("")
+    with pytest.raises(InputError, match=r"must be a folder .* a .csv or an .mf4 file"):
+        read_side(tmp_path / "page.html")
+
+
+def test_two_rows_of_one_time_are_a_jump(tmp_path):
+    jump = log(tmp_path, "time,x.y\n0,0\n1,0\n1,5\n2,5\n")
+    assert np.array_equal(read_side(jump).time, [0.0, 1.0, 1.0, 2.0])
+    assert compare(jump, jump).alike
+
+
+# ------------------------------------------------------------------------- settings
+
+OFF = {"simultaneous_contact.enabled": False, "impact_reduction.enabled": False}
+
+
+def with_settings(**settings):
+    run = grasp_run()
+    fmus = {"plant": {"guid": "aa"}} if settings else {}
+    return replace(run, settings={**run.settings, **settings}, origin={"fmus": fmus})
+
+
+def with_controller(**values):
+    parts = grasp_run().settings["components"]
+    return {**parts, "controller": component("GraspController.fmu", **values)}
+
+
+def test_settings_that_differ(snapshot):
+    run = with_settings(metrics=["grasp"])
+    assert differences(run, replace(run, wall_time=9.0)) == ()
+    parts = run.settings["components"]
+    others = {
+        "numbers": with_settings(step=2e-3, scheme="jacobi", system="own.toml"),
+        "lists": with_settings(faults=[], connections=[], roles={"plant": "gripper"}),
+        "start": with_settings(initialisation={"loops": "refuse"}),
+        "case": with_settings(components=with_controller(**OFF)),
+        "mixture": with_settings(components=with_controller(**{"impact_reduction.enabled": False})),
+        "order": with_settings(components=dict(reversed(parts.items()))),
+        "parts": with_settings(
+            components={**parts, "plant": {**parts["plant"], "step": 0.5, "rename": {"a": "b"}}}
+        ),
+        "versions": replace(
+            run,
+            origin={
+                "fmus": {"plant": {"guid": "bb", "native_twin_of": "aa"}},
+                "versions": {"numpy": "2.2"},
+            },
+        ),
+    }
+    assert {n: [" | ".join(d) for d in differences(run, b)] for n, b in others.items()} == snapshot

@@ -44,24 +44,6 @@ def by_hand(one, other, shift):
     return float(max(apart))
 
 
-@QUICK
-@given(SAMPLES, SHIFT, SHIFT, HELD)
-def test_a_curve_that_comes_later_is_inside_up_to_the_shift(values, later, more, held):
-    early = sampled(np.concatenate([values, np.full(later, values[-1])]), held)
-    late = sampled(np.concatenate([np.full(later, values[0]), values]), held)
-    assert deviation(early, late, (later + more) * STEP).values.max() == 0.0
-
-
-@QUICK
-@given(SAMPLES, st.floats(1e-3, 1e3), SHIFT, HELD)
-def test_an_offset_is_found_at_its_size(values, offset, shift, held):
-    """At the largest value, no shift helps: the offset is the deviation."""
-    values = np.concatenate([values, np.full(shift + 1, values[-1])])
-    moved = sampled(values + offset, held)
-    largest = deviation(sampled(values, held), moved, shift * STEP).values.max()
-    assert largest == pytest.approx(offset, rel=1e-9, abs=1e-9)
-
-
 @st.composite
 def pairs(draw):
     count = draw(st.integers(1, 60))
@@ -91,29 +73,6 @@ def test_the_tube_holds_the_curve_between_samples_too(values, shift, held):
         taken = whole.at(at + fraction * shift)
         assert (allowed.low <= taken + 1e-6).all()
         assert (taken <= allowed.high + 1e-6).all()
-
-
-def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is():
-    time = times(200)
-    impact = np.where(time < 0.1, 0.0, np.exp(-(time - 0.1) / 0.02))
-    late = np.concatenate([np.zeros(2), impact[:-2]])
-    assert np.abs(impact - late).max() == 1.0
-    assert deviation(Curve(time, impact), Curve(time, late), 3 * STEP).values.max() == 0.0
-    higher = deviation(Curve(time, impact), Curve(time, 1.25 * late), 3 * STEP)
-    worst = higher.values.argmax()
-    assert higher.values[worst] == pytest.approx(0.25)
-    assert (higher.reference[worst], higher.candidate[worst]) == (1.0, 1.25)
-    assert higher.time[worst] == time[102]
-
-
-def test_an_impact_that_is_lacking_is_found():
-    """A flat curve is all in the tube of the spike, but the spike is not in that of the curve."""
-    spike = np.zeros(100)
-    spike[50] = 1.0
-    for pair in ((spike, np.zeros(100)), (np.zeros(100), spike)):
-        found = deviation(sampled(pair[0]), sampled(pair[1]), 5 * STEP)
-        assert found.values.max() == 1.0
-        assert found.time[found.values.argmax()] == 0.05
 
 
 def test_curves_of_different_steps_are_compared_at_the_times_of_both():

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grasp_cosim import InputError, metric, simulate
-from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS
+from grasp_cosim.grasp.metrics import METRICS
 from grasp_cosim.metrics.metric import (
     RESERVED,
     MissingSignalError,
     Signals,
     check_portable,
+    chosen,
     load_metrics,
     measure,
 )
@@ -53,20 +54,6 @@ def made(name, function, **more):
 
 
 # ------------------------------------------------------------------------- signals
-
-
-def test_a_signal_is_found_by_the_role_of_its_component_and_by_its_name():
-    run = signals({"plant": "gripper"}, "gripper")
-    assert run["plant.gap"] is run["gripper.gap"] is run.by_name["gripper.gap"]
-    assert "plant.gap" in run
-    assert list(run) == ["gripper.gap", "gripper.on"]
-    assert len(run) == 2
-
-
-def test_a_component_plays_the_role_of_its_name_where_no_other_does():
-    assert signals()["plant.gap"] is not None
-    swapped = Signals(TIME, {"plant.gap": GAP, "other.gap": 2 * GAP}, {"plant": "other"})
-    assert swapped["plant.gap"] is swapped.by_name["other.gap"]
 
 
 @pytest.mark.parametrize(
@@ -139,6 +126,8 @@ def test_numbers_become_pythons_own(value, plain):
         (1.0, ("a", "b"), "returned 1.0; must be a value for each of a, b"),
         ([1.0], ("a", "b"), "returned [1.0]; must be a value for each of a, b"),
         (None, ("a", "b"), "returned None; must be a value for each of a, b"),
+        (float("nan"), (), "returned nan; must be finite, None where there is no value"),
+        ([1.0, np.float64("-inf")], (), "returned [1.0, -inf]; must be finite"),
     ],
 )
 def test_another_value_is_refused(value, entries, message):
@@ -173,65 +162,11 @@ def grasp_signals(without=""):
     return Signals(TIME, {name: np.zeros(3) for name in names})
 
 
-def test_a_grasp_has_all_its_metrics_but_those_of_other_objects():
-    found = measure(grasp_signals(), METRICS)
-    assert [m.name for m in found.metrics] == [m.name for m in METRICS if not m.optional]
-    assert found.missing == ()  # an optional one is left out in silence
-
-
-@pytest.mark.parametrize(
-    ("without", "reason"),
-    [
-        ("plant.contact[1]", "plant lacks contact[1]"),
-        ("controller.target", "controller lacks target_position"),
-    ],
-)
-def test_a_signal_that_a_grasp_lacks_is_said_once(without, reason):
-    found = measure(grasp_signals(without), METRICS)
-    assert found.missing == (f"no metrics of the grasp: {reason}",)
-    assert (dict(found.values), found.metrics, found.flat()) == ({}, (), {})
-    found = measure(grasp_signals("controller."), METRICS)
-    assert found.missing == (
-        "no metrics of the grasp: no component is the controller; name it under [roles]: "
-        'controller = "..."',
-    )
-
-
 def test_a_plant_that_does_not_tell_where_the_object_is_has_the_other_metrics():
     found = measure(grasp_signals("plant.object_position"), METRICS)
     lost = ["object_shift", "object_drift"]
     assert [*found.values, *lost] == [m.name for m in METRICS if not m.optional]
     assert found.missing == tuple(f"no {name}: plant lacks object_position" for name in lost)
-
-
-def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles():
-    run = grasp_signals()
-    names = {"plant": "gripper", "controller": "law"}
-    other = {
-        f"{names[component]}.{variable}": column
-        for (component, _, variable), column in ((n.partition("."), run[n]) for n in run)
-    }
-    line = "no metrics of the grasp: no component is the {}; name it under [roles]: {}"
-    missing = measure(Signals(run.time, other), METRICS).missing
-    assert missing == (line.format("controller", 'controller = "law"'),)
-    missing = measure(Signals(run.time, other, {"controller": "law"}), METRICS).missing
-    assert missing == (line.format("plant", 'plant = "gripper"'),)
-    roles = {"controller": "law", "plant": "gripper"}
-    assert measure(Signals(run.time, other, roles), METRICS) == measure(run, METRICS)
-
-
-def test_a_metric_without_a_description_has_the_first_line_of_its_docstring():
-    def documented(run):
-        """Half the gap.
-
-        And more.
-        """
-        return float(run["plant.gap"][0]) / 2
-
-    assert metric("half")(documented).description == "Half the gap."
-    assert metric("half", description="said")(documented).description == "said"
-    assert metric("half")(lambda run: 0.0).description == ""
-    assert all(m.description for m in METRICS)
 
 
 def test_a_metric_of_its_own_says_what_it_lacks():
@@ -369,12 +304,39 @@ def test_a_metric_that_cannot_go_to_another_process_is_refused():
         check_portable([at_end, made("x", lambda _: 1.0)])
 
 
-@pytest.mark.parametrize("value", [float("nan"), [1.0, float("inf")], np.float64("-inf")])
-def test_what_is_not_finite_is_no_value(value):
-    @metric("odd")
-    def odd(run):
-        return value
+# ------------------------------------------------------------------------- what is asked for
 
-    measured = measure(Signals(np.zeros(1), {}), [odd])
-    assert measured.values == {}
-    assert re.fullmatch(r"metric 'odd': .*: returned .*; must be finite, .*", measured.failures[0])
+
+def widest(run):
+    """The gap at its widest."""
+    return float(run["plant.gap[1]"].max())
+
+
+def test_a_function_is_a_metric_of_its_name_and_docstring():
+    own = metric("own", unit="m", description="said")(widest)
+    found, same = chosen([widest, own], (), (), {})
+    assert (found.name, found.unit, found.description) == ("widest", None, "The gap at its widest.")
+    assert (same, same.description) == (own, "said")
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("time_to_contct", "'time_to_contct': no such metric; did you mean time_to_contact"),
+        ("time_to_contact", "metrics: time_to_contact: is not available: "),
+        (3, "metrics: 3: must be a metric, a function or a name"),
+        (lambda _: 1.0, "metric '<lambda>': must be a name"),
+    ],
+)
+def test_what_is_no_metric_is_refused_in_one_line(asked, said):
+    with pytest.raises(InputError) as raised:
+        chosen([asked], ["grasp"], ("a.y",), {})
+    assert said in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_run_has_them(grasp):
+    result = simulate(grasp, step=1e-3, stop=0.01, metrics=[widest, "time_to_contact"])
+    assert result.metrics["widest"] == pytest.approx(0.045)
+    assert result.metrics["time_to_contact"] == [None, None]
+    assert result.metric_units["widest"] is None

@@ -74,18 +74,17 @@ def refusal(system, *metrics):
 # ------------------------------------------------------------------------- the unit of a signal
 
 
-def test_a_declared_unit_is_converted(load):
-    assert found(load({"x": MM, "y": M})) == InSi({"room.x": MILLI}, ())
-
-
-def test_a_named_unit_is_converted(load):
-    assert found(load({"y": M}, units='x = "mm"')) == InSi({"room.x": MILLI}, ())
-    assert found(load({"x": M, "y": M}, units='x = "mm"')) == InSi({"room.x": MILLI}, ())
-
-
-def test_a_unit_that_is_not_defined_is_known_by_its_name(load):
-    room = {"x": unit(OUTPUT, "cm"), "y": M}  # made.py defines no cm
-    assert found(load(room)) == InSi({"room.x": Conversion(1e-2, 0.0)}, ())
+@pytest.mark.parametrize(
+    ("room", "units", "to_si"),
+    [
+        ({"x": MM, "y": M}, "", MILLI),
+        ({"y": M}, 'x = "mm"', MILLI),
+        ({"x": M, "y": M}, 'x = "mm"', MILLI),
+        ({"x": unit(OUTPUT, "cm"), "y": M}, "", Conversion(1e-2, 0.0)),  # made.py defines no cm
+    ],
+)
+def test_a_unit_that_is_declared_named_or_known_is_converted(load, room, units, to_si):
+    assert found(load(room, units=units)) == InSi({"room.x": to_si}, ())
 
 
 def test_without_any_unit_it_is_that_of_si_and_that_is_said(load):

@@ -118,3 +118,12 @@ def write_run(folder, result):
     folder.mkdir()
     result.to_csv(folder / "signals.csv")
     result.to_json(folder / "run.json")
+
+
+def rounded(value):
+    """JSON with its numbers to nine digits, which are those of any machine."""
+    if isinstance(value, dict):
+        return {key: rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [rounded(entry) for entry in value]
+    return float(f"{value:.9g}") if isinstance(value, float) else value
