@@ -75,6 +75,19 @@ def test_the_tube_holds_the_curve_between_samples_too(values, shift, held):
         assert (taken <= allowed.high + 1e-6).all()
 
 
+def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is():
+    time = times(200)
+    impact = np.where(time < 0.1, 0.0, np.exp(-(time - 0.1) / 0.02))
+    late = np.concatenate([np.zeros(2), impact[:-2]])
+    assert np.abs(impact - late).max() == 1.0
+    assert deviation(Curve(time, impact), Curve(time, late), 3 * STEP).values.max() == 0.0
+    higher = deviation(Curve(time, impact), Curve(time, 1.25 * late), 3 * STEP)
+    worst = higher.values.argmax()
+    assert higher.values[worst] == pytest.approx(0.25)
+    assert (higher.reference[worst], higher.candidate[worst]) == (1.0, 1.25)
+    assert higher.time[worst] == time[102]
+
+
 def test_curves_of_different_steps_are_compared_at_the_times_of_both():
     fine, coarse = times(101), times(51, 2_000_000)
     found = deviation(Curve(fine, np.sin(fine)), Curve(coarse, np.sin(coarse)), 0.0)

@@ -19,7 +19,7 @@ from grasp_cosim.realtime.pacer import HAS_CLOCK, check_cpu
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.load import load_run
-from report.timings import paced
+from report.runs import paced
 from support.marks import engines, slow
 from support.native_fmus import TYPES, build
 

@@ -1,14 +1,19 @@
-"""The page in a headless Chromium: it runs without an error, draws, zooms."""
+"""Pages in a headless Chromium: they run without an error, draw, zoom, and save what they show."""
 
+import base64
+import struct
 from dataclasses import replace
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.page import comparison_html
+from grasp_cosim.recording.load import load_run
 from grasp_cosim.report.page import page_html
 from report.javascript import in_browser
-from report.runs import grasp_run, ring_run
-from report.timings import paced
+from report.runs import grasp_run, paced, ring_run, write_run
+from report.test_page import BY, GAP, two_runs
 
 pytestmark = pytest.mark.slow
 
@@ -135,3 +140,162 @@ def test_an_error_in_the_page_is_not_silent(html, tmp_path):
     broken = html.replace('<script type="text/plain" id="time">', '<script id="time" type="x">!')
     with pytest.raises(AssertionError, match="not correctly encoded"):
         in_browser(broken, "return 1;", tmp_path)
+
+
+# ------------------------------------------------------------------------- panels
+
+PANELS = """return panels.map((panel) => ({
+  title: panel.heading.textContent,
+  names: panel.series.map((one) => one.label || one.name),
+  looks: panel.series.map(({ style }) => [style.color, style.dash].join()),
+  last: panel.series.map(({ values }) => values[values.length - 1]),
+}));"""
+
+
+def test_many_lines_of_a_unit_are_in_several_panels(tmp_path):
+    names = [f"c{k}" for k in range(23)]
+    html = page_html(ring_run(names))
+    shown = ",".join(f"{name}.y" for name in names)
+    found = in_browser(html, PANELS, tmp_path, address=f"show={shown}")
+    assert [len(panel["names"]) for panel in found] == [6, 6, 6, 5]
+    assert [panel["title"] for panel in found] == [f"y ({k} of 4)" for k in (1, 2, 3, 4)]
+    assert all(len(set(panel["looks"])) == len(panel["looks"]) for panel in found)
+
+
+def test_finger_2_is_dashed_and_presses_with_a_positive_force(tmp_path):
+    run = grasp_run()
+    panels = in_browser(page_html(run, scene=run.view.scene(run)), PANELS, tmp_path)
+    force = next(panel for panel in panels if panel["title"] == "contact force in N")
+    assert force["names"] == ["plant.contact_force[1]", "−plant.contact_force[2]"]
+    assert force["last"] == [3.4, 3.4]
+    for panel in panels[:3]:
+        assert panel["looks"] == ["--finger1,0", "--finger2,1"]
+
+
+def test_so_it_is_in_a_comparison(tmp_path):
+    run = grasp_run()
+    name = "plant.contact_force[2]"
+    weaker = replace(run, signals={**run.signals, name: 0.5 * run.signals[name]})
+    html = comparison_html(compare(run, weaker))
+    act = f"await choose(['{name}']); await frame(); {PANELS}"
+    force, apart = in_browser(html, act, tmp_path)
+    assert force["names"] == [f"A −{name}", f"B −{name}"]
+    assert force["last"] == [3.4, 1.7]
+    assert apart["last"][0] == pytest.approx(1.7)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_both_runs_their_band_and_their_deviation_are_drawn(dark, tmp_path):
+    act = """
+      await choose(["plant.gap[1]", "plant.contact[1]"]);
+      await frame();
+      const texts = (panel, what) => [...panel.querySelectorAll(what)].map((e) => e.textContent);
+      return panels.map((panel) => ({
+        title: panel.heading.textContent,
+        names: panel.series.map((one) => one.label),
+        dashes: panel.series.map((one) => one.style.dash),
+        readings: texts(panel.root, "output"),
+        tube: panel.series.map((one) => Boolean(one.tube)),
+        low: +panel.canvas.dataset.low, high: +panel.canvas.dataset.high }));
+    """
+    gap, apart, contact, off = in_browser(comparison_html(two_runs()), act, tmp_path, dark=dark)
+    start = float(grasp_run()[GAP][0])
+    assert gap["names"] == [f"A {GAP}", f"B {GAP}"]
+    assert gap["dashes"] == [0, 1]
+    assert gap["tube"] == [True, False]
+    assert gap["title"] == "gap in mm"
+    assert gap["readings"] == [f"{1e3 * start:.3f} mm", f"{1e3 * (start + BY):.3f} mm"]
+    assert apart["names"] == [GAP, "its band"]
+    assert apart["high"] == pytest.approx(BY)
+    assert apart["readings"][1] == "0.2000 mm"
+    assert contact["tube"] == [False, False]
+    assert off["names"] == ["plant.contact[1]"]
+
+
+def test_a_row_of_the_table_leads_to_its_worst_moment(tmp_path):
+    act = """
+      await choose(["plant.contact[1]"]);
+      document.querySelector('button[data-show="plant.gap[1]"]').click();
+      await frame(); await frame();
+      return [view.to - view.from < 0.2, chosen, panels.length];
+    """
+    assert in_browser(comparison_html(two_runs()), act, tmp_path) == [
+        True,
+        [GAP, "plant.contact[1]"],
+        4,
+    ]
+
+
+# ------------------------------------------------------------------------- downloads
+
+SAVED = """
+  const saved = [], read = (blob) => new Promise((done) => {
+    const reader = new FileReader();
+    reader.onload = () => done(reader.result.split(",")[1]);
+    reader.readAsDataURL(blob);
+  });
+  window.offer = async (name, blob) => saved.push([name, blob.type, await read(blob)]);
+  const click = async (which) => {
+    const before = saved.length;
+    document.querySelector(which).click();
+    while (saved.length === before) { work(); await sleep(5); }
+  };
+"""
+
+
+def saved(html, which, folder):
+    """What the buttons save: name, type, content."""
+    act = f"{SAVED} for (const one of {which!r}) await click(one); return saved;"
+    found = in_browser(html, act, folder)
+    return [(name, kind, base64.b64decode(data)) for name, kind, data in found]
+
+
+def test_the_csv_of_the_page_is_that_of_the_run(tmp_path):
+    run = grasp_run(rows=60)
+    words = np.array(["=1+1", 'say "no"', "a\nb"] * 20, object)
+    run = replace(
+        run, signals={**run.signals, "plant.word": words}, units={**run.units, "plant.word": None}
+    )
+    write_run(tmp_path / "results", run)
+    ((name, kind, data),) = saved(page_html(run), ["#csv"], tmp_path)
+    assert (name, kind) == ("signals.csv", "text/csv")
+    (tmp_path / "results" / "signals.csv").write_bytes(data)
+    again, signals = load_run(tmp_path / "results"), dict(run)
+    assert list(again) == list(signals)
+    np.testing.assert_array_equal(again.time, run.time)
+    for signal, column in signals.items():
+        np.testing.assert_array_equal(again[signal], column)
+
+
+def test_a_thinned_page_says_so_in_the_name_of_its_csv(tmp_path):
+    run = ring_run(["a", "b"], rows=5000)
+    ((name, _, data),) = saved(page_html(run, limit=300), ["#csv"], tmp_path)
+    assert name == "signals_thinned.csv"
+    assert data.count(b"\n") < 110
+
+
+def test_each_panel_and_the_scene_are_saved_with_what_they_show(tmp_path):
+    run = grasp_run().titled("Before lunch")
+    html = page_html(run, scene=run.view.scene(run))
+    names = ["gap_in_mm", "contact_force_in_N", "velocity_in_mm_s", "target_position_in_mm"]
+    buttons = [f".panel:nth-child({k + 1}) .save" for k in range(len(names))]
+    found = saved(html, [*buttons, "[data-canvas]"], tmp_path)
+    expected = [*(f"Before_lunch_{name}.png" for name in names), "Before_lunch.png"]
+    assert [name for name, _, _ in found] == expected
+    for _, kind, data in found:
+        width, height = struct.unpack(">II", data[16:24])
+        assert kind == "image/png"
+        assert width > 700
+        assert height > 168 + 3 * 17  # the title, what it is, and the legend above it
+
+
+def test_drawings_are_saved_as_svg_with_their_rules(tmp_path):
+    html = page_html(replace(ring_run(["a", "b"]), timing=paced(steps=200)))
+    buttons = ["[data-name=connections]", "[data-name=timing]"]
+    for name, kind, data in saved(html, buttons, tmp_path):
+        assert name in ("grasp_connections.svg", "grasp_timing.svg")
+        assert kind == "image/svg+xml"
+        root = ElementTree.fromstring(data)
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert root.get("class") in ("diagram", "chart")
+        assert "--paper" in (root[0].text or "")

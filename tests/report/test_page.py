@@ -5,12 +5,18 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
+from grasp_cosim.base.errors import InputError
+from grasp_cosim.comparison.bands import Bands, Given
+from grasp_cosim.comparison.compare import compare
+from grasp_cosim.comparison.page import comparison_html
 from grasp_cosim.metrics.metric import Metric
+from grasp_cosim.recording.load import load_run
+from grasp_cosim.report.caption import about, caption, changes
 from grasp_cosim.report.page import Scene, Zoom, page_html
-from report.runs import grasp_run, ring_run
+from report.runs import grasp_run, paced, ring_run, write_run
 from report.test_embed import unpacked
-from report.timings import paced
 
 EMPTY = {"meta", "link", "input", "br"}
 
@@ -102,29 +108,6 @@ def test_names_stay_text():
     assert boxes == [f"{name}.y" for name in wicked]
 
 
-def test_metrics_and_settings_are_there():
-    text = Elements(page_html(grasp_run())).visible
-    for expected in (
-        "2 s in 2\N{NARROW NO-BREAK SPACE}000 steps of 1 ms, sequential",
-        "GripperPlant.fmu",
-        "object_width = 0.07",
-        "at = 0.5, set = (sensor_1.reflectance = 0.6)",
-        "kind = bias, value = 0.1",
-        "sensor_1.intensity → controller.intensity[1], bias",
-        "t = 0.5 s: sensor_1.reflectance = 0.6",
-        "sensor_2: count = 3, first = 0.25",
-        "loops = iterate",
-    ):
-        assert expected in text
-    assert "not complete" not in text
-
-
-def test_a_run_that_was_broken_off_says_so():
-    run = grasp_run()
-    broken = replace(run, complete=False)
-    assert "not complete" in Elements(page_html(broken)).visible
-
-
 SCENE = Scene(
     title="Scene",
     html='<p id="stage"></p>',
@@ -136,6 +119,78 @@ SCENE = Scene(
     marks=[(0.5, "--c1")],
     zooms=[Zoom("<Half>", 0.25, 0.75, "f1")],
 )
+
+
+METRICS = (
+    Metric("a", lambda _: [0.5, 2.0, None], unit="m", entries=("x", "y", "z"), factor=1e3,
+           shown_unit="mm", description="<A>"),
+    Metric("b", lambda _: True),
+    Metric("c_d", lambda _: [0.125, 0.25], unit="s", entries=("left", "right")),
+    Metric("e", lambda _: [1.5, 2.5]),
+    Metric("lacking", lambda run: run["plant.nothing"][0]),
+)  # fmt: skip
+"""One with other entries has a row for each; one without, or a list, is across all."""
+
+
+def rich_run():
+    """A grasp with a bit of all that a page shows."""
+    run = grasp_run(rows=201)
+    settings = {**run.settings, "metrics": []}
+    parts = dict(settings["components"])
+    solver = {"relative_tolerance": 1e-5}
+    more = {"step": 2e-3, "isolation": "process", "rename": {"u": "v"}, "solver": solver}
+    parts["sensor_1"] = {**parts["sensor_1"], **more}
+    settings["components"] = parts
+    first, *others = settings["connections"]
+    settings["connections"] = [{**first, "factor": 2.0, "offset": 0.5}, *others]
+    log = ("t = 0.25 s: a.u = 1", "b: 3 steps rejected, first at t = 0.7 s", "t = 1e-3 s: fault")
+    origin = {**run.origin, "command": ["grasp-cosim", "run", "my file.toml"]}
+    return replace(
+        run, settings=settings, more_metrics=METRICS, log=log, complete=False, origin=origin
+    )
+
+
+BY, GAP = 1e-3, "plant.gap[1]"
+"""m by which the gap of B is wider, and nothing else is."""
+
+
+def two_runs():
+    run = grasp_run()
+    still = {
+        n: 0.0 * c if "velocity" in n else c for n, c in run.items()
+    }  # without rounding errors
+    run = replace(run, signals=still)
+    rows = {name: column[::2] for name, column in {**run, GAP: run[GAP] + BY}.items()}
+    settings = {**run.settings, "scheme": "jacobi"}
+    other = replace(run, settings=settings, time=run.time[::2], signals=rows)
+    given = {GAP: Given(absolute=2e-4), "plant.contact*": Given(absolute=np.inf)}
+    return compare(run.titled("<First>"), other, bands=Bands(signals=given))
+
+
+PAGES = {
+    "run": lambda: page_html(rich_run(), scene=SCENE),
+    "unfinished": lambda: page_html(replace(ring_run(["a"]), wall_time=None)),
+    "comparison": lambda: comparison_html(two_runs()),
+}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_what_a_page_says(name, snapshot):
+    """All that is on it, and what its scripts get, but for the values of signals."""
+    html = PAGES[name]()
+    body = html[html.index("<nav>") : html.index("<footer>")].replace("<tr>", "\n<tr>")
+    assert re.sub(r"\d{4}-\d\d-\d\d · grasp-cosim [^<]*", "", body).splitlines() == snapshot
+    state = json.loads(Elements(html).texts["page"])
+    del state["about"]
+    assert {**state, "signals": state["signals"][:2]} == snapshot
+
+
+def test_a_long_comparison_is_thinned_and_hostile_notes_stay_text():
+    found = replace(two_runs(), notes=("<script>alert(1)</script>",))
+    whole, thinned = (comparison_html(found, limit=n) for n in (10**9, 20_000))
+    assert "this page keeps the lowest and the highest value" in thinned
+    assert len(thinned) < len(whole)
+    assert "<script>alert(1)" not in whole
 
 
 def test_a_scene_has_its_section_scripts_colours_buttons_and_marks():
@@ -159,44 +214,24 @@ def test_a_scene_has_its_section_scripts_colours_buttons_and_marks():
     assert "<Half>" in page.visible
 
 
-def test_without_a_scene_the_page_does_without():
-    page = Elements(page_html(grasp_run()))
-    assert "scene" not in page.ids()
-    state = json.loads(page.texts["page"])
-    assert (state["scene"], state["colors"]) == (None, {})
-    ends = {c["from"] for c in grasp_run().settings["connections"]}
-    assert len(state["shown"]) == 6
-    assert set(state["shown"]) <= ends  # the connected ones
-
-
-def test_metrics_stand_in_the_columns_of_their_entries():
-    """One with other entries has a row for each; one without, or a list, is across all."""
-    found = [
-        Metric("a", lambda _: [0.5, 2.0, None], unit="m", entries=("x", "y", "z"), factor=1e3,
-               shown_unit="mm"),
-        Metric("b", lambda _: True),
-        Metric("c_d", lambda _: [0.125, 0.25], unit="s", entries=("left", "right")),
-        Metric("e", lambda _: [1.5, 2.5]),
-    ]  # fmt: skip
-    html = page_html(replace(ring_run(["a"]), more_metrics=tuple(found)))
-    table = html[html.index('id="metrics"') : html.index('id="connections"')]
-    heads = re.findall(r'<th class="n"><span class="key(\d)">(.*?)</span>', table)
-    assert heads == [("1", "x"), ("2", "y"), ("3", "z")]
-    cells = [re.findall(r"<td([^>]*)>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
-    assert [[text for _, text in row] for row in cells] == [
-        ["a", "500.0000", "2000.0000", "none", "mm"],
-        ["b", "yes", ""],
-        ["c d, left", "0.1250", "s"],
-        ["c d, right", "0.2500", "s"],
-        ["e", "1.5000, 2.5000", ""],
-    ]
-    assert cells[1][1][0] == ' class="both" colspan="3"'
-
-
-def test_lines_of_the_log_with_a_time_are_marked():
+def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_path):
     run = grasp_run()
-    log = ["t = 0.25 s: a.u = 1", "b: 3 steps rejected, first at t = 0.7 s", "t = 1e-3 s: fault"]
-    logged = replace(run, log=tuple(log))
-    page = Elements(page_html(logged))
-    marks = [(m["color"], m["t"]) for m in json.loads(page.texts["page"])["marks"]]
-    assert marks == [("--fault", 0.25), ("--fault", 0.001)]
+    assert caption(run).title == "grasp, case 2, GraspController"
+    assert caption(ring_run(["a"])).title == "grasp"
+    write_run(tmp_path / "results", run.titled("Before lunch"))
+    kept = load_run(tmp_path / "results")
+    assert caption(kept).title == "Before lunch"
+    assert caption(kept, "After").title == caption(kept.titled("After")).title == "After"
+
+
+def test_many_changes_are_counted():
+    assert changes({}) == "as in the system file"
+    assert changes({"a": True, "b": 0.1, "c": "x.fmu"}) == "a = true, b = 0.1, c = x.fmu"
+    assert changes({f"v{k}": k for k in range(8)}).endswith("v5 = 5, 2 more")
+
+
+@pytest.mark.parametrize("epoch", ["today", "1e9", "-1" + 30 * "0"])
+def test_a_date_that_is_none(epoch, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+    with pytest.raises(InputError, match=rf"^SOURCE_DATE_EPOCH={epoch}: must be the seconds"):
+        about({})
