@@ -1,17 +1,15 @@
 """Sliding and sticking: analytic, exact at the stop, and without chatter."""
 
-from itertools import pairwise
-from math import exp, sqrt
+from math import exp
 
 import numpy as np
 import pytest
-from gripper_plant import fingers, friction, rigid
-from gripper_plant.fingers import Actuator, Inputs
+from gripper_plant import friction, rigid
+from gripper_plant.fingers import Inputs
 from gripper_plant.friction import Params, move, resistance
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from support.declared import parameters
 from support.marks import examples
 
 QUICK = examples(100)
@@ -55,37 +53,12 @@ def test_at_rest_below_breakaway_nothing_moves_at_all(m, f, d):
     assert run(0.123, 0.0, m, f, STRIBECK, d, 10) == (0.123, 0.0)
 
 
-def test_breakaway_is_at_the_static_force_under_a_slow_ramp():
-    """And then the Stribeck curve lets it run away from where it stuck."""
-    x, v, moved = 0.0, 0.0, 0.0
-    for k in range(20_000):
-        f = 1e-4 * k
-        x, v = move(x, v, 0.5, f, STRIBECK, 1e-3)
-        if v != 0.0 and moved == 0.0:
-            moved = f
-    assert moved == pytest.approx(0.7, abs=1.1e-4)
-    assert x > 0.0
-
-
 @QUICK
 @given(MASSES, SPEEDS, st.floats(-5.0, 5.0), STEPS)
 def test_friction_never_gives_energy(m, v, f, d):
     x, rate = move(0.0, v, m, f, STRIBECK, d)
     gained = 0.5 * m * (rate**2 - v**2) - f * x
     assert gained <= 1e-12 * (0.5 * m * (rate**2 + v**2) + abs(f * x))
-
-
-def test_there_is_no_chatter_about_a_stop():
-    """Slowed down under a force that cannot move it, the velocity falls to zero and stays."""
-    x, v = 0.0, 0.05
-    speeds = []
-    for _ in range(300):
-        x, v = move(x, v, 0.5, -0.3, STRIBECK, 1e-3)
-        speeds.append(v)
-    stopped = speeds.index(0.0)
-    assert 10 < stopped < 200
-    assert all(later < before for before, later in pairwise(speeds[:stopped]))
-    assert set(speeds[stopped:]) == {0.0}
 
 
 def test_the_stribeck_curve():
@@ -109,9 +82,6 @@ def test_the_order_of_convergence():
     ]
     order, _ = np.polyfit(np.log(steps), -np.log(errors), 1)
     assert order == pytest.approx(2.0, abs=0.1)
-
-
-# ---------------------------------------------------------------------------- the fingers
 
 
 def gripper(**values):
@@ -151,20 +121,6 @@ def test_a_pressed_finger_with_friction_comes_to_rest_exactly(h):
     assert after(p, x, (-3.0, 3.0), h, 10) == x
 
 
-def test_the_moment_of_contact_with_friction():
-    """It gathers speed under what friction leaves of the force, and meets the object on time."""
-    p = gripper(coulomb=(0.4, 0.4))
-    a, way = (1.0 - 0.4) / 0.5, 0.11 - 0.065
-    arrival = sqrt(2.0 * way / a)
-    h = 1e-4
-    x = after(p, rigid.initial_state(p, Inputs()), (-1.0, 0.0), h, int(arrival / h))
-    assert x.contact_force[0] == 0.0
-    x = after(p, x, (-1.0, 0.0), h, 1)
-    assert x.contact_force[0] > 0.0
-    rest = (int(arrival / h) + 1) * h - arrival
-    assert x.position[0] - 0.065 == pytest.approx(-a * arrival * rest, rel=0.1)
-
-
 @QUICK
 @given(
     st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0)),
@@ -191,31 +147,3 @@ def stored(p, x, j):
     gap = rigid.outputs(p, x, Inputs()).gap[j]
     m = p.finger_mass[j]
     return 0.5 * m * (x.velocity[j] ** 2 + (p.baumgarte_beta * min(gap, 0.0)) ** 2)
-
-
-# ------------------------------------------------------------------------------ the actuator
-
-
-def test_the_actuator_gives_no_more_than_its_limit():
-    p = rigid.Params(actuator=Actuator((2.0, 0.5)))
-    assert fingers.forces(p.actuator, Inputs((-3.0, 0.4))) == (-2.0, 0.4)
-    assert fingers.forces(p.actuator, Inputs((1.9, 0.6))) == (1.9, 0.5)
-    assert fingers.forces(Actuator((0.0, 1.0)), Inputs((-1e9, 1e9))) == (-1e9, 1.0)
-    start = rigid.initial_state(p, Inputs())
-    limited = after(p, start, (-3.0, 3.0), 1e-3, 400)
-    assert limited == after(p, start, (-2.0, 0.5), 1e-3, 400)
-
-
-@pytest.mark.parametrize("parameter", parameters(Params), ids=lambda p: p.name)
-def test_a_value_outside_its_range_is_refused(parameter):
-    for number, value in parameter.invalid():
-        with pytest.raises(ValueError, match=r".+") as caught:
-            Params(**{parameter.name: value})
-        text = str(caught.value)
-        assert text.startswith(f"friction.{parameter.name} = {number!r} {parameter.unit}: ")
-        assert text.endswith(parameter.valid)
-
-
-def test_a_force_limit_below_zero_is_refused():
-    with pytest.raises(ValueError, match=r"^actuator.force_limit = -1.0 N: must be from 0 to 1e"):
-        Actuator((-1.0, 1.0))

@@ -12,7 +12,6 @@ from gripper_plant.contact_laws import HuntCrossley, KelvinVoigt
 from gripper_plant.movable import Inputs, Params, State
 from hypothesis import given
 from hypothesis import strategies as st
-from support.gripper import assert_ranges_are_checked, swapped
 from support.marks import examples
 
 QUICK = examples(25)
@@ -38,10 +37,6 @@ def start(p):
     return movable.initial_state(p, Inputs())
 
 
-def position(p, x):
-    return movable.outputs(p, x, Inputs()).object_position
-
-
 def stored(p, x):
     """Energy of fingers, box and contacts, J."""
     q, law = standing.shape(p), contact_laws.law(p.kelvin_voigt, p.hunt_crossley)
@@ -49,14 +44,6 @@ def stored(p, x):
     kinetic = sum(0.5 * m * v * v for m, v in zip(p.finger_mass, x.velocity, strict=True))
     depths = (right - x.position[0], x.position[1] - left)
     return kinetic + standing.energy(q, x.box) + sum(contact_laws.energy(law, z) for z in depths)
-
-
-def test_the_start_is_at_rest_where_the_parameters_say():
-    y = movable.outputs(Params(), start(Params()), Inputs())
-    assert y.position == (0.11, -0.11)
-    assert y.gap == pytest.approx((0.045, 0.105))
-    assert y.contact == (False, False)
-    assert (y.object_position, y.tilt, y.toppled) == (0.03, 0.0, False)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -81,12 +68,7 @@ def test_a_push_near_the_top_topples_it_for_good():
         seen.append((y.toppled, y.tilt > 0.0))
     assert seen[1:] == [(True, True), (True, True)]
     assert y.tilt == pytest.approx(standing.balance(standing.shape(TALL)), rel=0.02)
-
-
-def test_a_toppled_box_stays_as_it_was():
-    x = after(TALL, start(TALL), (0.0, 0.4), 1e-3, 800)
-    assert x.toppled
-    assert after(TALL, x, (-3.0, 3.0), 1e-3, 300).box == x.box
+    assert after(TALL, x, (-3.0, 3.0), 1e-3, 100).box == x.box
 
 
 @pytest.mark.parametrize("enabled", [False, True], ids=["Kelvin-Voigt", "Hunt-Crossley"])
@@ -118,8 +100,6 @@ def test_the_order_of_convergence():
     order, _ = np.polyfit(np.log(steps), -np.log(errors), 1)
     assert order == pytest.approx(2.0, abs=0.4)
 
-
-# ---------------------------------------------------------------- for any motion at all
 
 FORCES = st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0))
 HISTORIES = st.lists(st.tuples(FORCES, st.floats(5e-5, 2e-3)), min_size=5, max_size=12)
@@ -159,34 +139,3 @@ def test_contacts_push_only_and_nothing_gives_energy(begin, history):
         scale = stored(p, before) + stored(p, x) + abs(work)
         flat = before.box.tilt == x.box.tilt == 0.0
         assert stored(p, x) - stored(p, before) - work <= (1e-9 if flat else 1e-5) * scale
-
-
-@QUICK
-@given(plants(), HISTORIES)
-def test_the_mirrored_plant_does_the_mirrored_thing(begin, history):
-    p, x = begin
-    q = replace(p, finger_mass=p.finger_mass[::-1])
-
-    def image(x):
-        box = Box(*(-value for value in x.box))
-        pairs = (swapped(x.position), swapped(x.velocity), swapped(x.contact_force))
-        return State(*pairs, box, x.toppled)
-
-    z = image(x)
-    for force, h in history:
-        x = movable.step(p, x, Inputs(force), h)
-        z = movable.step(q, z, Inputs(swapped(force)), h)
-        assert z == image(x)
-
-
-# ----------------------------------------------------------------------------- parameters
-
-
-def test_values_outside_their_ranges_are_refused():
-    apart = ("initial_position", "object_width", "contact_height", "object_height")
-    assert_ranges_are_checked(Params, but=apart)
-
-
-def test_fingertips_above_the_object_are_refused():
-    with pytest.raises(ValueError, match=r"^contact_height = 0.2 m: must be from 0 to object_he"):
-        Params(contact_height=0.2)
