@@ -9,52 +9,28 @@ from grasp_controller.impedance import advance, transition
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 from support.marks import examples
-
-Rows = tuple[Decimal, Decimal, Decimal, Decimal]
-
-IDENTITY = (Decimal(1), Decimal(0), Decimal(0), Decimal(1))
 
 
 def oscillator(m, d, k, h):
-    """What m·e'' + d·e' + k·e = 0 does to (e, e') in h seconds, row by row."""
+    """What m·e'' + d·e' + k·e = 0 does to (e, e') in h seconds, row by row, in 120 digits.
+
+    Taylor's series of the matrix scaled down to nearly nothing, squared up again.
+    """
     with localcontext() as context:
         context.prec = 120
         mass, time = Decimal(m), Decimal(h)
-        a = _exponential((Decimal(0), time, -Decimal(k) / mass * time, -Decimal(d) / mass * time))
-        return float(a[0]), float(a[1]), float(a[2]), float(a[3])
-
-
-def _exponential(a):
-    """Taylor's series of the matrix scaled down to nearly nothing, squared up again."""
-    squarings = 0
-    while max(abs(entry) for entry in a) > Decimal("1e-6"):
-        a, squarings = _times(a, Decimal("0.5")), squarings + 1
-    power = result = IDENTITY
-    for n in range(1, 16):
-        power = _times(_product(power, a), 1 / Decimal(n))
-        result = _sum(result, power)
-    for _ in range(squarings):
-        result = _product(result, result)
-    return result
-
-
-def _times(a, factor):
-    return a[0] * factor, a[1] * factor, a[2] * factor, a[3] * factor
-
-
-def _sum(a, b):
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]
-
-
-def _product(a, b):
-    return (
-        a[0] * b[0] + a[1] * b[2],
-        a[0] * b[1] + a[1] * b[3],
-        a[2] * b[0] + a[3] * b[2],
-        a[2] * b[1] + a[3] * b[3],
-    )
+        a = np.array([[Decimal(0), time], [-Decimal(k) / mass * time, -Decimal(d) / mass * time]])
+        squarings = 0
+        while abs(a).max() > Decimal("1e-6"):
+            a, squarings = a / 2, squarings + 1
+        power = result = np.array([[Decimal(1), Decimal(0)], [Decimal(0), Decimal(1)]])
+        for n in range(1, 16):
+            power = power @ a / n
+            result = result + power
+        for _ in range(squarings):
+            result = result @ result
+        return tuple(map(float, result.ravel()))
 
 
 QUICK = examples(100)
@@ -114,13 +90,6 @@ def test_nothing_overflows_in_the_corners(m, d, k, h):
     a = transition(m, d, k, h)
     assert all(isfinite(entry) for entry in a)
     assert agree(a, oscillator(m, d, k, h), (m, d, k, h), roundings=8.0)
-
-
-@pytest.mark.parametrize("h", [1e-4, 1e-2, 0.5])
-@pytest.mark.parametrize(("m", "d", "k"), PUBLISHED)
-def test_the_transition_is_the_matrix_exponential(m, d, k, h):
-    expected = expm(np.array([[0.0, 1.0], [-k / m, -d / m]]) * h).ravel()
-    np.testing.assert_allclose(transition(m, d, k, h), expected, rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.parametrize("h", [1e-4, 1e-2, 0.1])

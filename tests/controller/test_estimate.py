@@ -1,0 +1,194 @@
+"""What is learnt of the reflectances: its deviation against Monte Carlo, errors of n and l_0.
+
+White noise of sigma_0 in samples h seconds apart is behind the low-pass sigma_0/sqrt(1 + 2·T_f/h),
+which is `intensity_noise`. For a sensor with n_j, y is (K·alpha_j)^(-1/n)·(l + l_0)^(n_j/n): no
+line, but the same curve for both faces where n_1 = n_2.
+"""
+
+from dataclasses import replace
+from math import exp, log, sqrt, tanh
+from random import Random
+from statistics import fmean, variance
+
+import pytest
+from grasp_controller import holding, reflectance_ratio
+from grasp_controller.adaptive import Inputs, Params
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi2
+from support.approach import L_0, H, N, approach, intensity, pairs, relit, run
+from support.marks import examples, slow
+
+TRIALS = 200
+
+LOW, HIGH = (float(chi2.ppf(tail, TRIALS)) / TRIALS for tail in (1e-4, 1.0 - 1e-4))
+"""Between them is a mean of so many squares, but for 1 in 5000."""
+
+ALPHA = (0.6, 1.0)
+TRUTH = log(0.6)
+
+NEVER_HOLDS = holding.Params(squeeze=1e12)
+
+
+def law(q, noise, prior):
+    """One that knows of the noise of a sample in V, and whose low-pass lets through all."""
+    T_f = 1e-6
+    learnt = reflectance_ratio.Params(
+        time_constant=T_f,
+        weight_exponent=q,
+        intensity_noise=noise / sqrt(1.0 + 2.0 * T_f / H),
+        prior_deviation=prior,
+        limit=10.0,
+    )
+    return Params(reflectance=learnt, hold=NEVER_HOLDS)
+
+
+def noisy(samples, deviation, random):
+    def in_noise(xi):
+        return xi + random.gauss(0.0, deviation)
+
+    return [relit(u, in_noise, in_noise) for u in samples]
+
+
+def learnt_in_noise(p, noise, alpha, gaps, count, random):
+    """What an approach in noise of so many V teaches, from the first gap in m to the second."""
+    start, end = gaps
+    samples = approach(alpha, (start, start), end, count)
+    return run(p, noisy(samples, noise, random))[-1][0].estimate
+
+
+@pytest.mark.parametrize(
+    ("q", "gaps"), [(5.0, (0.08, 5e-3)), (5.0, (0.08, 0.04)), (1.0, (0.08, 5e-3))]
+)
+def test_the_variance_is_that_of_many_approaches(q, gaps):
+    """The prior is so wide that it draws nothing towards 0."""
+    noise = 5e-5
+    p, random = law(q, noise, 10.0), Random(1)
+    found = [learnt_in_noise(p, noise, ALPHA, gaps, 40, random) for _ in range(TRIALS)]
+    said = fmean(each.deviation**2 for each in found)
+    assert LOW < variance(each.beta for each in found) / said < HIGH
+    assert fmean(each.beta for each in found) == pytest.approx(TRUTH, abs=0.5 * sqrt(said))
+
+
+@pytest.mark.parametrize(("noise", "gaps"), [(5e-4, (0.08, 0.075)), (2e-3, (0.04, 0.03))])
+def test_any_ratio_is_as_far_off_as_is_said(noise, gaps):
+    """Ratios as the prior has them, and little to learn from: what is known is prior and light."""
+    p, random = law(5.0, noise, 1.0), Random(2)
+    errors, deviations = [], []
+    for _ in range(TRIALS):
+        beta = random.gauss(0.0, 1.0)
+        alpha = (exp(0.5 * beta), exp(-0.5 * beta))
+        estimate = learnt_in_noise(p, noise, alpha, gaps, 5, random)
+        errors.append((estimate.beta - beta) / estimate.deviation)
+        deviations.append(estimate.deviation)
+    assert LOW < fmean(error * error for error in errors) < HIGH
+    assert 0.1 < fmean(deviations) < 0.8
+
+
+@pytest.mark.parametrize("count", [100, slow(400)])
+@pytest.mark.parametrize("end", [5e-3, 0.04])
+def test_behind_the_low_pass_it_is_the_same(count, end):
+    """With the numbers of the block: noise that is no longer white counts as if it were."""
+    p = replace(Params(), hold=NEVER_HOLDS)
+    noise = p.reflectance.intensity_noise * sqrt(1.0 + 2.0 * p.reflectance.time_constant / H)
+    random, trials = Random(3), 60
+    found = [learnt_in_noise(p, noise, ALPHA, (0.08, end), count, random) for _ in range(trials)]
+    squares = fmean(((each.beta - TRUTH) / each.deviation) ** 2 for each in found)
+    assert float(chi2.ppf(1e-4, trials)) < trials * squares < float(chi2.ppf(1.0 - 1e-4, trials))
+
+
+def test_weights_of_one_over_the_noise_are_the_best():
+    """q = 2 + 2/n; the default costs 1.9 times the variance, and looks more at what is near."""
+    best = 2.0 + 2.0 / N
+    variances = {}
+    for q in (best, 3.0, 4.5, 5.0):
+        samples = approach((1.0, 1.0), end=0.0, count=400)
+        variances[q] = run(law(q, 5e-5, 10.0), samples)[-1][0].estimate.deviation ** 2
+    assert min(variances, key=lambda q: variances[q]) == best
+    assert variances[5.0] / variances[best] == pytest.approx(1.86, abs=0.1)
+
+
+SURE = Params(
+    reflectance=reflectance_ratio.Params(time_constant=1e-6, intensity_noise=1e-12, limit=10.0),
+    hold=holding.Params(squeeze=1e12),
+)
+"""No noise is reckoned with, no lag, and nothing but the light."""
+
+SHORT = 1e-4
+"""m, of travel: the line is the tangent."""
+
+
+def learnt(samples):
+    return run(SURE, samples)[-1][0].estimate.beta
+
+
+def sensed(samples, alpha, n):
+    """The same approach, seen by sensors of other exponents."""
+    seen = []
+    for u in samples:
+        (x_1, x_2), (n_1, n_2) = u.position, n
+        xi_1 = intensity(x_1 - 0.035, alpha[0], n_1)
+        seen.append(u._replace(intensity=(xi_1, intensity(-x_2 - 0.035, alpha[1], n_2))))
+    return seen
+
+
+@examples(15)
+@given(pairs(0.1, 2.0), st.floats(0.9, 1.5), st.floats(1e-3, 0.04), st.integers(10, 60))
+def test_at_equal_gaps_a_common_error_of_n_cancels(alpha, n, end, count):
+    samples = approach(alpha, end=end, count=count, n=n)
+    assert learnt(samples) == pytest.approx(log(alpha[0] / alpha[1]), abs=1e-6)
+
+
+def short(alpha, gaps, n):
+    """A tenth of a millimetre before the gaps in m."""
+    samples = []
+    for k in range(11):
+        l_1, l_2 = (gap + SHORT * (1.0 - k / 10) for gap in gaps)
+        seen = (intensity(l_1, alpha[0], n), intensity(l_2, alpha[1], n))
+        samples.append(Inputs((0.035 + l_1, -0.035 - l_2), (-1e-3, 1e-3), seen))
+    return samples
+
+
+@pytest.mark.parametrize("n", [1.0, 1.3])
+@pytest.mark.parametrize("gaps", [(0.02, 0.01), (0.005, 0.04), (0.03, 0.03)])
+def test_layer_3_rests_at_equal_gaps_whatever_n(n, gaps):
+    """beta is off by (n_true - n)·ln(d_2/d_1), which is nothing where layer 3 takes the fingers.
+
+    With it the intensities count as those of equal faces, and of the block's n.
+    """
+    samples = short((0.5, 1.0), gaps, n)
+    d_1, d_2 = (gap + L_0 for gap in gaps)
+    assert learnt(samples) == pytest.approx(log(0.5) + (n - N) * log(d_2 / d_1), abs=3e-3)
+    alike = (d_1 / d_2) ** N
+    f_s = 3.0 * tanh((1.0 - alike) / (1.0 + alike))
+    _, y = run(SURE, samples)[-1]
+    assert y.simultaneous_contact_force == pytest.approx(f_s, abs=5e-3)
+
+
+@pytest.mark.parametrize("n", [(1.14, 1.16), (1.3, 1.1)])
+def test_an_error_of_one_sensor_does_not_cancel(n):
+    """The slopes then have the ratio n_1/n_2 as well, and distances to two powers."""
+    gap = 0.02
+    samples = sensed(approach((0.5, 1.0), (gap + SHORT, gap + SHORT), gap, 10), (0.5, 1.0), n)
+    n_1, n_2 = n
+    calibrated = (n_1 - n_2) * log(0.1)  # of K, which is the same at 100 mm
+    expected = log(0.5) + calibrated - (n_1 - n_2) * log(gap + L_0) - N * log(n_1 / n_2)
+    assert learnt(samples) == pytest.approx(expected, abs=2e-3)
+
+
+@examples(15)
+@given(pairs(0.1, 2.0), st.floats(5e-4, 0.02), pairs(0.02, 0.08))
+def test_neither_the_gain_nor_the_offset_is_used(alpha, l_0, gaps):
+    """A common l_0 shifts the lines, and K scales both: the slopes have the ratio of alpha."""
+    samples = [
+        u._replace(
+            intensity=(
+                intensity(u.position[0] - 0.035 + l_0 - L_0, alpha[0]),
+                intensity(-u.position[1] - 0.035 + l_0 - L_0, alpha[1]),
+            )
+        )
+        for u in approach(alpha, gaps)
+    ]
+    assert learnt(samples) == pytest.approx(log(alpha[0] / alpha[1]), abs=1e-6)
+    other = replace(SURE.reflectance, gain=1.0, offset_distance=0.5)
+    assert run(replace(SURE, reflectance=other), samples)[-1][0].estimate.beta == learnt(samples)
