@@ -25,9 +25,9 @@ from hypothesis import strategies as st
 from support import campaign, kinds
 from support.fmi2 import Fmu
 from support.kinds import Kind
-from support.packages import skip_without_pythonfmu
+from support.marks import skip_without_pythonfmu
 
-pytest_plugins = ("support.hosts", "support.budget")
+pytest_plugins = ("support.platforms", "support.budget")
 
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""

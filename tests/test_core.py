@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import pytest
 from support.native_fmus import needs_gcc
-from support.oscillator import write_oscillator
+from support.native_systems import write_oscillator
 
 pytestmark = needs_gcc
 

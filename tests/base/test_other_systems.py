@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.integrator import write_integrator
 from support.native_fmus import needs_gcc
+from support.native_systems import write_integrator
 
 ROOT = Path(__file__).parents[2]
 HIDDEN = Path(__file__).parents[1] / "support" / "no_posix"

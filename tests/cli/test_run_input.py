@@ -7,7 +7,7 @@ import pytest
 from grasp_cosim import System, load_run
 from grasp_cosim.ssp.to_archive import write_ssp
 from support.native_fmus import needs_gcc
-from support.stimuli import driven
+from support.native_systems import driven
 
 pytestmark = needs_gcc
 TEXT = "time,a.u_Real\n0,0\n1,10\n"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import grasp_cosim.cli as cli
 import pytest
-from support.oscillator import write_oscillator
+from support.native_systems import write_oscillator
 
 Run = Callable[..., tuple[int, str, str]]
 

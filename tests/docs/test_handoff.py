@@ -14,7 +14,7 @@ from time import monotonic
 import pytest
 from grasp_cosim import cli
 from support import native_fmus
-from support.ports import kept_port
+from support.processes import kept_port
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")

@@ -17,7 +17,6 @@ from fmpy.validation import validate_fmu
 from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.to_archive import write_ssp
-from support.foreign_fmus import deviations_from_fmpy
 from support.foreign_tools import (
     COFMUPY,
     COSIM,
@@ -25,6 +24,7 @@ from support.foreign_tools import (
     PYSSP_STANDARD,
     PYSSP_STANDARD_MAKES,
     call,
+    deviations_from_fmpy,
     python_with,
     run_in,
     script_of,

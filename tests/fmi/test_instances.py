@@ -2,23 +2,78 @@
 
 import ctypes
 import math
+import os
 import re
 import tempfile
 import zipfile
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
-from fmi.instances import KINDS, SAMPLES, Bound, real, running, variable
 from fmpy import simulate_fmu
-from grasp_cosim import InputError, SimulationError
+from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.base.calls import STEP_2, STEP_3, TRANSFER_2, TRANSFER_3
-from grasp_cosim.fmi.instance import DISCARD, EARLY, OK
+from grasp_cosim.fmi.fmi2 import SharedInstance
+from grasp_cosim.fmi.inputs import Inputs
+from grasp_cosim.fmi.instance import DISCARD, EARLY, OK, dtype
 from grasp_cosim.fmi.make_instance import load
+from grasp_cosim.interface.interface import Variable
 from grasp_cosim.interface.obstacles import this_platform
-from grasp_cosim.system.parts import Component
+from grasp_cosim.system.parts import Component, Connection, Port
+from support.marks import engines, skip_where_fmpy_runs_none, slow
+from support.native_fmus import CAPABLE, TYPES, build, needs_gcc, starts
 from support.native_fmus import EARLY as MIGHT_RETURN_EARLY
-from support.native_fmus import TYPES, build, needs_gcc
-from support.packages import skip_where_fmpy_runs_none
+
+KINDS = [("2.0", "none"), slow("2.0", "process"), ("3.0", "none"), ("3.0", "process")]
+"""Every version, in this process and in one of its own."""
+
+SAMPLES = {
+    "Real": -1.25e-300, "Integer": -(2**31), "Float64": -1.25e-300, "Float32": 0.15625,
+    "Int8": -128, "UInt8": 255, "Int16": -(2**15), "UInt16": 2**16 - 1, "Int32": -(2**31),
+    "UInt32": 2**32 - 1, "Int64": -(2**63), "UInt64": 2**64 - 1, "Boolean": True,
+    "Enumeration": 2, "String": "Grüße \N{SNOWMAN}",
+}  # fmt: skip
+"""A value by type, at the edge of what it holds where that has one."""
+
+
+@contextmanager
+def running(folder, version, isolation="none", values=None, capabilities=None):
+    """An initialised instance named 'part' of the native FMU."""
+    fmu = build(folder, version=version, capabilities=capabilities)
+    instance = load(Component("part", fmu, {}, isolation=isolation))
+    try:
+        instance.enter_initialization(values or {}, 10.0)
+        instance.exit_initialization()
+        yield instance
+    finally:
+        instance.close()
+
+
+class Bound:
+    """The calls of an instance as a plan binds them, on buffers of its own."""
+
+    def __init__(self, instance, step):
+        self.instance = instance
+        self.clock = np.zeros(2)
+        self.step = instance.stepper(self.clock, step).python
+
+    def exchange(self, action, *names):
+        """The call that sets or gets the variables, and the buffer."""
+        variables = [self.instance.interface.by_name[name] for name in names]
+        data = np.zeros(len(names), dtype(self.instance.interface.version, variables[0].type))
+        return self.instance.transfer(action, variables, data).python, data
+
+
+def variable(instance, name):
+    """The declared variable of that name."""
+    return instance.interface.by_name[name]
+
+
+def real(version):
+    """The double precision type of a version."""
+    return next(iter(TYPES[version]))
+
 
 pytestmark = needs_gcc
 both = pytest.mark.parametrize(("version", "isolation"), KINDS)
@@ -216,3 +271,178 @@ def test_what_is_extracted_is_what_this_machine_uses(tmp_path, monkeypatch, vers
     instance.close()
     assert files == {"modelDescription.xml", "extra/x/y", *binaries}
     assert not list(folder.iterdir())
+
+
+@contextmanager
+def shared(fmu, name, **values):
+    instance = load(Component(name, fmu, {}, native=fmu))
+    assert isinstance(instance, SharedInstance)
+    try:
+        instance.enter_initialization(values, 10.0)
+        instance.exit_initialization()
+        yield instance
+    finally:
+        instance.close()
+
+
+def steps(instance, count):
+    bound = Bound(instance, 1.0)
+    for k in range(count):
+        bound.clock[0] = float(k)
+        assert bound.step() == OK
+    (x,) = instance.get([variable(instance, "x")])
+    assert isinstance(x, float)
+    return x
+
+
+def test_two_at_once_have_values_of_their_own(tmp_path):
+    fmu = build(tmp_path, version="2.0")
+    with shared(fmu, "a", u_Real=1.0) as a, shared(fmu, "b", u_Real=10.0, gain=2.0) as b:
+        assert (steps(a, 3), steps(b, 2)) == (3.0, 40.0)
+        assert a._slave.component != b._slave.component
+
+
+def test_one_after_the_other_starts_anew_from_the_same_files(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    fmu = build(tmp_path, version="2.0")
+    extracted = []
+    for _ in range(3):
+        with shared(fmu, "a", u_Real=1.0) as a:
+            assert steps(a, 2) == 2.0
+            extracted.append(a._slave.unzipDirectory)
+    assert len(set(extracted)) == 1
+    assert [f.name for f in tmp_path.iterdir() if f.is_dir()] == [Path(extracted[0]).name]
+
+
+def test_an_fmu_that_was_built_anew_is_loaded_anew(tmp_path):
+    with shared(build(tmp_path, version="2.0"), "a") as a:
+        before = a._slave.unzipDirectory
+    fmu = build(tmp_path, version="2.0")
+    os.utime(fmu, ns=(1, 1))
+    with shared(fmu, "a") as a:
+        assert a._slave.unzipDirectory != before
+
+
+def test_in_a_process_of_its_own_and_of_fmi_3_it_is_loaded_as_any_other(tmp_path):
+    kinds = [("2.0", "process"), ("3.0", "none")]
+    for version, isolation in kinds:
+        fmu = build(tmp_path, version=version)
+        instance = load(Component("a", fmu, {}, isolation=isolation, native=fmu))
+        assert not isinstance(instance, SharedInstance)
+        instance.close()
+
+
+# Whole runs: steps that are rejected, inputs that a failure names
+
+DISCARDED = (
+    r"^part: native.fmu returned discard at t = 0.3 s: the step is too long "
+    r"\(inputs: u_\w+ = 2, .*\)(\n|$)"
+)
+
+
+def alone(folder, version, isolation, **values):
+    """A native FMU that integrates 2.0 for a second in steps of 0.1 s."""
+    fmu = build(
+        folder, version=version, capabilities=CAPABLE if version == "2.0" else MIGHT_RETURN_EARLY
+    )
+    given = {**starts(version), f"u_{real(version)}": 2.0, **values}
+    component = Component("part", fmu, given, isolation=isolation)
+    return System("alone", (component,), (), 100_000_000, 1_000_000_000, "sequential")
+
+
+@both
+@engines
+@pytest.mark.parametrize("parameter", ["early_at", "discard_at"])
+def test_a_rejected_step_is_taken_in_parts(tmp_path, version, isolation, engine, parameter):
+    """The integral of a constant does not depend on how the step is divided."""
+    result = simulate(alone(tmp_path, version, isolation, **{parameter: 0.35}), engine=engine)
+    assert result.complete
+    assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-13, abs=1e-15)
+    rejection = result.rejections["part"]
+    assert (rejection.count, rejection.first) == (1, 0.3)
+    assert result["part.steps"][-1] == 11  # of two parts each
+    assert result["part.now"][-1] == pytest.approx(1.0, rel=1e-15)
+
+
+@both
+@engines
+def test_a_wish_to_end_ends_the_run_in_good_order(tmp_path, version, isolation, engine):
+    """The last row is that of the communication point behind it."""
+    result = simulate(alone(tmp_path, version, isolation, terminate_at=0.35), engine=engine)
+    assert result.complete
+    assert result["part.x"] == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.7], rel=1e-13)
+    assert result.log[-1] == (
+        "part asked for the end of the simulation at t = 0.35 s; its values there are in the last "
+        "row, that of t = 0.4 s"
+    )
+    assert not result.rejections
+
+
+def test_a_wish_to_end_in_a_part_of_a_step(tmp_path):
+    result = simulate(alone(tmp_path, "2.0", "none", early_at=0.32, terminate_at=0.37))
+    assert result.complete
+    assert result["part.x"][-1] == pytest.approx(0.74, rel=1e-13)
+    assert "at t = 0.37 s" in result.log[-1]
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_step_that_must_not_vary_ends_the_run(tmp_path, version):
+    system = alone(tmp_path, version, "none", discard_at=0.35)
+    build(tmp_path, version=version, capabilities={})
+    with pytest.raises(SimulationError, match=DISCARDED):
+        simulate(system)
+
+
+@both
+def test_a_step_that_no_part_of_can_be_taken_ends_the_run(tmp_path, version, isolation):
+    """A step is halved at most ten times; so close to its start none of them is short enough."""
+    system = alone(tmp_path, version, isolation, discard_at=0.3 + 1e-6)
+    with pytest.raises(SimulationError, match=DISCARDED) as caught:
+        simulate(system)
+    assert len(caught.value.__notes__) == 11
+
+
+def declared(name, kind="Real", causality="input", **more):
+    given = {"unit": None, "start": None, "minimum": None, "maximum": None, **more}
+    return Variable(name, kind, causality, 1, **given)  # type: ignore[arg-type]
+
+
+def test_an_fmu_without_inputs_names_none():
+    assert str(Inputs()) == ""
+
+
+def test_of_many_those_that_are_out_of_range_come_first():
+    inputs = Inputs()
+    for i in range(20):
+        inputs.set(declared(f"u[{i}]", minimum=0.0), float(i))
+    inputs.set(declared("far", minimum=0.0, maximum=1.0), 2.0)
+    inputs.set(declared("broken"), math.nan)
+    assert str(inputs) == (
+        " (inputs: far = 2, broken = nan, u[0] = 0, u[1] = 1, u[2] = 2, u[3] = 3, ... (16 more))"
+    )
+
+
+@pytest.mark.parametrize(("version", "isolation"), KINDS)
+@engines
+def test_a_failing_step_names_what_came_over_its_connections(tmp_path, version, isolation, engine):
+    """Under the system's name, after the factor of the connection."""
+    u, y = f"u_{real(version)}", f"y_{real(version)}"
+    others = starts(version)
+    others.pop(u)
+    fmu = build(tmp_path, version=version, units={u: "mm", y: "m"})
+    system = System(
+        "two",
+        (
+            Component("first", fmu, {u: 1.5, **others}),
+            Component("second", fmu, {"error_at": 1.05, **others}, {"width": u}, None, isolation),
+        ),
+        (Connection(Port("first", y), Port("second", "width")),),
+        100_000_000,
+        2_000_000_000,
+        "sequential",
+    )
+    with pytest.raises(SimulationError) as caught:
+        simulate(system, engine=engine)  # type: ignore[arg-type]
+    head, _, inputs = str(caught.value).partition(" (inputs: ")
+    assert head.startswith("second: native.fmu returned error at t = 1 s")
+    assert inputs.startswith("width = 1500 mm, u_")

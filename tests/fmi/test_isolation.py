@@ -10,11 +10,11 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from fmi.instances import Bound, real, running
+from fmi.test_instances import Bound, real, running
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi import process
 from grasp_cosim.fmi.instance import OK
-from support.native_fmus import TYPES, build, needs_gcc
+from support.native_fmus import build, needs_gcc, starts_text
 from support.processes import alive, ends
 
 pytestmark = needs_gcc
@@ -46,8 +46,7 @@ def system_file(folder, version, values, isolation="process"):
     """A native part that drives a second one, which fails as its values say."""
     build(folder, version=version)
     u, y = f"u_{real(version)}", f"y_{real(version)}"
-    starts = {"Boolean": "false", "String": "''", "Enumeration": "1"}
-    others = "".join(f", u_{t} = {starts.get(t, '0')}" for t in list(TYPES[version])[1:])
+    others = f", {starts_text(version, u)}"
     path = folder / "two.toml"
     path.write_text(
         f"""connections = ["first.{y} -> second.{u}"]

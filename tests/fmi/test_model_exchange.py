@@ -1,16 +1,21 @@
 """FMUs for model exchange are integrated to their exact solutions, event by event."""
 
+import sys
+from ctypes import c_double
+from math import exp
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import numpy.typing as npt
 import pytest
+from fmpy.validation import validate_fmu
 from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim.cli import main
 from grasp_cosim.system.parts import Component, Connection, Event, Port, Solver
 from scipy.integrate import solve_ivp
 from support.marks import ENGINES
-from support.native_fmus import build_model, needs_cvode, needs_gcc, state_space
+from support.native_fmus import KINDS, MODELS, build_model, needs_cvode, needs_gcc, state_space
 
 Floats = npt.NDArray[np.float64]
 
@@ -246,3 +251,94 @@ def test_a_solver_table_is_kept_to(tmp_path):
 def test_the_libraries_are_unloaded(tmp_path):
     run(part("bouncing_ball", tmp_path), 0.1, 0.2)
     assert "bouncing_ball.so" not in Path("/proc/self/maps").read_text("utf-8")
+
+
+def cvode(*arguments):
+    from grasp_cosim.fmi.cvode import Cvode  # here, as it may not be there
+
+    return Cvode(*arguments)
+
+
+class Decay:
+    """x' = -x, and an indicator x - 0.5; the latest time and the number of evaluations."""
+
+    def __init__(self):
+        self.latest, self.count = 0.0, 0
+        self.solver = cvode(1, 1, self.slopes, self.crossings, Solver())
+        self.solver.x[0] = 1.0
+
+    def slopes(self, time, states, slopes):
+        self.latest, self.count = max(self.latest, time), self.count + 1
+        c_double.from_address(slopes).value = -c_double.from_address(states).value
+        return 0
+
+    def crossings(self, time, states, values):
+        c_double.from_address(values).value = c_double.from_address(states).value - 0.5
+        return 0
+
+
+def test_it_stops_at_a_root_and_at_its_stop():
+    decay = Decay()
+    decay.solver.restart(0.0)
+    time, found = 0.0, False
+    while not found:
+        time, found = decay.solver.step(1.0)
+    assert time == pytest.approx(np.log(2.0), rel=1e-7)
+    assert decay.solver.x[0] == pytest.approx(0.5, rel=1e-7)
+    while time < 1.0:
+        time, _ = decay.solver.step(1.0)
+    assert (time, decay.latest) == (1.0, 1.0)
+    decay.solver.close()
+
+
+def test_new_nominal_values_are_kept_to():
+    """Against a huge one the state is nothing, and takes few evaluations."""
+    counts = []
+    for nominal in (1.0, 1e12):
+        decay, time = Decay(), 0.0
+        decay.solver.restart(0.0, np.array([nominal]))
+        while time < 1.0:
+            time, _ = decay.solver.step(1.0)
+        counts.append(decay.count)
+        decay.solver.close()
+    assert counts[1] < counts[0] / 2
+
+
+SOLVING = ("grasp_cosim.fmi.cvode", "grasp_cosim.fmi.model_exchange")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("name", MODELS)
+def test_is_valid(name, version, tmp_path):
+    assert validate_fmu(str(build_model(name, tmp_path, version))) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_either_kind_alone_runs_in_fmpy(version, kind, tmp_path):
+    fmu = build_model("dahlquist", tmp_path, version, [kind])
+    run = fmpy.simulate_fmu(str(fmu), stop_time=1.0, relative_tolerance=1e-9)
+    assert run["x"][-1] == pytest.approx(exp(-1.0), rel=1e-7)
+
+
+def test_without_cvode_it_is_refused_by_name(tmp_path, monkeypatch, capsys):
+    """FMPy has it for x86-64 Linux and Windows, and for Apple's ARM."""
+    monkeypatch.setattr(fmpy, "platform_tuple", "riscv64-linux")
+    for module in [m for m in sys.modules if m.startswith("fmpy.sundials") or m in SOLVING]:
+        monkeypatch.delitem(sys.modules, module)
+        package, _, name = module.rpartition(".")
+        if package in sys.modules:
+            monkeypatch.delattr(sys.modules[package], name, raising=False)
+    build_model("dahlquist", tmp_path, "2.0", ["ModelExchange"])
+    path = tmp_path / "system.toml"
+    part = '[components.part]\nfmu = "dahlquist.fmu"\nvalues = { u = 0.0 }\n'
+    path.write_text(f"[experiment]\nstep = 0.1\nstop = 1.0\n{part}", "utf-8")
+    assert main(["run", str(path)]) == 2
+    said = capsys.readouterr()
+    *_, line = said.err.splitlines()
+    begin = "grasp-cosim: part: dahlquist.fmu is for model exchange, and FMPy has no CVode for "
+    assert line.startswith(f"{begin}this machine: ")
+    assert line.endswith("; must be a co-simulation FMU")
+    assert said.out == ""

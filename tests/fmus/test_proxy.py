@@ -24,7 +24,7 @@ from grasp_fmus.link.message import (
     Message,
 )
 from support.native_proxies import connected, hosted
-from support.ports import kept_port
+from support.processes import kept_port
 from support.scripted_peer import (
     SIGNATURE,
     Clock,

@@ -7,7 +7,7 @@ from grasp_fmus.contract import declared, unpacker
 from grasp_fmus.shipped import blocks
 from support.fmi2 import OK, Instance
 from support.kinds import all_kinds
-from support.packages import skip_without_pythonfmu
+from support.marks import skip_without_pythonfmu
 
 pytestmark = all_kinds
 

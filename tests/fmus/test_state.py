@@ -3,8 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.driven import H, drive
-from support.fmi2 import OK, Instance
+from support.fmi2 import OK, H, Instance, drive
 from support.kinds import all_kinds
 from support.marks import examples
 

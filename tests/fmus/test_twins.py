@@ -6,8 +6,7 @@ Values, what is refused and why, and the bytes of states; whatever is called, wi
 import pytest
 from hypothesis import HealthCheck, given
 from support.drawn_calls import SEQUENCES, Drawn
-from support.driven import drive
-from support.fmi2 import OK, Instance
+from support.fmi2 import OK, Instance, drive
 from support.kinds import NAMES
 from support.marks import examples
 from support.twins import Twins

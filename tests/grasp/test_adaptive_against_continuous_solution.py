@@ -14,8 +14,7 @@ from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
 from support.adaptive import adaptive_grasp, last, run, values_of
 from support.approach import pairs
-from support.continuous import Grasp, solve
-from support.continuous_learning import Adaptive
+from support.continuous import Adaptive, Grasp, solve
 from support.marks import examples, slow
 
 STEP = 1e-4

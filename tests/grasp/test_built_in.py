@@ -10,7 +10,7 @@ import pytest
 from grasp_cosim import grasp_system
 from grasp_fmus import build as builds
 from grasp_fmus.shipped import SHIPPED
-from support.packages import skip_without_pythonfmu
+from support.marks import skip_without_pythonfmu
 
 EIGHT_THREADS = """
 from concurrent.futures import ThreadPoolExecutor

@@ -17,7 +17,7 @@ from grasp_cosim.metrics.metric import Signals, measure
 from grasp_cosim.recording.result import UNITS
 from hypothesis import given
 from hypothesis import strategies as st
-from support.packages import needs_pythonfmu
+from support.marks import needs_pythonfmu
 
 LOST = (
     'no metrics of the grasp: no component is the plant; name it under [roles]: plant = "gripper"',

@@ -9,7 +9,7 @@ from grasp_cosim import simulate
 from grasp_cosim.hil.relay import DIRECTIONS, Conditions, Network, Outage
 from grasp_cosim.hil.served import Service
 from support.marks import slow
-from support.ports import kept_port
+from support.processes import kept_port
 from support.proxies import ANY_PORT, build_proxy, relaying, serving, wait_until
 
 ENGINE = "python"

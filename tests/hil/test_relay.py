@@ -15,7 +15,7 @@ import pytest
 from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.hil.relay import DIRECTIONS, MOST_CLIENTS, Conditions, Counters, Network, Relay
-from support.ports import kept_port
+from support.processes import kept_port
 from support.proxies import relaying, wait_until
 
 

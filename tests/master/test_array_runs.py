@@ -9,10 +9,9 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.cli.entry import main
 from grasp_cosim.recording.load import load_run
 from scipy.linalg import expm
-from support.marks import engines
+from support.marks import engines, skip_where_fmpy_runs_none
 from support.native_fmus import ARRAY_TYPES as TYPES
 from support.native_fmus import needs_cvode, needs_gcc, state_space
-from support.packages import skip_where_fmpy_runs_none
 
 
 def isolated(system, isolation="process"):

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fmi.instances import KINDS
-from fmi.test_rejected_steps import alone
+from fmi.test_instances import KINDS, alone
 from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.master import master
 from support.marks import engines

@@ -16,7 +16,7 @@ import pytest
 from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from support.cases import CASES
-from support.packages import needs_pythonfmu
+from support.marks import needs_pythonfmu
 
 SHORT = 0.05
 

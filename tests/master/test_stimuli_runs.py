@@ -7,10 +7,9 @@ from grasp_cosim import InputError, System, simulate
 from grasp_cosim.system.stimuli import read_stimuli
 from hypothesis import given
 from hypothesis import strategies as st
-from support.marks import engines, examples
+from support.marks import engines, examples, skip_where_fmpy_runs_none
 from support.native_fmus import build, needs_gcc
-from support.packages import skip_where_fmpy_runs_none
-from support.stimuli import REALS, driven
+from support.native_systems import REALS, driven
 
 pytestmark = needs_gcc
 INPUT = '[input]\nfile = "drive.csv"\n'

@@ -31,7 +31,7 @@ from ssp.hand_made import (
     system,
 )
 from support.native_fmus import needs_gcc
-from support.stimuli import driven
+from support.native_systems import driven
 
 
 def round_trip(original, folder):

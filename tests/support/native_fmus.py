@@ -4,6 +4,7 @@ The equations are in MODEL.c; fmi.c makes an FMU of them, which refuses a call i
 The value reference of a variable is its place in the lists here, where it names no other one.
 """
 
+import json
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -55,6 +56,18 @@ UNITS = {
 
 CAPABLE = {"canHandleVariableCommunicationStepSize": "true"}
 EARLY = {**CAPABLE, "mightReturnEarlyFromDoStep": "true"}
+
+
+def starts(version):
+    """A value for each input of models/native.c, by name."""
+    own = {"Boolean": False, "String": "", "Enumeration": 1}
+    return {f"u_{t}": own.get(t, 0) for t in TYPES[version]}
+
+
+def starts_text(version, *but):
+    """The same as what is in an inline table of TOML, but for some inputs."""
+    given = {n: v for n, v in starts(version).items() if n not in but}
+    return ", ".join(f"{n} = {json.dumps(v)}" for n, v in given.items())
 
 
 class Variable(NamedTuple):

@@ -14,8 +14,8 @@ from grasp_cosim import InputError, sweep
 from grasp_cosim.metrics.metric import load_metrics
 from grasp_cosim.sweeps.rows import grid
 from grasp_cosim.sweeps.sweep import Task, cluster, packed, run_packed, run_row
-from support.integrator import integrator, write_integrator
 from support.native_fmus import needs_gcc
+from support.native_systems import integrator, write_integrator
 from support.processes import ends
 
 pytestmark = needs_gcc

@@ -7,7 +7,7 @@ import pytest
 from grasp_cosim import InputError, System, grasp_system, simulate
 from grasp_cosim.grasp.controllers import with_controller
 from support.marks import needs_compiler
-from support.oscillator import write_oscillator
+from support.native_systems import write_oscillator
 
 pytestmark = needs_compiler
 

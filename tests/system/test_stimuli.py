@@ -12,7 +12,7 @@ from grasp_cosim.system.stimuli_checks import samples_of
 from hypothesis import given
 from hypothesis import strategies as st
 from support.native_fmus import needs_gcc
-from support.stimuli import driven
+from support.native_systems import driven
 
 FORCE = Port("a", "u_Real")
 INPUT = '[input]\nfile = "drive.csv"\n'

@@ -1,4 +1,4 @@
-"""The C slave behind both versions of FMI, with a block written by hand: what it refuses, and why.
+"""The C slave behind both versions of FMI, with a small block: what it refuses, and why.
 
 Texts are those of FMI 2.0; support.fmi3 puts those of FMI 3.0 so, and is a host for it.
 """
@@ -11,6 +11,7 @@ from math import inf, nan
 from typing import Any
 
 import pytest
+from fmus.native.mass import GUID, native_fmu
 from grasp_fmus.native.sources import C
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -26,7 +27,6 @@ from support.fmi2 import (
     Instance,
     _Callbacks,
 )  # fmt: skip
-from support.hand_written import GUID, native_fmu
 from support.marks import examples, slow
 from support.native_fmus import needs_gcc
 

@@ -5,11 +5,12 @@ import re
 import shutil
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from fmus.native.mass import GUID, NAME, compile_in, write_sources
 from support.compiled import compile_c
-from support.hand_written import GUID, NAME, compile_in, write_sources
 from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
 
@@ -121,3 +122,34 @@ def test_a_processor_that_drops_small_numbers_makes_no_instance(tmp_path):
     command = ["gcc", "-Ofast", "-Wl,--no-as-needed", *plain, "-o", "over.so"]
     subprocess.run(command, cwd=tmp_path / "c", check=True, capture_output=True)
     assert SMALL in str(said_of(tmp_path / "c" / "over.so"))
+
+
+FOLDER = Path(__file__).parents[3] / "fmus/grasp_fmus/native/c"
+HEADERS = {file.name: file.read_text("utf-8") for file in FOLDER.glob("*.h")}
+INCLUDES = {
+    name: [other for other in re.findall(r'#include "(.+)"', text) if other in HEADERS]
+    for name, text in HEADERS.items()
+}
+COMPILER = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wno-unused-function")
+
+
+def lacks(name):
+    """Whether a header, or one of those that it includes, says what must stand before it."""
+    says = re.search(r"\bincluded\b", HEADERS[name].partition("*/")[0])
+    return bool(says) or any(map(lacks, INCLUDES[name]))
+
+
+def test_no_headers_include_each_other_in_a_circle():
+    assert "slave.h" in INCLUDES["block_slave.h"]
+    TopologicalSorter(INCLUDES).prepare()  # CycleError where there is one
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", sorted(HEADERS))
+def test_a_header_compiles_by_itself_or_says_what_it_lacks(name):
+    options = ["-D_POSIX_C_SOURCE=200809L", f"-I{FOLDER / 'headers'}", "-fsyntax-only"]
+    source = f'#include "{FOLDER / name}"\n'
+    done = subprocess.run(
+        [*COMPILER, *options, "-x", "c", "-"], input=source, text=True, stderr=subprocess.PIPE
+    )
+    assert (done.stderr != "") == lacks(name), done.stderr

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from grasp_fmus.native.targets import Target, here
 from support.c_host import BENCH, Grasp, Host, Script, bits, good, rows_in_python
-from support.hosts import Parts
-from support.platforms import ARM, WIN, X86, Platform, cases
+from support.platforms import ARM, WIN, X86, Parts, Platform, cases
 
 pytestmark = pytest.mark.platforms
 

@@ -3,22 +3,22 @@
 Each file to compile is compiled alone, with nothing but its own folder, and linked with others.
 """
 
+import ctypes
 import re
 import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from c_compilers import LIBM
-from support.c_host import HEADERS, number, rows_in_python
-from support.hosts import Parts
+from support.c_host import COMPONENTS, CONNECTIONS, rows_in_python
+from support.fmi2 import OK, Instance
 from support.kinds import TRANSLATED
-from support.platforms import MINGW
+from support.platforms import MINGW, Parts
 
-LINKED = Path(__file__).with_name("linked.c")
-ROLES = {"PLANT": "GripperPlant", "SENSOR": "ProximitySensor", "CONTROLLER": "GraspController"}
 PLAIN = ["gcc", "-std=c99", "-O1", "-ffp-contract=off"]
 
 PartsOf = Callable[[int], Parts]
@@ -50,34 +50,57 @@ every = pytest.mark.parametrize(
 # Linked into one program
 
 
-def program(parts, folder, prefixes, defined):
-    """All three and a host in one program; each compiled alone, first in folders of the others."""
-    objects = []
-    names = []
-    for role, name in ROLES.items():
-        fmu = parts[name].fmu
-        found = folder / f"{role}.o"
-        others = [f"-I{sources(parts[other].fmu)}" for other in ROLES.values() if other != name]
-        command = [*PLAIN, *others, *defined.get(role, []), "-c", str(sources(fmu) / f"{name}.c")]
-        subprocess.run([*command, "-o", str(found)], cwd=folder, check=True)
-        objects.append(found)
-        names += [f"-D{role}={prefixes[role]}fmi2", f'-D{role}_TOKEN="{fmu.token}"']
-    files = [str(LINKED), *map(str, objects), "-lm", "-o", str(folder / "linked")]
-    strict = ["-Wall", "-Wextra", "-Werror", f"-I{HEADERS}"]
-    subprocess.run([*PLAIN, *strict, *names, *files], check=True)
-    return folder / "linked"
+class Prefixed:
+    """Those functions of a library whose names begin with a prefix, without it."""
+
+    def __init__(self, library, prefix):
+        self._library, self._prefix = library, prefix
+        self.fmi2Instantiate.restype = ctypes.c_void_p
+
+    def __getattr__(self, name):
+        return getattr(self._library, self._prefix + name)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("given", [False, True])
 def test_three_fmus_in_one_program_are_the_grasp(given, parts_of, tmp_path):
-    own = {role: f"{name}_" for role, name in ROLES.items()}
-    mine = {role: f"rt_{role.lower()}_" for role in ROLES}
-    defined = {role: [f"-DFMI2_FUNCTION_PREFIX={prefix}"] for role, prefix in mine.items()}
-    made = program(parts_of(2), tmp_path, mine if given else own, defined if given else {})
-    done = subprocess.run([made], capture_output=True, text=True, check=True)
-    found = np.array([[number(word) for word in line.split()] for line in done.stdout.splitlines()])
-    assert np.array_equal(found, rows_in_python({}, 500, 1e-3)[:, :2])
+    """Each compiled alone, first in folders of the others, and linked with no name left open."""
+    fmus = {name: part.fmu for name, part in parts_of(2).items() if name in COMPONENTS.values()}
+    objects, grasp = [], {}
+    for name, fmu in fmus.items():
+        others = [f"-I{sources(fmus[other])}" for other in fmus if other != name]
+        own = [f"-DFMI2_FUNCTION_PREFIX=rt_{name}_"] if given else []
+        objects.append(tmp_path / f"{name}.o")
+        command = [*PLAIN, "-fPIC", *others, *own, "-c", sources(fmu) / f"{name}.c"]
+        subprocess.run([*command, "-o", objects[-1]], check=True)
+    whole = tmp_path / "whole.so"
+    command = ["gcc", "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", whole]
+    subprocess.run(command, check=True)
+    for component, name in COMPONENTS.items():
+        library = Prefixed(ctypes.CDLL(str(whole)), f"rt_{name}_" if given else f"{name}_")
+        fmu = fmus[name]
+        references = {n: fmu.reference(n) for n in fmu.kinds}
+        grasp[component] = Instance(SimpleNamespace(
+            python=False, folder=fmu.folder, fmi=2, guid=fmu.token, library=library,
+            references=references,
+        ))  # fmt: skip
+        assert (grasp[component].setup(), grasp[component].enter()) == (OK, OK)
+
+    def feed(component):
+        for source, output, target, name in CONNECTIONS:
+            if target == component:
+                assert grasp[component].set({name: grasp[source].get(output)[0]}) == OK
+
+    for component in ("sensor_1", "sensor_2", "controller"):
+        feed(component)
+    assert [part.exit() for part in grasp.values()] == [OK] * 4
+    rows = [grasp["plant"].get("position[1]", "position[2]")]
+    for k in range(200):
+        for component, part in grasp.items():
+            feed(component)
+            assert part.step(k * 1e-3, 1e-3) == OK
+        rows.append(grasp["plant"].get("position[1]", "position[2]"))
+    assert np.array_equal(rows, rows_in_python({}, 200, 1e-3)[:, :2])
 
 
 @pytest.mark.slow
