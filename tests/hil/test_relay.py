@@ -4,8 +4,6 @@ import json
 import re
 import signal
 import socket
-import subprocess
-import sys
 import threading
 from csv import DictReader
 from dataclasses import asdict
@@ -159,6 +157,43 @@ def test_the_command_relays_until_it_is_interrupted(capsys, monkeypatch):
     assert note == f"listening beyond this machine: whoever reaches {where} reaches 127.0.0.1:5501"
 
 
+def test_its_log_is_that_of_the_fates_and_its_counters_are_those_of_the_log(
+    tmp_path, capsys, monkeypatch
+):
+    """With each option; two requests do not get through as there is an outage."""
+    path = tmp_path / "log.csv"
+
+    def run(relay):
+        for number in range(40):
+            for direction in DIRECTIONS:
+                relay._traffic.receive(direction, lambda: True, number)
+        relay._traffic.send_due(10**9)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Relay, "run", run)
+    chances = "--loss 0.3 --delay 0.001:0.003 --duplicate 0.3 --reorder 0.2 --seed 7 --outage 3:5"
+    assert command("0", "5501", *chances.split(), "--log", str(path), "--json") == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report.pop("listening").startswith("127.0.0.1:")
+    assert [report.pop(k) for k in ("to", "seed")] == ["127.0.0.1:5501", 7]
+    both = Conditions(0.001, 0.002, loss=0.3, duplicate=0.3, reorder=0.2)
+    net = Network(dict.fromkeys(DIRECTIONS, both), seed=7)
+    with path.open(newline="") as file:
+        rows = list(DictReader(file))
+    assert [*report] == [*DIRECTIONS]
+    for direction, counts in report.items():
+        of = [row for row in rows if row["direction"] == direction]
+        expected = []
+        for n in range(1, 41):
+            fate = () if n in (3, 4) else net.fate(direction, n)
+            expected += [str(p.delay_ns / 1e9) for p in fate] or [""]
+        assert [row["delay"] for row in of] == expected
+        assert (counts["received"], counts["outage"], counts["held"]) == (40, 2, 0)
+        assert counts["lost"] == counts["dropped"] - 2 == sum(row["fate"] == "lost" for row in of)
+        assert counts["duplicated"] == sum(row["copy"] == "1" for row in of)
+        assert counts["delivered"] == sum(row["delay"] != "" for row in of)
+
+
 DELAY = "must be S or FROM:TO, in s, the longer last"
 
 
@@ -189,50 +224,3 @@ def test_wrong_input_is_one_line(tmp_path, arguments, said, capsys):
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert err.startswith(f"grasp-cosim: {said.format(missing)}")
-
-
-@pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_ends_it_with_counters_and_log(tmp_path):
-    """As a process of its own: the log is that of the fates, the counters are those of the log."""
-    path = tmp_path / "log.csv"
-    chances = "--loss 0.3 --delay 0:0.002 --duplicate 0.3 --reorder 0.2 --seed 7 --json --log"
-    conditions = Conditions(jitter=0.002, loss=0.3, duplicate=0.3, reorder=0.2)
-    net = Network(dict.fromkeys(DIRECTIONS, conditions), seed=7)
-    with EchoPeer() as peer, client() as mine:
-        to = f"127.0.0.1:{peer.address[1]}"
-        process = subprocess.Popen(
-            [sys.executable, "-m", "grasp_cosim", "relay", "0", to, *chances.split(), str(path)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        try:
-            port = int(re.match(r"relaying .*:(\d+) ->", process.stderr.readline())[1])
-            for number in range(1, 41):
-                mine.sendto(b"%d" % number, ("127.0.0.1", port))
-            expected = sum(len(net.fate("request", n)) for n in range(1, 41))
-            wait_until(lambda: len(peer.received) == expected)
-            for _ in range(sum(len(net.fate("reply", n)) for n in range(1, expected + 1))):
-                mine.recv(100)
-            process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=60)
-        finally:
-            process.kill()
-            process.wait()
-    assert (process.returncode, err) == (0, "")
-    report = json.loads(out)
-    assert [report.pop(k) for k in ("listening", "to", "seed")] == [f"127.0.0.1:{port}", to, 7]
-    with path.open(newline="") as file:
-        rows = list(DictReader(file))
-    for direction, received in zip(DIRECTIONS, (40, expected), strict=True):
-        of = [row for row in rows if row["direction"] == direction]
-        assert [row["delay"] for row in of] == [
-            delay
-            for n in range(1, received + 1)
-            for delay in ([str(p.delay_ns / 1e9) for p in net.fate(direction, n)] or [""])
-        ]
-        counts = report.pop(direction)
-        assert counts["received"] == received
-        assert counts["lost"] == counts["dropped"] == sum(row["fate"] == "lost" for row in of)
-        assert counts["duplicated"] == sum(row["copy"] == "1" for row in of)
-        assert counts["delivered"] == sum(row["delay"] != "" for row in of)
-        assert counts["held"] == 0
-    assert not report

@@ -99,11 +99,30 @@ def test_no_garbage_is_collected_on_the_way(collecting):
         with privileges(Realtime()) as found:
             assert not gc.isenabled()
             assert gc.get_freeze_count() > 0
-        assert gc.isenabled() == collecting
-        assert gc.get_freeze_count() == 0
+        assert (gc.isenabled(), gc.get_freeze_count()) == (collecting, 0)
         assert (found.granted, found.refused) == ([], [])
     finally:
         (gc.enable if before else gc.disable)()
+
+
+@pytest.mark.parametrize(
+    ("runtime", "sleeps", "said"),
+    [("950000", False, 1), ("950000", True, 0), ("-1", False, 0), (None, False, 0)],
+)
+def test_a_priority_that_the_kernel_breaks_off_is_said(
+    monkeypatch, tmp_path, runtime, sleeps, said
+):
+    """Where there is no time to sleep, and Linux limits such threads to a share of the time."""
+    monkeypatch.setattr("grasp_cosim.realtime.pacer.THROTTLE", tmp_path)
+    System(monkeypatch)
+    if runtime:
+        (tmp_path / "sched_rt_runtime_us").write_text(runtime)
+        (tmp_path / "sched_rt_period_us").write_text("1000000")
+    with privileges(Realtime(priority=20), sleeps) as found:
+        pass
+    line = "SCHED_FIFO all the time: the period leaves no time to sleep, and the kernel stops such "
+    more = "a thread for 50 ms in every 1000 ms; "
+    assert [text.startswith(line + more) for text in found.refused] == [True] * said
 
 
 @linux

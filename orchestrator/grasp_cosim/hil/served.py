@@ -39,20 +39,10 @@ class Service:
     key: bytes | None = None
 
 
-@dataclass(slots=True)
-class Counts:
-    """The number of events that the peer of the protocol does not count.
-
-    `own_steps`: steps by the own clock; `skipped`: those that it left out, being too late;
-    `watchdog`: how often the inputs were put to their failsafe values.
-    """
-
-    sessions: int = 0
-    own_steps: int = 0
-    skipped: int = 0
-    watchdog: int = 0
-    failures: int = 0
-
+COUNTS = ("sessions", "own_steps", "skipped", "watchdog", "failures")
+"""The events that the peer of the protocol does not count: steps by the own clock, those that it
+left out, being too late, how often the inputs were put to their failsafe values, and what failed.
+"""
 
 DROPPED = {
     "forged": "without the right key was dropped",
@@ -76,7 +66,7 @@ class ServedFmu:
         InputError where the FMU cannot be served so, SimulationError where it cannot be set up.
         """
         signature, self.notes = link_signature(interface)
-        self.counts = Counts()
+        self._counts = dict.fromkeys(COUNTS, 0)
         self._service, self._say = service, say
         try:
             self.peer = Peer(signature, service.key)
@@ -98,7 +88,7 @@ class ServedFmu:
 
     def counters(self) -> dict[str, int]:
         """The numbers of what was done and of what was received, by name."""
-        return {**asdict(self.counts), **asdict(self.peer.counters)}
+        return {**self._counts, **asdict(self.peer.counters)}
 
     def due(self) -> int | None:
         """Return when `look` has something to do next; None: not before the next datagram."""
@@ -111,7 +101,7 @@ class ServedFmu:
         if not isinstance(action, Request):
             self._say_what_is_dropped(source)
             if self._in_session and not self.peer.in_session:
-                self.counts.failures += 1
+                self._counts["failures"] += 1
                 self._end(TOO_LONG)
             return action
         if action.kind == END:
@@ -125,7 +115,7 @@ class ServedFmu:
             self._do(action, now)
             return self.peer.outputs(self._fmu.outputs(), self._fmu.time)
         except (InputError, SimulationError, ValueError) as error:
-            self.counts.failures += 1
+            self._counts["failures"] += 1
             self._end(str(error))
             return self.peer.failed(str(error))
 
@@ -160,7 +150,7 @@ class ServedFmu:
         try:
             if self._heard is not None and now - self._heard >= self._service.watchdog_ns:
                 self._heard = None
-                self.counts.watchdog += 1
+                self._counts["watchdog"] += 1
                 silence = self._service.watchdog_ns / NANOSECONDS
                 self._say(f"no request for {silence:g} s: the inputs went to their failsafe values")
                 for i, value in self._failsafe.items():
@@ -168,11 +158,11 @@ class ServedFmu:
                 self._fmu.set(self._values)
             if self._deadline is not None and now >= self._deadline:
                 self._fmu.advance(self._fmu.time, self._step_ns / NANOSECONDS)
-                self.counts.own_steps += 1
+                self._counts["own_steps"] += 1
                 self._deadline += self._step_ns
                 if now - self._deadline > BACKLOG:
                     skipped = (now - self._deadline) // self._step_ns
-                    self.counts.skipped += skipped
+                    self._counts["skipped"] += skipped
                     self._deadline += skipped * self._step_ns
         except (InputError, SimulationError) as error:
             self._own_failure = str(error)
@@ -186,7 +176,7 @@ class ServedFmu:
         self._own_failure = ""
         self._fmu.close()
         if was_one:
-            self.counts.sessions += 1
+            self._counts["sessions"] += 1
             self._say(f"the session is over at t = {self._fmu.time:.9g} s: {reason}")
 
 
@@ -221,8 +211,7 @@ class Server(EventLoop):
 
     def serve(self, sessions: int | None = None) -> None:
         """Serve until `stop`, or so many sessions."""
-        counts = self.fmu.counts
-        self.run(lambda: sessions is not None and counts.sessions >= sessions)
+        self.run(lambda: sessions is not None and self.fmu.counters()["sessions"] >= sessions)
 
     def _receive(self) -> None:
         """Take one datagram: after it the clock is looked at again."""

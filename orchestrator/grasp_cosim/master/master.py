@@ -172,7 +172,7 @@ class Master:
             pass
         except OverrunError:
             assert self._pacer is not None  # noqa: S101 - who else has raised it
-            raise SimulationError(self._pacer.verdict()) from None
+            raise SimulationError(self._pacer.settled().verdict()) from None
         fresh = self._waiting()[max(first - self._handed_on, 0) :]
         wraps = len(self._waiting()) < self.steps_done - self._handed_on
         if self._enough() or wraps or not np.isfinite(fresh).all():
@@ -194,7 +194,7 @@ class Master:
             if self._pacer is None:
                 self._receive(steps, rows)
             elif self._alone:
-                self._pacer.record_aside(steps, times)
+                self._pacer.meter.add(steps - 1, times)
                 self._receive(steps, rows)
             else:
                 self._pacer.record(steps, times, partial(self._receive, steps, rows))

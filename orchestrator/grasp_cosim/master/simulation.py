@@ -272,6 +272,7 @@ class Session:
 
     def _result(self) -> Result:
         master, signals, asked = self._master, self._dispatch.signals, self._privileges
+        pacer = self.pacer
         time, columns = self._memory.columns(self._dispatch.pending)
         return Result(
             self._dispatch.settings,
@@ -283,7 +284,7 @@ class Session:
             descriptions={s.name: s.description for s in signals},
             rejections=dict(master.rejections),
             log=self._log(),
-            timing=self.pacer.timing(asked.granted, asked.refused) if self.pacer else None,
+            timing=pacer.settled().timing(asked.granted, asked.refused) if pacer else None,
             more_metrics=self._metrics,
             to_si=self._in_si.conversions,
             known=self._known(),
@@ -442,7 +443,7 @@ def _drive(session: Session, progress: bool | str) -> None:
 
         def show() -> None:
             if session.pacer and not bar.disable:
-                bar.set_postfix_str(session.pacer.live(), refresh=False)
+                bar.set_postfix_str(session.pacer.meter.live(), refresh=False)
             bar.update(session.time - begin - bar.n)
 
         steps, start = session.shown_by(show), time.perf_counter()
@@ -452,4 +453,4 @@ def _drive(session: Session, progress: bool | str) -> None:
             steps = max(1, min(GROWTH * steps, int(steps * LOOK / (now - start))))
             start = now
         if session.pacer:
-            bar.set_postfix_str(session.pacer.live(settled=True), refresh=False)
+            bar.set_postfix_str(session.pacer.settled().live(), refresh=False)

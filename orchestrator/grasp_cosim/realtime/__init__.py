@@ -1,4 +1,1 @@
-"""Runs paced by the clock.
-
-Waiting for the next step, what the operating system grants, and the statistics of the times.
-"""
+"""Runs paced by the clock: waiting for each step, and the statistics of the times."""

@@ -9,7 +9,7 @@ import gc
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -24,7 +24,7 @@ from ..base.errors import InputError, choices
 from ..base.system_calls import NotPossible, cpus, lock_memory, pin, put_first
 from ..system.description import System
 from ..system.parts import Realtime
-from .timing import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table, Timing
+from .timing import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
 
 SPIN_NS = 200_000
 """Before the deadline the pacer does not sleep any more: it may be woken too late."""
@@ -206,30 +206,15 @@ class Pacer:
             self._recording = self._now() - start
             self.meter.recorded(self._taken - 1, self._recording)
 
-    def record_aside(self, steps: Steps, rows: Table) -> None:
-        """Take steps as record() does, from another thread than that of the steps."""
-        self.meter.add(steps - 1, rows)
+    def settled(self) -> Meter:
+        """Return the meter with the end of the last step, once the steps until then are recorded.
 
-    def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
-        """Return the timing so far: see Meter.timing()."""
-        self._settle()
-        return self.meter.timing(granted, refused)
-
-    def live(self, settled: bool = False) -> str:
-        """Return the state of the run in a few words, `settled` with the end of its last step."""
-        if settled:
-            self._settle()
-        return self.meter.live()
-
-    def verdict(self) -> str:
-        """Return the cause of an OverrunError, once the steps until then are recorded."""
-        self._settle()
-        return self.meter.verdict()
-
-    def _settle(self) -> None:
+        After an OverrunError it tells the cause.
+        """
         if self._end is not None:
             self.meter.end(*self._end)
             self._end = None
+        return self.meter
 
     def _use_the_wait(self, step: int) -> None:
         """Do what has to be done some time, where it is not likely to make the step late.

@@ -120,8 +120,7 @@ def read_csv(
     count = path.read_bytes().count(b"\n") - 1 if torn else None
     try:
         if texts is None:
-            first = zip(names, next(_rows(path), [])[1:], strict=False)
-            texts = {name for name, cell in first if not _is_number(cell)}
+            texts = _not_numbers(names, next(_rows(path), [])[1:])
         columns = _texts(path, names, texts, count) if texts else {}
         places = [0, *(i for i, name in enumerate(names, 1) if name not in columns)]
         table = [] if columns or torn else _fast(path, len(places))
@@ -187,12 +186,13 @@ def _rows(path: Path) -> Iterator[list[str]]:
         yield from rows
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        real(cell)
-    except ValueError:
-        return False
-    return True
+def _not_numbers(names: Sequence[str], cells: Sequence[str]) -> set[str]:
+    texts = {*names}
+    for name, cell in zip(names, cells, strict=False):
+        with suppress(ValueError):
+            real(cell)
+            texts.remove(name)
+    return texts
 
 
 def _names(path: Path, torn: bool) -> list[str]:

@@ -56,16 +56,15 @@ class RunFolder:
         system: System,
         command: Sequence[str] = (),
         paced: bool = False,
-        title: str = "",
         form: Form = "csv",
     ) -> None:
         """`command` led to the run; if it is `paced`, rows are written in spare() time only.
 
-        `title` is what its pictures and pages are called, by default what it is. `form` is that of
-        the rows, signals.csv or signals.arrow. InputError without pyarrow, where that needs it.
+        `form` is that of the rows, signals.csv or signals.arrow. InputError without pyarrow, where
+        that needs it.
         """
         self._folder, self._paced = folder, paced
-        self._origin = {**origin(system, command), **({"title": title} if title else {})}
+        self._origin = origin(system, command)
         self._to_si = in_si(system, ()).conversions
         self._file: CsvListener | ArrowListener
         if form == "arrow":

@@ -88,16 +88,23 @@ class MdfListener:
             with closing(self._mdf):
                 self._flush()
                 if self._mdf.groups[0].channel_group.cycles_nr:
-                    self._mdf.header.comment = _comment(self._experiment, complete)
-                    self._convert_texts()
+                    self._describe(complete)
                     with in_one_piece(self._path) as part, part.open("wb+") as file:
                         self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
         except OSError as error:  # also of close(), which writes what is still in a buffer
             raise SimulationError(unwritable(self._said, error)) from error
 
-    def _convert_texts(self) -> None:
+    def _describe(self, complete: bool) -> None:
+        """Write the header's comment, in the XML that MDF 4 asks for, and the texts of Strings."""
         from asammdf.blocks.conversion_utils import from_dict
 
+        root, settings = ElementTree.Element("HDcomment"), self._experiment.settings
+        ElementTree.SubElement(root, "TX").text = json.dumps(settings)
+        properties = ElementTree.SubElement(root, "common_properties")
+        for name, value in {**settings, "complete": complete}.items():
+            if not isinstance(value, dict | list):
+                ElementTree.SubElement(properties, "e", name=name).text = json.dumps(value)
+        self._mdf.header.comment = ElementTree.tostring(root, encoding="unicode")
         channels: Any = self._mdf.groups[0].channels[1:]  # the first is time
         for channel, signal in zip(channels, self._signals, strict=True):
             if signal.kind == "String":
@@ -117,17 +124,6 @@ class MdfListener:
             self._mdf.extend(0, [(c, None) for c in (self._experiment.times(steps), *own)])
         except OSError as error:
             raise SimulationError(unwritable(self._said, error)) from error
-
-
-def _comment(experiment: Experiment, complete: bool) -> str:
-    """The header's comment, in the XML that MDF 4 asks for."""
-    root = ElementTree.Element("HDcomment")
-    ElementTree.SubElement(root, "TX").text = json.dumps(experiment.settings)
-    properties = ElementTree.SubElement(root, "common_properties")
-    for name, value in {**experiment.settings, "complete": complete}.items():
-        if not isinstance(value, dict | list):
-            ElementTree.SubElement(properties, "e", name=name).text = json.dumps(value)
-    return ElementTree.tostring(root, encoding="unicode")
 
 
 def read_mdf(

@@ -29,8 +29,8 @@ FLOAT = np.dtype(np.float64).itemsize
 class MemoryListener:
     """Copies the rows into one table, which has room for the whole run from the start.
 
-    every is the decimation of the run, from 1 on; paced says that it is to be in real time. The
-    table takes up memory only as far as it is filled.
+    every is the decimation of the run, from 1 on; paced says that it is to be in real time. Only
+    what is filled of the table takes up memory.
     """
 
     def __init__(self, every: int = 1, paced: bool = False) -> None:

@@ -9,17 +9,14 @@ import numpy.typing as npt
 Signals = Mapping[str, npt.NDArray[Any]]
 Times = npt.NDArray[np.float64]
 
-_STATE = ".proxy.state"
-_LOST = 3
+STATE = ".proxy.state"
+LOST = 3
 """The value of proxy.state while the peer is lost."""
 
-_COUNTS = ("missed", "late", "out_of_order", "duplicated", "rejected", "sessions")
+COUNTS = ("missed", "late", "out_of_order", "duplicated", "rejected", "sessions")
 
-_LISTED = 5
-"""The most losses that are named."""
-
-_AHEAD = 10
-"""Steps that a peer's clock may be ahead of the run without a word."""
+LISTED, AHEAD = 5, 10
+"""The most losses that are named; steps that a peer's clock may be ahead without a word."""
 
 
 def of_proxies(names: Iterable[object]) -> frozenset[str]:
@@ -33,7 +30,7 @@ def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:
     lost and back are the communication points at which the peer was lost, and answered again;
     ahead is how far its outputs were from the future at most.
     """
-    names = [name.removesuffix(_STATE) for name in signals if name.endswith(_STATE)]
+    names = [name.removesuffix(STATE) for name in signals if name.endswith(STATE)]
     return {name: _figures(time, signals, f"{name}.proxy.") for name in names if len(time)}
 
 
@@ -48,10 +45,10 @@ def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
 
 def _figures(time: Times, signals: Signals, start: str) -> dict[str, Any]:
     own = {key.removeprefix(start): v for key, v in signals.items() if key.startswith(start)}
-    lost = own["state"] == _LOST
+    lost = own["state"] == LOST
     turns = np.diff(lost.astype(np.int8), prepend=0)
     return {
-        **{name: int(own[name][-1]) for name in _COUNTS},
+        **{name: int(own[name][-1]) for name in COUNTS},
         "most_in_a_row": int(own["consecutive_missed"].max()),
         "round_trip_median": float(np.median(own["round_trip_time"])),
         "round_trip_worst": float(own["round_trip_time"].max()),
@@ -62,7 +59,7 @@ def _figures(time: Times, signals: Signals, start: str) -> dict[str, Any]:
 
 
 def _lines(f: Mapping[str, Any], steps: int, step: float) -> Iterator[str]:
-    for moment in f["lost"][:_LISTED]:
+    for moment in f["lost"][:LISTED]:
         back = next((t for t in f["back"] if t > moment), None)
         again = f"came back at t = {back:.9g} s" if back else "did not come back"
         yield (
@@ -74,7 +71,7 @@ def _lines(f: Mapping[str, Any], steps: int, step: float) -> Iterator[str]:
             f"the peer was started anew, and its model set up from the start: {f['sessions']} "
             "sessions in this run"
         )
-    if f["ahead"] > _AHEAD * step:
+    if f["ahead"] > AHEAD * step:
         yield (
             f"the peer's clock was up to {f['ahead']:.3g} s ahead of the run, which did not keep up"
         )

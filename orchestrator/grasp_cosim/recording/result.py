@@ -280,8 +280,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         With a `path` it is written there too, as its suffix says: .png, .svg or .pdf. InputError
         where that is another one, or without matplotlib.
         """
-        run = self.titled(title)
-        figure: Figure = self.view.draw(run, None if path is None else Path(path))
+        where = None if path is None else Path(path)
+        figure: Figure = self.view.draw(self.titled(title), where)
         return figure
 
     def titled(self, title: str) -> Result:
