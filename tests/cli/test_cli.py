@@ -131,7 +131,7 @@ def test_debug_shows_the_traceback(command, line):
 
 
 def test_a_bug_is_one_line_and_exit_3(command, monkeypatch):
-    monkeypatch.setattr("grasp_cosim.cli.commands.run.simulate", lambda *_, **__: math.sqrt(-1.0))
+    monkeypatch.setattr("grasp_cosim.cli.run.simulate", lambda *_, **__: math.sqrt(-1.0))
     code, out, err = command("run")
     assert (code, out) == (3, "")
     assert err.startswith("grasp-cosim: ValueError: ")

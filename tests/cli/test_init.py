@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from comparison.made import write_fmu
 from grasp_cosim import System
-from grasp_cosim.cli.commands.init import shown
+from grasp_cosim.cli.systems import shown
 from grasp_cosim.grasp.presets import SYSTEM
 from support.native_fmus import build_model, needs_gcc
 

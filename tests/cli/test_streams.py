@@ -50,7 +50,7 @@ def test_standard_error_that_cannot_be_written(where):
 def test_what_a_binary_has_printed_is_not_lost_at_the_end():
     code = """
 import ctypes
-from grasp_cosim.cli.streams import keep_output_for_us, leave
+from grasp_cosim.cli.entry import keep_output_for_us, leave
 keep_output_for_us()
 ctypes.CDLL(None).printf(b"kept in the buffer of C")
 print("ours", flush=True)

@@ -1,6 +1,6 @@
 """The command line, grasp-cosim.
 
-group.py finds the commands, each a file in commands/; frame.py and options.py is what they share.
+group.py says which module has a command; frame.py and options.py are what they share.
 """
 
 from .entry import entry, main

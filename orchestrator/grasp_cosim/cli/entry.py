@@ -1,21 +1,28 @@
-"""From a command line to an exit code."""
+"""From a command line to an exit code.
 
+What is printed is harmless to a terminal, and an output that fails is an error of one line.
+"""
+
+import atexit
 import ctypes
 import faulthandler
 import os
 import signal
 import sys
-from typing import NoReturn
+from codecs import lookup
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from typing import Any, NoReturn
 
 import click
 
 from ..base import interruption
 from ..base.errors import InputError, SimulationError
 from ..base.files import FULL
-from ..base.system_calls import when_c_exits
+from ..base.system_calls import flush_c, when_c_exits
+from ..base.text import printable
 from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
-from .streams import OutputError, harmless_streams, keep_output_for_us, leave
 
 NAME = "grasp-cosim"
 COMPLETE = "_GRASP_COSIM_COMPLETE"
@@ -52,31 +59,28 @@ def main(arguments: list[str]) -> int:
 
     An error is one line on standard error, without a traceback unless --debug is given.
     """
+    debug = "--debug" in arguments
     with harmless_streams():
-        return _main(arguments, "--debug" in arguments)
-
-
-def _main(arguments: list[str], debug: bool) -> int:
-    try:
-        return int(cli.main(arguments, NAME, standalone_mode=False, obj=arguments) or 0)
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.ctx.get_help(), err=True)
-        return WRONG
-    except click.ClickException as error:
-        return fail(error.format_message(), WRONG)
-    except InputError as error:
-        return fail(str(error), WRONG, debug)
-    except OSError as error:
-        text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        return fail(text, FAILED if error.errno in FULL else WRONG, debug)
-    except (SimulationError, OutputError) as error:
-        return fail(str(error), FAILED, debug)
-    except (KeyboardInterrupt, click.Abort):
-        return fail("interrupted", INTERRUPTED)
-    except (Exception, SystemExit) as error:  # which a Python FMU may raise
-        if interruption.came():  # and a module that was being imported made this error of it
+        try:
+            return int(cli.main(arguments, NAME, standalone_mode=False, obj=arguments) or 0)
+        except click.exceptions.NoArgsIsHelpError as error:
+            click.echo(error.ctx.get_help(), err=True)
+            return WRONG
+        except click.ClickException as error:
+            return fail(error.format_message(), WRONG)
+        except InputError as error:
+            return fail(str(error), WRONG, debug)
+        except OSError as error:
+            text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+            return fail(text, FAILED if error.errno in FULL else WRONG, debug)
+        except (SimulationError, OutputError) as error:
+            return fail(str(error), FAILED, debug)
+        except (KeyboardInterrupt, click.Abort):
             return fail("interrupted", INTERRUPTED)
-        return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
+        except (Exception, SystemExit) as error:  # which a Python FMU may raise
+            if interruption.came():  # and a module that was being imported made this error of it
+                return fail("interrupted", INTERRUPTED)
+            return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
 
 
 def _exited(_: object) -> None:
@@ -88,3 +92,98 @@ def _exited(_: object) -> None:
 
 _OWNER = os.getpid()
 _EXITED = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(_exited)
+
+
+# ------------------------------------------------------------------ standard output and error
+
+
+class OutputError(Exception):
+    """Standard output cannot be written. The message is one line."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(f"standard output: {error.strerror}")
+
+
+class _Harmless:
+    """A stream that writes text as printable() makes it."""
+
+    def __init__(self, stream: Any, failed: Callable[[OSError], object]) -> None:
+        self._stream = stream
+        self._failed = failed
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write the text. A carriage return at its beginning stays: so a progress bar begins."""
+        start = text[: text.startswith("\r")]
+        try:
+            self._stream.write(start + printable(text[len(start) :]))
+        except OSError as error:
+            self._failed(error)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what waits."""
+        try:
+            self._stream.flush()
+        except OSError as error:
+            self._failed(error)
+
+
+@contextmanager
+def harmless_streams() -> Iterator[None]:
+    """Whatever is printed goes through printable(); OutputError where it cannot be written."""
+    stderr: Any = sys.stderr
+
+    def failed(error: OSError) -> NoReturn:  # of an OSError click would make its own exit code
+        raise OutputError(error) from error
+
+    def nobody_to_tell(_: OSError) -> None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stderr.fileno())
+
+    out: Any = _Harmless(sys.stdout, failed)
+    err: Any = _Harmless(stderr, nobody_to_tell)
+    with redirect_stdout(out), redirect_stderr(err):
+        yield
+
+
+def keep_output_for_us() -> None:
+    """What the binary of an FMU prints goes to standard error: with --json, we alone may print.
+
+    In the place of a standard file that is closed comes one that cannot be written. Else the next
+    file that is opened would get its number, and what an FMU prints.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDONLY)
+    ours = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = _opened(ours, sys.stdout)
+    sys.stderr = _opened(os.dup(2), sys.stderr)
+
+
+def leave(code: int) -> NoReturn:
+    """End the process as sys.exit() does, and what FMUs have printed is not lost.
+
+    But without the end of libraries, which may crash where an import was interrupted.
+    """
+    atexit._run_exitfuncs()
+    with suppress(OSError):
+        sys.stderr.flush()
+    flush_c()
+    os._exit(code)
+
+
+def _opened(descriptor: int, like: Any) -> Any:
+    """A text stream with the encoding of another, which is None where that was closed.
+
+    In place of ASCII it is UTF-8, as click has it, too.
+    """
+    plain = like is None or lookup(like.encoding).name == "ascii"
+    encoding = "utf-8" if plain else like.encoding
+    errors = "backslashreplace" if plain else like.errors
+    line = like is not None and like.line_buffering
+    return os.fdopen(descriptor, "w", 1 if line else -1, encoding=encoding, errors=errors)

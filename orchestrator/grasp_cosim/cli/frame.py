@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import logging
 import traceback
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +14,11 @@ import click
 
 from ..base.errors import InputError
 from ..base.files import check_folder
-from ..base.progress import Progress, phase, write
+from ..base.progress import Progress, write
 from ..base.text import on_one_line
 
 if TYPE_CHECKING:
     from ..metrics.metric import Metric
-    from ..system.description import System
-    from ..system.stimuli import Stimuli
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 """Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C, SIGTERM."""
@@ -29,22 +26,11 @@ NEGATIVE, WRONG, FAILED, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 LONGEST = 2000
 """Characters of a message; of a longer one, without --debug, the middle is left out."""
 
-Command = Callable[..., Any]
-
 PATH = click.Path(path_type=Path)
 """The type of an option or argument that is a path."""
 
 
-def together(*options: Command) -> Command:
-    """Several options as one decorator."""
-    return lambda command: reduce(lambda made, option: option(made), reversed(options), command)
-
-
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-
-title_option = click.option(
-    "--title", default="", help="Title of the page. Default: system, case and controller."
-)
 
 metrics_option = click.option(
     "--metrics",
@@ -53,48 +39,6 @@ metrics_option = click.option(
     type=PATH,
     help="Work out metrics of your own, from a Python file.",
 )
-
-
-def load_system(
-    path: Path | None = None,
-    step: float | None = None,
-    stop: float | None = None,
-    stimuli: Stimuli | None = None,
-) -> System:
-    """The system of a file, by default the built-in grasp; what its reader notes is printed.
-
-    stimuli go before those that it names.
-    """
-    from ..system.description import System
-
-    if path is None:
-        from ..grasp.system import as_named
-
-        with phase("reading the system"):
-            return as_named().with_input(stimuli)
-    with phase("reading the system"):
-        system = System.load(path, step=step, stop=stop, input=stimuli)
-    for note in system.notes:
-        say(note)
-    return system
-
-
-def with_preset(system: System, name: str) -> System:
-    """The system with a preset that its file names, or else with one of the built-in grasp."""
-    if name in system.presets:
-        return system.with_presets(name)
-    from ..grasp.presets import with_preset as with_built_in
-
-    return with_built_in(system, name)
-
-
-def with_controller(system: System, law: str | None, swapped: Collection[str] = ()) -> System:
-    """The system with one of the controllers that come with the package; None: as it is."""
-    if law is None:
-        return system
-    from ..grasp.controllers import with_controller as with_shipped
-
-    return with_shipped(system, law, swapped)
 
 
 def chosen_metrics(files: Sequence[Path]) -> tuple[Metric, ...]:
@@ -138,14 +82,14 @@ def waiting(what: str) -> Progress:
     return Progress(what, unit="", shown=not is_quiet())
 
 
+QUIET = "grasp_cosim.quiet"
+"""The entry for --quiet in what click keeps of a command line."""
+
+
 def is_quiet() -> bool:
     """True with --quiet."""
     context = click.get_current_context(silent=True)
     return bool(context and context.meta.get(QUIET))
-
-
-QUIET = "grasp_cosim.quiet"
-"""The entry for --quiet in what click keeps of a command line."""
 
 
 def _set_quiet(ctx: click.Context, _: click.Parameter, value: bool) -> None:

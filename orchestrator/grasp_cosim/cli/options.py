@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
+from pathlib import Path
 from typing import Any
 
 import click
 
 from ..base.errors import InputError
+from ..base.progress import phase
 from ..system.changes import plain
 from ..system.description import System
-from ..system.stimuli import read_stimuli
+from ..system.stimuli import Stimuli, read_stimuli
 from ..system.structure import SCHEMES
-from .frame import (
-    PATH,
-    Command,
-    load_system,
-    pair,
-    say,
-    together,
-    waiting,
-    with_controller,
-    with_preset,
-)
+from .frame import PATH, pair, say, waiting
+
+Command = Callable[..., Any]
 
 
 def native_option(default: str) -> Command:
@@ -86,7 +81,7 @@ scheme_option = click.option(
     help="Step the components one after the other (by default), or all at once.",
 )
 
-system_options = together(
+SYSTEM_OPTIONS = (
     controller_option,
     preset_option,
     click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
@@ -94,7 +89,12 @@ system_options = together(
     step_option,
     stop_option,
 )
-"""How the system of a command, in its `system`, is changed."""
+
+
+def system_options(command: Command) -> Command:
+    """How the system of a command, in its `system`, is changed."""
+    return reduce(lambda made, option: option(made), reversed(SYSTEM_OPTIONS), command)
+
 
 PLACES = {
     "step": "experiment.step",
@@ -113,22 +113,21 @@ class Settings(dict[str, Any]):
 
     def __init__(self, given: Mapping[str, Any]) -> None:
         self._options: dict[str, str] = {}
-        for option, place in PLACES.items():
-            if given.get(option) is not None:
-                self._add(f"--{option}", place, given[option])
+        said: list[tuple[str, str, Any]] = [
+            (f"--{o}", place, given.get(o)) for o, place in PLACES.items()
+        ]
         for text in given.get("swaps", ()):
             name, fmu = pair("--swap", text, "COMPONENT=FMU")
-            self._add(f"--swap {name}", f"components.{name}.fmu", fmu)
+            said.append((f"--swap {name}", f"components.{name}.fmu", fmu))
         for text in given.get("settings", ()):
             place, value = pair("--set", text, "PLACE=VALUE")
-            self._add(f"--set {place}", place, value)
-
-    def _add(self, option: str, place: str, value: Any) -> None:
-        if place in self:
-            raise InputError(
-                f"{option}: {place} is given by {self._options[place]}, too; must be given once"
-            )
-        self[place], self._options[place] = value, option
+            said.append((f"--set {place}", place, value))
+        for option, place, value in said:
+            if place in self:
+                other = self._options[place]
+                raise InputError(f"{option}: {place} is given by {other}, too; must be given once")
+            if value is not None:
+                self[place], self._options[place] = value, option
 
     def option(self, place: str) -> str:
         """The option that says a place, or the beginning of one, for messages."""
@@ -138,6 +137,27 @@ class Settings(dict[str, Any]):
 def set_values(settings: Sequence[str]) -> dict[str, Any]:
     """The values of --set by their places."""
     return dict(Settings({"settings": settings}))
+
+
+def load_system(
+    path: Path | None,
+    step: float | None = None,
+    stop: float | None = None,
+    stimuli: Stimuli | None = None,
+) -> System:
+    """The system of a file, by default the built-in grasp; what its reader notes is printed.
+
+    stimuli go before those that it names.
+    """
+    with phase("reading the system"):
+        if path is None:
+            from ..grasp.system import as_named
+
+            return as_named().with_input(stimuli)
+        system = System.load(path, step=step, stop=stop, input=stimuli)
+    for note in system.notes:
+        say(note)
+    return system
 
 
 def chosen_system(given: Mapping[str, Any]) -> System:
@@ -157,10 +177,19 @@ def chosen_system(given: Mapping[str, Any]) -> System:
                 raise InputError(f"--set {port}: does nothing, as {stimuli.file} drives it")
     loaded = load_system(given.get("system"), step, stop, stimuli)
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
-    system = with_controller(loaded, given.get("controller"), swapped)
+    system = loaded
+    if law := given.get("controller"):
+        from ..grasp.controllers import with_controller
+
+        system = with_controller(system, law, swapped)
     case = given.get("case")
     for name in [*given.get("presets", ()), *([] if case is None else [f"case_{case}"])]:
-        system = with_preset(system, name)
+        if name in system.presets:
+            system = system.with_presets(name)
+        else:
+            from ..grasp.presets import with_preset
+
+            system = with_preset(system, name)
     changed = system.with_settings(settings, settings.option)
     for note in changed.notes[len(loaded.notes) :]:
         say(note)

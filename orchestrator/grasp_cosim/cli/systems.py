@@ -1,4 +1,4 @@
-"""The command init."""
+"""The commands that write systems: init a file to start from, ssp an archive."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...base.errors import InputError
-from ...base.files import check_file, write_text
-from ...base.text import counted
-from ...inspection.draft import with_paths
-from ...interface.read import read_interface
-from ...system.description import System
-from ...system.toml import to_do
-from ..frame import PATH, json_option, pair, say, show
+from ..base.errors import InputError
+from ..base.files import check_file, write_text
+from ..base.text import counted
+from ..inspection.draft import with_paths
+from ..interface.read import read_interface
+from ..system.description import System
+from ..system.toml import to_do
+from .frame import PATH, json_option, pair, say, show
+from .options import chosen_system, set_option
 
 if TYPE_CHECKING:
-    from ...inspection.draft import Draft
+    from ..inspection.draft import Draft
 
 NAME = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -77,7 +78,7 @@ def init(
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
-        from ...inspection.draft import alone
+        from ..inspection.draft import alone
 
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
     elif hand:
@@ -152,9 +153,9 @@ def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
 
 def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, list[str]]:
     """The text of a hand, and what is to be said of it."""
-    from ...base.checks import real
-    from ...grasp.system import built
-    from ...hand.system import directions_of, faint, hand_text, sized
+    from ..base.checks import real
+    from ..grasp.system import built
+    from ..hand.system import directions_of, faint, hand_text, sized
 
     try:
         given = None if angles is None else [real(angle) for angle in angles.split(",")]
@@ -170,9 +171,9 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
 
 def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Draft]]:
     """The text of the built-in grasp, with foreign FMUs in the place of components."""
-    from ...grasp.presets import SYSTEM, built_in_presets
-    from ...grasp.system import built
-    from ...inspection.draft import replacing
+    from ..grasp.presets import SYSTEM, built_in_presets
+    from ..grasp.system import built
+    from ..inspection.draft import replacing
 
     fmus = built(folder)
     built_in = System.load(SYSTEM, fmus)
@@ -210,3 +211,36 @@ def _lines(file: Path, drafts: Mapping[str, Draft], left: Mapping[int, str]) -> 
     more = [f"and {counted(len(listed) - MOST, 'line')} more"] if len(listed) > MOST else []
     then = "when no TODO is left" if left else "then"
     return [*lines, *listed[:MOST], *more, f"{then}: grasp-cosim run {quote(str(file))}"]
+
+
+@click.command()
+@click.argument("system", required=False, type=PATH)
+@click.option("-o", "--out", type=PATH, required=True, help="Archive to write, an .ssp.")
+@set_option
+@json_option
+def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool) -> int:
+    """Write SYSTEM as an SSP 1.0 archive.
+
+    SYSTEM is a .toml or .ssp file, by default the built-in grasp. An .ssp without a step gets one
+    by --set experiment.step=1e-3.
+
+    \b
+    Example: grasp-cosim ssp my_system.toml -o my_system.ssp
+    """
+    from ..ssp.to_archive import write_ssp  # only here: its libraries take time to load
+
+    chosen = chosen_system({"system": system, "settings": settings})
+    check_file(out)
+    written = write_ssp(chosen, out)
+    report = {
+        "ssp": str(out),
+        "entries": list(written.entries),
+        "components": [c.name for c in chosen.components],
+        "connections": len(chosen.connections),
+        "notes": [*chosen.notes, *written.notes],
+    }
+    show(as_json, report, "\n    ".join((f"{out}: written", *written.entries)))
+    if not as_json:
+        for note in written.notes:
+            say(note)
+    return 0

@@ -6,15 +6,15 @@ from typing import Any
 
 import click
 
-from ...base.errors import InputError
-from ...interface.interface import Value
-from ...sweeps.pictures import draw_sweep
-from ...sweeps.rows import as_rows, grid, varied
-from ...sweeps.sweep import cluster, kept_runs
-from ...sweeps.sweep import sweep as run_sweep
-from ...sweeps.table import as_json as in_json
-from ...sweeps.table import as_text, check_format
-from ..frame import (
+from ..base.errors import InputError
+from ..interface.interface import Value
+from ..sweeps.pictures import draw_sweep
+from ..sweeps.rows import as_rows, grid, varied
+from ..sweeps.sweep import cluster, kept_runs
+from ..sweeps.sweep import sweep as run_sweep
+from ..sweeps.table import as_json as in_json
+from ..sweeps.table import as_text, check_format
+from .frame import (
     INTERRUPTED,
     NEGATIVE,
     PATH,
@@ -28,7 +28,7 @@ from ..frame import (
     show,
     waiting,
 )
-from ..options import (
+from .options import (
     Settings,
     chosen_system,
     many_runs_option,

@@ -6,14 +6,14 @@ from typing import Any
 
 import click
 
-from ...base.errors import InputError, SimulationError
-from ...master.simulation import simulate
-from ...recording.folder import FORMS, Form, RunFolder
-from ...recording.mdf import check_mdf
-from ...recording.result import Result
-from ...report import terminal
-from ...report.timing import draw_result
-from ..frame import (
+from ..base.errors import InputError, SimulationError
+from ..master.simulation import simulate
+from ..recording.folder import FORMS, Form, RunFolder
+from ..recording.mdf import check_mdf
+from ..recording.result import Result
+from ..report import terminal
+from ..report.timing import draw_result
+from .frame import (
     INTERRUPTED,
     NEGATIVE,
     PATH,
@@ -27,7 +27,7 @@ from ..frame import (
     show,
     waiting,
 )
-from ..options import (
+from .options import (
     chosen_system,
     input_option,
     native_option,

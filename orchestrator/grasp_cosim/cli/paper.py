@@ -1,0 +1,89 @@
+"""The commands that repeat the paper: evaluate its tables, identify its friction."""
+
+from pathlib import Path
+
+import click
+
+from ..base.files import check_folder, write_text
+from ..grasp.identification.identification import DEFAULT, GROUPS
+from ..grasp.identification.identification import identify as run_identification
+from ..grasp.published.evaluation import evaluate as run_evaluation
+from ..grasp.published.evaluation import verdict
+from ..grasp.system import grasp_system
+from .frame import NEGATIVE, PATH, is_quiet, json_option, show
+from .options import controller_option, many_runs_option, set_option, set_values
+
+
+@click.command()
+@click.option("--bench", is_flag=True, help="Take the experiments, with friction and electronics.")
+@controller_option
+@click.option(
+    "-o",
+    "--out",
+    type=PATH,
+    default=Path("results"),
+    show_default=True,
+    help="Folder for the page, evaluation.html, and the numbers.",
+)
+@many_runs_option
+@json_option
+def evaluate(
+    bench: bool, controller: str | None, out: Path, native: bool | None, as_json: bool
+) -> int:
+    """Run the published tables and figures again, and compare.
+
+    They are those of the simulations, or with --bench of the experiments. The exit code is 1 where
+    a claim of the paper does not hold.
+
+    \b
+    Example: grasp-cosim evaluate --out results
+    """
+    report = run_evaluation(
+        bench=bench,
+        controller=controller or "published",
+        out=out,
+        native=native,
+        progress=not is_quiet(),
+    )
+    page = f"to be opened in a browser: {out / 'evaluation.html'}"
+    show(as_json, report, f"{verdict(report)}\n{page}")
+    return 0 if all(claim["holds"] for claim in report["claims"]) else NEGATIVE
+
+
+@click.command()
+@click.argument("log", type=PATH, required=False)
+@click.option(
+    "--fit",
+    multiple=True,
+    default=DEFAULT,
+    show_default=True,
+    metavar="|".join(GROUPS),
+    help="Fit this; may be given several times.",
+)
+@set_option
+@click.option("-o", "--out", type=PATH, help="Folder for the values and the residuals.")
+@json_option
+def identify(
+    log: Path | None,
+    fit: tuple[str, ...],
+    settings: tuple[str, ...],
+    out: Path | None,
+    as_json: bool,
+) -> int:
+    """Fit the friction of the fingers to a LOG.
+
+    It is a run, as .csv or .mf4, or a table of contact times: CSV with the columns x_m, case,
+    finger, time. By default these are the contact times of the published experiments.
+
+    \b
+    Example: grasp-cosim identify --fit coulomb --fit viscous --out identified
+    From a run: grasp-cosim identify results/signals.csv --fit coulomb
+    """
+    if out:
+        check_folder(out)
+    system = grasp_system().with_settings(set_values(settings), "--set {}".format)
+    found = run_identification(log, fit=fit, system=system, progress=not is_quiet())
+    for name, text in found.files().items() if out else ():
+        write_text(Path(out or "", name), text)
+    show(as_json, found.as_json(), found.text())
+    return 0
