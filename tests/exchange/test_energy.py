@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 from grasp_controller import series
 from grasp_cosim.exchange.energy import Bond, ExchangeEnergy, bonds
-from grasp_cosim.interface.arrays import MOST_ELEMENTS
+from grasp_cosim.interface.interface import MOST_ELEMENTS
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system import parts
 from grasp_cosim.system.parts import Port

@@ -2,14 +2,14 @@
 
 import math
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
+from tempfile import gettempdir
 
 import fmpy
 import pytest
 from grasp_cosim.base.errors import InputError
+from grasp_cosim.interface.obstacles import of_loading
 from grasp_cosim.interface.read import describe, read_interface
-from support.native_fmus import build, needs_gcc
+from support.native_fmus import build, build_model, needs_gcc
 
 FMI_2 = """<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">
   <CoSimulation modelIdentifier="m"/>
@@ -44,7 +44,6 @@ OURS = (
     "GripperPlant", "GripperPlantCompliant", "GripperPlantMovable",
     "ProximitySensor", "GraspController", "GraspControllerAdaptive",
 )  # fmt: skip
-Write = Callable[[str], Path]
 
 
 @pytest.fixture
@@ -241,3 +240,21 @@ def test_a_description_in_another_place_is_named(tmp_path, name):
         archive.writestr(name, FMI_2)
     with pytest.raises(InputError, match=rf"must be there, and called so: there is {name}$"):
         describe(tmp_path / "x.fmu")
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("said", "what"),
+    [
+        ("No license for feature X", "needs a licence on this machine; have that of "),
+        ("libflexlm.so: cannot open shared object file", "needs a licence"),
+        ("x.so: undefined symbol: licence_check", None),
+        ("undefined symbol: licence_check (no licence)", "needs a licence"),
+        ("cannot allocate memory", None),
+        # the words of glibc, where TMPDIR is mounted with noexec
+        ("x.so: failed to map segment from shared object", f"was extracted to {gettempdir()}, on"),
+    ],
+)
+def test_why_an_fmu_does_not_load_by_what_is_said(said, what, tmp_path):
+    obstacle = of_loading(describe(build_model("stair", tmp_path)), said)
+    assert str(obstacle).startswith(what or "None")

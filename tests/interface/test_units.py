@@ -1,16 +1,17 @@
-"""Conversion between units."""
+"""Conversion between units, and what an FMU defines."""
 
 import math
 import zipfile
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.units import conversion
 from grasp_cosim.system.parts import Component, Connection, Port
 from grasp_cosim.system.validity import connection_transform
 from hypothesis import given
 from hypothesis import strategies as st
-from si_units import BASE, Unit
+from si_units import BASE, Unit, known_unit
 
 exponents = st.tuples(*[st.integers(-4, 4)] * len(BASE))
 factors = st.floats(1e-9, 1e9) | st.floats(-1e9, -1e-9)
@@ -45,22 +46,19 @@ def test_other_quantities_do_not_convert(one, other, a):
 @pytest.mark.parametrize(
     ("source", "target", "value", "expected"),
     [
-        (Unit("mm", LENGTH, 1e-3), Unit("m", LENGTH), 250.0, 0.25),
-        (Unit("m", LENGTH), Unit("mm", LENGTH, 1e-3), 0.25, 250.0),
-        (Unit("degC", TEMPERATURE, 1.0, 273.15), Unit("K", TEMPERATURE), 25.0, 298.15),
-        (
-            Unit("degF", TEMPERATURE, 5 / 9, 273.15 - 32 * 5 / 9),
-            Unit("degC", TEMPERATURE, 1.0, 273.15),
-            212.0,
-            100.0,
-        ),
-        (Unit("lbf", FORCE, 4.4482216152605), Unit("kN", FORCE, 1e3), 1000.0, 4.4482216152605),
+        ((LENGTH, 1e-3), (LENGTH, 1.0), 250.0, 0.25),
+        ((TEMPERATURE, 1.0, 273.15), (TEMPERATURE, 1.0), 25.0, 298.15),
+        ((TEMPERATURE, 5 / 9, 273.15 - 160 / 9), (TEMPERATURE, 1.0, 273.15), 212.0, 100.0),
+        ((FORCE, 4.4482216152605), (FORCE, 1e3), 1000.0, 4.4482216152605),
+        ((LENGTH, 1e308), (LENGTH, 1e-308), 1.0, None),
+        ((LENGTH, 1e-308), (LENGTH, 1e308), 1.0, None),
+        ((TEMPERATURE, 1.0, 1e308), (TEMPERATURE, 1e-5), 1.0, None),
     ],
 )
 def test_known_values(source, target, value, expected):
-    found = conversion(source, target)
-    assert found is not None
-    assert found[0] * value + found[1] == pytest.approx(expected, rel=1e-13)
+    """None where it is beyond what a number can be."""
+    found = conversion(Unit("a", *source), Unit("b", *target))
+    assert (found and found(value)) == (expected and pytest.approx(expected, rel=1e-13))
 
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
@@ -105,13 +103,22 @@ def test_a_difference_is_no_temperature(tmp_path, relative):
         from_y_to_u(tmp_path, f'unit="degF" {relative}', RISE)
 
 
+LAZY = """<fmiModelDescription fmiVersion="2.0" modelName="lazy" guid="1">
+<CoSimulation modelIdentifier="lazy"/>
+<UnitDefinitions><Unit name="{name}"><BaseUnit/></Unit></UnitDefinitions>
+<ModelVariables><ScalarVariable name="y" valueReference="0" causality="output"><Real unit="{name}"/>
+</ScalarVariable></ModelVariables>
+<ModelStructure><Outputs><Unknown index="1"/></Outputs></ModelStructure></fmiModelDescription>"""
+
+
 @pytest.mark.parametrize(
-    ("source", "target"),
-    [
-        (Unit("a", LENGTH, 1e308), Unit("b", LENGTH, 1e-308)),
-        (Unit("a", LENGTH, 1e-308), Unit("b", LENGTH, 1e308)),
-        (Unit("a", TEMPERATURE, 1.0, 1e308), Unit("b", TEMPERATURE, 1e-5)),
-    ],
+    ("name", "defined"), [("mm", False), ("N", False), ("rad", True), ("%", True), ("cubit", True)]
 )
-def test_a_conversion_beyond_what_a_number_can_be_is_none(source, target):
-    assert conversion(source, target) is None
+def test_a_definition_without_a_dimension_is_none_of_a_unit_that_has_one(tmp_path, name, defined):
+    path = tmp_path / "lazy.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", LAZY.format(name=name))
+    interface = read_interface(path)
+    assert (name in interface.units) is defined
+    found = interface.unit(interface.by_name["y"])
+    assert found == (Unit(name, (0,) * len(BASE)) if defined else known_unit(name))

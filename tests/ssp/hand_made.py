@@ -151,6 +151,12 @@ def bind(inline, mapped="", **attributes):
     )
 
 
+def annotated(kind, content):
+    """Annotations with one of that type."""
+    annotation = f'<ssc:Annotation type="{kind}">{content}</ssc:Annotation>'
+    return f"<ssd:Annotations>{annotation}</ssd:Annotations>"
+
+
 def structure(
     top,
     experiment='<ssd:DefaultExperiment startTime="0" stopTime="1"/>',

@@ -15,8 +15,8 @@ from typing import Any, Literal
 
 from ..base.checks import is_number
 from ..base.errors import choices, nearest
-from ..interface.capabilities import KINDS
 from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
+from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion
 from ..system.changes import stated
 from ..system.description import System

@@ -30,8 +30,7 @@ from ..base.calls import TRANSFER_3, Call, Native
 from ..base.errors import InputError, SimulationError
 from ..base.files import FULL
 from ..base.scratch import ScratchFolder, without_scratch
-from ..interface.arrays import Element
-from ..interface.interface import Interface, Value, Variable
+from ..interface.interface import Element, Interface, Value, Variable
 from ..interface.obstacles import of_binary, of_loading, this_machine
 from .inputs import Inputs
 from .instance import EARLY, ERROR, FATAL, OK, STATUS

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import choices
-from ..interface.capabilities import KINDS
 from ..interface.interface import Variable
-from ..interface.obstacles import this_platform
+from ..interface.obstacles import KINDS, this_platform
 from ..interface.read import describe
 
 COLUMNS = (

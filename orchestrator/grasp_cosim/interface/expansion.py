@@ -1,21 +1,24 @@
-"""Arrays of numbers taken apart: an interface with a variable for each element."""
+"""Arrays of numbers taken apart: an interface with a variable for each element, u[2] or A[1,2]."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 from ..base.errors import InputError
-from .arrays import (
+from .interface import (
     MOST_ELEMENTS,
+    SETTABLE,
     Array,
     Element,
+    Given,
+    Interface,
+    Value,
+    Variable,
     element_names,
-    flattened,
-    from_text,
-    shape_text,
     size_of,
 )
-from .interface import SETTABLE, Given, Interface, Value, Variable
 
 TAKEN_APART = (*SETTABLE, "output")
 """The causalities of arrays that a master does something with."""
@@ -81,7 +84,12 @@ def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:
         room -= size
         arrays[v.name] = Array(shape, names)
         variables += _elements(v, shape, names)
-    named = _Named(arrays)
+
+    @cache  # thousands of outputs depend on the same inputs
+    def named(names: Names) -> Names:
+        parts = (arrays[n].names if n in arrays else (n,) for n in names or ())
+        return None if names is None else tuple(name for part in parts for name in part)
+
     variables = [
         replace(
             v,
@@ -107,15 +115,38 @@ def _elements(v: Variable, shape: tuple[int, ...], names: tuple[str, ...]) -> li
     ]
 
 
-class _Named:
-    """The elements in the place of arrays in what a variable depends on, each tuple made once."""
+def shape_text(shape: Sequence[int]) -> str:
+    """A shape as messages have it, like '[2, 3]'."""
+    return f"[{', '.join(map(str, shape))}]"
 
-    def __init__(self, arrays: Mapping[str, Array]) -> None:
-        self._arrays = arrays
-        self._made: dict[Names, Names] = {}
 
-    def __call__(self, names: Names) -> Names:
-        if names is not None and names not in self._made:
-            parts = (self._arrays[n].names if n in self._arrays else (n,) for n in names)
-            self._made[names] = tuple(name for part in parts for name in part)
-        return self._made.get(names)
+def from_text(text: str) -> Any:
+    """Values as on a command line: 1,2,3 or [[1,2],[3,4]]; the text itself where it is one value.
+
+    ValueError where brackets do not close.
+    """
+    if text.lstrip().startswith("["):
+        return json.loads(text)
+    return [part.strip() for part in text.split(",")] if "," in text else text
+
+
+def flattened(value: Any, shape: Sequence[int]) -> list[Any]:
+    """The elements row by row of nested lists of that shape, of a list of all, or of one for all.
+
+    ValueError, which says what it is, where it is none of these.
+    """
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if not isinstance(value, list | tuple):
+        return [value] * size_of(shape)
+    found, flat = [len(value)], list(value)
+    while flat and all(isinstance(part, list | tuple) for part in flat):
+        lengths = {len(part) for part in flat}
+        flat = [entry for part in flat for entry in part]
+        if len(lengths) > 1:
+            raise ValueError("has rows of different lengths")
+        found.append(lengths.pop())
+    if any(isinstance(entry, list | tuple) for entry in flat):
+        raise ValueError("has rows of different lengths")
+    if tuple(found) != tuple(shape) and found != [size_of(shape)]:
+        raise ValueError(f"is {shape_text(found)}")
+    return flat

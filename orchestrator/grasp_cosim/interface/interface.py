@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from shlex import quote
 from typing import Any, Literal, Protocol, get_args
@@ -14,7 +15,6 @@ from si_units import Unit, known_unit, spelt_like
 from ..base.checks import EXACT, integer, known, real
 from ..base.errors import InputError, choices
 from ..base.scratch import without_scratch
-from .arrays import MOST_ELEMENTS, Array, Element, element_names, size_of
 from .units import IDENTITY, Conversion, conversion
 
 Value = float | int | bool | str
@@ -44,6 +44,41 @@ _WHOLE = {
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 TYPES_3 = ("Float64", "Float32", *_WHOLE, "Boolean", "String", "Binary", "Enumeration", "Clock")
 """The types of variables in FMI 1.0 and 2.0, and in FMI 3.0."""
+
+
+MOST_ELEMENTS = 100_000
+"""Of all arrays of an FMU that are taken apart; what would be more is left alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """Where a variable is in an array of that name: its place, row by row from 0, of size."""
+
+    array: str
+    place: int
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """An array that was taken apart: its shape, and the names of its elements row by row."""
+
+    shape: tuple[int, ...]
+    names: tuple[str, ...]
+
+
+def size_of(shape: Sequence[int]) -> int:
+    """The number of elements; no more than one beyond MOST_ELEMENTS where there are more."""
+    size = 1
+    for length in shape if 0 not in shape else [0]:
+        size = min(size * length, MOST_ELEMENTS + 1)
+    return size
+
+
+def element_names(name: str, shape: Sequence[int]) -> tuple[str, ...]:
+    """The names of the elements, row by row."""
+    places = product(*(range(1, length + 1) for length in shape))
+    return tuple(f"{name}[{','.join(map(str, place))}]" for place in places)
 
 
 def limits(fmi_type: str, version: str) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Obstacles to running an FMU here, by what it declares, and what to ask its vendor for.
+"""The kinds of FMUs and what they are capable of; obstacles to running one here, and the remedy.
 
 The one place that says so: reading a system, loading an instance and `inspect` ask it.
 """
@@ -6,14 +6,49 @@ The one place that says so: reading a system, loading an instance and `inspect` 
 import platform
 import re
 import sys
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from tempfile import gettempdir
 from typing import NamedTuple
+from xml.etree.ElementTree import Element
 
 from ..base.errors import choices
-from .capabilities import KINDS
-from .interface import Interface
+from .interface import Interface, Value, typed
+
+KINDS = {
+    "CoSimulation": "co-simulation",
+    "ModelExchange": "model exchange",
+    "ScheduledExecution": "scheduled execution",
+}
+"""The kinds as elements of a model description, and in words."""
+_ALL_2 = """needsExecutionTool canBeInstantiatedOnlyOncePerProcess canGetAndSetFMUstate
+    canSerializeFMUstate canNotUseMemoryManagementFunctions providesDirectionalDerivative """
+_ALL_3 = """needsExecutionTool canBeInstantiatedOnlyOncePerProcess canGetAndSetFMUState
+    canSerializeFMUState providesDirectionalDerivatives providesAdjointDerivatives
+    providesPerElementDependencies """
+FLAGS = {
+    ("1", "CoSimulation"): """canHandleVariableCommunicationStepSize canHandleEvents canRejectSteps
+        canInterpolateInputs maxOutputDerivativeOrder canRunAsynchronuously canSignalEvents
+        canBeInstantiatedOnlyOncePerProcess canNotUseMemoryManagementFunctions""",
+    ("1", "ModelExchange"): "",
+    ("2", "CoSimulation"): _ALL_2 + """canHandleVariableCommunicationStepSize
+        canInterpolateInputs maxOutputDerivativeOrder canRunAsynchronuously""",
+    ("2", "ModelExchange"): _ALL_2 + "completedIntegratorStepNotNeeded",
+    ("3", "CoSimulation"): _ALL_3 + """canHandleVariableCommunicationStepSize
+        fixedInternalStepSize maxOutputDerivativeOrder recommendedIntermediateInputSmoothness
+        providesIntermediateUpdate mightReturnEarlyFromDoStep hasEventMode
+        canReturnEarlyAfterIntermediateUpdate providesEvaluateDiscreteStates""",
+    ("3", "ModelExchange"): _ALL_3 + "needsCompletedIntegratorStep providesEvaluateDiscreteStates",
+    ("3", "ScheduledExecution"): _ALL_3,
+}  # fmt: skip
+"""The capabilities that each version of FMI has for each kind."""
+NUMBERS: dict[str, tuple[str, str | None]] = {
+    "maxOutputDerivativeOrder": ("Integer", "0"),
+    "recommendedIntermediateInputSmoothness": ("Integer", "0"),
+    "fixedInternalStepSize": ("Real", None),
+}
+"""Those that are no booleans: type and default."""
 
 RUN = ("CoSimulation", "ModelExchange")
 """The kinds that the master runs, the one it prefers first."""
@@ -38,6 +73,30 @@ class Obstacle(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.what}; {self.remedy}"
+
+
+def kinds_of(root: Element, major: str) -> dict[str, Element]:
+    """The kinds of an FMU, each with the element that has its capabilities."""
+    if major == "1":
+        implementation = root.find("Implementation")
+        if implementation is None:
+            return {"ModelExchange": root}
+        capable = implementation.find(".//Capabilities")
+        return {"CoSimulation": implementation if capable is None else capable}
+    found = {kind: root.find(kind) for version, kind in FLAGS if version == major}
+    return {kind: element for kind, element in found.items() if element is not None}
+
+
+def capabilities_of(kinds: Mapping[str, Element], major: str) -> dict[str, Value | None]:
+    """Flag to value; where a later kind differs from the first, it has an entry of its own."""
+    found: dict[str, Value | None] = {}
+    for kind, element in kinds.items():
+        for flag in FLAGS[major, kind].split():
+            type_, default = NUMBERS.get(flag, ("Boolean", "false"))
+            value = typed(type_, element.get(flag, default))
+            if found.setdefault(flag, value) != value:
+                found[f"{flag} ({KINDS[kind]})"] = value
+    return found
 
 
 def this_machine(version: str) -> str:

@@ -19,7 +19,6 @@ from si_units import BASE, Unit, known_unit
 from ..base.checks import real
 from ..base.errors import InputError
 from ..base.files import check_fmu_file
-from .capabilities import capabilities_of, kinds_of
 from .document import read_document, unreadable
 from .interface import (
     SETTABLE,
@@ -33,7 +32,7 @@ from .interface import (
     limits,
     typed,
 )
-from .obstacles import of_binary, of_kind, platform_of
+from .obstacles import capabilities_of, kinds_of, of_binary, of_kind, platform_of
 
 NUMERIC = ("Real", "Integer")
 WHOLE = re.compile(r"\s*[+-]?[0-9]+\s*")

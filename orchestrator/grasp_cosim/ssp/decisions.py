@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from heapq import heappop, heappush
 from typing import Any
 
 import numpy as np
@@ -99,17 +100,24 @@ def flow_order(
     start, end = np.array([*edges], int).reshape(-1, 2).T
     flow = coo_array((np.ones(len(edges)), (start, end)), (len(places), len(places)))
     _, loops = connected_components(flow, connection="strong")
-    left, waits = Counter(loops.tolist()), {loop: set[int]() for loop in loops.tolist()}
-    for source, target in edges:
-        if loops[source] != loops[target]:
-            waits[loops[target]].add(loops[source])
-    order: dict[int, Component] = {}
-    while len(order) < len(components):
-        free = (i for i, loop in enumerate(loops) if not any(left[w] for w in waits[loop]))
-        place = next(i for i in free if i not in order)
-        order[place] = components[place]
+    members: dict[int, list[int]] = {}
+    for i, loop in enumerate(loops.tolist()):
+        members.setdefault(loop, []).append(i)
+    between = {(loops[s], loops[t]) for s, t in edges if loops[s] != loops[t]}
+    gives: dict[int, list[int]] = {loop: [] for loop in members}
+    for source, target in between:
+        gives[source].append(target)
+    waits, left = Counter(target for _, target in between), Counter(loops.tolist())
+    free = [i for i, loop in enumerate(loops) if not waits[loop]]  # sorted, so a heap
+    order = []
+    while free:
+        order.append(components[place := heappop(free)])
         left[loops[place]] -= 1
-    return tuple(order.values())
+        for after in gives[loops[place]] if not left[loops[place]] else ():
+            waits[after] -= 1
+            for i in members[after] if not waits[after] else ():
+                heappush(free, i)
+    return tuple(order)
 
 
 class Called:

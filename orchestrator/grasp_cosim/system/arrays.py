@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from ..base.checks import known
 from ..base.errors import InputError, choices
-from ..interface.arrays import shape_text
-from ..interface.expansion import values_of
+from ..interface.expansion import shape_text, values_of
 from ..interface.interface import Given, Value
 from .parts import Component, Connection, Port
 from .stimuli_checks import driven

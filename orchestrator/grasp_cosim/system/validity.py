@@ -10,8 +10,8 @@ from typing import NamedTuple
 from ..base.checks import choice, known, number, whole
 from ..base.errors import InputError, choices
 from ..base.text import counted
-from ..interface.capabilities import KINDS
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
+from ..interface.obstacles import KINDS
 from ..interface.units import conversion
 from .arrays import as_written, unsourced
 from .parts import LOOPS, NANOSECONDS, Connection, Port, seconds
