@@ -69,10 +69,9 @@ class Given:
 
     def band(self, scale: float, derived: Band) -> Band:
         """The band it makes where relative is of scale; what it does not give stays derived."""
-        width = derived.width
-        if self.wide:
-            width = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
-        return Band(width, derived.time if self.time is None else self.time, "given")
+        given = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
+        time = derived.time if self.time is None else self.time
+        return Band(given if self.wide else derived.width, time, "given")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +89,11 @@ def read_bands(path: Path) -> Bands:
     InputError names the entry that is wrong.
     """
     table = _used(path) if path.suffix == ".json" else toml_table(path, "file of bands")
+    valid = {"signals": ("absolute", "relative", "time"), "metrics": ("absolute", "relative")}
     for key in table:
-        known(f"{path}: unknown entry", key, ("signals", "metrics"))
-    return Bands(
-        str(path),
-        _entries(f"{path}: [signals]", table.get("signals", {}), ("absolute", "relative", "time")),
-        _entries(f"{path}: [metrics]", table.get("metrics", {}), ("absolute", "relative")),
-    )
+        known(f"{path}: unknown entry", key, valid)
+    found = (_entries(f"{path}: [{key}]", table.get(key, {}), of) for key, of in valid.items())
+    return Bands(str(path), *found)
 
 
 def _used(path: Path) -> dict[str, Any]:

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from ..base.files import write_text
 from ..base.text import counted, grouped
 from ..metrics.metric import Metric
-from ..recording.result import Result
 from ..report.caption import Caption, about, caption, changes
 from ..report.embed import LIMIT, Shown, fit
 from ..report.page import Scene, data_html, document, looks, moments, scripts, traces_html
@@ -146,34 +145,22 @@ def _state(
 
 
 def _exactness(c: Comparison, shown: Shown, rows: int) -> str:
-    thinned = shown.rows_per_pair
-    kept = (
-        f" Of each {thinned} rows this page keeps the lowest and the highest value."
-        if thinned
-        else ""
-    )
-    return (
+    said = (
         f"{c.names[0]} solid and pale, {c.names[1]} dashed over it; the tube is the band around "
-        f"{c.names[0]}. {grouped(rows)} rows of "
-        f"{counted(len(c.signals), 'signal')}.{kept}"
+        f"{c.names[0]}. {grouped(rows)} rows of {counted(len(c.signals), 'signal')}."
     )
+    if thinned := shown.rows_per_pair:
+        said += f" Of each {thinned} rows this page keeps the lowest and the highest value."
+    return said
 
 
 def _runs(c: Comparison, remarks: Sequence[str]) -> str:
     """A table of the two runs and of the settings that differ; and what is not compared."""
     sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *c.names))
-    about = [dict(origin_rows(side.result.origin)) if side.result else {} for side in sides]
-    rows = [
-        _row("from", [escape(side.name) for side in sides]),
-        _row("what", [escape(caption(s.result).title) if s.result else "" for s in sides]),
-        _row("changed", [escape(_changed(s.result)) if s.result else "" for s in sides]),
-        _row("run", [_summary(side) for side in sides]),
-        *(
-            _row(key, [escape(of.get(key, "")) for of in about])
-            for key in ("date", "command")
-            if any(key in of for of in about)
-        ),
-    ]
+    about = [_about(side) for side in sides]
+    always = ("from", "what", "changed", "run")
+    there = [key for key in (*always, "date", "command") if any(key in of for of in about)]
+    rows = [_row(key, [of.get(key, "") for of in about]) for key in there]
     differ = [_row(d.what, [escape(d.a), escape(d.b)]) for d in c.differences]
     settings = f"<h3>The settings differ in</h3>{table(heads, differ)}" if differ else ""
     if c.a.result and c.b.result and not differ:
@@ -181,16 +168,21 @@ def _runs(c: Comparison, remarks: Sequence[str]) -> str:
     return f"{table(heads, rows)}{settings}{bullets('Notes', remarks, 'None.')}"
 
 
-def _changed(run: Result) -> str:
-    """What differs from the defaults, as far as that is known."""
-    return changes(run.settings["changed"]) if "changed" in run.settings else ""
-
-
-def _summary(side: Side) -> str:
-    if side.result:
-        return summary(side.result.metrics)
-    span = " to ".join(number(float(side.time[row])) for row in (0, -1))
-    return f"{grouped(len(side.time))} rows, {span} s"
+def _about(side: Side) -> dict[str, str]:
+    """What is said of a run, by heads, as HTML."""
+    run = side.result
+    if run is None:
+        span = " to ".join(number(float(side.time[row])) for row in (0, -1))
+        said = f"{grouped(len(side.time))} rows, {span} s"
+        return {"from": escape(side.name), "what": "", "changed": "", "run": said}
+    changed = changes(run.settings["changed"]) if "changed" in run.settings else ""
+    return {
+        "from": escape(side.name),
+        "what": escape(caption(run).title),
+        "changed": escape(changed),
+        "run": summary(run.metrics),
+        **{key: escape(text) for key, text in origin_rows(run.origin)},
+    }
 
 
 def _row(what: str, cells: Iterable[str]) -> str:

@@ -29,9 +29,6 @@ WIDE = 0.1
 """A band wider than this share of the range of its signal proves little."""
 
 
-# A comparison
-
-
 def verdict(c: Comparison) -> str:
     """The outcome in a line."""
     word = "ALIKE" if c.alike else "DIFFERENT"
@@ -46,9 +43,9 @@ def as_text(c: Comparison) -> str:
     parts = [[verdict(c), *(f"{name}: {side.name}" for name, side in sides)]]
     if c.differences:
         rows = [f"  {d.what}: {d.a} | {d.b}" for d in c.differences[:MOST]]
-        left = len(c.differences) - len(rows)
-        more = [f"  {left} more; --json and the page have all"] if left else []
-        parts.append([f"the runs differ in ({' | '.join(c.names)}):", *rows, *more])
+        if left := len(c.differences) - len(rows):
+            rows.append(f"  {left} more; --json and the page have all")
+        parts.append([f"the runs differ in ({' | '.join(c.names)}):", *rows])
     elif c.a.result and c.b.result:
         parts.append(["the settings of the runs are the same"])
     parts += _tables(c.signals, c.metrics, c.names)
@@ -82,16 +79,14 @@ def as_json(c: Comparison) -> dict[str, Any]:
         "begin": c.begin,
         "end": c.end,
         "differences": [d._asdict() for d in c.differences],
-        **_compared_json(c.signals, c.metrics, ("a", "b")),
+        "signals": [_json(s, "a", "b") for s in c.signals],
+        "metrics": [_json(m, "a", "b") for m in c.metrics],
         "no_value": list(c.absent),
         "only_a": {"signals": list(c.only[0]), "metrics": list(c.only_metrics[0])},
         "only_b": {"signals": list(c.only[1]), "metrics": list(c.only_metrics[1])},
         "notes": notes(c),
         "units": {"begin": "s", "end": "s", "band_time": "s", "time": "s"},
     }
-
-
-# A qualification
 
 
 def qualification_text(q: Qualification) -> str:
@@ -137,7 +132,8 @@ def qualification_json(q: Qualification) -> dict[str, Any]:
         "scheme": system.scheme,
         "failure": q.failure,
         "differences": [asdict(d) for d in q.swap.differences],
-        **_compared_json(q.signals, q.metrics, ("original", "candidate")),
+        "signals": [_json(c, "original", "candidate") for c in q.signals],
+        "metrics": [_json(c, "original", "candidate") for c in q.metrics],
         "no_value": list(q.absent),
         "uncompared": list(q.uncompared),
         "numerics": list(q.numerics),
@@ -191,13 +187,9 @@ def qualification_basis(q: Qualification) -> list[str]:
                 "--bands with '*' = { absolute = inf } under [metrics]"
             )
     lines += [f"the candidate's run: {line}" for line in q.log[:ROWS]]
-    left = len(q.log) - ROWS
-    return (
-        [*lines, f"the candidate's run: {left} more lines; --json has all"] if left > 0 else lines
-    )
-
-
-# What both have
+    if len(q.log) > ROWS:
+        lines.append(f"the candidate's run: {len(q.log) - ROWS} more lines; --json has all")
+    return lines
 
 
 def counts(signals: Sequence[Compared], metrics: Sequence[Compared]) -> str:
@@ -225,9 +217,8 @@ def bands_lines(signals: Sequence[Compared], metrics: Sequence[Compared], basis:
     """Where the bands are from: given, or derived from `basis`; and which prove little."""
     given = sum(c.band.source == "given" for c in (*signals, *metrics))
     derived = len(signals) + len(metrics) - given
-    lines = [f"bands: {given} given, {derived} derived from {basis}"]
-    if not derived:
-        lines = [f"bands: all {given} given"]
+    from_ = f"{given} given, {derived} derived from {basis}" if derived else f"all {given} given"
+    lines = [f"bands: {from_}"]
     if wide := [c.name for c in signals if c.span and WIDE * c.span < c.band.width < inf]:
         lines.append(f"bands that are wide for the range of their signals: {', '.join(wide)}")
     return lines
@@ -245,30 +236,23 @@ def _table(name: str, compared: Sequence[Compared], runs: tuple[str, str]) -> li
     that are inside; `runs` are the heads of their values.
     """
     outside = [c for c in compared if not c.inside]
-    shown = outside[:ROWS] or compared[:FEW]
-    rows = [["x band", name, "deviation", "band", "unit", "at t in s", *runs]]
+    shown, time = outside[:ROWS] or compared[:FEW], ["at t in s"] if name == "signal" else []
+    rows = [["x band", name, "deviation", "band", "unit", *time, *runs]]
     for c in shown:
-        time = "" if c.time is None else f"{c.time:.9g}"
+        at = [] if c.time is None else [f"{c.time:.9g}"]
         values = [significant(v, 6) for v in (c.original, c.candidate)]
         widths = [significant(v, 3) for v in (c.deviation, c.band.width)]
-        rows.append([significant(c.ratio, 3), c.name, *widths, c.unit or "", time, *values])
-    if name == "metric":
-        rows = [[*row[:5], *row[6:]] for row in rows]
-    left = len(compared) - len(shown)
-    more = f"{len(outside) - len(shown)} more out of band, " if len(outside) > len(shown) else ""
-    inside = len(compared) - len(outside) if outside else left
-    texts = {i for i, head in enumerate(rows[0]) if head in ("signal", "metric", "unit")}
-    return [*columns(rows, texts), *([f"{'':8}{more}{inside} more inside"] if left else [])]
+        rows.append([significant(c.ratio, 3), c.name, *widths, c.unit or "", *at, *values])
+    lines = columns(rows, {1, 4})
+    if left := len(compared) - len(shown):
+        beyond = len(outside) - len(shown)
+        more = f"{beyond} more out of band, " if beyond > 0 else ""
+        inside = len(compared) - len(outside) if outside else left
+        lines.append(f"{'':8}{more}{inside} more inside")
+    return lines
 
 
-def _compared_json(
-    signals: Sequence[Compared], metrics: Sequence[Compared], runs: tuple[str, str]
-) -> dict[str, Any]:
-    both = {"signals": signals, "metrics": metrics}
-    return {name: [_json(c, runs) for c in compared] for name, compared in both.items()}
-
-
-def _json(c: Compared, runs: tuple[str, str]) -> dict[str, Any]:
+def _json(c: Compared, *runs: str) -> dict[str, Any]:
     """All of it: a number that is infinite is null; `runs` name the two values."""
     numbers = {"ratio": c.ratio, "deviation": c.deviation, "band": c.band.width}
     return {

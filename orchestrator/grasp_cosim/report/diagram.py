@@ -239,18 +239,17 @@ def _connection(way: _Way, lane: Sequence[Point], room: float) -> str:
 
 
 def _rounded(points: Sequence[Point]) -> str:
+    def near(corner: Point, point: Point) -> Point:
+        """The point BEND px from a corner, straight towards another."""
+        x, y = (max(-BEND, min(b - a, BEND)) for a, b in zip(corner, point, strict=True))
+        return corner[0] + x, corner[1] + y
+
     path = "M{:.1f} {:.1f}".format(*points[0])
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
         path += "L{:.1f} {:.1f}Q{:.1f} {:.1f} {:.1f} {:.1f}".format(
-            *_near(corner, before), *corner, *_near(corner, after)
+            *near(corner, before), *corner, *near(corner, after)
         )
     return path + "L{:.1f} {:.1f}".format(*points[-1])
-
-
-def _near(corner: Point, point: Point) -> Point:
-    """Return the point BEND px from a corner, straight towards another."""
-    x, y = (max(-BEND, min(b - a, BEND)) for a, b in zip(corner, point, strict=True))
-    return corner[0] + x, corner[1] + y
 
 
 def _drawn(box: _Box, units: Mapping[str, str | None]) -> str:

@@ -217,11 +217,8 @@ def _state(result: Result, shown: Shown, scene: Scene | None) -> dict[str, Any]:
 
 def looks(scene: Scene | None) -> dict[str, Any]:
     """Return how signals are drawn, for the scripts."""
-    if scene is None:
-        return {"colors": {}, "dashes": {}, "negated": []}
-    return {
-        "colors": dict(scene.colors), "dashes": dict(scene.dashes), "negated": list(scene.negated),
-    }  # fmt: skip
+    colors, dashes, negated = (scene.colors, scene.dashes, scene.negated) if scene else ({}, {}, ())
+    return {"colors": dict(colors), "dashes": dict(dashes), "negated": list(negated)}
 
 
 def _texts(column: npt.NDArray[Any]) -> dict[str, Any]:
@@ -254,19 +251,16 @@ def data_html(time: npt.NDArray[np.float64], columns: Mapping[str, npt.NDArray[A
     )
 
 
-def exactness(shown: Shown, rows: int, columns: int) -> str:
-    """Return how much of so many rows and signals is in the page, as HTML."""
-    if shown.rows_per_pair is None:
-        return f"All {grouped(rows)} points of {columns} signals are in this page, to the last bit."
-    return (
-        f"<b>Of {grouped(rows)} points of {columns} signals this page keeps, of each "
-        f"{shown.rows_per_pair}, the lowest and the highest value;</b> all are in signals.csv."
-    )
-
-
 def _traces(result: Result, shown: Shown, scene: Scene | None) -> str:
+    points = f"{grouped(len(result.time))} points of {len(shown.signals)} signals"
+    exact = f"All {points} are in this page, to the last bit."
+    if shown.rows_per_pair is not None:
+        exact = (
+            f"<b>Of {points} this page keeps, of each {shown.rows_per_pair}, the lowest and the "
+            "highest value;</b> all are in signals.csv."
+        )
     return traces_html(
-        exactness(shown, len(result.time), len(shown.signals)),
+        exact,
         {name: result.units[name] for name in result.signals},
         result.descriptions,
         scene.zooms if scene else (),
@@ -298,26 +292,17 @@ def traces_html(
 
 def _choice(units: Mapping[str, str | None], texts: Mapping[str, str]) -> str:
     """A box to tick per signal, in groups by component."""
-    groups: dict[str, list[str]] = {}
-    for name in units:
-        groups.setdefault(name.partition(".")[0], []).append(name)
-    html = []
-    for component, names in groups.items():
-        of = escape(component)
-        html.append(
-            f'<fieldset><legend><label><input type="checkbox" data-component="{of}">{of}</label>'
-            "</legend>"
+    groups: dict[str, str] = {}
+    for name, unit in units.items():
+        component, _, variable = map(escape, name.partition("."))
+        box = f'<input type="checkbox" data-component="{component}">{component}'
+        groups.setdefault(component, f"<fieldset><legend><label>{box}</label></legend>")
+        groups[component] += (
+            f'<label title="{escape(texts.get(name, ""))}"><input type="checkbox" '
+            f'data-signal="{escape(name)}" data-of="{component}">'
+            f"{variable} <small>{escape(unit or '')}</small></label>"
         )
-        for name in names:
-            unit = f" <small>{escape(units[name] or '')}</small>"
-            about = escape(texts.get(name, ""))
-            html.append(
-                f'<label title="{about}"><input type="checkbox" '
-                f'data-signal="{escape(name)}" data-of="{of}">'
-                f"{escape(name.partition('.')[2])}{unit}</label>"
-            )
-        html.append("</fieldset>")
-    return "".join(html)
+    return "".join(f"{group}</fieldset>" for group in groups.values())
 
 
 def moments(log: Sequence[str]) -> list[float]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from importlib import import_module
 from io import BytesIO, StringIO
 from itertools import cycle
 from pathlib import Path
@@ -50,6 +50,13 @@ MOST_LINES = 6
 MOST_SIGNALS = 36
 """So many signals at most are in a picture where none are asked for by name."""
 
+_FORMATS = {
+    "png": ("agg", "Agg", ("Software",)),
+    "svg": ("svg", "SVG", ("Creator", "Date", "Format", "Type")),
+    "pdf": ("pdf", "Pdf", ("Creator", "Producer", "CreationDate")),
+}
+"""The module and the canvas of matplotlib that write it, and what would not be the same again."""
+
 DASHES = {1: "-", 2: "--"}
 """How finger 1 and 2 are drawn: they can be told apart in grey."""
 
@@ -67,7 +74,14 @@ def plot_signals(run: Result, path: Path | None = None, of: Sequence[str] = ()) 
     KeyError where there is none of a name.
     """
     names = [name for name in of if run[name] is not None] or that_matter(run)
-    panels = _panels(run, names)
+    by_unit: dict[str, list[str]] = {}
+    for name in names:
+        by_unit.setdefault(run.units[name] or "", []).append(name)
+    panels = [
+        (unit, some[k : k + MOST_LINES])
+        for unit, some in by_unit.items()
+        for k in range(0, len(some), MOST_LINES)
+    ]
     if not panels:
         place = run.settings["system"] if path is None else path
         raise InputError(
@@ -100,18 +114,6 @@ def that_matter(run: Result, most: int = MOST_SIGNALS) -> list[str]:
 
     chosen = set(sorted(run.numbers, key=rank)[:most])
     return [name for name in run.numbers if name in chosen]
-
-
-def _panels(run: Result, names: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """The unit and the signals of each panel."""
-    of: dict[str, list[str]] = {}
-    for name in names:
-        of.setdefault(run.units[name] or "", []).append(name)
-    return [
-        (unit, names[k : k + MOST_LINES])
-        for unit, names in of.items()
-        for k in range(0, len(names), MOST_LINES)
-    ]
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -181,31 +183,20 @@ def save(figure: Figure, path: Path) -> None:
     which draws a figure with a layout twice.
     """
     kind = check_picture(path)
-    with in_one_piece(path) as part, _any_letter():
-        {"png": _write_png, "svg": _write_svg, "pdf": _write_pdf}[kind](figure, part)
+    with in_one_piece(path) as part:
+        _write(figure, kind, part)
 
 
-def _write_png(figure: Figure, file: Any) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.print_png(file, metadata={"Software": None})
-
-
-def _write_svg(figure: Figure, file: Any) -> None:
+def _write(figure: Figure, kind: str, file: Any) -> None:
+    """Write a figure; a letter that the font lacks is a box, which says it without a warning."""
     from matplotlib import rc_context
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-    canvas: Any = FigureCanvasSVG(figure)
-    with rc_context({"svg.hashsalt": "grasp-cosim", "svg.fonttype": "path"}):
-        canvas.print_svg(file, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-
-
-def _write_pdf(figure: Figure, file: Any) -> None:
-    from matplotlib.backends.backend_pdf import FigureCanvasPdf
-
-    canvas: Any = FigureCanvasPdf(figure)
-    canvas.print_pdf(file, metadata=dict.fromkeys(("Creator", "Producer", "CreationDate")))
+    module, canvas, unsaid = _FORMATS[kind]
+    made = getattr(import_module(f"matplotlib.backends.backend_{module}"), f"FigureCanvas{canvas}")
+    how: Any = {"svg.hashsalt": "grasp-cosim", "svg.fonttype": "path"}
+    with warnings.catch_warnings(), rc_context(how):
+        warnings.filterwarnings("ignore", "Glyph .* missing")
+        getattr(made(figure), f"print_{kind}")(file, metadata=dict.fromkeys(unsaid))
 
 
 def as_svg(figure: Figure) -> str:
@@ -214,19 +205,10 @@ def as_svg(figure: Figure) -> str:
     It takes the width that the page gives it.
     """
     file = StringIO()
-    with _any_letter():
-        _write_svg(figure, file)
+    _write(figure, "svg", file)
     _, start, text = file.getvalue().partition("<svg ")
     text = re.sub(r'(width|height)="[^"]*pt" ', "", text, count=2)
     return start + text.replace("*{stroke", ".chart *{stroke", 1)  # its rule is for all else
-
-
-@contextmanager
-def _any_letter() -> Iterator[None]:
-    """Let a letter that the font lacks be drawn as a box, which says it too, without a warning."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")
-        yield
 
 
 def finish(axes: Axes, label: str, legend: bool = True) -> None:
@@ -240,12 +222,8 @@ def finish(axes: Axes, label: str, legend: bool = True) -> None:
 
 def beside(axes: Axes) -> None:
     """Give axes a legend on their right."""
-    place: dict[str, Any] = {
-        "loc": "upper left",
-        "bbox_to_anchor": (1.01, 1.0),
-        "borderaxespad": 0.0,
-    }
-    _plain(axes.legend(fontsize=8, frameon=False, handlelength=3.0, **place))
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
+    _plain(axes.legend(fontsize=8, frameon=False, handlelength=3.0, borderaxespad=0.0, **place))
 
 
 def one_legend(figure: Figure) -> None:

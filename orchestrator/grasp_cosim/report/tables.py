@@ -23,20 +23,13 @@ _UNITS = {"step": "s", "stop": "s", "wall_time": "s"}
 
 def summary(run: Mapping[str, Any]) -> str:
     """One line on the run."""
-    unfinished = run["wall_time"] is None
-    text = escape(
-        f"{number(run['stop'])} s in {grouped(run['steps'])} steps of "
-        f"{number(1e3 * run['step'])} ms, {run['scheme']}"
-        + (
-            ""
-            if unfinished
-            else f", {number(run['real_time_factor'], 3)} times as fast as real time"
-        )
-    )
-    if unfinished:
+    steps = f"{grouped(run['steps'])} steps of {number(1e3 * run['step'])} ms"
+    text = escape(f"{number(run['stop'])} s in {steps}, {run['scheme']}")
+    if run["wall_time"] is None:
         end = number(run["steps"] * run["step"])
-        text += f' <span class="warn">unfinished: to t = {end} s</span>'
-    elif not run["complete"]:
+        return f'{text} <span class="warn">unfinished: to t = {end} s</span>'
+    text += f", {number(run['real_time_factor'], 3)} times as fast as real time"
+    if not run["complete"]:
         text += ' <span class="warn">not complete: interrupted, or failed on the way</span>'
     return text
 
@@ -65,11 +58,10 @@ def metrics_table(result: Result) -> str:
     rows = []
     for m in measured.metrics:
         values = measured.values[m.name]
-        if not m.entries or m.entries == heads:
-            rows.append(_metric(m.title, values if m.entries else [values], m, len(heads)))
-            continue
-        for column, value in zip(m.columns, values, strict=True):
-            rows.append(_metric(m.column_title(column), [value], m, len(heads)))
+        one_row = not m.entries or m.entries == heads
+        titles = [m.title] if one_row else map(m.column_title, m.columns)
+        found = [values if m.entries else [values]] if one_row else [[value] for value in values]
+        rows += [_metric(t, c, m, len(heads)) for t, c in zip(titles, found, strict=True)]
     why = "".join(f"<p>{escape(line)}</p>" for line in measured.missing)
     if not rows:
         return why or "<p>There are no metrics of this system.</p>"

@@ -36,11 +36,8 @@ def as_text(result: Result) -> str:
 
 
 def _numbers(value: Any, factor: float) -> str:
-    values = value if isinstance(value, list) else [value]
-    return "  ".join(_number(v, factor) for v in values)
-
-
-def _number(value: float | bool | None, factor: float) -> str:
+    if isinstance(value, list):
+        return "  ".join(_numbers(v, factor) for v in value)
     if isinstance(value, bool):
         return f"{'yes' if value else 'no':>8}"
     return "    none" if value is None else fixed(factor * value, 3, width=8)

@@ -257,15 +257,11 @@ def _draw_curve(axes: Axes, curve: Curve, look: Look) -> None:
         for points in (curve.points, [*curve.marks.values()][:-1], [curve.marks["worst"]])
     )
     axes.plot(
-        *_columns(line), DASHES[look.dash], color=look.color, label=curve.part,
+        *zip(*line, strict=True), DASHES[look.dash], color=look.color, label=curve.part,
         linewidth=2.2 if curve.part == "step" else 1.3,
     )  # fmt: skip
-    axes.plot(*_columns(marks[0]), ".", color=look.color)
-    axes.plot(*_columns(marks[1]), "o", color=look.color, mfc="white", markersize=5, clip_on=False)
-
-
-def _columns(points: Sequence[Point]) -> tuple[list[float], list[float]]:
-    return [x for x, _ in points], [y for _, y in points]
+    axes.plot(*(zip(*marks[0], strict=True) if marks[0] else ([], [])), ".", color=look.color)
+    axes.plot(*marks[1][0], "o", color=look.color, mfc="white", markersize=5, clip_on=False)
 
 
 def _key(axes: Axes, timing: Timing) -> None:
@@ -304,7 +300,7 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
         if not points:
             continue
         color, dash = look[part]
-        times_in_run, lates = _columns(points)
+        times_in_run, lates = zip(*points, strict=True)
         if few:
             axes.vlines(times_in_run, low, lates, color=color, linewidth=0.8, alpha=0.4)
         axes.plot(
