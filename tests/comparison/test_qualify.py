@@ -249,16 +249,6 @@ def test_a_unit_that_is_only_called_another_is_not_the_same_plant(loop, tmp_path
 
 
 @needs_gcc
-def test_a_unit_that_cannot_be_converted_blocks(loop, tmp_path):
-    candidate = build(tmp_path, "kelvin", "2.0", {"x": "K", "gain": "m"})
-    found = qualify(loop, "plant", candidate)
-    assert not found.qualified
-    assert [(d.variable, d.text) for d in found.blocks] == [
-        ("x", "is in K, which cannot be converted to m")
-    ]
-
-
-@needs_gcc
 def test_a_candidate_of_fmi_3_under_other_names(loop, tmp_path):
     candidate = build(tmp_path, "three", "3.0", UNITS)
     rename = {"u_Real": "u_Float64", "y_Real": "y_Float64", "u_Integer": "u_Int32"}

@@ -55,10 +55,8 @@ def corners(path):
     return [(n[-2], n[-1]) for n in numbers]
 
 
-def link(text, label="", fault=False):
-    source, target = text.split(" → ")
-    a, b = source.split(".", 1), target.split(".", 1)
-    return Link((a[0], a[1]), (b[0], b[1]), label, fault)
+def link(text):
+    return Link(*(tuple(end.split(".", 1)) for end in text.split(" → ")))
 
 
 def draw(names, links):
@@ -152,34 +150,3 @@ def test_data_flow_to_the_right_and_feedback_below(case):
             assert "back" in diagram.kinds[w.name]
             assert diagram.labels[w.name] == w.name
     assert len(lanes) == sum("back" in kind for kind in diagram.kinds.values())
-
-
-def test_labels_and_faults_stand_on_their_connections():
-    links = [link("a.y → b.u", "× 1000"), link("b.y → a.u", "noise", fault=True)]
-    diagram = draw(["a", "b"], links)
-    assert diagram.labels == {"a.y → b.u": "× 1000", "b.y → a.u": "b.y → a.u, noise"}
-    assert diagram.kinds == {"a.y → b.u": "connection", "b.y → a.u": "connection back fault"}
-
-
-def test_names_are_escaped_and_units_shown():
-    svg = diagram_svg(
-        {"<b>&": "x<y>.fmu"}, [Link(("<b>&", "<o>"), ("<b>&", "<i>"))], {"<b>&.<o>": "µ<"}
-    )
-    diagram = Diagram(svg)
-    assert list(diagram.boxes) == ["<b>&"]
-    assert ("<b>&", "output", "<o>") in diagram.ports
-    assert "µ&lt;" in svg
-
-
-def test_ports_stand_in_the_order_of_their_connections_and_those_of_feedback_lowest():
-    links = [
-        link("d.y → b.fed"),
-        link("c.y → d.second"),
-        link("b.y → d.first"),
-        link("a.to_c → c.u"),
-        link("a.to_b → b.u"),
-    ]
-    heights = draw(["a", "b", "c", "d"], links).ports
-    assert heights["b", "input", "u"] < heights["b", "input", "fed"]
-    assert heights["a", "output", "to_b"] < heights["a", "output", "to_c"]
-    assert heights["d", "input", "first"] < heights["d", "input", "second"]

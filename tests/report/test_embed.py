@@ -51,14 +51,6 @@ def test_a_smooth_signal_takes_a_quarter_of_its_base64():
     assert len(packed(values)) < 0.25 * 4 / 3 * values.nbytes
 
 
-def test_a_run_that_fits_stays_as_it_is():
-    time, signals = np.arange(100.0), {"a.y": np.arange(100.0)}
-    shown = fit(time, signals, limit=200)
-    assert shown.rows_per_pair is None
-    assert shown.time is time
-    assert shown.signals is signals
-
-
 @pytest.mark.parametrize("rows", [1000, 1001, 1003, 9999])
 def test_a_thinned_run_keeps_the_extremes_of_each_block_and_the_end(rows):
     time = np.linspace(0.0, 1.0, rows)
