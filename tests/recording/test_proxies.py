@@ -17,15 +17,17 @@ def diagnostics(**values):
     return {"arm.angle": np.zeros(6), **signals}
 
 
-def test_a_run_without_proxies_has_nothing_to_say():
-    assert proxy_figures(TIME, {"arm.angle": TIME}) == {}
-    assert proxy_lines(TIME, {"arm.angle": TIME}, 0.1) == []
-
-
-def test_of_a_quiet_one_a_line():
-    assert proxy_lines(
-        TIME, diagnostics(round_trip_time=[0.0, 0.001, 0.001, 0.009, 0.001, 0.001]), 0.1
-    ) == ["arm: 0 of 5 steps missed (0 in a row), 0 answers late; round trip 1 ms, at worst 9 ms"]
+def test_of_a_quiet_one_there_is_a_line():
+    """None without proxies or a row; steps are counted though not each is recorded."""
+    times = [0.0, 0.001, 0.001, 0.009, 0.001, 0.001]
+    quiet = diagnostics(round_trip_time=times)
+    said = "steps missed (0 in a row), 0 answers late; round trip 1 ms, at worst 9 ms"
+    assert proxy_lines(TIME, quiet, 0.1) == [f"arm: 0 of 5 {said}"]
+    assert proxy_lines(TIME, quiet, 0.01) == [f"arm: 0 of 50 {said}"]
+    nothing = {name: column[:0] for name, column in quiet.items()}
+    for time, signals in ((TIME, {"arm.angle": TIME}), (TIME[:0], nothing)):
+        assert proxy_figures(time, signals) == {}
+        assert proxy_lines(time, signals, 0.1) == []
 
 
 def test_a_loss_and_a_return_are_named():
@@ -54,13 +56,3 @@ def test_many_losses_are_not_all_listed():
         name: np.resize(column, 40) for name, column in diagnostics(state=[1, 3] * 3).items()
     }
     assert sum("lost at" in line for line in proxy_lines(time, signals, 0.1)) == 5
-
-
-def test_steps_are_counted_though_not_each_is_recorded():
-    (line,) = proxy_lines(TIME, diagnostics(), 0.01)
-    assert line.startswith("arm: 0 of 50 steps missed")
-
-
-def test_without_a_row_there_is_nothing_to_say():
-    nothing = {name: column[:0] for name, column in diagnostics().items()}
-    assert proxy_lines(TIME[:0], nothing, 0.1) == []
