@@ -22,7 +22,7 @@ from grasp_fmus.build import build, build_native, shipped_twins
 from grasp_fmus.shipped import SHIPPED
 from hypothesis import find, settings
 from hypothesis import strategies as st
-from support import campaign, kinds
+from support import kinds, marks
 from support.fmi2 import Fmu
 from support.kinds import Kind
 from support.marks import skip_without_pythonfmu
@@ -73,7 +73,7 @@ def pytest_configure(config):
 
     Many tests read sources: each time after 700 nodes those that there are would be gone over.
     """
-    campaign.first_seed = int(config.getoption("hypothesis_seed") or 0)
+    marks.first_seed = int(config.getoption("hypothesis_seed") or 0)
     gc.set_threshold(50_000, 10, 10)
 
 

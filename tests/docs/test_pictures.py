@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from grasp_cosim import simulate
 from report.javascript import in_browser
-from support.campaign import only_whole
 from support.cases import CASES
+from support.marks import only_whole
 from support.pictures import assert_same_picture
 
 DOCS = Path(__file__).parents[2] / "docs"

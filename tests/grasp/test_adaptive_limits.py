@@ -15,7 +15,7 @@ from grasp_cosim.grasp.controllers import with_controller
 from grasp_cosim.grasp.presets import with_preset
 from grasp_cosim.sweeps.rows import grid
 from scipy.stats import qmc
-from support import campaign
+from support import marks
 
 SEED = 20241107
 FACES = {
@@ -81,7 +81,7 @@ def rows(study, runs):
     varied = {**{(name,): span for name, span in FACES.items()}, **study.more}
     low, high = np.array(list(varied.values())).T
     cube = qmc.LatinHypercube(
-        len(varied), rng=np.random.default_rng(SEED + campaign.first_seed)
+        len(varied), rng=np.random.default_rng(SEED + marks.first_seed)
     ).random(runs)
     found = [
         {name: float(x) for names, x in zip(varied, row, strict=True) for name in names}
@@ -111,7 +111,7 @@ def columns(table, metric):
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_keeps_its_limits(name, grasp, fmus):
     study = STUDIES[name]
-    table = sweep(system_of(study, grasp, fmus), rows(study, campaign.part(200)))
+    table = sweep(system_of(study, grasp, fmus), rows(study, marks.part(200)))
     assert not table.errors
     for metric, limits in study.limits.items():
         values = columns(table, metric)

@@ -54,3 +54,27 @@ def skip_where_fmpy_runs_none(version):
     """Skip a test in which FMPy simulates an FMU of that version of FMI."""
     if version == "3.0" and fmpy.architecture != "x86_64":
         pytest.skip(f"FMPy simulates no FMI 3.0 on {fmpy.architecture}")
+
+
+first_seed = 0
+"""Where seeds begin: what --hypothesis-seed says, see conftest.py."""
+
+
+def exploring():
+    """Whether this is `make explore`."""
+    return settings.get_current_profile_name() == "explore"
+
+
+def part(whole):
+    """How much of a campaign that many large is done."""
+    return whole if exploring() else -(-whole // 10)
+
+
+def seeds(whole):
+    """The seeds of a campaign with that many: the same ones in each run of the slow tests."""
+    return range(first_seed, first_seed + part(whole))
+
+
+def only_whole(why):
+    """For what cannot be done in part, and takes longer than all slow tests may."""
+    return pytest.mark.skipif(not exploring(), reason=f"{why}: make explore")

@@ -17,7 +17,7 @@ from ..link import message
 from ..link.message import Codec, Value, check_size
 from ..link.peer import TOO_LONG
 from ..link.signature import ORDER, Causality, LinkVariable, Signature
-from .text import string
+from .text import WORDS, string
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
 WIRE = Path(__file__).with_name("wire.h.in")
@@ -32,24 +32,6 @@ _MEANINGS: dict[Causality, str] = {
     "parameter": "What the proxy sends with every request as well; only tunable ones change",
     "output": "What it gets",
 }
-
-_TAKEN = frozenset(
-    """
-    auto break case char const continue default do double else enum extern float for goto if inline
-    int long register restrict return short signed sizeof static struct switch typedef union
-    unsigned void volatile while
-
-    alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class co_await
-    co_return co_yield compl concept const_cast consteval constexpr constinit decltype delete
-    dynamic_cast explicit export false friend mutable namespace new noexcept not not_eq nullptr
-    operator or or_eq private protected public reinterpret_cast requires static_assert static_cast
-    template this thread_local throw true try typeid typename typeof typeof_unqual using virtual
-    wchar_t xor xor_eq
-
-    NULL I errno linux unix stdin stdout stderr assert offsetof
-    """.split()  # noqa: SIM905 - a list of words is read as words
-)
-"""Words of C and C++, and macros, that no member may be called."""
 
 
 class Member(NamedTuple):
@@ -155,11 +137,11 @@ def structs(
 def members(signature: Signature, causality: Causality) -> tuple[list[Member], int]:
     """Return the variables of a causality in C, and the size in bytes of a body with them."""
     found: list[Member] = []
-    taken = set(_TAKEN)
+    taken = set(WORDS)
     offset = 0
     for variable in signature.of(causality):
         wanted = _identifier(variable.name, "v")
-        endings = chain(["_"] if wanted in _TAKEN else [""], (f"_{i}" for i in count(2)))
+        endings = chain(["_"] if wanted in WORDS else [""], (f"_{i}" for i in count(2)))
         identifier = next(n for n in (f"{wanted}{ending}" for ending in endings) if n not in taken)
         taken.add(identifier)
         found.append(Member(variable, identifier, offset))

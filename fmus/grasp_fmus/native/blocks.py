@@ -9,16 +9,16 @@ from typing import Any
 
 from ..contract import Field, declared, longest_step, variables
 from .statements import Check, translated_function
-from .structs import Function, Program
-from .text import comment, identifier, number, string, wrapped
+from .text import UntranslatableError, comment, identifier, number, string, wrapped
 from .types import (
     BOOLEAN,
     REAL,
+    Function,
     Group,
+    Program,
     Record,
     Scalar,
     Type,
-    UntranslatableError,
     fields,
     parts,
     said,

@@ -16,9 +16,22 @@ from types import FunctionType, ModuleType
 from typing import Any, NoReturn
 
 from . import types
-from .structs import Function, Program
 from .text import Source, identifier, number
-from .types import BOOLEAN, NUMBERS, REAL, WHOLE, Group, Record, Scalar, Tuple, Type, Value, said
+from .types import (
+    BOOLEAN,
+    NUMBERS,
+    REAL,
+    WHOLE,
+    Function,
+    Group,
+    Program,
+    Record,
+    Scalar,
+    Tuple,
+    Type,
+    Value,
+    said,
+)
 
 CHOICE, OR, AND, EQUAL, LESS, SUM, PRODUCT, SIGN, WORD = range(1, 10)
 """How tightly operators bind in C; WORD is what needs no parentheses."""

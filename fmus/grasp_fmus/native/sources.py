@@ -10,8 +10,7 @@ from ..page import NATIVE, PROXY, licences, page
 from .blocks import translated
 from .text import string
 
-HERE = Path(__file__).parent
-C = HERE / "c"
+C = Path(__file__).with_name("c")
 OF_BLOCK = ("arithmetic.h", "block_slave.h")
 OF_PROXY = ("sockets.h", "client.h", "channel.h", "proxy_slave.h")
 HEADERS = {
@@ -22,6 +21,32 @@ HEADERS = {
 
 ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
 
+_MAIN = """\
+/* $name for FMI $fmi.0: the file to compile. It includes all others, and all in it but the
+   functions of FMI is static: any number of such FMUs link into one program.
+
+   The functions are called ${name}_fmi${fmi}DoStep and so on. FMI${fmi}_FUNCTION_PREFIX may be \
+defined
+   otherwise. For a shared library, where they are called fmi${fmi}DoStep, define
+   FMI${fmi}_OVERRIDE_FUNCTION_PREFIX, as the standard says; CMake's ${name}_EXPORTS does as well.
+
+$how */
+
+#if !defined(FMI${fmi}_FUNCTION_PREFIX) && !defined(${name}_EXPORTS)
+#define FMI${fmi}_FUNCTION_PREFIX ${name}_
+#endif
+
+#if defined(_MSC_VER) && !defined(_CRT_SECURE_NO_WARNINGS)
+#define _CRT_SECURE_NO_WARNINGS /* strcpy is given room for what it writes */
+#endif
+$system
+#define TOKEN "$guid"
+$defined
+#define SLAVE "$slave"
+
+$included
+#include "fmi$fmi.h"
+"""
 _BLOCK = """\
    Compile as C99, without contraction (-ffp-contract=off) and never with -ffast-math: an FMU that
    would not calculate as its Python source does makes no instance and says why in the log."""
@@ -82,7 +107,7 @@ def _main(
     texts["slave"] = OF_PROXY[-1] if system else OF_BLOCK[-1]
     texts["defined"] = f"#define {defined}"
     texts["included"] = "\n".join(f'#include "{file}"' for file in own)
-    return Template((HERE / "main.c.in").read_text("ascii")).substitute(texts).encode()
+    return Template(_MAIN).substitute(texts).encode()
 
 
 def _files(fmi: Version, *names: str) -> dict[str, bytes]:

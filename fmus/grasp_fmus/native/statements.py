@@ -8,9 +8,8 @@ from functools import partial
 from typing import Any
 
 from .expressions import SIGN, WORD, Expressions
-from .structs import Function, Program
 from .text import comment, string, wrapped
-from .types import REAL, WHOLE, Group, Record, Type, Value, said, size
+from .types import REAL, WHOLE, Function, Group, Program, Record, Type, Value, said, size
 
 ADVICE = {
     "While": "while is not in the subset, as a step must end; use for ... in range(n) with break",

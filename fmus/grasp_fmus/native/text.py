@@ -9,28 +9,48 @@ from math import copysign, isinf, isnan
 from pathlib import Path
 from typing import Any
 
-from .types import UntranslatableError
-
 WIDTH = 100
 
-RESERVED = frozenset(
+
+class UntranslatableError(ValueError):
+    """A block has what cannot be C: where, what, and what to write instead, in one line."""
+
+
+WORDS = frozenset(
     re.findall(
         r"\w+",
         """
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union
-    unsigned void volatile while asm bool class delete false near far new near nullptr operator
-    private public this true typeof virtual alignas alignof constexpr static_assert thread_local
+    unsigned void volatile while
+
+    alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class co_await
+    co_return co_yield compl concept const_cast consteval constexpr constinit decltype delete
+    dynamic_cast explicit export false friend mutable namespace new noexcept not not_eq nullptr
+    operator or or_eq private protected public reinterpret_cast requires static_assert static_cast
+    template this thread_local throw true try typeid typename typeof typeof_unqual using virtual
+    wchar_t xor xor_eq
+
+    NULL I errno linux unix stdin stdout stderr assert offsetof
+        """,
+    )
+)
+"""Words of C and C++, and macros, that no member may be called."""
+
+RESERVED = WORDS | {
+    *re.findall(
+        r"\w+",
+        """
+    far near CLOCKS_PER_SEC EOF HUGE_VAL INFINITY NAN
     abs acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh div erf erfc exp exp2
     expm1 fabs fdim floor fma fmax fmin fmod free frexp gamma hypot index j0 j1 jn ldexp lgamma log
     log10 log1p log2 logb malloc modf nan pow remainder rint round scalb signal signgam sin sinh
     sqrt tan tanh tgamma trunc y0 y1 yn
-    CLOCKS_PER_SEC EOF HUGE_VAL I INFINITY NAN NULL assert errno linux stderr stdin stdout unix
     larger smaller scaled floored ceiled truncated values numbers why
         """,
     )
-)
-"""Words of C and C++, functions of its library, macros, and names of arithmetic.h."""
+}
+"""Those, words of old compilers, functions of the library, more macros, names of arithmetic.h."""
 
 
 def identifier(name: str) -> str:

@@ -1,13 +1,15 @@
-"""The types of a block's values, and a value as C has it."""
+"""The types of a block's values, and what its C is made of: structs, constants and functions."""
 
+import re
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, is_dataclass
 from enum import IntEnum
 from functools import cache
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
-
-class UntranslatableError(ValueError):
-    """A block has what cannot be C: where, what, and what to write instead, in one line."""
+from .text import Source, comment, identifier, number, wrapped
 
 
 @dataclass(frozen=True)
@@ -120,3 +122,164 @@ def said(t: Type) -> str:
     if isinstance(t, Tuple):
         return f"tuple[{', '.join(map(said, t.items))}]"
     return t.name if isinstance(t, Scalar) else t.cls.__name__
+
+
+class Function(NamedTuple):
+    """A function in C."""
+
+    name: str
+    returns: Type
+    by_address: tuple[bool, ...] = ()
+    """Which arguments are large NamedTuples, by their address."""
+
+
+class Program:
+    """The definitions of one block; `file` is the source of a block of one's own."""
+
+    def __init__(self, params: type[Any], file: Path | None = None) -> None:
+        self.params, self.file = Group(params), file
+        self.functions: dict[Any, Function | None] = {}
+        """By code and the types of the arguments; None while it is being translated."""
+        self.kept: dict[str, Function] = {}
+        """The cached properties of the parameters, which are worked out when those are read."""
+        self.bodies: list[str] = []
+        self._sources: dict[str, Source] = {}
+        self.names: dict[str, Any] = {}
+        self._constants: dict[Any, str] = {}
+        self._structs: dict[Type, str] = {}
+        self._definitions: list[str] = []
+
+    # Sources
+
+    def source(self, file: str) -> Source:
+        """The source in a file."""
+        if file not in self._sources:
+            own = self.file is not None and Path(file).name == self.file.name
+            self._sources[file] = Source(file, str(self.file) if own else Path(file).name)
+        return self._sources[file]
+
+    # Names
+
+    def unique(self, module: str, name: str, key: Any) -> str:
+        """The name in C of what a module has, behind the module's own name."""
+        short = module.rpartition(".")[2].removesuffix("_block")
+        short = f"{short}_py" if short in ("block", "text", "slave") else short
+        wanted = "_".join([short, *(part.lstrip("_") for part in name.split("."))])
+        found, count = wanted, 1
+        while self.names.setdefault(found, key) != key:
+            count += 1
+            found = f"{wanted}_{count}"
+        return found
+
+    # Types
+
+    def c(self, t: Type, near: dict[str, Any] | None = None) -> str:
+        """A type in C; `near` are the names of the module that asks, one of which a tuple gets."""
+        t = plain(t)
+        if isinstance(t, Scalar):
+            return "int" if t == BOOLEAN else "double"
+        if t not in self._structs:
+            self._structs[t] = self._struct_name(t, near or {})
+        return self._structs[t]
+
+    def _struct_name(self, t: Type, near: dict[str, Any]) -> str:
+        if not isinstance(t, Tuple):
+            cls = t.cls  # type: ignore[union-attr]  # no Scalar
+            return self.unique(cls.__module__, cls.__name__, t)
+        modules = [near, *(vars(m) for m in near.values() if type(m) is type(sys))]
+        for names in modules:
+            for name, hint in names.items():
+                if (
+                    not name.startswith("_")
+                    and str(hint).startswith("tuple[")
+                    and of_hint(hint) == t
+                ):
+                    return self.unique(names["__name__"], name, t)
+        return self.unique("Tuple", str(len(t.items)), t)
+
+    def member(self, t: Type, i: int) -> str:
+        """How an item of a tuple is reached: .at[0], .at_0 or .name."""
+        if isinstance(t, Record):
+            return f".{identifier(t.cls._fields[i])}"
+        return f".at[{i}]" if alike(t) else f".at_{i}"
+
+    def braces(self, t: Type, items: list[str]) -> str:
+        """The initialiser of a struct."""
+        text = ", ".join(items)
+        return f"{{{{{text}}}}}" if alike(t) else f"{{{text}}}"
+
+    def structs(self) -> str:
+        """The definitions of all structs that were asked for, each after those in it."""
+        done: set[Type] = set()
+        while waiting := [t for t in self._structs if t not in done]:
+            for t in waiting:
+                self._define(t, done)
+        return "\n".join(self._definitions)
+
+    def _define(self, t: Type, done: set[Type]) -> None:
+        t = plain(t)
+        if isinstance(t, Scalar) or t in done:
+            return
+        done.add(t)
+        members = list(self._members(t))
+        for _, kind, _ in members:
+            self._define(kind, done)
+        lines = []
+        for name, kind, meaning in members:
+            line = f"    {self.c(kind)} {name};"
+            lines.append(f"{line}{' ' + comment(meaning) if meaning else ''}")
+        head = [] if isinstance(t, Tuple) else [comment(t.cls.__doc__ or t.cls.__name__)]
+        self._definitions.append(
+            "\n".join([*head, "typedef struct {", *lines, f"}} {self.c(t)};", ""])
+        )
+
+    def _members(self, t: Type) -> Iterator[tuple[str, Type, str]]:
+        if isinstance(t, Tuple):
+            several = enumerate(t.items)
+            alone = [(f"at[{len(t.items)}]", t.items[0], "")] if alike(t) else []
+            yield from alone or ((f"at_{i}", kind, "") for i, kind in several)
+            return
+        assert not isinstance(t, Scalar)  # noqa: S101 - it has no members
+        for name, kind in fields(t).items():
+            yield identifier(name), kind, self._meaning(t.cls, name)
+        if t == self.params:
+            for name, made in self.kept.items():
+                yield identifier(name), made.returns, "worked out from the others"
+
+    def _meaning(self, cls: type[Any], name: str) -> str:
+        declared = getattr(get_type_hints(cls, include_extras=True)[name], "__metadata__", None)
+        if declared:
+            unit = f", {declared[0].unit}" if declared[0].unit else ""
+            return f"{declared[0].description}{unit}"
+        spec: Any = sys.modules[cls.__module__].__spec__
+        return re.sub(r"\s+", " ", self.source(spec.loader.path).member(cls.__name__, name))
+
+    # Constants
+
+    def constant(self, names: dict[str, Any], name: str, value: Any) -> str:
+        """The name in C of a constant of a module."""
+        key = names["__name__"], name
+        c_name = self.unique(*key, key)
+        if key not in self._constants:
+            kind = of_value(value)
+            assert kind  # noqa: S101 - the caller has made sure
+            line = f"static const {self.c(kind, names)} {c_name} = {self.literal(value)};"
+            self._constants[key] = line
+        return c_name
+
+    def literal(self, value: Any) -> str:
+        """A constant as an initialiser."""
+        if isinstance(value, tuple):
+            kind = of_value(value)
+            assert kind  # noqa: S101 - the caller has made sure
+            return self.braces(kind, [self.literal(item) for item in value])
+        return str(int(value)) if isinstance(value, bool) else number(value)
+
+    def constants(self) -> str:
+        """The definitions of all constants."""
+        return "".join(f"{wrapped(line)}\n" for line in self._constants.values())
+
+
+def alike(t: Type) -> bool:
+    """Return True for a tuple whose items have one type in C: they are an array."""
+    return isinstance(t, Tuple) and len({plain(item) for item in t.items}) == 1

@@ -14,7 +14,7 @@ from playground import wasm
 from playground.page import page_system, playground_html
 from playground.wasm import LAWS, PLANTS, shipped
 from report.javascript import in_browser
-from support import campaign
+from support import marks
 from support.marks import needs_zig
 from support.native_fmus import needs_gcc
 
@@ -173,6 +173,6 @@ def drawn(choose):
 @pytest.mark.usefixtures("built")
 @pytest.mark.campaign
 def test_of_settings_drawn_at_random(tmp_path, capsys):
-    addresses = [drawn(random.Random(seed)) for seed in campaign.seeds(300)]
+    addresses = [drawn(random.Random(seed)) for seed in marks.seeds(300)]
     for page in visited(addresses, tmp_path):
         assert_equal_to_a_run(page, capsys)

@@ -1,6 +1,5 @@
 """The C of a block alone: compiles, calls nothing but what it lists, gives the block's bits."""
 
-import ctypes
 import re
 import shutil
 import subprocess
@@ -10,13 +9,10 @@ from pathlib import Path
 
 import pytest
 from c_compilers import BITS
-from grasp_fmus.contract import build_params, declared, packer, unpacker
-from grasp_fmus.cross_check import STEP_SIZE, STEPS
+from grasp_fmus.contract import build_params, declared, unpacker
 from grasp_fmus.native.c_only import called_of_libm, write_c
 from grasp_fmus.own_block import own_model
 from grasp_fmus.package import shipped_model
-from grasp_fmus.shipped import blocks
-from support.compiled import compile_c
 from support.kinds import TRANSLATED
 from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
@@ -113,72 +109,6 @@ def test_the_example_runs_by_the_command_at_its_top(name, written):
             expected = [k * 0.01, *map(float, listed(block.outputs(p, x, u)))]
             assert repr(rows[k]) == repr(expected)
             x = block.step(p, x, u, 0.01)
-
-
-def shared(source, *options):
-    command = ["gcc", *STRICT, *options, "-shared", "-fPIC"]
-    return ctypes.CDLL(str(compile_c([*command, source, "-lm"], source.with_suffix(".so"))))
-
-
-class InC:
-    """The block in C, called from here; its structs are of doubles but for those of `packing`."""
-
-    def __init__(self, model, folder):
-        name = model.description.name
-        write_c(folder, model)
-        library = shared(folder / f"{name}.c", *BITS)
-        self.call = lambda function: getattr(library, f"{name}_{function}")
-        self.state = (ctypes.c_double * 64)()
-        self.why = ctypes.create_string_buffer(2000)
-
-
-CONTROLLER_INPUTS = ctypes.c_double * 6
-
-
-@pytest.fixture(scope="module")
-def controller(tmp_path_factory):
-    """A controller, and its default parameters as its header has them; made once."""
-
-    @cache
-    def made(name):
-        folder = tmp_path_factory.mktemp(name)
-        c = InC(shipped_model(name), folder)
-        (folder / "p.c").write_text(
-            f'#include "{name}.h"\n'
-            f"const {name}_Parameters defaults = {name.upper()}_PARAMETERS_DEFAULTS;\n"
-            "int size = sizeof defaults;\n"
-        )
-        library = shared(folder / "p.c")
-        size = ctypes.c_int.in_dll(library, "size").value
-        return c, (ctypes.c_char * size).in_dll(library, "defaults")
-
-    return made
-
-
-@pytest.mark.parametrize("name", ["GraspController", slow("GraspControllerAdaptive")])
-def test_the_same_bits_as_the_block_over_changing_inputs(fmus, controller, name):
-    c, p = controller(name)
-    block = blocks()[name]
-    fields = declared(block)
-    pack, listed = packer(block.Inputs, fields), unpacker(fields)
-    params = block.Params()
-    y = (ctypes.c_double * 16)()
-    names = [n for f in fields if f.causality == "input" for n in f.names]
-    lines = (fmus / f"{name}_in.csv").read_text().splitlines()
-    assert [cell.strip('"') for cell in lines[0].split(",")] == ["time", *names]
-    rows = [[float(cell) for cell in line.split(",")[1:]] for line in lines[1:]]
-    assert len(rows) == STEPS + 1
-    x = block.initial_state(params, pack(rows[0]))
-    u = CONTROLLER_INPUTS(*rows[0])
-    assert c.call("check")(p, c.why) == 0
-    assert c.call("initial_state")(p, u, c.state, c.why) == 0
-    for row in rows:
-        u = CONTROLLER_INPUTS(*row)
-        assert c.call("step")(p, u, ctypes.c_double(STEP_SIZE), c.state, c.why) == 0
-        assert c.call("outputs")(p, u, c.state, y, c.why) == 0
-        x = block.step(params, x, pack(row), STEP_SIZE)
-        expected = listed(block.outputs(params, x, pack(row)))
-        assert repr([*y][: len(expected)]) == repr(expected)
 
 
 def test_libm_is_what_the_block_calls():

@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 from fmus.native.c_block import Both, loaded
-from support.campaign import seeds
+from support.marks import seeds
 from support.native_fmus import needs_gcc
 
 pytestmark = needs_gcc

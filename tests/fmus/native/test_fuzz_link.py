@@ -10,11 +10,11 @@ import pytest
 from grasp_fmus.link.message import HELLO, INITIALISE, STEP, VERSION
 from grasp_fmus.link.signature import LinkVariable, Signature
 from grasp_fmus.native.bench_header import bench_header
-from support import campaign
+from support import marks
 from support.native_proxies import write_sources
 
 FUZZ = Path(__file__).parent / "fuzz"
-RUNS = campaign.part(60_000)
+RUNS = marks.part(60_000)
 """Inputs that each side is given."""
 
 FLAGS = [
@@ -58,7 +58,7 @@ def fuzzed(program, seeds):
         folder.mkdir()
     for i, seed in enumerate(seeds):
         (corpus / f"{i}").write_bytes(seed)
-    options = [f"-runs={RUNS}", f"-seed={campaign.first_seed + 1}", "-rss_limit_mb=600"]
+    options = [f"-runs={RUNS}", f"-seed={marks.first_seed + 1}", "-rss_limit_mb=600"]
     options += ["-max_len=6000", f"-artifact_prefix={found}/", "-print_final_stats=1"]
     # By a shell: a process inherits the peak of memory of the one that starts it, here of tests.
     command = ["/bin/sh", "-c", '"$@"; exit $?', "sh", str(program), *options, str(corpus)]

@@ -6,7 +6,7 @@ import pytest
 from fmus.native.c_block import loaded
 from fmus.native.test_constructs import HEAD
 from grasp_fmus.native.blocks import translated
-from grasp_fmus.native.types import UntranslatableError
+from grasp_fmus.native.text import UntranslatableError
 
 MORE = """
 

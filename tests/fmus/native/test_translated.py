@@ -1,4 +1,4 @@
-"""The shipped blocks, those of docs/, a hand of N fingers, blocks by chance: the bits of Python."""
+"""The shipped blocks, also of N fingers, those of docs/, blocks by chance: the bits of Python."""
 
 import os
 import subprocess
@@ -10,18 +10,15 @@ from random import Random
 import pytest
 from fmus.native.c_block import Both, loaded
 from fmus.native.random_block import random_block
-from grasp_fmus.shipped import blocks
-from support.campaign import part, seeds
+from grasp_fmus.shipped import block_of as block_of_ours
 from support.kinds import TRANSLATED
-from support.marks import platforms, slow
+from support.marks import part, platforms, seeds, slow
 from support.native_fmus import needs_gcc
 
 pytestmark = needs_gcc
 
 DOCS = Path(__file__).parents[3] / "docs"
-HAND = Path(__file__).with_name("hand.py")
 OWN = {name: DOCS / f"{name}.py" for name in ("spring_plant", "moving_object")}
-OWN["hand"] = HAND
 NAMES = [*TRANSLATED, *OWN]
 
 
@@ -32,7 +29,7 @@ def block_of(name, folder):
         with loaded(folder / f"{name}.py", OWN[name].read_text("utf-8")) as own:
             yield own
     else:
-        yield blocks()[name]
+        yield block_of_ours(name)
 
 
 @pytest.mark.parametrize("name", [*TRANSLATED, *map(slow, OWN)])
@@ -42,13 +39,13 @@ def test_c_gives_the_bits_of_python(name, tmp_path):
         assert sum(both.random_run(Random(seed), 10) for seed in range(15)) > 100
 
 
-@pytest.mark.parametrize("fingers", [2, *map(slow, (3, 4, 5))])
-def test_a_hand_of_n_fingers(fingers, tmp_path):
-    source = HAND.read_text("utf-8").replace("N = 3", f"N = {fingers}")
-    with loaded(tmp_path / "hand.py", source) as block:
-        both = Both(f"hand{fingers}", block, tmp_path / "c")
-        assert both.n_state == 7 * fingers
-        assert sum(both.random_run(Random(seed), 20) for seed in range(20)) > 1_000
+@pytest.mark.parametrize(
+    "name",
+    ["HandPlant4", *map(slow, ("HandController2", "HandControllerAdaptive5", "HandPlantMovable8"))],
+)
+def test_a_hand_of_n_fingers(name, tmp_path):
+    both = Both(name, block_of_ours(name), tmp_path / "c", options=["-O0"])
+    assert sum(both.random_run(Random(seed), 10) for seed in range(15)) > 50
 
 
 def test_a_block_by_chance(tmp_path):

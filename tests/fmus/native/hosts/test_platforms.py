@@ -3,14 +3,27 @@
 Where the libm is that of glibc, every bit is that of Python; elsewhere the loop stays close.
 """
 
+import csv
+import importlib.util
+import subprocess
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from grasp_fmus.native.targets import Target, here
-from support.c_host import BENCH, Grasp, Host, Script, bits, good, rows_in_python
-from support.platforms import ARM, WIN, X86, Parts, Platform, cases
+from grasp_cosim import System, simulate
+from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.hil.served import Service
+from grasp_cosim.ssp.to_archive import write_ssp
+from grasp_fmus.build import build_native, planned
+from grasp_fmus.native.targets import LINUX_ARM, WINDOWS, Target, here
+from support.c_host import BENCH, Grasp, Host, Script, bits, good, number, rows_in_python, unpacked
+from support.fmi2 import Fmu, Instance
+from support.marks import needs_zig
+from support.platforms import ARM, WIN, X86, Parts, Platform, cases, needs_programs, windows
+from support.proxies import build_proxy, serving, wait_until
 
 pytestmark = pytest.mark.platforms
 
@@ -108,3 +121,140 @@ def leg(host, grasp, folder, states, first):
     written = [answer.found[0] for answer in answers if answer.command == "bytes"]
     assert written[: len(states or [])] == (states or [])
     return grasp.read(folder / "leg"), written[len(states or []) :]
+
+
+ON_WINDOWS = needs_programs("wine")
+ON_ARM = needs_programs("qemu-aarch64", "aarch64-linux-gnu-gcc")
+
+STEPS = 50
+
+
+@needs_zig
+@pytest.mark.parametrize(
+    ("target", "fmi", "place"),
+    [
+        pytest.param(WINDOWS, 2, "win64", marks=ON_WINDOWS),
+        pytest.param(WINDOWS, 3, WINDOWS.tuple, marks=ON_WINDOWS),
+        pytest.param(LINUX_ARM, 3, LINUX_ARM.tuple, marks=ON_ARM),
+    ],
+)
+def test_steps_of_a_proxy(fmus, host_for, tmp_path, target, fmi, place):  # fmt: skip
+    """To the bit what the FMU gives here."""
+    original = fmus / "ProximitySensor.fmu"
+    script = Script()
+    with serving(original, Service(lockstep=True)) as server:
+        options = ["--target", target.tuple, "--fmi", str(fmi)]
+        path = build_proxy(original, tmp_path / "Bench.fmu", server.address[1], *options)
+        fmu = unpacked(path, tmp_path / "unpacked")
+        gap, intensity = fmu.reference("gap"), fmu.reference("intensity")
+        script.add("load", 0, fmi, f"{'Z:' if target == WINDOWS else ''}{fmu.binary(place)}")
+        script.add("new", 0, 0, "full", "bench", fmu.token, None)
+        script.add("init", 0, bits(0.0)).add("leave", 0)
+        for k in range(STEPS):
+            script.add("set", 0, "real", gap, bits(0.01 + 1e-4 * k))
+            script.add("step", 0, bits(k * H), bits(H))
+            script.add("get", 0, "real", intensity)
+        script.add("terminate", 0).add("free", 0)
+        (answers,) = host_for(target).run(script, folder=tmp_path)
+        wait_until(lambda: server.fmu.counters()["sessions"] == 1)  # the end has no answer
+        assert server.fmu.counters()["steps"] == STEPS
+    assert [a for a in answers if a.status] == []
+    found = [number(a.found[0]) for a in answers if a.command == "get"]
+    with Instance(Fmu(original, tmp_path / "here")) as instance:
+        instance.initialise()
+        for k in range(STEPS):
+            instance.set({"gap": 0.01 + 1e-4 * k})
+            instance.step(k * H, H)
+            assert instance.get("intensity") == [found[k]]
+
+
+@needs_zig
+@ON_WINDOWS
+def test_a_peer_that_is_gone_on_windows(fmus, host_for, tmp_path):
+    original = fmus / "ProximitySensor.fmu"
+    with serving(original, Service(lockstep=True)) as server:
+        port = server.address[1]
+    options = ["--target", "win64"]
+    fmu = unpacked(build_proxy(original, tmp_path / "B.fmu", port, *options), tmp_path / "u")
+    script = Script().add("load", 0, 2, f"Z:{fmu.binary('win64')}")
+    script.add("new", 0, 0, "full", "bench", fmu.token, None)
+    script.add("set", 0, "real", fmu.reference("proxy.connect_timeout"), bits(0.2))
+    script.add("init", 0, bits(0.0)).add("free", 0)
+    (answers,) = host_for(WINDOWS).run(script, folder=tmp_path)
+    assert [a.status for a in answers] == [0, 0, 0, 3, 0]
+    ((_, _, _, said),) = answers[3].said
+    assert f"no answer from 127.0.0.1:{port} within 0.2 s: is the peer running there" in said
+
+
+NAMES = ("GraspController", "GripperPlant", "GripperPlantMovable", "ProximitySensor")
+
+
+@pytest.fixture(scope="module")
+def natives_of_windows(tmp_path_factory):
+    """The folder of native FMUs that have a binary for Windows, too."""
+    folder = tmp_path_factory.mktemp("windows")
+    build_native(folder, planned([WINDOWS]), NAMES)
+    return folder
+
+
+def extracted(archive, folder):
+    with ZipFile(archive) as file:
+        file.extractall(folder)
+    return folder
+
+
+STEP = 1e-4
+DIGITS = 0.6e-6
+"""What ecos rounds to in its table, and a little."""
+
+UNZIP = "@echo off\r\nxcopy /E /I /Y /Q %2.d %4\r\n"
+"""Where SHELL is bash, ecos calls unzip, which wine lacks: this copies what was unpacked before."""
+
+SAMPLED = ("plant.", "controller.target_position", "controller.virtual_position")
+"""What a master that steps all at once has at the same points as ours."""
+
+
+@needs_zig
+@ON_WINDOWS
+@pytest.mark.skipif(not importlib.util.find_spec("ecospy"), reason="NO ecospy")
+def test_ecos_runs_the_grasp(natives_of_windows, tmp_path):
+    system = (
+        System.load(SYSTEM, natives_of_windows)
+        .with_experiment(STEP, scheme="jacobi")
+        .with_values({"plant.initial_object_position": 0.02, "sensor_1.reflectance": 0.86})
+    )
+    path = tmp_path / "grasp.ssp"
+    write_ssp(system, path)
+    folder = extracted(path, tmp_path / "grasp.ssp.d")
+    for fmu in [*folder.glob("resources/*.fmu")]:
+        extracted(fmu, fmu.with_name(f"{fmu.name}.d"))
+    (tmp_path / "unzip.bat").write_bytes(UNZIP.encode())
+    spec = importlib.util.find_spec("ecospy")
+    assert spec is not None
+    assert spec.origin is not None
+    program = Path(spec.origin).with_name("binaries") / "ecos.exe"
+    options = ["--stopTime", "3", "--stepSize", repr(STEP), "--parameterSet", "initialValues"]
+    done = subprocess.run(
+        ["wine", program, "simulate", "--path", f"Z:{path}", *options],
+        cwd=tmp_path, env=windows() | {"SHELL": "/bin/bash"}, capture_output=True, text=True,
+        timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    theirs = table(tmp_path / "grasp.csv")
+    ours = simulate(system)
+    names = [name for name in ours.units if name.startswith(SAMPLED) and name in theirs]
+    assert len(names) > 12
+    for name in names:
+        found = np.asarray(ours[name], dtype=np.float64)[: len(theirs[name])]
+        assert np.max(np.abs(theirs[name] - found)) <= DIGITS, name
+    assert {len(column) for column in theirs.values()} == {30_000}
+    assert theirs["plant.contact[1]"][-1] == theirs["plant.contact[2]"][-1] == 1.0
+
+
+def table(path):
+    """The columns of a table of ecos, by our names of variables."""
+    with path.open(newline="") as file:
+        head, *rows = csv.reader(file, skipinitialspace=True)
+    columns = np.array([row[2:] for row in rows], dtype=np.float64).T
+    names = [name.rpartition("[")[0].replace("::", ".") for name in head[2:]]
+    return dict(zip(names, columns, strict=True))
