@@ -1,11 +1,22 @@
-"""From the master to the listeners: every row once, in order, whatever happens."""
+"""From the master to the listeners: every row once, in order; what runs away ends the run."""
+
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, SimulationError, simulate
+from grasp_cosim.exchange.dispatch import DECADES, FAR, Divergence, Runaway, largest
+from grasp_cosim.exchange.listener import Signal
+from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.memory import MemoryListener
+from grasp_cosim.system.parts import Connection, Port
+from hypothesis import given
+from hypothesis import strategies as st
 from recording.rows import full_disk
+from si_units import Unit
 
 
 @pytest.mark.parametrize("every", [1, 300])
@@ -65,3 +76,134 @@ def test_where_a_listener_does_not_end_the_others_do(grasp, tmp_path):
         session.close()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["1.csv", "2.csv", "3.csv"]
     assert [len(path.read_text().splitlines()) for path in (paths[0], paths[2])] == [12, 12]
+
+
+Floats = npt.NDArray[Any]
+
+UNITS = {
+    "N": Unit("N", (1, 1, -2, 0, 0, 0, 0, 0)),
+    "uN": Unit("uN", (1, 1, -2, 0, 0, 0, 0, 0), 1e-6),
+}
+ROWS = 4000
+K = np.arange(ROWS)
+
+
+def watch(*columns, block=1000, unit=None, nominal=None, kind="Real", factor=None):
+    """What runs away of signals a.y0, ... 1 ms apart; rows are counted over all blocks."""
+    names = [f"y{i}" for i in range(len(columns))]
+    variables = tuple(
+        Variable(n, "Real", "output", 1, unit, None, None, None, magnitude=nominal) for n in names
+    )
+    interface = Interface(Any, "", "", variables, units=UNITS)  # type: ignore[arg-type]
+    system = SimpleNamespace(
+        component=lambda name, place: SimpleNamespace(interface=interface),
+        connections=(Connection(Port("a", "y0"), Port("b", "u"), factor),),
+        scheme="jacobi",
+        step_ns=1_000_000,
+        time_ns=lambda step: 1_000_000 * step,
+    )
+    outputs = {Port("a", n): Signal(f"a.{n}", unit, kind) for n in names}
+    divergence, rows = Divergence(system, outputs), np.column_stack(columns)
+    for first in range(0, len(rows), block):
+        piece = slice(first, first + block)
+        found = divergence(np.arange(len(rows))[piece], rows[piece], largest(rows[piece]))
+        if found is not None:
+            return Runaway(first + found.row, found.text)
+    return None
+
+
+def ten(low, high):
+    """Powers of ten of a number from low to high."""
+    return st.floats(low, high).map(lambda x: float(10.0**x))
+
+
+def response(damping, frequency, time):
+    """Step and impulse response of a system of second order, from the roots; 0 before time 0."""
+    t = np.maximum(time, 0.0)
+    s = frequency * np.sqrt(np.array(damping**2 - 1.0, complex))
+    one, two = -damping * frequency + s, -damping * frequency - s
+    if abs(one - two) < 1e-6 * frequency:
+        two = one * (1.0 + 1e-6)
+    impulse = ((np.exp(one * t) - np.exp(two * t)) / (one - two)).real * frequency
+    step = (1.0 + (two * np.exp(one * t) - one * np.exp(two * t)) / (one - two)).real
+    return np.where(time >= 0.0, step, 0.0), np.where(time >= 0.0, impulse, 0.0)
+
+
+@given(ten(-4.0, 1.0), ten(-4.0, 0.6), ten(-3.0, 12.0), st.integers(0, ROWS), st.floats(-1e3, 1e3))
+def test_a_stable_system_of_second_order_may_overshoot(damping, frequency, size, start, rest):
+    for curve in response(damping, frequency, K - float(start)):
+        assert watch(rest + size * curve) is None
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.0, 6.0), ten(-3.0, 6.0), st.integers(0, ROWS), st.booleans()),
+        min_size=1,
+        max_size=3,
+    )
+)
+def test_ramps_powers_and_their_sums_do_not_trip(parts):
+    """A power of 0 is a jump."""
+    total = np.zeros(ROWS)
+    for power, size, start, down in parts:
+        after = np.maximum(K - start, 0) / ROWS
+        total += (-size if down else size) * np.where(start <= K, after**power, 0.0)
+    assert watch(total) is None
+
+
+@given(ten(-3.0, 13.0), ten(-4.0, -1.0), ten(-8.0, -3.0), st.booleans())
+def test_a_chirp_does_not_trip(size, start, rise, growing):
+    envelope = K / ROWS if growing else 1.0
+    assert watch(size * envelope * np.sin(start * K + rise * K**2)) is None
+
+
+@given(ten(-2.3, 0.7), ten(-4.0, 0.497), st.floats(0.0, 6.3), ten(-9.0, 3.0), st.integers(1, 2000))
+def test_what_grows_exponentially_trips_whatever_its_rate_and_frequency(
+    rate, turn, phase, size, block
+):
+    """`rate` in decades a step: from one in 200 steps to five in one, with any oscillation."""
+    decades = np.log10(size) + rate * K
+    there = decades < 60.0
+    curve = 10.0 ** decades[there] * np.cos(turn * K[there] + phase)
+    if np.abs(curve).max() < 10.0 * FAR * max(1.0, size):
+        return  # it has not grown enough
+    found = watch(curve, block=block)
+    assert np.abs(curve[: found.row + 1]).max() >= 10.0**DECADES
+
+
+def test_the_scale_is_the_nominal_or_the_first_value():
+    curve = 10.0 ** (K / 500.0)  # up to 1e8
+    assert watch(curve) is not None
+    assert watch(curve, nominal=1e4) is None
+    assert watch(1e4 * curve, nominal=1.0) is not None  # from 1e4: to be 1e10, and it is 1e12
+    assert watch(1e-3 * curve) is None
+    assert watch(1e-3 * curve, nominal=1e-3) is not None
+
+
+def test_large_values_from_the_start_do_not_trip():
+    assert watch(np.full(ROWS, 6e23)) is None
+    assert watch(np.where(K < 100, 0.0, 6e23)) is None
+    assert watch(np.where(K < 100, 1.0, 1e14)) is None
+
+
+def test_only_reals_count():
+    assert watch(10.0 ** (K / 100.0), kind="Integer") is None
+
+
+@given(st.integers(1, 300), st.integers(1, 300))
+def test_blocks_of_any_length_come_to_the_same(one, two):
+    columns = [10.0 ** (K[:900] / d) for d in (60.0, 70.0, 61.0)]
+    assert watch(*columns, block=one) == watch(*columns, block=two)
+
+
+def test_the_first_to_run_away_is_named():
+    late, early = 10.0 ** (K / 500.0), 10.0 ** (K / 300.0)
+    found = watch(late, early, unit="N")
+    assert found.text.startswith("a.y1 ran away: 1e+06 N at t = 1.8 s, ")
+    found = watch(late, unit="N")
+    assert found.text == (
+        "a.y0 ran away: 1e+06 N at t = 3 s, ten times as much every 0.5 s; look at the signs and "
+        "gains, or try a shorter step"
+    )
+    found = watch(-late, factor=-1.0)
+    assert found.text.endswith("; look at factor = -1 of a.y0 -> b.u, or try a shorter step")

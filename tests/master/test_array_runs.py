@@ -2,14 +2,13 @@
 
 import json
 
-import fmpy
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.cli.entry import main
 from grasp_cosim.recording.load import load_run
 from scipy.linalg import expm
-from support.marks import engines, skip_where_fmpy_runs_none
+from support.marks import engines
 from support.native_fmus import ARRAY_TYPES as TYPES
 from support.native_fmus import needs_cvode, needs_gcc, state_space
 
@@ -106,24 +105,6 @@ def test_stimuli_drive_elements(tmp_path, engine, isolation):
     times = np.arange(17) * STEP - STEP
     assert found[1:, 1].tolist() == np.interp(times[1:], [0.0, 1.0], [1.0, 3.0]).tolist()
     assert found[:, [0, 2]].tolist() == [[1.0, 3.0]] * 17
-
-
-@engines
-def test_fmpy_finds_the_same_bits(tmp_path, engine):
-    skip_where_fmpy_runs_none("3.0")
-    given = values_of(3, 3, 3)
-    result = simulate(
-        alone(tmp_path).with_values({f"ss.{k}": v for k, v in given.items()}), engine=engine
-    )
-    theirs = fmpy.simulate_fmu(
-        state_space(tmp_path, "complete", complete=True),
-        stop_time=STOP,
-        step_size=STEP,
-        output_interval=STEP,
-        start_values={k: v.ravel().tolist() for k, v in given.items()},
-        output=["y"],
-    )
-    np.testing.assert_array_equal(signals(result, "ss.y", 3), theirs["y"])
 
 
 @engines

@@ -3,10 +3,8 @@
 import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.interface.interface import limits
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system.parts import Event, Port
 from grasp_cosim.system.validity import connection_transform, remarks
@@ -44,38 +42,6 @@ def connected(source, target):
     return f'"a.y_{source} -> b.u_{target}"'
 
 
-def test_the_interface_of_fmi_3(tmp_path):
-    found = read_interface(build(tmp_path, units={"x": "m"}))
-    assert (found.version, found.guid, found.identifier) == ("3.0", "{native}", "native")
-    assert found.can_vary_step is True
-    assert found.capability("canGetAndSetFMUstate") is False
-    assert found.capability("mightReturnEarlyFromDoStep") is False
-    by_type = {fmi_type: found.by_name[f"y_{fmi_type}"] for fmi_type in TYPES["3.0"]}
-    assert {v.type for v in by_type.values()} == set(TYPES["3.0"])
-    kinds = {"Float64": "Real", "Float32": "Real", "Boolean": "Boolean", "String": "String"}
-    assert {t: v.kind for t, v in by_type.items()} == {
-        t: kinds.get(t, "Integer") for t in TYPES["3.0"]
-    }
-    assert by_type["Int8"].dependencies == by_type["Int8"].initial_dependencies == ("u_Int8",)
-    assert found.by_name["x"].dependencies == ()
-    assert found.by_name["x"].unit == "m"
-    assert found.by_name["y_array"].shape == (3,)
-    assert found.by_name["y_array"].dependencies is None
-    assert found.by_name["gain"].variability == "tunable"
-    assert found.units["mm"].factor == 0.001
-    assert "bare" not in found.units
-
-
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_limits_are_those_of_numpy(version):
-    types = {"Enumeration": "Int32" if version == "2.0" else "Int64", "Integer": "Int32"}
-    for fmi_type in TYPES[version]:
-        if "Int" in fmi_type or fmi_type == "Enumeration":
-            info = np.iinfo(types.get(fmi_type, fmi_type).lower())
-            assert limits(fmi_type, version) == (info.min, info.max)
-    assert limits("Float32", "3.0")[1] == float(np.finfo(np.float32).max)
-
-
 @pytest.mark.parametrize(
     ("name", "value", "fits"),
     [
@@ -94,11 +60,6 @@ def test_values_must_fit_their_type(tmp_path, name, value, fits):
     else:
         with pytest.raises(InputError, match=f"^here: {name} = .*: must be "):
             interface.parse("here", name, value, text=True)
-
-
-def test_large_integers_are_exact(tmp_path):
-    interface = read_interface(build(tmp_path))
-    assert interface.parse("here", "u_Int64", str(2**53 + 1), text=True) == 2**53 + 1
 
 
 @pytest.mark.parametrize(

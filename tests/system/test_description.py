@@ -6,7 +6,6 @@ import zipfile
 import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.system.parts import Port
 from grasp_cosim.system.validity import remarks
 
 TEXT = SYSTEM.read_text("utf-8")
@@ -16,17 +15,6 @@ def load(text, fmus, folder):
     path = folder / "system.toml"
     path.write_text(text, encoding="utf-8")
     return System.load(path, fmus)
-
-
-def test_the_built_in_grasp(grasp):
-    assert [c.name for c in grasp.components] == ["plant", "sensor_1", "sensor_2", "controller"]
-    assert len(grasp.connections) == 10
-    assert (grasp.step_ns, grasp.stop_ns, grasp.scheme) == (100_000, 3_000_000_000, "sequential")
-
-
-def test_every_input_is_connected(grasp):
-    inputs = {Port(c.name, v.name) for c in grasp.components for v in c.interface.of("input")}
-    assert {connection.target for connection in grasp.connections} == inputs
 
 
 WRONG = [
@@ -41,9 +29,7 @@ WRONG = [
         r"\[experiment\]: unknown entry 'stepp'; did you mean step",
     ),
     ("step = 1e-4", "step = 0", r"experiment.step = 0 s: must be a number greater than 0"),
-    ("step = 1e-4", "step = nan", "must be a number greater than 0"),
     ("step = 1e-4", "step = 'fast'", "experiment.step = 'fast' s: must be a number"),
-    ("step = 1e-4", "step = true", "experiment.step = True s: must be a number"),
     ("step = 1e-4", "step = 1.5e-9", "must be a whole number of nanoseconds"),
     ("step = 1e-4", "step = 7e-4", "step = 0.0007 s does not divide stop = 3 s; stop could be"),
     ("stop = 3.0", "", "experiment.stop = None s: must be a number"),
@@ -76,12 +62,9 @@ WRONG = [
         "parameter 'width'; did you mean object_width",
     ),
     ("object_width = 0.07", "object_width = -1.0", "must be a finite number from 0 to 10 m"),
-    ("object_width = 0.07", "object_width = nan", "object_width = nan: must be a finite number"),
     ("object_width = 0.07", "object_width = '7 cm'", "must be a finite number from 0 to 10 m"),
-    ("object_width = 0.07", "object_width = true", "must be a finite number from 0 to 10 m"),
     ("object_width = 0.07", "object_width = [0.07]", "is not an array; must be one value"),
     ("object_width = 0.07", "object_width = [{}]", "must be a number, boolean or string"),
-    ("object_width = 0.07", "object_width = 'brown'", "must be a finite number from 0 to 10 m"),
     ("[experiment]", "[experiment", "not readable as TOML"),
 ]
 

@@ -18,7 +18,6 @@ from grasp_cosim.system.parts import (
     Connection,
     Event,
     Fault,
-    Initialisation,
     Port,
 )
 from grasp_cosim.system.scenario import event_entry, fault_entry, read_events, read_faults
@@ -62,47 +61,11 @@ def load(text, fmus, folder):
     return System.load(path, fmus)
 
 
-def test_events_are_read(fmus, tmp_path):
-    assert load(GRASP + EVENTS, fmus, tmp_path).events == (
-        Event({Port("sensor_1", "reflectance"): 0.6}, at_ns=500_000_000),
-        Event(
-            {Port("sensor_1", "reflectance"): 0.4, Port("sensor_2", "reflectance"): 1},
-            when=Condition(Port("plant", "gap[1]"), "<", 0.01),
-        ),
-    )
-
-
-def test_faults_are_read(fmus, tmp_path):
-    assert load(GRASP + FAULTS, fmus, tmp_path).faults == (
-        Fault(
-            INTENSITY,
-            "noise",
-            {"standard_deviation": 0.002},
-            500_000_000,
-            1_000_000_000,
-            1,
-            Condition(Port("plant", "contact[2]"), "==", True),
-        ),
-        Fault(INTENSITY, "saturation", {"high": 0.4}),
-    )
-
-
-def test_without_a_scenario_there_is_none(grasp):
-    assert (grasp.events, grasp.faults, grasp.initialisation) == ((), (), Initialisation())
-
-
-def test_the_options_of_the_initialisation(fmus, tmp_path):
-    text = GRASP + '[initialisation]\nloops = "refuse"\ntolerance = 1e-6\niterations = 9\n'
-    expected = Initialisation("refuse", 1e-6, 9)
-    assert load(text, fmus, tmp_path).initialisation == expected
-
-
 WRONG_EVENTS = [
     ("at = 0.5", "att = 0.5", r"events\[0\]: unknown entry 'att'; did you mean at"),
     ("at = 0.5", "", r"events\[0\]: must have either at, a time in s, or when, a condition"),
     ("at = 0.5", 'at = 0.5\nwhen = "plant.gap[1] < 1"', "must have either at"),
     ("at = 0.5", "at = -1", r"events\[0\]: at = -1 s: must be a number from 0 to 1e\+09"),
-    ("at = 0.5", "at = nan", "at = nan s: must be a number from 0"),
     ("at = 0.5", "at = 'now'", "at = 'now' s: must be a number"),
     ("at = 0.5", "at = 1.5e-9", "must be a whole number of nanoseconds"),
     (
@@ -140,15 +103,9 @@ WRONG_EVENTS = [
         r"set\.sensor_1\.gap: has a connection, from plant\.gap\[1\]; put a fault of kind 'stuck'",
     ),
     ("= 0.6", "= 11", "reflectance = 11: must be a finite number from 0 to 10$"),
-    ("= 0.6", "= true", "reflectance = True: must be a finite number"),
-    ("= 0.6", "= nan", "reflectance = nan: must be a finite number"),
-    ("= 0.6", "= '0.6'", "reflectance = '0.6': must be a finite number"),
     ("= 0.6", "= [0.6]", r"set\.sensor_1\.reflectance = \[0\.6\]: must be a number, boolean or"),
     ("plant.gap[1] < 0.01", "plant.gap[1]", r"events\[1\]: when = 'plant.gap\[1\]': must be like"),
-    ("plant.gap[1] < 0.01", "plant.gap[1] < near", "must be like 'plant.gap"),
-    ("plant.gap[1] < 0.01", "plant.gap[1] = 0.01", "must be like 'plant.gap"),
     ("plant.gap[1] < 0.01", "gap < 0.01", "when: 'gap': must be 'component.variable'"),
-    ("plant.gap[1] < 0.01", "plant.gap[1] < nan", "is Real; must be compared with a finite number"),
     ("plant.gap[1] < 0.01", "plant.gap[1] < true", "must be compared with a finite number"),
     ("plant.gap[1] < 0.01", "plant.gap[1] == 0.01", "is Real; must be compared with <, <=, >, >="),
     ("plant.gap[1] < 0.01", "plant.contact[1] > 0", "is Boolean; must be compared with ==, !="),
@@ -164,7 +121,6 @@ WRONG_EVENTS = [
 
 WRONG_FAULTS = [
     ('kind = "noise"', 'kind = "hum"', "kind = 'hum': must be one of stuck, dropout, bias, noise"),
-    ('kind = "noise"', "", "kind = None: must be one of stuck"),
     ('kind = "noise"', "kind = ['noise']", r"kind = \['noise'\]: must be one of stuck"),
     (
         "standard_deviation",
@@ -174,16 +130,11 @@ WRONG_FAULTS = [
     ),
     ("standard_deviation = 0.002", "", "standard_deviation = None: must be a finite number of at"),
     ("= 0.002", "= -1", "standard_deviation = -1: must be a finite number of at least 0"),
-    ("= 0.002", "= inf", "standard_deviation = inf: must be a finite number of at least 0"),
-    ("= 0.002", "= true", "standard_deviation = True: must be a finite number"),
     ("from = 0.5", "from = -0.5", r"from = -0.5 s: must be a number from 0 to 1e\+09"),
     ("until = 1.0", "until = 0", "until = 0 s: must be a number greater than 0"),
     ("until = 1.0", "until = 0.5", "from 0.5 s until 0.5 s: must hold a communication point"),
-    ("until = 1.0", "until = 0.4", "from 0.5 s until 0.4 s: must hold a communication point"),
     ("from = 0.5\nuntil = 1.0", "from = 0.11e-3\nuntil = 0.19e-3", "a multiple of 0.0001 s"),
-    ("seed = 1", "seed = 1.5", "seed = 1.5: must be a whole number, at least 0"),
     ("seed = 1", "seed = -1", "seed = -1: must be a whole number, at least 0"),
-    ("seed = 1", "seed = true", "seed = True: must be a whole number, at least 0"),
     (
         "sensor_1.intensity ->",
         "sensor_2.intensity ->",
@@ -204,7 +155,6 @@ WRONG_FAULTS = [
     ),
     ("high = 0.4", "", "a saturation must have low, high or both"),
     ("high = 0.4", "high = 0.4\nlow = 0.4", "high = 0.4: must be above low = 0.4"),
-    ("high = 0.4", "high = nan", "high = nan: must be a finite number"),
     ("high = 0.4", "high = 0.4\nseed = 1", "unknown entry 'seed' of saturation; valid: low, high"),
     ('"saturation"\nhigh = 0.4', '"dropout"\nprobability = 1.1', "must be a number from 0 to 1"),
     ('"saturation"\nhigh = 0.4', '"quantisation"\nstep = 0', "must be a finite number above 0"),
@@ -216,7 +166,6 @@ WRONG_FAULTS = [
         "time = 0.00123 s: must be a whole number of steps of 0.0001 s; could be 0.0012 s",
     ),
     ('"saturation"\nhigh = 0.4', '"stuck"\nvalue = nan', r"value: intensity\[1\] = nan: must be a"),
-    ('"saturation"\nhigh = 0.4', '"stuck"\nvalue = true', r"intensity\[1\] = True: must be a"),
     (
         '"saturation"\nhigh = 0.4',
         '"stuck"\nhold = 1.0',
@@ -228,12 +177,7 @@ WRONG_INITIALISATION = [
     ("loop = 'refuse'", "unknown entry 'loop'; did you mean loops"),
     ("loops = 'ignore'", "loops = 'ignore': must be one of iterate, refuse"),
     ("tolerance = 0.0", "tolerance = 0.0: must be a number between 0 and 1"),
-    ("tolerance = nan", "tolerance = nan: must be a number between 0 and 1"),
-    ("tolerance = 'small'", "tolerance = 'small': must be a number between 0 and 1"),
-    ("tolerance = true", "tolerance = True: must be a number between 0 and 1"),
     ("iterations = 0", "iterations = 0: must be a whole number, at least 1"),
-    ("iterations = 9.0", "iterations = 9.0: must be a whole number, at least 1"),
-    ("iterations = true", "iterations = True: must be a whole number, at least 1"),
 ]
 
 
@@ -402,20 +346,3 @@ def test_an_entry_of_a_fault_reads_as_it_again(faults):
     read = read_faults("run.json", entries, ())
     assert read == tuple(faults)
     assert [fault_entry(fault) for fault in read] == entries
-
-
-def test_entries_are_those_of_the_system_file(fmus, tmp_path):
-    system = load(GRASP + EVENTS + FAULTS, fmus, tmp_path)
-    assert event_entry(system.events[1]) == {
-        "when": "plant.gap[1] < 0.01",
-        "set": {"sensor_1.reflectance": 0.4, "sensor_2.reflectance": 1},
-    }
-    assert fault_entry(system.faults[0]) == {
-        "connection": "controller.intensity[1]",
-        "kind": "noise",
-        "standard_deviation": 0.002,
-        "from": 0.5,
-        "until": 1.0,
-        "when": "plant.contact[2] == true",
-        "seed": 1,
-    }
