@@ -81,17 +81,6 @@ def test_a_shift_in_time_within_the_band_is_allowed_and_a_longer_one_is_not():
     assert [s.name for s in found.signals if not s.inside] == [GAP]
 
 
-def test_runs_of_unlike_length_and_step_are_compared_where_both_are(folders):
-    run = grasp_run()
-    found = folders(run, cut(run, slice(200, 1801, 4)))
-    assert (found.begin, found.end) == (0.2, 1.8)
-    by_name = {s.name: s for s in found.signals}
-    assert by_name[GAP].inside
-    assert by_name["controller.target_position"].deviation < 1e-6
-    same = {m.name: (m.original, m.candidate) for m in found.metrics}
-    assert same["target_position"][0] == pytest.approx(run["controller.target_position"][1800])
-
-
 def test_a_metric_that_is_off_or_that_only_one_has_makes_the_runs_differ(folders):
     @metric("farthest", unit="m")
     def farthest(run):

@@ -102,17 +102,6 @@ def test_a_blocked_candidate_is_not_run(short, fmus):
     assert "  notes   missing      finger_mass[1]: parameter is missing" in lines
 
 
-def test_the_deviation_is_that_of_the_runs(short, heavy):
-    """A finger under the same force falls behind by as much as it is heavier."""
-    bands = Bands("b.toml", {"*": Given(absolute=1e-12, time=0.0)})
-    found = qualify(short, "plant", heavy, bands=bands, isolation="none")
-    original, candidate = (run["plant.velocity[2]"].values for run in found.runs)
-    largest = float(abs(original - candidate).max())
-    compared = by_name(found.signals)["plant.velocity[2]"]
-    assert compared.deviation == pytest.approx(largest, rel=1e-12)
-    assert candidate[2] / original[2] == pytest.approx(0.5 / 0.6, rel=1e-3)
-
-
 def test_bands_of_a_file_decide(short, heavy):
     wide = Bands("b.toml", {"*": Given(relative=1.0)}, {"*": Given(absolute=math.inf)})
     found = qualify(short, "plant", heavy, bands=wide, isolation="none")
@@ -214,17 +203,6 @@ def loop(tmp_path):
 
 
 @needs_gcc
-def test_the_loop_is_what_it_says(loop, tmp_path):
-    found = qualify(loop, "plant", tmp_path / "plant.fmu")
-    assert found.qualified
-    assert found.swap.differences == ()
-    assert {c.deviation for c in found.signals} == {0.0}
-    assert found.metrics == ()
-    x = found.runs[0]["plant.x"].values
-    assert x.tolist() == pytest.approx([1.0 - 0.97**k for k in range(101)], rel=1e-9)
-
-
-@needs_gcc
 def test_millimetres_are_converted_on_the_connection_in_values_and_in_signals(loop, tmp_path):
     """With its gain in mm, the candidate integrates to x in mm."""
     candidate = build(tmp_path, "millimetres", "2.0", {"x": "mm", "gain": "mm"})
@@ -235,17 +213,9 @@ def test_millimetres_are_converted_on_the_connection_in_values_and_in_signals(lo
     ]
     assert found.qualified
     x, other = (run["plant.x"].values for run in found.runs)
+    assert x.tolist() == pytest.approx([1.0 - 0.97**k for k in range(101)], rel=1e-9)
     assert other.tolist() == pytest.approx(x.tolist(), rel=1e-12)
     assert {c.unit for c in found.signals if c.name == "plant.x"} == {"m"}
-
-
-@needs_gcc
-def test_a_unit_that_is_only_called_another_is_not_the_same_plant(loop, tmp_path):
-    candidate = build(tmp_path, "millimetres", "2.0", {"x": "mm", "gain": "m"})
-    found = qualify(loop, "plant", candidate, isolation="none")
-    assert not found.qualified
-    assert {"plant.x", "spring.y_Real"} <= {c.name for c in found.outside}
-    assert found.runs[1]["plant.x"].values[1] == pytest.approx(0.03e-3, rel=1e-12)
 
 
 @needs_gcc

@@ -88,19 +88,6 @@ def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is()
     assert higher.time[worst] == time[102]
 
 
-def test_curves_of_different_steps_are_compared_at_the_times_of_both():
-    fine, coarse = times(101), times(51, 2_000_000)
-    found = deviation(Curve(fine, np.sin(fine)), Curve(coarse, np.sin(coarse)), 0.0)
-    assert found.time.tolist() == fine.tolist()
-    assert found.values[::2].max() == 0.0
-    assert 0.0 < found.values.max() < 1e-6
-
-
-def test_a_curve_until_a_time():
-    short = sampled(np.arange(10.0)).until(0.004)
-    assert short.values.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-
-
 def test_a_late_curve_that_still_moves_at_the_end_is_inside():
     time = times(100)
     ramp = Curve(time, 5.0 * time)

@@ -7,7 +7,6 @@ It warns where results may differ, and is a note where nothing in this system de
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isclose
@@ -68,7 +67,7 @@ class Use:
 
     values are what the original is given. stated are variables for which the system states other
     numbers in the unit of the original: in events, conditions, faults and factors of connections.
-    tuned are those that events set. loops is what is done with an algebraic loop.
+    tuned are those that events set.
     """
 
     component: str
@@ -77,7 +76,6 @@ class Use:
     stated: frozenset[str]
     tuned: frozenset[str]
     step: float
-    loops: str
 
     def uses(self, name: str) -> bool:
         """True if the system depends on the variable."""
@@ -98,7 +96,6 @@ def use_of(system: System, name: str) -> Use:
         stated(system, name),
         own(port for event in system.events for port in event.set),
         (component.step_ns or system.step_ns) / NANOSECONDS,
-        system.initialisation.loops,
     )
 
 
@@ -262,24 +259,13 @@ def capability_differences(
         had, has = bool(original.capability(flag)), bool(candidate.capability(flag))
         if had != has and had == lost:
             yield Difference(severity, "capability", flag, text, had, has)
-    yield from _steps(original, candidate, step)
-
-
-def _steps(original: Interface, candidate: Interface, step: float) -> Iterator[Difference]:
-    if "CoSimulation" not in candidate.kinds:
-        return  # the solver's steps are of any size
     flag = "canHandleVariableCommunicationStepSize"
-    if original.capability(flag) and not candidate.capability(flag):
+    able = [original.capability(flag), candidate.capability(flag)]
+    if "CoSimulation" in candidate.kinds and able[0] and not able[1]:
         default = candidate.experiment.get("step_size")
         same = isclose(as_float(default, step), step, rel_tol=SAME)
         text = f"steps of one size only: {step:g} s here, its default is {_shown(default)} s"
         yield Difference("notes" if same else "warns", "capability", flag, text, True, False)
-    flag = "fixedInternalStepSize"
-    was, now = original.capability(flag), candidate.capability(flag)
-    size = as_float(now, 0.0)
-    if size > 0.0 and not isclose(step / size, max(1, round(step / size)), rel_tol=1e-9):
-        text = f"steps by {size:g} s inside, of which the step of {step:g} s is no whole multiple"
-        yield Difference("warns", "capability", flag, text, was, now)
 
 
 def _less(a: float, b: float) -> bool:
@@ -303,79 +289,38 @@ def _a(noun: str) -> str:
     return f"an {noun}" if noun[0] in "aeio" else f"a {noun}"
 
 
-Interfaces = Mapping[str, Interface]
-"""What the FMUs of a system declare, under the system's names, by component."""
-
-
 def feedthrough_differences(
-    system: System, name: str, originals: Interfaces, candidate: Interface, use: Use
+    original: Interface, candidate: Interface, use: Use
 ) -> Iterator[Difference]:
     """Of outputs that depend directly on other inputs than those of the original.
 
-    system is the one with the original in the component of that name.
+    What is connected may so be part of an algebraic loop, which is solved or refused in the run.
     """
-    ours, swapped = originals[name].by_name, {**originals, name: candidate}
-    inputs = _inputs(candidate)
-    for variable in candidate.of("output"):
-        old = ours.get(variable.name)
+    for new in candidate.of("output"):
+        old = original.by_name.get(new.name)
         if old is None or old.causality != "output":
             continue
-        before, now = _needs(old, originals[name]), _needs(variable, candidate)
-        added = [i for i in now if i in inputs and i not in before]
+        before, now = _needs(old, original), _needs(new, candidate)
+        added = [i for i in now if i not in before]
         gone = [i for i in before if i not in now]
-        undeclared = variable.dependencies is None
         severity: Severity = "notes"
         if added:
             text = f"depends directly on {choices(added)}"
-            if undeclared:
+            if new.dependencies is None:
                 text = f"may depend directly on {choices(added)}, as it declares no dependencies"
-            if loop := _loop(system, Port(name, variable.name), added, swapped):
-                severity = "blocks" if use.loops == "refuse" else "warns"
-                text = f"{text}: an algebraic loop {' -> '.join(map(str, loop))}"
-            else:
-                text = f"{text}; closes no loop"
-        elif gone and not undeclared:
-            text = (
-                f"does not depend directly on {choices(gone)}: a change there shows one step later"
-            )
+            if use.connected >= {new.name} and use.connected & set(added):
+                severity, text = "warns", f"{text}: there may be an algebraic loop"
+        elif gone and new.dependencies is not None:
+            late = "a change there shows one step later"
+            text = f"does not depend directly on {choices(gone)}: {late}"
         else:
             continue
-        listed = [None if v.dependencies is None else list(v.dependencies) for v in (old, variable)]
-        yield Difference(severity, "dependency", variable.name, text, *listed)
-
-
-def _loop(
-    system: System, output: Port, inputs: Sequence[str], interfaces: Interfaces
-) -> list[Port]:
-    """The shortest way from an output back to it by one of its component's inputs, or none."""
-    ends = {Port(output.component, i) for i in inputs}
-    queue, seen = deque([[output]]), {output}
-    while queue:
-        path = queue.popleft()
-        if path[-1] in ends:
-            return [*path, output]
-        for following in _followers(system, path[-1], interfaces):
-            if following not in seen:
-                seen.add(following)
-                queue.append([*path, following])
-    return []
-
-
-def _followers(system: System, port: Port, interfaces: Interfaces) -> Iterator[Port]:
-    """The ports whose values follow at once from that of a port."""
-    yield from (connection.target for connection in system.connections if connection.source == port)
-    interface = interfaces[port.component]
-    if port.variable not in _inputs(interface):
-        return
-    for variable in interface.of("output"):
-        if port.variable in _needs(variable, interface):
-            yield Port(port.component, variable.name)
-
-
-def _inputs(interface: Interface) -> list[str]:
-    return [v.name for v in interface.of("input")]
+        was, is_now = (None if v.dependencies is None else [*v.dependencies] for v in (old, new))
+        yield Difference(severity, "dependency", new.name, text, was, is_now)
 
 
 def _needs(variable: Variable, interface: Interface) -> Sequence[str]:
     """Inputs that an output depends on directly: all where that is not declared."""
-    return _inputs(interface) if variable.dependencies is None else variable.dependencies
+    inputs = [v.name for v in interface.of("input")]
+    needs = inputs if variable.dependencies is None else variable.dependencies
+    return [name for name in needs if name in inputs]

@@ -81,8 +81,9 @@ def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[st
         "metrics": ("Metrics", f'<div class="pairs">{_metrics(c)}</div>'),
         "signals-table": ("Signals, the worst first", f'<div class="pairs">{_signals(c)}</div>'),
     }
+    titles = [str((s.result and s.result.origin.get("title")) or s.name) for s in (c.a, c.b)]
     return document(
-        Caption(" and ".join(_called(side) for side in (c.a, c.b)), about(None)),
+        Caption(" and ".join(titles), about(None)),
         f'<span class="{"" if good else "warn"}">{escape(said)}</span>',
         sections,
         _state(c, shown, ids, scene, texts),
@@ -90,11 +91,6 @@ def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[st
         [scripts("save", "pairs")],
         scene.style if scene else "",
     )
-
-
-def _called(side: Side) -> str:
-    """The title that a run was given, else its name."""
-    return str((side.result.origin if side.result else {}).get("title") or side.name)
 
 
 def _drawn(

@@ -174,7 +174,9 @@ def qualify(
     asked += (END,) if _ended_early(run) else ()
     side = side_of(run, swap.original.name)
     side = replace(side, to_si={n: c for n, c in more.items() if n not in run} | dict(run.to_si))
-    original = Reference(side, asked, _shift(swap.system), bands or Bands(), swap.nominals)
+    span_ns, step_ns = swap.system.stop_ns - swap.system.start_ns, swap.system.step_ns
+    shift = max(SHARE * span_ns, FEWEST_STEPS * step_ns) / NANOSECONDS
+    original = Reference(side, asked, shift, bands or Bands(), swap.nominals)
     original.check_bands(metrics=(END.name,))
     result, failure = _tried(swap.swapped, progress)
     again: list[Curves] = []
@@ -241,12 +243,8 @@ def _other_numerics(
 
 
 def _variants(system: System) -> Iterator[tuple[str, System]]:
-    twice = 2 * system.step_ns
-    steps = [
-        system.stop_ns - system.start_ns,
-        *(c.step_ns for c in system.components if c.step_ns is not None),
-    ]
-    if not any(step % twice for step in steps):
+    twice, spans = 2 * system.step_ns, [c.step_ns or 0 for c in system.components]
+    if not any(span % twice for span in (system.stop_ns - system.start_ns, *spans)):
         step = twice / NANOSECONDS
         yield f"step {step:g} s", system.with_experiment(step=step)
     for scheme in SCHEMES:
@@ -259,13 +257,6 @@ def _remarks(reference: Result, result: Result) -> tuple[str, ...]:
     texts = [name for name in reference if name not in reference.numbers]
     said = [line for line in result.log if line not in reference.log]
     return (*said, *(f"{name} is a String: not compared" for name in texts))
-
-
-def _shift(system: System) -> float:
-    """The shift in time in s that a derived band allows."""
-    return (
-        max(SHARE * (system.stop_ns - system.start_ns), FEWEST_STEPS * system.step_ns) / NANOSECONDS
-    )
 
 
 def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
@@ -308,7 +299,7 @@ def prepare_swap(
     use = use_of(system, component)
     differences = [
         *interface_differences(ours, theirs, use, own),
-        *feedthrough_differences(system, component, interfaces, theirs, use),
+        *feedthrough_differences(ours, theirs, use),
     ]
     swapped = None
     if not any(d.severity == "blocks" for d in differences):

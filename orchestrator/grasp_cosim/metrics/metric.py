@@ -367,7 +367,8 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     for m in there:
         try:
             value = _plain(m, m.function(signals))
-            if not (m.reason and _absent(value)):
+            some = value if isinstance(value, list) else [value]
+            if not m.reason or any(v is not None for v in some):
                 values[m.name] = value
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
@@ -441,10 +442,6 @@ def _plain(m: Metric, found: Any) -> Any:
     if m.entries and not (several and len(values) == len(m.entries)):
         raise InputError(f"returned {found!r}; must be a value for each of {choices(m.entries)}")
     return values if several else values[0]
-
-
-def _absent(value: Any) -> bool:
-    return all(v is None for v in value) if isinstance(value, list) else value is None
 
 
 def load_metrics(path: Path) -> tuple[Metric, ...]:

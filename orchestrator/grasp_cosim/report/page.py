@@ -169,7 +169,7 @@ def document(
             for name, (head, html) in sections.items()
         ),
         version=escape(version("grasp-cosim")),
-        page=_json(state),
+        page=json.dumps(state).replace("<", "\\u003c"),  # cannot end its script element
         data=data,
         script="\n".join([traces_script(), *script, scripts("main")]),
     )
@@ -236,11 +236,6 @@ def _drawn(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def _text(name: str) -> str:
     return (files(__package__) / "page" / name).read_text("utf-8")
-
-
-def _json(value: Any) -> str:
-    """JSON that cannot end the script element it stands in."""
-    return json.dumps(value).replace("<", "\\u003c")
 
 
 def data_html(time: npt.NDArray[np.float64], columns: Mapping[str, npt.NDArray[Any]]) -> str:

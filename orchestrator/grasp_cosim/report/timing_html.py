@@ -57,13 +57,12 @@ def _pace(timing: Timing) -> str:
 
 def _parts(timing: Timing) -> str:
     """The times that each part took and how often it was to blame."""
-    heads, rows = (*QUANTILES, "worst", "at t in s"), []
+    late = ["overruns"] if timing.overruns else []
+    heads, rows = [*QUANTILES, "worst", "at t in s", *late], []
     for part in dict.fromkeys((*timing.parts, *timing.culprits)):
-        row = f"<td>{escape(label(part))}</td>" + _figures(timing, part)
+        row = f"<td>{escape(label(part))}</td>{_figures(timing, part)}"
         blamed = grouped(timing.culprits[part]) if part in timing.culprits else ""
-        rows.append(row + (f'<td class="n">{blamed}</td>' if timing.overruns else ""))
-    if timing.overruns:
-        heads = (*heads, "overruns")
+        rows.append(row + (f'<td class="n">{blamed}</td>' if late else ""))
     cells = "".join(f'<th class="n">{head}</th>' for head in heads)
     return table(f"<th>part of a step, in µs</th>{cells}", rows)
 
