@@ -19,7 +19,7 @@ from pathlib import Path
 from c_compilers import BITS, LIBM, environment, find_zig
 from grasp_cosim.base.checks import install_command
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.grasp.controllers import CONTROLLERS
+from grasp_cosim.grasp.system import CONTROLLERS
 from grasp_fmus.native.blocks import translated
 from grasp_fmus.native.sources import native_sources
 from grasp_fmus.package import Model, shipped_model, write_file

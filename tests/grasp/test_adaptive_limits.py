@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import sweep
-from grasp_cosim.grasp.controllers import with_controller
 from grasp_cosim.grasp.presets import with_preset
+from grasp_cosim.grasp.system import with_controller
 from grasp_cosim.sweeps.rows import grid
 from scipy.stats import qmc
 from support import marks

@@ -4,7 +4,7 @@ import signal
 
 import pytest
 from grasp_cosim import simulate
-from grasp_cosim.grasp.closing import LOOK, close
+from grasp_cosim.grasp.published.compared import LOOK, close
 from grasp_cosim.master.simulation import Session
 
 STEP = 2e-3

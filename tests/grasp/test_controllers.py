@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.grasp.controllers import CONTROLLERS, with_controller
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
-from grasp_cosim.grasp.system import grasp_system
+from grasp_cosim.grasp.system import CONTROLLERS, grasp_system, with_controller
 from grasp_fmus.build import shipped_fmus
 
 ADAPTIVE = "GraspControllerAdaptive.fmu"

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, grasp_system, simulate
-from grasp_cosim.grasp.controllers import with_controller
+from grasp_cosim.grasp.system import with_controller
 from support.marks import needs_compiler
 from support.native_systems import write_oscillator
 

@@ -11,7 +11,7 @@ from grasp_fmus.build import shipped_fmus
 from grasp_fmus.shipped import FEWEST, MOST
 
 from ..base.errors import InputError
-from ..grasp.controllers import with_controller
+from ..grasp.system import with_controller
 from ..system.description import System
 from .weights import LEAST, balance_weights
 

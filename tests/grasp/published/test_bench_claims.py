@@ -5,9 +5,8 @@ from dataclasses import replace
 from itertools import product
 
 import pytest
-from grasp_cosim.grasp.published.claims import Evidence, check_claims
-from grasp_cosim.grasp.published.compared import bench_rms, simulation_rms
-from grasp_cosim.grasp.published.grasps import Run
+from grasp_cosim.grasp.published.claims import check_claims
+from grasp_cosim.grasp.published.compared import Evidence, Run, bench_rms, simulation_rms
 from grasp_cosim.grasp.published.tables import Setting, published_rows
 
 Judge = Callable[..., list[int]]

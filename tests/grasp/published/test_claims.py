@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 from grasp_cosim.grasp.published import compared as module
+from grasp_cosim.grasp.published.compared import Run
 from grasp_cosim.grasp.published.evaluation import as_report
-from grasp_cosim.grasp.published.grasps import Run
 from grasp_cosim.grasp.published.tables import Setting, published_rows
 
 SETTLED = 98.0 * 0.07 / 2.0

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.grasp.closing import close
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
-from grasp_cosim.grasp.published.compared import compared
+from grasp_cosim.grasp.published.compared import close, compared
 from grasp_cosim.grasp.published.evaluation import as_report
 from support.cases import CASES
 

@@ -19,9 +19,9 @@ from ...base.errors import InputError, SimulationError, choices
 from ...base.parallel import Crew
 from ...base.progress import Progress
 from ...system.description import System
-from ..closing import close
 from ..metrics import FINGERS
 from ..presets import CASES, start_in_si, with_case, with_si_values
+from ..published.compared import close
 from ..published.tables import Setting, published_rows
 from .fit import Fit, Parameter, Vector, fit
 

@@ -7,12 +7,11 @@ holds. Those of the simulation are CLAIMS["simulation"], of the experiments CLAI
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from ...system.description import System
 from ..metrics import IMPACT_WINDOW
-from .grasps import Runs, balances, off_centre, settled_force
-from .tables import REFLECTANCE_X_M, Row, Source
+from .compared import Evidence, balances, off_centre, settled_force
+from .tables import REFLECTANCE_X_M, Source
 
 TIME_BAND = 0.10
 DIFFERENCE_BAND = 0.03
@@ -26,16 +25,6 @@ RMS_BAND = 0.35
 
 COLOUR_BAND = 0.1
 """Nearly independent of the colour: contact times differ by less than this share of their mean."""
-
-
-class Evidence(NamedTuple):
-    """The grasps, the published figures, the rows of the report with both, and their deviations."""
-
-    runs: Runs
-    published: Sequence[Row]
-    rows: Sequence[dict[str, Any]]
-    rms: dict[str, float]
-    system: System
 
 
 Claim = tuple[str, bool]

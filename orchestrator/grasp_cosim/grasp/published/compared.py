@@ -1,7 +1,7 @@
 """The published figures beside ours: the grasps of all their settings, and the deviations.
 
 One way for both sources, the simulation and the experiments on the bench preset; what differs is in
-SOURCES.
+SOURCES. What claims ask of the grasps is here as well.
 """
 
 from __future__ import annotations
@@ -9,15 +9,132 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.interruption import interrupts
 from ...base.parallel import run_all
+from ...master.simulation import simulate
+from ...metrics.metric import resolved
+from ...recording.result import Result
 from ...system.description import System
-from ..closing import close
+from ...system.parts import NANOSECONDS
+from ..metrics import FINGERS, IMPACT_WINDOW, time_at_gap
 from ..presets import CASES, start_in_si, with_case, with_si_values
-from .claims import Evidence
-from .grasps import Run, Runs, as_run
-from .tables import Row, Setting, Source, published_rows
+from .tables import REFLECTANCE_X_M, Row, Setting, Source, published_rows
+
+LOOK = 0.05
+"""s; how often is asked whether both fingers touch."""
+
+
+def close(system: System, after: float | None = None) -> Result:
+    """Run a grasp until `after` s after both fingers touch, else or at the latest to its stop time.
+
+    The end is known to LOOK; a result that ends early is not complete. KeyboardInterrupt on Ctrl-C.
+    """
+    steps = max(1, round(LOOK * NANOSECONDS / system.step_ns))
+    with simulate.session(system) as session, interrupts(session.halt.set):
+        end = system.stop_ns / NANOSECONDS
+        touching = False
+        contacts = [resolved(f"plant.contact[{j}]", system.roles) for j in FINGERS]
+        while session.time < end and session.step(steps):
+            if session.halt.is_set():
+                raise KeyboardInterrupt
+            if after is not None and not touching and all(session[name] for name in contacts):
+                touching, end = True, session.time + after
+        return session.result()
+
+
+SENSOR_CONTACT = 0.37e-3
+"""m; the gap at which contact, were it declared there, would explain the published times best."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One grasp of an evaluation; times in s, per finger."""
+
+    setting: Setting
+    case: int
+    metrics: dict[str, Any]
+    times_at_sensor_contact: tuple[float, float]
+    overshoot: float
+    """m by which the target passes the centre of the object, seen from the start."""
+    touch_forces: tuple[float, float]
+    """The highest contact force within IMPACT_WINDOW of touching, in N."""
+    result: Result | None
+    """Every signal, for the runs that the figures show."""
+
+    @property
+    def times(self) -> tuple[float, float]:
+        """When the fingers touch, in s."""
+        first, second = self.metrics["time_to_contact"]
+        return first, second
+
+    @property
+    def apart(self) -> float:
+        """The time difference of contact in s."""
+        first, second = self.times
+        return abs(second - first)
+
+    @property
+    def off_target(self) -> float:
+        """Distance of the target from the centre of the object in the end, m."""
+        return abs(float(self.metrics["target_position"]) - self.setting.x_m)
+
+
+Runs = dict[tuple[Setting, int], Run]
+"""By setting and case."""
+
+
+def as_run(result: Result, setting: Setting, case: int) -> Run:
+    """Part of a grasp that an evaluation keeps; InputError where a finger does not touch."""
+    moments = [time_at_gap(result.by_role, j, SENSOR_CONTACT) for j in FINGERS]
+    first, second = moments
+    if first is None or second is None or None in result.metrics["time_to_contact"]:
+        raise InputError(
+            f"evaluate: x_m = {setting.x_m} m, Case {case}: a finger does not reach the object"
+        )
+    target = result.by_role["controller.target_position"]
+    beyond = float(np.max((target - setting.x_m) * math.copysign(1.0, setting.x_m)))
+    shown = result if setting == Setting(REFLECTANCE_X_M) else None
+    right, left = (_touch_force(result, j) for j in FINGERS)
+    return Run(setting, case, dict(result.metrics), (first, second), beyond, (right, left), shown)
+
+
+def _touch_force(result: Result, finger: int) -> float:
+    touch = result.metrics["time_to_contact"][finger - 1]
+    near = (result.time >= touch) & (result.time <= touch + IMPACT_WINDOW)
+    return float(np.abs(result.by_role[f"plant.contact_force[{finger}]"][near]).max())
+
+
+def off_centre(runs: Runs) -> list[Setting]:
+    """The settings in which the object is not in the middle of the fingers."""
+    return sorted({setting for setting, _ in runs if setting.x_m})
+
+
+def balances(runs: Runs, setting: Setting) -> bool:
+    """True if Case 2 makes the nearer finger, the first, later and the farther one earlier."""
+    (near_1, far_1), (near_2, far_2) = (runs[setting, case].times for case in (1, 2))
+    return near_2 > near_1 and far_2 < far_1
+
+
+def settled_force(system: System) -> float:
+    """K_i·W/2 in N, with which a finger presses in the end where friction does not hold it."""
+    stiffness = start_in_si(system, "controller.contact_force.stiffness")
+    return 0.5 * stiffness * start_in_si(system, "plant.object_width")
+
+
+class Evidence(NamedTuple):
+    """The grasps, the published figures, the rows of the report with both, and their deviations."""
+
+    runs: Runs
+    published: Sequence[Row]
+    rows: Sequence[dict[str, Any]]
+    rms: dict[str, float]
+    system: System
+
 
 Job = tuple[System, Setting, int, Source]
 

@@ -14,8 +14,8 @@ from ...report.plot import new_figure
 from ..metrics import METRICS
 from ..presets import with_preset
 from ..system import grasp_system
-from .claims import Evidence, check_claims
-from .compared import compared
+from .claims import check_claims
+from .compared import Evidence, compared
 from .page import evaluation_html
 from .tables import Source, table_csv
 

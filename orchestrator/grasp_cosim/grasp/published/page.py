@@ -15,11 +15,10 @@ from ...report.tables import table
 from ...system.description import System
 from ...system.parts import NANOSECONDS
 from ...system.settings import changed
-from ..controllers import controller_name
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES
-from .claims import Evidence
-from .compared import SOURCES
+from ..system import controller_name
+from .compared import SOURCES, Evidence
 from .tables import REFLECTANCE_X_M, Source
 
 if TYPE_CHECKING:
