@@ -1,6 +1,5 @@
 """The figures of the paper, as they are in the package."""
 
-import csv
 from importlib.resources import files
 from pathlib import Path
 
@@ -10,41 +9,25 @@ from grasp_cosim.grasp.published.tables import Setting, published_rows
 SHARED = Path(__file__).parents[4] / "shared" / "paper"
 
 
-def found(rows):
-    return {(r.condition, r.case, r.finger): r.published for r in rows}
-
-
-def test_both_experimental_tables_are_there():
+def test_the_rows_of_both_sources_are_there():
     rows = published_rows("experiment")
-    assert len(rows) == (6 + 7) * 2 * 3
-    figures = found(rows)
-    assert figures[0.05, 1, 2] == 4.81
-    assert figures["white/brown", 2, None] == 0.19
+    figures = {(r.condition, r.case, r.finger): r.published for r in rows}
+    assert (len(rows), len(published_rows("simulation"))) == ((6 + 7) * 2 * 3, 36)
+    assert (figures[0.05, 1, 2], figures["white/brown", 2, None]) == (4.81, 0.19)
     settings = {r.condition: r.setting for r in rows}
     assert settings["brown/white"] == Setting(0.03, 0.86, 1.0)
     assert settings[0.03] == settings["white/white"] == Setting(0.03)
-
-
-def test_white_on_both_sides_is_the_position_row():
-    figures = found(published_rows("experiment"))
-    for case in (1, 2):
+    for case in (1, 2):  # white on both sides is the position row
         for finger in (1, 2, None):
             assert figures["white/white", case, finger] == figures[0.03, case, finger]
 
 
-def test_the_simulated_rows_are_the_other_half():
-    rows = published_rows("simulation")
-    assert len(rows) == 36
-    assert found(rows)[0.03, 1, 1] == 1.15
-
-
-@pytest.mark.parametrize("name", ["table_position.csv", "table_reflectance.csv"])
-def test_a_difference_is_that_of_its_times(name):
-    text = files("grasp_cosim.grasp.published").joinpath(name).read_text("utf-8")
-    for line in csv.DictReader(text.splitlines()):
-        for case in (1, 2):
-            first, second, apart = (float(line[f"case{case}_{n}"]) for n in ("t1", "t2", "dt"))
-            assert abs(second - first) == pytest.approx(apart, abs=0.011)
+@pytest.mark.parametrize("source", ["simulation", "experiment"])
+def test_a_difference_is_that_of_its_times(source):
+    rows = published_rows(source)
+    for first, second, apart in zip(rows[::3], rows[1::3], rows[2::3], strict=True):
+        assert (first.finger, second.finger, apart.finger) == (1, 2, None)
+        assert abs(second.published - first.published) == pytest.approx(apart.published, abs=0.011)
 
 
 @pytest.mark.parametrize("name", ["table_position.csv", "table_reflectance.csv"])
