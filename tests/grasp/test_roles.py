@@ -64,9 +64,6 @@ def gripper(fmus, tmp_path):
     return System.load(written(fmus, tmp_path, {"plant": "gripper"}, roles=False, presets=False))
 
 
-# ------------------------------------------------------------------------- metrics
-
-
 def test_without_a_plant_there_are_no_metrics_and_it_says_why(gripper):
     result = simulate(gripper, step=1e-3, stop=0.01)
     assert result.measured.missing == LOST
@@ -107,9 +104,6 @@ def test_metrics_do_not_depend_on_the_names_of_components(original, chosen):
     assert lacking.missing == (f"no metrics of the grasp: {names['plant']} lacks contact[2]",)
 
 
-# ------------------------------------------------------------------------- presets
-
-
 @pytest.mark.parametrize("presets", [True, False], ids=["own presets", "built-in presets"])
 def test_cases_and_bench_find_components_by_their_roles(grasp, fmus, tmp_path, presets):
     system = System.load(written(fmus, tmp_path, NAMES, roles=True, presets=presets))
@@ -121,25 +115,6 @@ def test_cases_and_bench_find_components_by_their_roles(grasp, fmus, tmp_path, p
         for role, name in NAMES.items():
             assert ours.component(name, "").values == theirs.component(role, "").values
         assert ours.roles == NAMES
-
-
-# ------------------------------------------------------------------------- commands
-
-
-def test_run_says_why_there_are_no_metrics(command, fmus, tmp_path):
-    path = written(fmus, tmp_path, {"plant": "gripper"}, roles=False, presets=False)
-    short = ("run", path, "--step", "1e-3", "--stop", "0.01")
-    code, out, _ = command(*short)
-    assert code == 0
-    assert LOST[0] in out.splitlines()
-    code, out, _ = command(*short, "--json")
-    found = json.loads(out)
-    assert (code, found["missing_metrics"]) == (0, list(LOST))
-    assert set(found) == {*UNITS, "units", "missing_metrics"}
-    assert set(found["units"]) == set(UNITS)
-
-
-# ------------------------------------------------------------------------- a user's own
 
 
 OWN = """

@@ -1,13 +1,17 @@
-"""The scene of a grasp in its page: which signals it is drawn from, where contacts begin."""
+"""The scene of a grasp in its page, and its picture: signals, contacts, close-ups."""
 
 import json
+import struct
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from grasp_cosim.grasp import pictures
 from grasp_cosim.grasp.scene import grasp_scene
 from grasp_cosim.report.page import page_html
-from report.runs import grasp_run, ring_run
+from report.runs import component, grasp_run, ring_run
 from report.test_page import Elements
+from support.marks import slow
 
 
 def page_of(result):
@@ -39,14 +43,6 @@ def test_signals_go_by_roles():
     ]
 
 
-def test_signals_of_a_finger_have_its_colour():
-    scene = grasp_scene(grasp_run())
-    assert scene is not None
-    assert scene.colors["plant.gap[1]"] == scene.colors["sensor_1.intensity"] == "--finger1"
-    assert scene.colors["controller.force[2]"] == "--finger2"
-    assert "controller.target_position" not in scene.colors
-
-
 def test_first_contacts_are_marked_and_have_buttons():
     scene = grasp_scene(grasp_run())
     assert scene is not None
@@ -66,3 +62,71 @@ def test_contacts_begin_where_the_metrics_say_and_again_after_each_release():
     found = [(c["finger"], c["t"]) for c in json.loads(page.texts["page"])["scene"]["contacts"]]
     assert [finger for finger, _ in found] == [1, 2, 1]
     np.testing.assert_allclose([t for _, t in found], [1.0, 1.2, 1.6], atol=1e-9)
+
+
+def width(path):
+    """Of a PNG, in pixels."""
+    head = path.read_bytes()[:24]
+    assert head.startswith(b"\x89PNG")
+    return int(struct.unpack(">I", head[16:20])[0])
+
+
+def touching_from(run, moments):
+    """The run with contacts that begin at these times only."""
+    contacts = {f"plant.contact[{j}]": run.time >= moments.get(j, np.inf) - 1e-9 for j in (1, 2)}
+    return replace(run, signals={**run.signals, **contacts})
+
+
+@pytest.mark.parametrize(
+    ("moments", "close_ups"),
+    [
+        slow({}, []),
+        slow({1: 1.0}, [[1]]),
+        slow({1: 1.0, 2: 1.2}, [[1], [2]]),
+        ({1: 1.03, 2: 1.0}, [[1, 2]]),
+        slow({2: 0.0}, [[2]]),
+    ],
+)
+def test_close_ups_of_the_contacts(moments, close_ups, tmp_path):
+    run = touching_from(grasp_run(), moments)
+    axes = pictures.draw_grasp(run, tmp_path / "grasp.png").axes
+    assert len(axes) == 3 * (1 + len(close_ups))
+    by_column = [axes[1 + k :: 1 + len(close_ups)] for k in range(len(close_ups))]
+    for fingers, column in zip(close_ups, by_column, strict=True):
+        begin, end = column[0].get_xlim()
+        assert all(begin < moments[j] < end for j in fingers)
+        assert end - begin < 0.1
+        for one in column:
+            assert [line.get_label() for line in one.lines] == [f"finger {j}" for j in fingers]
+            assert one.get_xlim() == (begin, end)
+    assert width(tmp_path / "grasp.png") == int(130 * (7.2 + 2.9 * len(close_ups)))
+
+
+def test_the_picture_says_what_it_shows():
+    run = touching_from(grasp_run(), {})
+    parts = {**run.settings["components"], "controller": component("My$Law$.fmu")}
+    changed = {"plant.object_width": 0.06, "controller.impact_reduction.enabled": False}
+    own = replace(run, settings={**run.settings, "components": parts, "changed": changed})
+    assert said(own) == [
+        "grasp, case 2, My$Law$",
+        "plant.object_width = 0.06, controller.impact_reduction.enabled = false · 2026-01-02 · "
+        "grasp-cosim 1.2.3",
+    ]
+    assert said(own.titled("$Mine$"))[0] == "$Mine$"
+
+
+def said(run):
+    """What the picture of a run says above its panels, lines joined."""
+    return [text.get_text().replace("\n", " ") for text in pictures.draw_grasp(run).texts]
+
+
+def test_fingers_differ_in_grey_and_there_is_one_legend():
+    figure = pictures.draw_grasp(grasp_run())
+    for axes in figure.axes:
+        assert axes.get_legend() is None
+        dashes = {line.get_label(): line.get_linestyle() for line in axes.lines}
+        for finger, style in (("finger 1", "-"), ("finger 2", "--")):
+            assert dashes.get(finger, style) == style
+    (legend,) = figure.legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["finger 1", "finger 2", "target", "centre of the object"]

@@ -1,4 +1,8 @@
-"""A hand as a system: soft, at once, whatever the colours; with two fingers it is the grasp."""
+"""A hand as a system: soft, at once, whatever the colours; with two fingers it is the grasp.
+
+Its balance weights are compared with a programme of scipy, its contacts with the published law in
+continuous time, by DOP853 with events.
+"""
 
 import math
 import warnings
@@ -8,6 +12,11 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, System, grasp_system, hand_system, load_run, simulate
 from grasp_cosim.hand.system import directions_of, fmus_of
+from grasp_cosim.hand.weights import LEAST, balance_weights, imbalance
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize
 from support.marks import needs_compiler, slow
 
 COLOURS = {"sensor_1.reflectance": 0.3, "sensor_2.reflectance": 1.2, "sensor_3.reflectance": 0.6}
@@ -132,3 +141,123 @@ def test_native_fmus_give_the_bits_of_the_python_ones(fingers, plant):
     native = simulate(placed(system, 0.004, 0.003).natively(True), stop=2.2)
     for name, column in python.items():
         assert np.array_equal(column, native[name]), name
+
+
+@pytest.mark.parametrize(
+    "angles", [(0, 120, 240), (0, 180), (0, 90, 180, 270), (10, 82, 154, 226, 298)]
+)
+def test_an_even_hand_has_even_weights(angles):
+    assert balance_weights(angles) == (1.0,) * len(angles)
+
+
+def test_three_fingers_have_the_only_weights_that_there_are():
+    """By the sines of the opposite gaps, 135, 135 and 90 degrees."""
+    sines = np.sin(np.radians([135.0, 135.0, 90.0]))
+    assert balance_weights((0.0, 90.0, 225.0)) == pytest.approx(3.0 * sines / sines.sum())
+
+
+@given(st.lists(st.floats(0.0, 359.0), min_size=3, max_size=8))
+def test_they_are_the_nearest_to_1_that_balance(angles):
+    ordered = np.sort(angles)
+    assume(np.diff([*ordered, ordered[0] + 360.0]).max() < 170.0)
+    found = balance_weights(angles)
+    e = np.exp(1j * np.radians(angles))
+    assert imbalance(np.radians(angles).tolist(), found) < 1e-10
+    assert np.mean(found) == pytest.approx(1.0)
+    assume(min(found) >= LEAST - 1e-9)
+    conditions = [
+        {"type": "eq", "fun": lambda n: np.array([n @ e.real, n @ e.imag, n.sum() - len(e)])}
+    ]
+    of_scipy = minimize(
+        lambda n: np.sum((n - 1.0) ** 2),
+        np.ones(len(e)),
+        bounds=[(LEAST, None)] * len(e),
+        constraints=conditions,
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    assume(of_scipy.success)
+    assert np.sum((np.array(found) - 1.0) ** 2) <= of_scipy.fun + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("angles", "said"),
+    [
+        ((0, 90, 180), "there is no finger for 180 degrees after 180"),
+        ((0, 40, 100), "there is no finger for 260 degrees after 100"),
+        ((30, 30), "there is no finger for 360 degrees after 30"),
+    ],
+)
+def test_directions_that_cannot_hold_are_refused(angles, said):
+    with pytest.raises(InputError, match=said) as refused:
+        balance_weights(angles)
+    assert "\n" not in str(refused.value)
+
+
+def test_where_all_cannot_have_a_quarter_the_least_has_what_it_can():
+    weights = balance_weights((0.0, 170.0, 181.0))
+    assert 0.0 < min(weights) < LEAST
+    assert imbalance(np.radians((0.0, 170.0, 181.0)).tolist(), weights) < 1e-10
+
+
+M, K, D = 0.5, 98.0, 14.0  # of layer 1 and the finger
+M_1, K_1, D_1, D_P = 1.0, 25.0, 10.0, 0.6
+M_2, K_2, D_2, K_S = 1.0, 36.0, 12.0, 3.0
+GAIN, L_0, EXPONENT = 0.0024, 5e-3, 1.1506
+
+
+def contacts(angles, centre, alpha):
+    """When each finger touches a prism of 35 mm: from then on it stays there."""
+    a, n, count = np.radians(angles), np.array(balance_weights(angles)), len(angles)
+    faces = 0.035 + np.cos(a) * centre[0] + np.sin(a) * centre[1]
+    times = np.full(count, np.inf)
+
+    def rates(_, x):
+        s, v, z, z_dot, s_v, s_v_dot = x.reshape(6, count)
+        free = ~np.isfinite(times)
+        reach = np.maximum(s - faces, 0.0) + L_0
+        xi = alpha * GAIN * reach**-EXPONENT
+        others = (xi.sum() - xi) / (count - 1)
+        phi = np.tanh((xi - others) / (xi + others))
+        f_s = K_S * (phi - n @ phi / count)
+        f_p = D_P * -EXPONENT * np.where(free, v, 0.0) / reach
+        z_d = s - n @ s / count
+        z_2 = (f_s - D_2 * z_dot - K_2 * (z - z_d)) / M_2
+        s_v_2 = z_2 + (f_p - D_1 * (s_v_dot - z_dot) - K_1 * (s_v - z)) / M_1
+        u = n * (-D * (v - s_v_dot) - K * (s - s_v))
+        return np.concatenate(
+            [np.where(free, v, 0.0), np.where(free, u / M, 0.0), z_dot, z_2, s_v_dot, s_v_2]
+        )
+
+    s_0 = np.full(count, 0.11)
+    still = np.zeros(count)
+    x, t = np.concatenate([s_0, still, s_0 - n @ s_0 / count, still, s_0, still]), 0.0
+    while not np.isfinite(times).all():
+
+        def next_gap(_, x):
+            return float((x[:count] - faces)[~np.isfinite(times)].min())
+
+        next_gap.terminal = True
+        found = solve_ivp(
+            rates, (t, 4.0), x, method="DOP853", events=next_gap, rtol=1e-9, atol=1e-12
+        )
+        assert found.status == 1
+        t, x = found.t[-1], found.y[:, -1].copy()
+        k = int(np.argmin(np.where(np.isfinite(times), math.inf, x[:count] - faces)))
+        times[k], x[k], x[count + k] = t, faces[k], 0.0
+    return times.tolist()
+
+
+@pytest.mark.parametrize(
+    ("angles", "centre", "alpha"),
+    [
+        ((0.0, 120.0, 240.0), (0.006, -0.008), 1.0),
+        ((0.0, 90.0, 225.0), (0.0, 0.01), 0.3),
+        ((20.0, 100.0, 200.0, 290.0), (-0.005, 0.002), 1.2),
+    ],
+)
+def test_each_finger_touches_within_a_millisecond(angles, centre, alpha):
+    system = hand_system(angles=angles, native=False).with_experiment(step=5e-4, stop=2.5)
+    values = {f"sensor_{k}.reflectance": alpha for k in range(1, len(angles) + 1)}
+    values |= {f"plant.initial_object_position[{i + 1}]": centre[i] for i in (0, 1)}
+    found = simulate(system.with_values(values)).metrics["time_to_contact"]
+    assert found == pytest.approx(contacts(angles, centre, alpha), rel=0.0, abs=1e-3)

@@ -179,7 +179,7 @@ def chosen_system(given: Mapping[str, Any]) -> System:
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
     system = loaded
     if law := given.get("controller"):
-        from ..grasp.controllers import with_controller
+        from ..grasp.system import with_controller
 
         system = with_controller(system, law, swapped)
     case = given.get("case")

@@ -22,12 +22,6 @@ def fitted(measured, parameters=()):
     return fit(lambda points: [decay(x[0], x[1]) - measured for x in points], chosen, "test")
 
 
-def test_exact_data_give_the_parameters_back():
-    found = fitted(decay(3.0, 0.7))
-    assert [e.value for e in found.estimates] == pytest.approx([3.0, 0.7], abs=1e-5)
-    assert found.rms < 1e-5
-
-
 def test_the_intervals_hold_the_truth_as_often_as_they_say():
     noise = np.random.default_rng(1).normal(0.0, SIGMA, (120, len(X)))
     held = np.zeros(2)
@@ -56,15 +50,6 @@ def test_a_parameter_at_its_bound_is_held_there_and_said_to_be():
     assert (second.value, second.interval) == (0.0, None)
     assert second.remark == "at its lower bound, held there"
     assert first.interval is not None
-
-
-def test_what_the_data_do_not_determine_has_no_interval():
-    measured = decay(3.0, 0.7)
-    parameters = [parameter("a"), parameter("b"), parameter("nothing")]
-    *known, nothing = fitted(measured, parameters).estimates
-    assert nothing.remark == "the data do not determine it"
-    assert nothing.interval is None
-    assert all(e.interval for e in known)
 
 
 def test_of_two_that_act_alike_neither_is_determined():

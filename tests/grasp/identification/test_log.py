@@ -109,51 +109,43 @@ def test_stribeck_friction_comes_back(grasp):
     assert found["plant.friction.stribeck_velocity"] == pytest.approx(0.04, rel=0.02)
 
 
-def test_static_friction_that_is_never_seen_is_not_determined(grasp, recorded):
-    log = scipy_log(TRUE, 0.0, 0.01)
-    found = {e.name: e for e in identified(grasp, log, "coulomb", "static").estimates}
-    assert found["plant.friction.static[1]"].interval is None
+def without(log):
+    return replace(log, by_name={k: v for k, v in log.items() if k != "controller.force[2]"})
 
 
-@pytest.mark.parametrize("kind", ["signals.csv", "signals.mf4"])
-def test_a_log_is_read_from_both_kinds_of_file(grasp, tmp_path, kind):
-    if kind.endswith("mf4"):
-        pytest.importorskip("asammdf")
-    result = simulate(grasp, step=1e-3, stop=0.05)
-    path = tmp_path / kind
-    result.to_csv(path) if kind.endswith("csv") else result.to_mdf(path)
-    log = load_log(path)
-    assert log.time.tolist() == pytest.approx(result.time.tolist())
-    assert log.by_name["plant.velocity[1]"].tolist() == result["plant.velocity[1]"].tolist()
+def resting(log):
+    rest = {"plant.velocity[1]": np.zeros(len(log.time))}
+    return replace(log, by_name={**log.by_name, **rest})
 
 
-def test_a_signal_that_is_missing_is_named(grasp, recorded):
-    signals = {k: v for k, v in recorded.items() if k != "controller.force[2]"}
-    with pytest.raises(
-        InputError, match=r"^test: no signal 'controller.force\[2\]'; did you mean con"
-    ):
-        identified(grasp, replace(recorded, by_name=signals))
+def coarse(log):
+    return Signals(log.time[::20], {k: v[::20] for k, v in log.items()})
 
 
-def test_a_log_in_which_a_finger_rests_is_refused(grasp, recorded):
-    rest = np.zeros(len(recorded.time))
-    signals = {**recorded.by_name, "plant.velocity[1]": rest}
-    with pytest.raises(InputError, match=r"^test: finger 1 does not move freely for 0.02 s"):
-        identified(grasp, replace(recorded, by_name=signals))
+def stuck(log, value=0.0):
+    return replace(log, time=np.where(np.arange(len(log.time)) == 50, value, log.time))
 
 
-def test_a_log_that_is_too_coarse_is_refused(grasp, recorded):
-    coarse = Signals(recorded.time[::20], {k: v[::20] for k, v in recorded.items()})
-    with pytest.raises(InputError, match=r"^test: a sample every 0.02 s; must be at most every"):
-        identified(grasp, coarse)
+def broken(log):
+    force = np.where(log.time > 1.0, np.nan, log["controller.force[1]"])
+    return replace(log, by_name={**log.by_name, "controller.force[1]": force})
 
 
-@pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
-def test_time_that_does_not_grow_is_refused(grasp, recorded, value):
-    time = recorded.time.copy()
-    time[50] = value
-    with pytest.raises(InputError, match=r"^test: the time must be finite and grow from sample to"):
-        identified(grasp, replace(recorded, time=time))
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (without, r"^test: no signal 'controller.force\[2\]'; did you mean con"),
+        (resting, r"^test: finger 1 does not move freely for 0.02 s"),
+        (coarse, r"^test: a sample every 0.02 s; must be at most every 0.01 s"),
+        (stuck, r"^test: the time must be finite and grow from sample to"),
+        (lambda log: stuck(log, np.nan), r"^test: the time must be finite and grow from"),
+        (lambda log: Signals(log.time[:1], {}), r"^test: 1 sample; must be at least two"),
+        (broken, r"^test: controller.force\[1\] = nan at 1.001 s, one of 1500 such samples"),
+    ],
+)
+def test_a_log_that_says_nothing_is_refused(grasp, recorded, spoil, said):
+    with pytest.raises(InputError, match=said):
+        identified(grasp, spoil(recorded))
 
 
 def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
@@ -172,7 +164,6 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("no.csv", None, "no such log; must be a .csv or .mf4 file"),
         ("log.txt", b"time\n", "must be a .csv or .mf4 file"),
         ("log.csv", b"time,a\n0.0\n", "is damaged"),
         ("log.mf4", b"not an MDF file at all", "is damaged, not an MDF file"),
@@ -181,8 +172,7 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
 def test_a_file_that_is_no_log_is_refused(tmp_path, name, content, message):
     if name.endswith("mf4"):
         pytest.importorskip("asammdf")
-    if content is not None:
-        (tmp_path / name).write_bytes(content)
+    (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message) as caught:
         load_log(tmp_path / name)
     assert "\n" not in str(caught.value)

@@ -1,14 +1,73 @@
-"""The controllers of ours by the names of their laws, in any system that has a controller."""
+"""The built-in system, its FMUs in the user's cache, and the controllers of ours by their laws."""
 
 import json
+import os
 import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
-from grasp_cosim import InputError
+from grasp_cosim import InputError, grasp_system
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
-from grasp_cosim.grasp.system import CONTROLLERS, grasp_system, with_controller
+from grasp_cosim.grasp.system import CONTROLLERS, with_controller
+from grasp_fmus import build as builds
 from grasp_fmus.build import shipped_fmus
+from grasp_fmus.shipped import SHIPPED
+from support.marks import skip_without_pythonfmu
+
+EIGHT_THREADS = """
+from concurrent.futures import ThreadPoolExecutor
+from grasp_cosim import grasp_system
+
+with ThreadPoolExecutor(8) as pool:
+    made = list(pool.map(lambda _: grasp_system(native=False), range(8)))
+print(len({c.fmu.parent for system in made for c in system.components}))
+"""
+
+
+@pytest.fixture
+def empty(tmp_path, monkeypatch):
+    """An empty current folder, and an empty cache beside it."""
+    skip_without_pythonfmu()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    return here
+
+
+@pytest.mark.slow
+def test_the_first_build_may_be_asked_for_by_many_threads_and_processes(empty):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", EIGHT_THREADS]
+    processes = [
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    assert [process.communicate()[0] for process in processes] == ["1\n", "1\n"]
+    assert len(list(Path(os.environ["XDG_CACHE_HOME"], "grasp-cosim/fmus").iterdir())) == 1
+    assert list(empty.iterdir()) == []
+
+
+def test_where_nothing_can_be_kept_one_line_says_so_and_threads_share_it(
+    empty, monkeypatch, caplog
+):
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    monkeypatch.setattr(builds, "_until_the_end", {})
+    of_the_grasp = {name: shipped for name, shipped in SHIPPED.items() if not shipped.size}
+    monkeypatch.setattr(builds, "SHIPPED", of_the_grasp)
+    with ThreadPoolExecutor(8) as pool:
+        made = list(pool.map(lambda _: grasp_system(native=False), range(8)))
+    assert len({c.fmu.parent for system in made for c in system.components}) == 1
+    assert caplog.messages == [
+        "/dev/null/grasp-cosim: cannot be written to, so each process builds the FMUs; "
+        "XDG_CACHE_HOME names another"
+    ]
+    assert list(empty.iterdir()) == []
+
 
 ADAPTIVE = "GraspControllerAdaptive.fmu"
 
@@ -49,13 +108,6 @@ def test_what_the_system_says_of_its_controller_stays(grasp):
     learning = adaptive.with_values({"controller.hold.squeeze": 0.2})
     (note,) = with_controller(learning, "published").notes
     assert "has no parameter hold.squeeze: its value 0.2 is left out" in note
-
-
-def test_in_python_the_grasp_is_asked_for_by_law():
-    assert fmus_of(grasp_system(controller="adaptive"))["controller"] == ADAPTIVE
-    assert fmus_of(grasp_system())["controller"] == "GraspController.fmu"
-    with pytest.raises(InputError, match=r"^controller = 'blind': must be one of published, adapt"):
-        grasp_system(controller="blind")
 
 
 def test_one_that_is_not_beside_the_other_is_that_of_the_cache(grasp, tmp_path):
