@@ -1,9 +1,164 @@
-"""Whole system files for foreign FMUs: one in the place of the plant, and some alone."""
+"""System files for foreign FMUs, and which of their variables are meant by those of ours."""
 
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
 from comparison.made import write_fmu
 from grasp_cosim import System
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.inspection.alike import candidates, matches
 from grasp_cosim.inspection.draft import alone, replacing
+from grasp_cosim.interface.interface import Interface, Variable
+from grasp_cosim.interface.read import read_interface
+from hypothesis import given
+from hypothesis import strategies as st
+
+
+@pytest.fixture(scope="module")
+def plant(fmus):
+    return read_interface(fmus / "GripperPlant.fmu")
+
+
+def output(name, unit=None, kind="Real", text=""):
+    return Variable(
+        name, kind, "output", 0, unit, None, None, None, description=text  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def settable(name, causality, unit=None):
+    return Variable(name, "Real", causality, 0, unit, "0", None, None)
+
+
+def foreign(*variables):
+    return Interface(Path("vendor.fmu"), "", "vendor", variables)
+
+
+def found(plant, *variables):
+    return matches(plant, plant.by_name, foreign(*variables))
+
+
+def names(plant, *variables, certain=None):
+    return {
+        name: match.variable.name
+        for name, match in found(plant, *variables).items()
+        if certain in (None, not match.doubt)
+    }
+
+
+SURE = [
+    ("GapRight", "GapLeft"),
+    ("gap_1", "gap_2"),
+    ("Gaps[1]", "Gaps[2]"),
+    ("plant.l_1", "plant.l_2"),
+    ("finger.r.distance", "finger.l.distance"),
+    ("Fingers[1].Clearance", "Fingers[2].Clearance"),
+    ("rightFingerGap", "leftFingerGap"),
+    ("gapdistanceR", "gapdistanceL"),
+    ("GAP_RH", "GAP_LH"),
+]
+
+
+@pytest.mark.parametrize("pair", SURE)
+@pytest.mark.parametrize("turned", [False, True])
+def test_names_of_the_gaps_that_need_no_check(plant, pair, turned):
+    """In any order of declaration, beside positions in the same unit."""
+    gaps = [output(name, "mm") for name in pair]
+    others = [output(f"fingertip_x_{side}", "mm") for side in ("right", "left")]
+    chosen = names(plant, *(gaps[::-1] if turned else gaps), *others, certain=True)
+    assert chosen == {
+        "gap[1]": pair[0],
+        "gap[2]": pair[1],
+        "position[1]": "fingertip_x_right",
+        "position[2]": "fingertip_x_left",
+    }
+
+
+@pytest.mark.parametrize(
+    ("pair", "doubt"),
+    [
+        (("gap[0]", "gap[1]"), "which is 1, which 2"),
+        (("gapA", "gapB"), "which is 1, which 2"),
+        (("distanceToWall1", "distanceToWall2"), "by its name"),
+        (("gapOne", "gapTwo"), "which is 1, which 2"),
+        (("surfaceDistance1", "surfaceDistance2"), "by its description"),
+    ],
+)
+def test_names_that_are_to_be_checked(plant, pair, doubt):
+    chosen = found(plant, *(output(name, "mm") for name in pair))
+    assert [(m.variable.name, m.doubt) for m in chosen.values()] == [(n, doubt) for n in pair]
+
+
+def test_a_description_is_to_be_checked(plant):
+    texts = ("gap right", "gap left", "position of the object", "something")
+    chosen = found(plant, *(output(f"y{i}", text=text) for i, text in enumerate(texts)))
+    assert {n: m.variable.name for n, m in chosen.items()} == {
+        "gap[1]": "y0", "gap[2]": "y1", "object_position": "y2",
+    }  # fmt: skip
+    assert {m.doubt for m in chosen.values()} == {"by its description"}
+
+
+def test_by_its_unit_alone_nothing_is_found(plant):
+    assert found(plant, output("rate1", "mm/s"), output("rate2", "mm/s")) == {}
+
+
+def test_unit_type_and_causality_decide(plant):
+    """One name, two quantities; and none for what is of another quantity or direction."""
+    assert names(plant, output("gap1", "N"), output("gap2", "N")) == {}
+    assert names(plant, output("gap1", "m", "Boolean"), output("gap2", "m", "Boolean")) == {}
+    assert names(plant, settable("gap1", "input", "m"), settable("gap2", "input", "m")) == {}
+    forces = [settable("F1", "input", "kN"), settable("F2", "input", "kN")]
+    loads = [output("F_c1", "kN"), output("F_c2", "kN")]
+    touches = [output(f"inContact{j}", kind="Boolean") for j in (1, 2)]
+    assert names(plant, *forces, *loads, *touches, certain=True) == {
+        "force[1]": "F1", "force[2]": "F2",
+        "contact_force[1]": "F_c1", "contact_force[2]": "F_c2",
+        "contact[1]": "inContact1", "contact[2]": "inContact2",
+    }  # fmt: skip
+
+
+def test_parameters(plant):
+    width, start = settable("partWidth", "parameter", "mm"), settable("W", "parameter", "m")
+    assert names(plant, width, certain=True) == {"object_width": "partWidth"}
+    assert names(plant, start) == {"object_width": "W"}
+    initial = settable("initial_part_pos", "parameter", "cm")
+    assert names(plant, initial, certain=True) == {"initial_object_position": "initial_part_pos"}
+
+
+WORDS = {"force": "input", "position": "output", "velocity": "output", "gap": "output"}
+STYLES = {
+    "camel": lambda word, j: f"finger{word.title()}{j}",
+    "side": lambda word, j: f"{word.title()}{'Right' if j == 1 else 'Left'}",
+    "snake": lambda word, j: f"{word}_{'r' if j == 1 else 'l'}",
+    "tree": lambda word, j: f"gripper.finger[{j}].{word}",
+    "plural": lambda word, j: f"{word}s[{j}]",
+}
+
+
+@given(
+    st.permutations(sorted((w, j) for w in WORDS for j in (1, 2))),
+    st.fixed_dictionaries({word: st.sampled_from(sorted(STYLES)) for word in WORDS}),
+    st.booleans(),
+)
+def test_any_style_in_any_order_with_and_without_units(plant, order, styles, units):
+    ours = {f"{word}[{j}]": plant.by_name[f"{word}[{j}]"] for word, j in order}
+    theirs = {
+        name: replace(v, name=STYLES[styles[word]](word, j), unit=v.unit if units else None)
+        for (name, v), (word, j) in zip(ours.items(), order, strict=True)
+    }
+    chosen = names(plant, *theirs.values(), certain=True)
+    assert chosen == {name: v.name for name, v in theirs.items()}
+
+
+def test_no_force_is_proposed_for_a_position(plant):
+    theirs = foreign(*(output(name) for name in ("F_1", "F_2", "contactForce", "way", "x_1")))
+    assert [v.name for v in candidates(plant, "position[1]", theirs, [])] == ["way", "x_1"]
+    assert not {"position[1]", "position[2]"} & matches(plant, plant.by_name, theirs).keys()
+
+
+def test_three_fingers_are_not_those_of_two(plant):
+    assert names(plant, *(output(f"position{j}", "m") for j in (1, 2, 3))) == {}
+
 
 SOME = 'causality="parameter" variability="fixed" | '
 VENDOR = {

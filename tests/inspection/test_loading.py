@@ -12,7 +12,6 @@ from shlex import quote
 import fmpy
 import pytest
 from fmpy.fmi2 import FMU2Slave
-from grasp_cosim.base.errors import InputError
 from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.loading import Finding, unpack
 from support import native_fmus
@@ -147,29 +146,6 @@ def test_a_temporary_folder_from_which_nothing_loads(
     verdict = loading.temporary_folder(fmu)
     assert (verdict and (verdict[0], verdict[2])) == (fix and ("problem", fix))
     assert not fix or f"/tmp/{name}" in verdict[1]
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (None, "no such FMU file"),
-        ({}, "not a readable FMU: no modelDescription.xml at the top of the archive"),
-        ({"modelDescription.xml": "<fmi"}, "not a readable FMU: unclosed token"),
-        ("text", "not a readable FMU: File is not a zip file"),
-    ],
-)
-def test_no_fmu_is_wrong_input(content, message, tmp_path):
-    fmu = tmp_path / "x.fmu"
-    if isinstance(content, str):
-        fmu.write_text(content)
-    elif content is not None:
-        with zipfile.ZipFile(fmu, "w") as archive:
-            for name, data in content.items():
-                archive.writestr(name, data)
-    with pytest.raises(InputError) as error:
-        loading.examine(fmu)
-    assert str(error.value).startswith(f"{fmu}: {message}")
-    assert len(str(error.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize(

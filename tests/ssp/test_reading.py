@@ -1,5 +1,6 @@
 """What a system is made of archives of others, as a whole: values, connections, times, notes."""
 
+import re
 import zipfile
 
 import pytest
@@ -414,6 +415,26 @@ def nested(sub, bindings="", unit="", **files):
 
 SHARED = system("first", component("b", "input u"), connect("in", "b/u"), "input in")
 SECOND = component("second", "input in", type=DEFINITION, source="#S")
+WHOLE = system("top", component("a", "output y Real") + component("b", "input u Real"), A_TO_B)
+ODD = '<ssd:Annotations><ssc:Annotation type="x"/></ssd:Annotations><ssd:Connectors/>'
+EARLY = annotated("org.open-simulation-platform", '<osp:Master stepSize="1e-4"/>')
+SET_FILE = '<ssd:ParameterBinding source="a.ssv"/>'
+NO_SPACE = re.sub(r' xmlns:ss[a-z]="[^"]*"', "", parameter_set("length Real 2.5 m"))
+WRONG_SPACE = NO_SPACE.replace("Set ", 'Set xmlns:ssv="http://ssp-standard.org/SSP1/Values" ', 1)
+FORMS = {
+    "another order, empty lists": of(
+        WHOLE.replace('name="top">', f'name="top">{ODD}'), a=METRES, b=MILLIMETRES
+    ),
+    "a prefix for no namespace": of(
+        WHOLE.replace('name="top">', f'name="top">{EARLY}'), a=METRES, b=MILLIMETRES
+    ),
+    "no namespace": valued(SET_FILE, files={"a.ssv": NO_SPACE}),
+    "a wrong namespace": valued(SET_FILE, files={"a.ssv": WRONG_SPACE}),
+    "not ASCII": of(
+        system("Übersicht", component("Größe 1", "input u", source="resources/gr%C3%B6.fmu")),
+        grö=FMU,
+    ),
+}
 NESTED = {
     "an archive": nested("resources/sub.ssp"),
     "a variant of it": nested("resources/sub.ssp#Other.ssd"),
@@ -445,7 +466,7 @@ def packed(folder, top):
     return archive(folder / "inner", ssd, {"b": takes}, {"Other.ssd": ssd}).read_bytes()
 
 
-CASES = PARAMETERS | CONNECTIONS | TIMES | VERSION_2 | NESTED
+CASES = PARAMETERS | CONNECTIONS | TIMES | VERSION_2 | FORMS | NESTED
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -1,5 +1,6 @@
 """A system written and read again is the same system, and runs the same to the bit."""
 
+import json
 import subprocess
 import sys
 import zipfile
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, System, simulate
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import (
     Component,
@@ -331,3 +333,41 @@ def test_an_archive_of_others_comes_back(tmp_path):
     ends = {"a": fmu("output Real y - m"), "b": fmu("input Real u 0.0 m")}
     loaded = System.load(archive(tmp_path, structure(top), ends))
     assert round_trip(loaded, tmp_path) == loaded
+
+
+def test_the_command_writes_an_archive_that_runs_the_same(fmus, tmp_path, command):
+    toml, path = tmp_path / "mine.toml", tmp_path / "mine.ssp"
+    toml.write_text(SYSTEM.read_text("utf-8"), encoding="utf-8")
+    for file in fmus.glob("*.fmu"):
+        (tmp_path / file.name).symlink_to(file)
+    code, out, err = command("ssp", str(toml), "-o", str(path))
+    assert (code, out.splitlines()[0]) == (0, f"{path}: written")
+    assert "SSP has no form for the step, 0.0001 s: OSP and OMSimulator read it" in err
+    runs = []
+    for file in (toml, path):
+        out = command("run", str(file), "--step", "1e-3", "--stop", "0.1", "--json")[1]
+        timed = ("wall_time", "real_time_factor")
+        runs.append({k: v for k, v in json.loads(out).items() if k not in timed})
+    assert runs[0] == runs[1]
+    code, out, err = command("ssp", str(toml), "-o", str(path), "--json")
+    report = json.loads(out)
+    assert (code, err, report["ssp"], report["connections"]) == (0, "", str(path), 10)
+    assert report["entries"][0] == "SystemStructure.ssd"
+    assert report["components"] == ["plant", "sensor_1", "sensor_2", "controller"]
+    assert [note.partition(",")[0] for note in report["notes"]] == [
+        "SSP has no form for the step",
+        "SSP has no form for the scheme",
+    ]
+    code, out, err = command("ssp", str(toml), "-o", str(tmp_path / "mine.zip"))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "must be a file named like system.ssp" in err
+
+
+def test_run_says_what_was_decided(tmp_path, command):
+    ssd = structure(system("top", component("a", "output y")))
+    path = archive(tmp_path, ssd, {"a": fmu("output Real y -", step="")})
+    assert "give one: --set experiment.step" in command("run", str(path))[2]
+    code, _, err = command("run", str(path), "--step", "1e-3")  # now it is the FMU that has no code
+    assert code == 2
+    assert "order of execution: a" in err
+    assert "a.fmu has no binary at all" in err
