@@ -42,7 +42,8 @@ def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
             if locked:
                 raise ValueError(f"{locked} is encrypted; ask the vendor for it without a password")
             entries = {i.filename.replace("\\", "/"): i for i in archive.infolist()}
-            if out := next((n for n in entries if n.startswith("/") or ".." in n.split("/")), None):
+            out = next((n for n in entries if n.startswith("/") or ".." in n.split("/")), None)
+            if out is not None:
                 raise ValueError(
                     f"{out} leads out of the archive; must be the path of a file in it"
                 )

@@ -34,10 +34,7 @@ def expanded(interface: Interface, lengths: Mapping[str, Value | None]) -> Inter
     name of one.
     """
     given = {n: v for n, v in lengths.items() if isinstance(v, int) and v >= 0}
-    key = ("sizes", *given.items())
-    if key not in interface.made:
-        interface.made[key] = _expanded(interface, given)
-    return interface.made[key]
+    return interface.kept(("sizes", *given.items()), lambda: _expanded(interface, given))
 
 
 def values_of(

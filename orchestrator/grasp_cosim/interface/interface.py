@@ -1,7 +1,7 @@
 """The interface that an FMU declares: its variables, units and capabilities."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -279,9 +279,14 @@ class Interface:
         return without_scratch(str(self.given or self.path))
 
     @cached_property
-    def made(self) -> dict[tuple[Any, ...], "Interface"]:
-        """Interfaces made of this one by elements, names or units, which are asked for again."""
+    def _made(self) -> dict[tuple[Any, ...], "Interface"]:
         return {}
+
+    def kept(self, key: tuple[Any, ...], make: Callable[[], "Interface"]) -> "Interface":
+        """What is made of this one by elements, names or units, once, as it is asked for again."""
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
 
     @cached_property
     def sized_by(self) -> tuple[str, ...] | None:
@@ -343,9 +348,7 @@ class Interface:
         renamed twice, or a new one is taken. An array is renamed whole, or by elements.
         """
         key = ("rename", *rename.items())
-        if rename and key not in self.made:
-            self.made[key] = self._renamed(rename, place)
-        return self.made[key] if rename else self
+        return self.kept(key, lambda: self._renamed(rename, place)) if rename else self
 
     @property
     def listing(self) -> str:
@@ -355,16 +358,21 @@ class Interface:
     @property
     def short(self) -> str:
         """The FMU in a message on a name that it does not have."""
-        several = choices(self.ambiguous)
-        return (
-            f"{self.path.name}, where several are called {several},"
-            if self.ambiguous
-            else self.path.name
-        )
+        several = f", where several are called {choices(self.ambiguous)}," * bool(self.ambiguous)
+        return f"{self.path.name}{several}"
 
     def _renamed(self, rename: Mapping[str, str], place: str) -> "Interface":
-        whole = {own: new for new, own in rename.items() if own in self.arrays}
-        rename = dict(_by_element(rename, self.arrays))
+        arrays = self.arrays
+        whole = {own: new for new, own in rename.items() if own in arrays}
+        rename = {
+            name: element
+            for new, own in rename.items()
+            for name, element in (
+                zip(element_names(new, arrays[own].shape), arrays[own].names, strict=True)
+                if own in arrays
+                else [(new, own)]
+            )
+        }
         names: dict[str, str] = {}
         for new, own in rename.items():
             entry = f"{place}: {new!r} = {own!r}"
@@ -409,9 +417,7 @@ class Interface:
         is no such variable, or no such unit.
         """
         key = ("units", *units.items())
-        if units and key not in self.made:
-            self.made[key] = self._in_units(units, place)
-        return self.made[key] if units else self
+        return self.kept(key, lambda: self._in_units(units, place)) if units else self
 
     def _in_units(self, units: Mapping[str, str], place: str) -> "Interface":
         defined = dict(self.units)
@@ -440,14 +446,13 @@ class Interface:
         plain = name[1:] if name.startswith("-") else name
         found = defined.get(name) or known_unit(name) or defined.get(plain) or known_unit(plain)
         if found is None:
-            alike = spelt_like(plain, defined)
             like = (
                 "'mm', 'm/s', 'N.s/m', 'deg', 'degC', '1', or '-mm' for what counts the other way"
             )
-            meant = f"did you mean {choices(alike)}?" if alike else f"must be like {like}"
-            raise InputError(
-                f"{entry}: no unit that {self.path.name} defines, or that is known; {meant}"
-            )
+            alike = choices(spelt_like(plain, defined))
+            meant = f"did you mean {alike}?" if alike != "none" else f"must be like {like}"
+            said = f"{entry}: no unit that {self.path.name} defines, or that is known; {meant}"
+            raise InputError(said)
         return found if found.name == name else found.reversed(name)
 
     def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
@@ -478,18 +483,6 @@ class Interface:
         if converted is None:
             raise InputError(f"{place}: {name} = {given!r}: must be {_expected(variable)}")
         return converted
-
-
-def _by_element(
-    rename: Mapping[str, str], arrays: Mapping[str, Array]
-) -> Iterator[tuple[str, str]]:
-    """The same names, of elements in the place of whole arrays."""
-    for new, own in rename.items():
-        array = arrays.get(own)
-        if array is None:
-            yield new, own
-        else:
-            yield from zip(element_names(new, array.shape), array.names, strict=True)
 
 
 def _plain(flag: str) -> str:

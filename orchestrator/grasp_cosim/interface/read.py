@@ -275,9 +275,8 @@ class _Reader:
         for element in entries:
             name, listed = called(f"{group}: {key}", element.get(key)), element.get("dependencies")
             place = f"{group} {name!r}: dependencies"
-            found[name] = (
-                listed if listed is None else tuple(called(place, t) for t in listed.split())
-            )
+            parts = None if listed is None else listed.split()
+            found[name] = None if parts is None else tuple(called(place, t) for t in parts)
         return found
 
     def variable(self, element: Element, reference: int, now: Names, initially: Names) -> Variable:
@@ -308,15 +307,15 @@ class _Reader:
         initial = {} if self.major == "1" else INITIAL.get(variability, {})
         is_enumeration = value.tag == "Enumeration"
         return Variable(
-            name=name,
-            kind=kind,
-            causality=causality,
-            reference=reference,
-            unit=said.get("unit"),
-            start=start,
-            minimum=typed(value.tag, bounds.get("min")),
-            maximum=typed(value.tag, bounds.get("max")),
-            type=value.tag,
+            name,
+            kind,
+            causality,
+            reference,
+            said.get("unit"),
+            start,
+            typed(value.tag, bounds.get("min")),
+            typed(value.tag, bounds.get("max")),
+            value.tag,
             variability=variability,
             dependencies=now,
             initial_dependencies=initially,

@@ -210,9 +210,7 @@ def _named(file: str, root: Any) -> Iterator[tuple[int, str]]:
     """Yield the steps that are named for the whole system, and where."""
     for parent in _TOP:
         for annotation in children(root, *parent, "ssd:Annotations", "ssc:Annotation"):
-            if annotation.get("type") not in FOREIGN:
-                continue
-            for name, attribute in _BASE.items():
+            for name, attribute in _BASE.items() if annotation.get("type") in FOREIGN else ():
                 for element in annotation.iter(f"{{*}}{name}"):
                     place = f"{at(file, element)}: annotation {annotation.get('type')!r}"
                     yield _time(f"{place}: step", element.get(attribute)), place

@@ -21,6 +21,8 @@ from ..interface.interface import Interface, Variable
 from .document import change, same
 from .elements import Element, Hop, Node, Path
 
+OTHERWISE = "unit {!r} is defined otherwise by the FMU, whose definition is taken"
+
 
 @dataclass(frozen=True, slots=True)
 class Part:
@@ -169,10 +171,7 @@ def _check_connectors(part: Part) -> None:
         if not declared or not connector.unit or same(declared, connector.unit):
             continue
         if connector.unit.name == variable.unit:
-            text = (
-                f"unit {variable.unit!r} is defined otherwise by the FMU, whose definition is taken"
-            )
-            part.element.origin.notes.add(place, text)
+            part.element.origin.notes.add(place, OTHERWISE.format(variable.unit))
         else:
             raise InputError(
                 f"{place}: unit {connector.unit.name} is not what the FMU declares, "

@@ -119,16 +119,9 @@ def read_system(
         _element(origin, entry, path, reachable)
         for entry in element.iterfind(f"{qualified('ssd:Elements')}/*")
     ]
-    system = Element(
-        place,
-        path,
-        name,
-        origin,
-        _connectors(origin, element),
-        _bindings(origin, element),
-        elements=_by_name(elements, f"system {name!r}: two elements"),
-        dictionaries=own,
-    )
+    inside = _by_name(elements, f"system {name!r}: two elements")
+    connectors, bindings = _connectors(origin, element), _bindings(origin, element)
+    system = Element(place, path, name, origin, connectors, bindings, None, inside, (), own)
     connections = children(element, "ssd:Connections", "ssd:Connection")
     return replace(system, hops=tuple(_hop(origin, entry, system) for entry in connections))
 
@@ -181,10 +174,9 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
             f"{choices(interface.kinds)}, or any"
         )
     connectors = _connectors(origin, entry, interface)
-    element = Element(at(origin.place, entry), path, name, origin, connectors)
-    exchange = asked == "ModelExchange"
-    bindings = _bindings(replace(origin, fmu=fmu), entry)
-    return replace(element, bindings=bindings, interface=interface, exchange=exchange)
+    bindings, exchange = _bindings(replace(origin, fmu=fmu), entry), asked == "ModelExchange"
+    line = at(origin.place, entry)
+    return Element(line, path, name, origin, connectors, bindings, interface, exchange=exchange)
 
 
 def _interface(origin: Origin, place: str, fmu: str) -> Interface:
@@ -313,16 +305,11 @@ def _hop(origin: Origin, entry: Any, system: Element) -> Hop:
         gives_a = None if gives_b is None else not gives_b
     if gives_a == gives_b:
         does = {True: "give", False: "take", None: "may give or take"}[gives_a]
-        raise InputError(
-            f"{place}: both {does} a value; must lead from one that gives to one that takes"
-        )
-    return Hop(
-        place,
-        a if gives_a else b,
-        b if gives_a else a,
-        None if change is None else linear(change),
-        is_true(entry, "suppressUnitConversion"),
-    )
+        said = f"{place}: both {does} a value; must lead from one that gives to one that takes"
+        raise InputError(said)
+    source, target = (a, b) if gives_a else (b, a)
+    factors = None if change is None else linear(change)
+    return Hop(place, source, target, factors, is_true(entry, "suppressUnitConversion"))
 
 
 def _end(place: str, system: Element, element: str | None, name: str) -> tuple[Node, bool | None]:
@@ -335,7 +322,7 @@ def _end(place: str, system: Element, element: str | None, name: str) -> tuple[N
     if name not in owner.connectors and variable and variable.causality in _CAUSALITIES:
         text = "an end has no connector, but its FMU a variable of that name"
         system.origin.notes.add(place, text)
-        kind: str = variable.causality
+        kind = variable.causality
     else:
         known(f"{place}: {owner.name} has no connector", name, owner.connectors)
         kind = owner.connectors[name].kind

@@ -20,9 +20,10 @@ from typing import Any
 
 from si_units import Unit
 
+from ..base.checks import known
 from ..base.errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
-from .connectors import Carried, Connectors
+from .connectors import OTHERWISE, Carried, Connectors
 from .document import at, change, child, children, is_true, same, short
 from .elements import Element, Hop, Node, Path, linear, transformation
 from .origin import Origin
@@ -42,7 +43,6 @@ class Parameter:
     """A value of a set with its SSP type; place says where it is from, in the document of origin.
 
     named is the name of its unit in the set; unit is what it is in at a connector or variable.
-    With twice, the set has another value under the same name.
     """
 
     place: str
@@ -52,7 +52,6 @@ class Parameter:
     named: str | None
     unit: Unit | None = None
     settled: bool = True
-    twice: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,21 +153,13 @@ def _set(origin: Origin, root: Any, prefix: str) -> dict[str, Parameter]:
     for element in children(root, "ssv:Parameters", "ssv:Parameter"):
         name = element.get("name")
         where = f"{at(origin.place, element)}: parameter {name!r}"
-        parameter = _parameter(where, origin, element[0])
-        before = parameters.get(prefix + name)
-        twice = before is not None and (before.value, before.named) != (
-            parameter.value,
-            parameter.named,
-        )
-        parameters[prefix + name] = replace(parameter, twice=twice)
+        kind, text = short(element[0].tag).removeprefix("ssv:"), element[0].get("value")
+        known(f"{where}: type", kind, _READERS, " is not supported")
+        parameter = Parameter(where, origin, kind, _READERS[kind](text), element[0].get("unit"))
+        before = parameters.setdefault(prefix + name, parameter)
+        if (before.value, before.named) != (parameter.value, parameter.named):
+            raise InputError(f"{where}: there are two; must be one")
     return parameters
-
-
-def _parameter(place: str, origin: Origin, element: Any) -> Parameter:
-    kind, text = short(element.tag).removeprefix("ssv:"), element.get("value")
-    if kind not in _READERS:
-        raise InputError(f"{place}: type {kind} is not supported; valid: {choices(_READERS)}")
-    return Parameter(place, origin, kind, _READERS[kind](text), element.get("unit"))
 
 
 def _nodes(network: Connectors, element: Element, name: str) -> Iterator[Node]:
@@ -203,11 +194,10 @@ def _arriving(network: Connectors, node: Node, given: Mapping[Node, Parameter]) 
     for hop in hops[start:]:
         beaten = given.get(hop.target)
         if beaten is not None:
-            beaten.origin.notes.add(
-                beaten.place,
-                f"{hop.target} has the value of {hop.source} by a connection, which goes before "
-                "it; not used",
+            text = (
+                f"{hop.target} has the value of {hop.source} by a connection, which goes before it"
             )
+            beaten.origin.notes.add(beaten.place, f"{text}; not used")
         parameter = _passed(network, hop, parameter)
     return parameter
 
@@ -229,18 +219,14 @@ def _check_type(network: Connectors, node: Node, given: Parameter) -> None:
     if node.path in network.parts:
         return
     connector = network.systems[node.path].connectors[node.name]
-    if connector.value_kind not in (None, given.type) and (connector.type, given.type) != (
-        "Real",
-        "Integer",
-    ):
+    whole = (connector.type, given.type) == ("Real", "Integer")
+    if connector.value_kind not in (None, given.type) and not whole:
         raise InputError(f"{given.place}: {given.type}; {node} is {connector.type}")
 
 
 def _adapted(network: Connectors, node: Node, given: Given) -> Parameter:
     """The parameter in the unit of the node, transformed."""
     unit, parameter = network.unit(node), given.parameter
-    if parameter.twice:
-        raise InputError(f"{parameter.place}: there are two; must be one")
     own = None if given.suppress else _own_unit(network, node, parameter)
     if own and unit:
         factor, offset = change(parameter.place, own, unit)
@@ -263,8 +249,7 @@ def _own_unit(network: Connectors, node: Node, parameter: Parameter) -> Unit | N
     defined = origin.units.get(name or "")
     if name and node.path in network.parts and name == wanted:
         if defined and unit and not same(defined, unit):
-            text = f"unit {name!r} is defined otherwise by the FMU, whose definition is taken"
-            origin.notes.add(place, text)
+            origin.notes.add(place, OTHERWISE.format(name))
         if defined:
             return unit
     if name and not defined and node.path in network.parts and wanted is None:
@@ -278,9 +263,8 @@ def _transformed(given: Parameter, element: Any) -> Parameter:
     kind = short(element.tag).removeprefix("ssc:").removesuffix("Transformation")
     if kind == "Linear":
         if given.type not in ("Real", "Integer"):
-            raise InputError(
-                f"{given.place}: {given.type} has a linear transformation; must be Real"
-            )
+            said = f"{given.place}: {given.type} has a linear transformation; must be Real"
+            raise InputError(said)
         return replace(given, type="Real", value=_linear(given.value, *linear(element)))
     mapped = kind.removesuffix("Mapping")
     if given.type != mapped:
@@ -313,7 +297,6 @@ def _value(network: Connectors, node: Node, given: Parameter) -> Value:
         )
     fits = given.type == variable.kind or (given.type, variable.kind) == ("Integer", "Real")
     if not fits and not (given.type == "Enumeration" and variable.items):
-        raise InputError(
-            f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"
-        )
+        said = f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"
+        raise InputError(said)
     return part.interface.parse(given.place, node.name, given.value)

@@ -134,9 +134,8 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
     units = _units(system.components)
     elements = add(top, "ssd:Elements")
     for component in system.components:
-        _write_component(
-            elements, component, sources[component.name], bindings.get(component.name), units
-        )
+        name = component.name
+        _write_component(elements, component, sources[name], bindings.get(name), units)
     if system.connections:
         connections = add(top, "ssd:Connections")
         names = {c.name: _own_names(c) for c in system.components}
@@ -153,20 +152,11 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
 
 
 def _write_component(
-    elements: Any,
-    component: Component,
-    source: str,
-    values: str | None,
-    units: Mapping[str, Unit],
+    elements: Any, component: Component, source: str, values: str | None, units: Mapping[str, Unit]
 ) -> None:
-    element = add(
-        elements,
-        "ssd:Component",
-        name=component.name,
-        type=FMU,
-        source=source,
-        implementation="ModelExchange" if component.integrated else "CoSimulation",
-    )
+    kind = "ModelExchange" if component.integrated else "CoSimulation"
+    attributes = {"name": component.name, "type": FMU, "source": source, "implementation": kind}
+    element = add(elements, "ssd:Component", **attributes)
     variables = _connected(component)
     connectors = add(element, "ssd:Connectors") if variables else None
     for variable in variables:
