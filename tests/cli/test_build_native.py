@@ -58,33 +58,6 @@ def test_what_is_built_is_said_before_the_compiler_runs(command, monkeypatch):
     assert command("build", "--native") == (3, "", line)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--native", "Gripper"], "build: Gripper: no such block; must be of GraspController, "),
-        (["--native", "missing.py"], "missing.py: No such file or directory"),
-        (["--native", "--target", "linux65"], "build: --target 'linux65': must be of linux64, "),
-        (["--native", "--target", ""], "build: --target '': must be of linux64, "),
-        (["--native", "--fmi", "1"], "Invalid value for '--fmi': '1' is not one of '2', '3'."),
-        (["--target", "linux64"], "--target linux64: needs --native"),
-        (["--fmi", "2"], "--fmi 2: needs --native"),
-        (["--c-only", "c"], "--c-only c: needs --native"),
-        (
-            ["--native", "--c-only", "c", "--fmi", "3"],
-            "build: --c-only cannot be used with --target",
-        ),
-        (["--native", "--out", "/dev/null/x"], "/dev/null/x: cannot write to /dev/null"),
-        (["--native", "--c-only", "c", "Gripper"], "build: Gripper: no such block; must be of"),
-    ],
-)
-def test_what_is_wrong_is_one_line(arguments, said, command):
-    code, out, err = command("build", *arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith(f"grasp-cosim: {said}")
-    assert err.count("\n") == 1
-    assert [*Path().iterdir()] == []
-
-
 def test_no_compiler_is_one_line_with_its_fix(command, monkeypatch, tmp_path):
     monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
     code, _, err = command("build", "--native", "--target", "win64")

@@ -1,32 +1,27 @@
-"""The help: every command once in that of the group; a text for everything and one example each."""
+"""The help, its commands, and what the shell completes."""
+
+import os
+import re
+import subprocess
+import sys
 
 import click
 import pytest
 from click.testing import CliRunner
-from grasp_cosim.cli.group import SECTIONS, cli
+from grasp_cosim.cli.group import MODULES, SECTIONS, cli
 
 CONTEXT = click.Context(cli)
 NAMES = cli.list_commands(CONTEXT)
 
 
-def command(name):
-    found = cli.get_command(CONTEXT, name)
-    assert found is not None
-    return found
-
-
 @pytest.mark.parametrize("name", NAMES)
-def test_a_command_has_an_example(name):
-    text = CliRunner().invoke(command(name), ["--help"]).output
-    assert "\\b" not in text
-    (example,) = [line for line in text.splitlines() if line.strip().startswith("Example: ")]
-    assert example.strip().startswith(f"Example: grasp-cosim {name} ")
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_everything_a_command_takes_has_a_text(name):
+def test_a_command_has_an_example_and_a_text_for_all_it_takes(name):
     """Click has none for an argument: it stands, in capitals, in the text of the command."""
-    made = command(name)
+    made = cli.get_command(CONTEXT, name)
+    text = CliRunner().invoke(made, ["--help"]).output
+    assert "\\b" not in text
+    (example,) = re.findall(r"^ *Example: (.*)", text, re.MULTILINE)
+    assert example.startswith(f"grasp-cosim {name} ")
     for parameter in made.params:
         if isinstance(parameter, click.Option):
             assert (parameter.help or "").strip(), parameter.opts
@@ -34,19 +29,40 @@ def test_everything_a_command_takes_has_a_text(name):
             assert parameter.make_metavar(CONTEXT).strip("[]") in (made.help or "")
 
 
-def test_the_group_lists_every_command_once_under_its_heading():
+def test_the_group_lists_every_command_once(snapshot):
     text = CliRunner().invoke(cli, ["--help"], terminal_width=80).output
-    found = {}
-    for block in text.partition("Options:\n")[2].split("\n\n")[1:]:
-        heading, *lines = block.rstrip("\n").split("\n")
-        found[heading.removesuffix(":")] = [line.split()[0] for line in lines]
-        assert all(line[2] != " " and not line.endswith("...") for line in lines), "cut or broken"
-    assert {h: list(names) for h, names in SECTIONS.items()} == found
-    assert sorted(name for names in found.values() for name in names) == NAMES
+    assert text == snapshot
+    homes = [name for names in MODULES.values() for name in names]
+    assert sorted(name for names in SECTIONS.values() for name in names) == sorted(homes) == NAMES
 
 
-def test_a_command_that_is_none_is_named():
-    result = CliRunner().invoke(cli, ["rnu"])
-    assert result.exit_code == 2
-    assert "'rnu': no such command; did you mean run?" in result.output
-    assert "`grasp-cosim --help` shows all" in CliRunner().invoke(cli, ["xyz"]).output
+def test_no_command_and_one_that_is_none(command):
+    code, out, err = command()
+    assert (code, out) == (2, "")
+    assert "Usage: grasp-cosim" in err
+    assert "'rnu': no such command; did you mean run?" in command("rnu")[2]
+    code, out, err = command("xyz")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "`grasp-cosim --help` shows all" in err
+
+
+SOURCE, ASKED = "bash_source", "bash_complete"
+
+
+@pytest.mark.parametrize(
+    ("instruction", "line", "found"),
+    [
+        (SOURCE, "", "_grasp_cosim_completion"),
+        (ASKED, "grasp-cosim r", "plain,relay\nplain,report\nplain,run\n"),
+        (ASKED, "grasp-cosim run --scheme j", "plain,jacobi\n"),
+    ],
+)
+def test_what_fits_is_completed(instruction, line, found):
+    asks = {"_GRASP_COSIM_COMPLETE": instruction, "COMP_WORDS": line}
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "grasp_cosim"],
+        env={**os.environ, **asks, "COMP_CWORD": str(line.count(" "))},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert found in done.stdout if instruction == SOURCE else found == done.stdout

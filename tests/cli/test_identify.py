@@ -61,21 +61,3 @@ def test_contact_times_are_known_by_their_columns(command, monkeypatch, table, d
     assert out.startswith(data)
     assert "0 N, at its lower bound" in out
     assert ("equal conditions scatter by 0.143 s, which no fit explains" in out) != bool(table)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("a.csv",), "a.csv: no such log; must be a .csv or .mf4 file"),
-        (("--fit", "mass"), "the published experiments: 'mass' cannot be fitted; valid: coulomb"),
-        (("--set", "plant.nothing=1"), "--set plant.nothing: "),
-        (("--set", "plant"), "--set 'plant': must be PLACE=VALUE"),
-        (("--out", "/proc/nowhere"), "/proc/nowhere: cannot write"),
-    ],
-)
-def test_wrong_input_is_one_line(command, tmp_path, arguments, message):
-    code, out, err = command("identify", *arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith(f"grasp-cosim: {message}")
-    assert len(err.splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []

@@ -59,37 +59,6 @@ def test_the_folder_may_be_moved(fmus_here, tmp_path):
     assert all(c.fmu.is_relative_to(tmp_path / "there") for c in system.components)
 
 
-WRONG = [
-    (("there.toml",), "there.toml: is there already; give another name, or --force"),
-    (("here.ssp",), "here.ssp: must end in .toml, a system file"),
-    (("folder.toml",), "folder.toml: is a folder; must be the name of a file"),
-    (("a.toml", "--as", "hand=vendor.fmu"), "--as hand: no component 'hand'; valid: plant, sens"),
-    (("a.toml", "--as", "plant"), "--as 'plant': must be COMPONENT=FMU"),
-    (("a.toml", "--as", "plant=none.fmu"), "none.fmu: no such FMU file"),
-    (("a.toml", "--fmu", "a.b=vendor.fmu"), "--fmu 'a.b=vendor.fmu': must be a name of its own"),
-    (("a.toml", "--fmu", "a=vendor.fmu", "--fmu", "a=vendor.fmu"), "must be a name of its own"),
-    (
-        ("a.toml", "--fmu", "a=vendor.fmu", "--as", "plant=vendor.fmu"),
-        "--fmu cannot be used with --as",
-    ),
-]
-
-
-@pytest.mark.parametrize(("arguments", "message"), WRONG)
-def test_wrong_input_is_one_line(fmus_here, tmp_path, arguments, message):
-    write_fmu(tmp_path / "vendor.fmu")
-    (tmp_path / "there.toml").write_text("mine")
-    (tmp_path / "folder.toml").mkdir()
-    before = sorted(tmp_path.iterdir())
-    code, out, err = fmus_here("init", *arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("grasp-cosim: ")
-    assert message in err
-    assert err.count("\n") == 1
-    assert sorted(tmp_path.iterdir()) == before
-    assert (tmp_path / "there.toml").read_text() == "mine"
-
-
 def filled_in(path):
     """Put something in the place of each TODO of a plant like FOREIGN."""
     lines = path.read_text("utf-8").splitlines()

@@ -91,34 +91,3 @@ def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(qualify, fmus):
     assert (code, err) == (1, "no page page.html: there were no two runs\n")
     assert "not run, the interface does not fit: force[1], " in out
     assert not Path("page.html").exists()
-
-
-WRONG = [
-    (["GripperPlant.fmu"], "Missing option '--as'"),
-    (["none.fmu", "--as", "plant"], "none.fmu: no such FMU file"),
-    (["GripperPlant.fmu", "--as", "hand"], "--as hand: no component 'hand'; valid: plant, se"),
-    (
-        ["GripperPlant.fmu", "--as", "plant", "--set", "components.plant.rename.a=b"],
-        "'a' = 'b': GripperPlant.fmu has",
-    ),
-    (["GripperPlant.fmu", "--as", "plant", "--set", "plant.x=1"], "no input or parameter 'x'"),
-    (["GripperPlant.fmu", "--as", "plant", "--bands", "no.toml"], "no.toml: no such file of bands"),
-    (
-        ["GripperPlant.fmu", "--as", "plant", "--step", "7e-4"],
-        "does not divide stop = 3 s",
-    ),
-    (
-        ["GripperPlant.fmu", "--as", "plant", "--set", "components.plant.isolation=full"],
-        "isolation = 'full'",
-    ),
-]
-
-
-@pytest.mark.parametrize(("arguments", "message"), WRONG)
-def test_wrong_input_is_one_line_and_exit_2(qualify, fmus, arguments, message):
-    first, *more = arguments
-    code, out, err = qualify(fmus / first, *more, "--out", "results")
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert message in err
-    assert list(Path().iterdir()) == []

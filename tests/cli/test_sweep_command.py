@@ -41,27 +41,6 @@ def test_a_grid_leaves_its_table_and_a_picture(command):
     assert {**row, "index": "1"} == table[1]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ((), "needs --vary or --table, one of them"),
-        ((*WIDTH, "--table", "rows.csv"), "needs --vary or --table, one of them"),
-        (("--vary", "plant.object_width"), "--vary 'plant.object_width': must be PLACE=START:END"),
-        (("--vary", "plant.width=1,2"), "width"),
-        ((*WIDTH, "--scheduler", "tcp://x", "--workers", "1"), "--workers: cannot be used with"),
-        ((*WIDTH, "--out", "t.xlsx"), "t.xlsx: must end in .csv or .parquet"),
-        (("--table", "none.csv"), "--table none.csv: "),
-        ((*WIDTH, "--vary", "plant.object_width=1,2"), "plant.object_width: is given twice"),
-        ((*WIDTH, "--set", "plant.object_width=0.05"), "plant.object_width: is given twice"),
-    ],
-)
-def test_a_mistake_is_one_line_before_any_run(command, arguments, said):
-    code, out, err = command("sweep", *arguments)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert said in err
-    assert not Path("sweep.csv").exists()
-
-
 @pytest.mark.slow
 def test_where_every_run_fails_the_result_is_negative(command):
     code, out, _ = command("sweep", "--vary", "plant.object_width=-1,-2", *SHORT)
