@@ -67,7 +67,7 @@ def test_columns_have_their_types_and_real_is_the_default(tmp_path):
         ("run.json", "{", "is damaged, not JSON in UTF-8: "),
         ("run.json", b"\xff", "is damaged, not JSON in UTF-8: "),
         ("run.json", [], "is list; must be a JSON object"),
-        ("run.json", {}, "no entry 'system'; must be as `grasp-cosim run --out` writes it"),
+        ("run.json", {}, "no entry 'system'; must be a string, as `grasp-cosim run --out` writes"),
         ("run.json", {**JSON, "units": 1}, "units = 1; must be a JSON object"),
         ("run.json", {**JSON, "step": True}, "step = True; must be a number"),
         ("run.json", {**JSON, "wall_time": "3"}, "wall_time = '3'; must be a number or null"),

@@ -19,6 +19,8 @@ Address = tuple[str, int]
 LARGEST = 65_536
 """Bytes to take of a datagram; no UDP datagram has as many."""
 
+NOT_HERE = "cannot listen there: {}; must be an address of this machine and a free port, or 0"
+
 
 class EventLoop:
     """Listens at a port once it is made; `run` calls the handlers. Leaving the context closes it.
@@ -39,7 +41,8 @@ class EventLoop:
             self._wake, woken = (stack.enter_context(end) for end in socket.socketpair())
             self._wake.setblocking(False)
             self.register(woken, lambda: woken.recv(LARGEST))
-            self.port_socket = stack.enter_context(_listening(resolved(*address)))
+            made = _socket(socket.socket.bind, resolved(*address), NOT_HERE)
+            self.port_socket = stack.enter_context(made)
             self.address: Address = self.port_socket.getsockname()
             self._stack = stack.pop_all()
 
@@ -86,11 +89,6 @@ def received(readable: socket.socket) -> tuple[bytes, Address] | None:
 def connected(peer: Address) -> socket.socket:
     """Return a socket that receives from the peer alone; InputError where there is no way to it."""
     return _socket(socket.socket.connect, peer, "no way to the peer: {}")
-
-
-def _listening(address: Address) -> socket.socket:
-    wrong = "cannot listen there: {}; must be an address of this machine and a free port, or 0"
-    return _socket(socket.socket.bind, address, wrong)
 
 
 def _socket(

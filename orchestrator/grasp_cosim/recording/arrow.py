@@ -17,7 +17,7 @@ from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..exchange.listener import Experiment, Signal
-from .memory import TYPES, Rows, typed
+from .memory import TYPES, Batch, typed
 
 BATCH = 4096
 """Rows that are written together, if they do not take longer than LONG to come."""
@@ -53,8 +53,7 @@ class ArrowListener:
             about = {"unit": s.unit or "", "description": s.description}
             fields.append(arrow.field(s.name, types[s.kind], metadata=about))
         self._schema = arrow.schema(fields)
-        self._waiting: list[Rows] = []
-        self._rows, self._since = 0, time.monotonic()
+        self._batch, self._since = Batch(), time.monotonic()
         try:
             self._file = self._path.open("wb")
             self._writer = arrow.ipc.new_file(self._file, self._schema)
@@ -64,9 +63,8 @@ class ArrowListener:
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Take the rows; SimulationError where writing fails, the batches until then are whole."""
-        self._waiting.append((steps.copy(), rows.copy()))
-        self._rows += len(steps)
-        if self._rows >= BATCH or time.monotonic() - self._since > LONG:
+        self._batch.add(steps, rows)
+        if self._batch.count >= BATCH or time.monotonic() - self._since > LONG:
             self._flush()
 
     def end(self, complete: bool) -> None:
@@ -79,10 +77,10 @@ class ArrowListener:
             raise SimulationError(unwritable(self._said, error)) from error
 
     def _flush(self) -> None:
-        if not self._waiting:
+        if not self._batch.count:
             return
-        steps, rows = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
-        self._waiting, self._rows, self._since = [], 0, time.monotonic()
+        steps, rows = self._batch.take()
+        self._since = time.monotonic()
         own = (np.ascontiguousarray(typed(s, rows[:, i])) for i, s in enumerate(self._signals))
         columns = [self._experiment.times(steps), *own]
         try:

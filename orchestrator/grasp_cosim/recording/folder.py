@@ -25,7 +25,7 @@ from .arrow import ArrowListener
 from .csv import CsvListener
 from .load import ARROW, SETTINGS, SIGNALS, TEXT
 from .memory import TYPES, Rows
-from .result import OF_ANY, Result, conversions_entry
+from .result import OF_ANY, Result
 
 DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
 """The files that may be made of a run in its folder, beside its picture."""
@@ -168,7 +168,7 @@ class RunFolder:
             "complete": False,
             **self._experiment.settings,
             "units": {s.name: s.unit for s in signals},
-            "to_si": conversions_entry(self._to_si),
+            "to_si": {name: c._asdict() for name, c in self._to_si.items()},
             "types": {s.name: types.get(s.kind, TEXT) for s in signals},
             "descriptions": {s.name: s.description for s in signals},
             "metric_units": {},

@@ -53,15 +53,15 @@ ENTRIES: Mapping[str, Any] = {
 }  # fmt: skip
 """All entries besides metrics."""
 
-TEXT = "str"
-TYPES = ("float64", "int32", "int64", "bool", TEXT)
-"""The element types of recorded columns, the last that of Strings."""
-
 FORMS = {
     str: "a string", NUMBER: "a number", MAYBE: "a number or null", bool: "true or false",
     list: "a list", dict: "a JSON object",
 }  # fmt: skip
 """Types of entries in words."""
+
+TEXT = "str"
+TYPES = ("float64", "int32", "int64", "bool", TEXT)
+"""The element types of recorded columns, the last that of Strings."""
 
 
 def run_folder(path: Path) -> Path:
@@ -189,16 +189,13 @@ def _settings(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is damaged, not JSON in UTF-8: {error}") from error
     if not isinstance(settings, dict):
         raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
-    for key in REQUIRED:
-        if key not in settings:
-            raise InputError(
-                f"{path}: no entry {key!r}; must be as `grasp-cosim run --out` writes it"
-            )
     for key, kind in ENTRIES.items():
-        value = settings.get(key)
+        there, value = key in settings, settings.get(key)
         wrong = not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)
-        if key in settings and wrong:
-            raise InputError(f"{path}: {key} = {value!r}; must be {FORMS[kind]}")
+        if (there and wrong) or (key in REQUIRED and not there):
+            said = f"{key} = {value!r}" if there else f"no entry {key!r}"
+            must = f"{FORMS[kind]}, as `grasp-cosim run --out` writes it"
+            raise InputError(f"{path}: {said}; must be {must}")
     return settings
 
 

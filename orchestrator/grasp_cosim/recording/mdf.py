@@ -1,13 +1,11 @@
 """ASAM MDF 4 by asammdf (the optional extra `mdf`): written while a run goes on, and read."""
 
-from __future__ import annotations
-
 import json
 import logging
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,9 +16,7 @@ from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..exchange.listener import Experiment, Signal
-
-if TYPE_CHECKING:
-    from .memory import Rows
+from .memory import Batch
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8, "String": np.uint32}
 """The element type of a channel by its signal's kind."""
@@ -60,8 +56,7 @@ class MdfListener:
         if not signals:
             raise InputError(f"{self._said}: nothing to record; must be a system with outputs")
         self._experiment, self._signals, none = experiment, signals, np.empty(0)
-        self._waiting: list[Rows] = []
-        self._count = 0
+        self._batch = Batch()
         folder = self._path.parent
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -77,9 +72,8 @@ class MdfListener:
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Take the rows; SimulationError where they cannot be written."""
-        self._waiting.append((steps.copy(), rows.copy()))
-        self._count += len(steps)
-        if self._count >= PIECE:
+        self._batch.add(steps, rows)
+        if self._batch.count >= PIECE:
             self._flush()
 
     def end(self, complete: bool) -> None:
@@ -114,10 +108,9 @@ class MdfListener:
                 channel.conversion = from_dict(table)
 
     def _flush(self) -> None:
-        if not self._waiting:
+        if not self._batch.count:
             return
-        steps, rows = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
-        self._waiting, self._count = [], 0
+        steps, rows = self._batch.take()
         pairs = zip(rows.T, self._signals, strict=True)
         own = (column.astype(TYPES[signal.kind]) for column, signal in pairs)
         try:

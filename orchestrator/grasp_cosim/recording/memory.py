@@ -26,6 +26,25 @@ Columns = tuple[npt.NDArray[np.float64], Mapping[str, npt.NDArray[Any]]]
 FLOAT = np.dtype(np.float64).itemsize
 
 
+class Batch:
+    """Rows that wait until there are enough of them."""
+
+    def __init__(self) -> None:
+        self._parts: list[Rows] = []
+        self.count = 0
+
+    def add(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Keep a copy of these."""
+        self._parts.append((steps.copy(), rows.copy()))
+        self.count += len(steps)
+
+    def take(self) -> Rows:
+        """All that wait, which are at least one row."""
+        steps, rows = (np.concatenate(parts) for parts in zip(*self._parts, strict=True))
+        self._parts, self.count = [], 0
+        return steps, rows
+
+
 class MemoryListener:
     """Copies the rows into one table, which has room for the whole run from the start.
 

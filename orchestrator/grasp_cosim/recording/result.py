@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -211,18 +212,15 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @cached_property
     def _figures(self) -> Mapping[str, Any]:
         """The metrics without those that fail."""
-        simulated, wall_time = float(self.time[-1]) - self._start, self.wall_time
-        factor = simulated / wall_time if wall_time else wall_time
-        known = self.known
+        known, wall_time = self.known, self.wall_time
+        simulated = float(self.time[-1]) - self.settings.get("start", 0.0)
         proxies = known.proxies if known else proxy_figures(self.time, self.signals)
         figures = {
             **self.measured.values,
             "wall_time": wall_time,
-            "real_time_factor": factor,
+            "real_time_factor": simulated / wall_time if wall_time else wall_time,
             "steps": int(self._steps[-1]),
-            "scheme": self.settings["scheme"],
-            "step": self.settings["step"],
-            "stop": self.settings["stop"],
+            **{key: self.settings[key] for key in ("scheme", "step", "stop")},
             "complete": self.complete,
             **({"proxies": proxies} if proxies else {}),
         }
@@ -235,18 +233,15 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
-        with in_one_piece(Path(path)) as part:
-            self._play(CsvListener(part, path, in_place=True))
+        self._play(path, partial(CsvListener, in_place=True))
 
     def to_arrow(self, path: str | Path) -> None:
         """Write an Arrow file (Feather 2), with the units; InputError without pyarrow."""
-        with in_one_piece(Path(path)) as part:
-            self._play(ArrowListener(part, path))
+        self._play(path, ArrowListener)
 
     def to_mdf(self, path: str | Path) -> None:
         """Write an ASAM MDF 4 file with the units and the settings; InputError without asammdf."""
-        with in_one_piece(Path(path)) as part:
-            self._play(MdfListener(part, path))
+        self._play(path, MdfListener)
 
     def to_json(self, path: str | Path) -> None:
         """Write the metrics and the settings that led to them, then what is known by signal
@@ -259,7 +254,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             **self._figures,
             **self.settings,
             "units": dict(self.units),
-            "to_si": conversions_entry(self.to_si),
+            "to_si": {name: c._asdict() for name, c in self.to_si.items()},
             "types": {
                 name: "str" if column.dtype == object else str(column.dtype)
                 for name, column in self.signals.items()
@@ -340,37 +335,33 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         views: Iterator[View] = (higher(f"{name}.view").VIEW for name in self.groups)
         return next((view for view in views if view.fits(self)), OF_ANY)
 
-    @property
-    def _start(self) -> float:
-        return float(self.settings.get("start", 0.0))
-
     @cached_property
     def _steps(self) -> npt.NDArray[np.int64]:
         """The numbers of the recorded communication points, shape (rows,)."""
-        step_ns, since = round(self.settings["step"] * NANOSECONDS), self.time - self._start
+        since = self.time - self.settings.get("start", 0.0)
+        step_ns = round(self.settings["step"] * NANOSECONDS)
         steps: npt.NDArray[np.int64] = np.rint(since * (NANOSECONDS / step_ns)).astype(np.int64)
         return steps
 
-    def _play(self, listener: Listener) -> None:
-        """Have a listener hear the recorded run again."""
+    def _play(self, path: str | Path, make: Callable[[Path, str | Path], Listener]) -> None:
+        """Have a listener hear the recorded run again: who writes a file, and its name."""
         said = self.descriptions
         signals = [
             Signal(name, self.units[name], KINDS[column.dtype.kind], said.get(name, ""))
             for name, column in self.signals.items()
         ]
-        listener.begin(Experiment.of(self.settings), signals)
-        try:
+        with in_one_piece(Path(path)) as part, ExitStack() as stack:
+            listener = make(part, path)
+            listener.begin(Experiment.of(self.settings), signals)
+            stack.callback(listener.end, self.complete)
             for first in range(0, len(self.time), PIECE):
                 piece = slice(first, first + PIECE)
-                steps = self._steps[piece]
-                rows = np.empty((len(steps), len(signals)))
+                rows = np.empty((len(self.time[piece]), len(signals)))
                 for i, (signal, column) in enumerate(zip(signals, self.values(), strict=True)):
-                    part = column[piece]
+                    values = column[piece]
                     text = signal.kind == "String"
-                    rows[:, i] = [*map(signal.texts.number, part)] if text else part
-                listener.block(steps, rows)
-        finally:
-            listener.end(self.complete)
+                    rows[:, i] = [*map(signal.texts.number, values)] if text else values
+                listener.block(self._steps[piece], rows)
 
 
 def _in_words(metric: Metric, value: Any) -> str:
@@ -381,8 +372,3 @@ def _in_words(metric: Metric, value: Any) -> str:
         for v in values
     ]
     return f"{metric.name} {', '.join(texts)} {metric.display_unit}".rstrip()
-
-
-def conversions_entry(to_si: Mapping[str, Conversion]) -> dict[str, Any]:
-    """The conversions of a result to SI base units as run.json has them."""
-    return {name: c._asdict() for name, c in to_si.items()}
