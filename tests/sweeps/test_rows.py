@@ -66,19 +66,16 @@ def test_a_unit_in_the_head_is_converted(tmp_path):
         ("a.b\n1,2\n", "line 2 has 2 cells; must be 1"),
         ("a.b [furlong]\n1\n", "'furlong' is no known unit"),
         ("a.b\n", "0 rows; must be 1 to"),
+        ([], "0 rows; must be 1 to"),
+        ([{}], "nothing varies"),
     ],
 )
 def test_a_table_that_is_none(tmp_path, content, said):
     path = tmp_path / "rows.csv"
-    path.write_text(content)
+    if isinstance(content, str):
+        path.write_text(content)
     with pytest.raises(InputError, match=said):
-        as_rows(path)
-
-
-def test_nothing_that_varies():
-    for rows in ([], [{}]):
-        with pytest.raises(InputError, match=r"rows; must be 1|nothing varies"):
-            as_rows(rows)
+        as_rows(path if isinstance(content, str) else content)
 
 
 @pytest.mark.parametrize(

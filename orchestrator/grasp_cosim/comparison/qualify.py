@@ -279,11 +279,7 @@ def prepare_swap(
 ) -> Swap:
     """The swap that qualify() describes; InputError where its arguments are wrong."""
     place = system.component(component, f"--as {component}")
-    interfaces = {
-        c.name: c.sized(describe(c.fmu)).renamed(c.rename).in_units(c.units)
-        for c in system.components
-    }
-    ours = interfaces[component]
+    ours = place.interface
     was = candidate if isinstance(candidate, Component) else replace(place, values={})
     fmu = was.fmu if isinstance(candidate, Component) else candidate
     now = replaced(was, Replacement(fmu, rename, units or {}), "")
@@ -322,9 +318,9 @@ def prepare_swap(
     }
     back |= _between(swapped, system, component) if swapped else {}
     nominals = {
-        f"{name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
-        for name, interface in interfaces.items()
-        for v in interface.of("output")
+        f"{c.name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
+        for c in system.components
+        for v in c.interface.of("output")
     }
     return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
 
