@@ -180,19 +180,6 @@ def test_the_end_at_the_very_beginning(tmp_path):
     assert "stair asked for the end of the simulation at t = 0 s" in result.log[-1]
 
 
-@needs_cvode
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_session_and_real_time(tmp_path, kind):
-    system = stair(tmp_path, kind, 0.1, width=0.1)
-    with simulate.session(system, realtime=Realtime(factor=100.0)) as session:
-        while session.step():
-            assert not session.complete or session.time == 0.9
-        assert session.complete
-        result = session.result()
-    assert result.time[-1] == 0.9
-    assert result.timing is not None
-
-
 def test_the_command_is_done(tmp_path, capsys):
     build_model("stair", tmp_path)
     path, out = tmp_path / "stair.toml", tmp_path / "out"

@@ -1,14 +1,17 @@
-"""Units that a system file names for variables whose FMU declares none, or a wrong one."""
+"""A component: the units that a system file names, and its solver."""
 
 from dataclasses import replace
 
 import pytest
 from comparison.made import PLANT, write_fmu
-from grasp_cosim import InputError, System
+from grasp_cosim import InputError, System, simulate
 from grasp_cosim.interface.read import read_interface
+from grasp_cosim.ssp.to_archive import write_ssp
+from grasp_cosim.system.parts import Solver
 from grasp_cosim.system.settings import settings
 from grasp_cosim.system.validity import connection_transform, remarks
 from si_units import Unit
+from support.native_fmus import build_model, needs_gcc
 
 SPRING = {
     "position": 'causality="input" | Real start="0" unit="m"',
@@ -88,6 +91,10 @@ def test_a_declared_unit_is_replaced_and_that_is_said(tmp_path):
         ('{ gap = "mmm" }', "units: 'gap' = 'mmm': no unit that plant.fmu defines, or that is kno"),
         ('{ gap = "" }', "units: 'gap' = '': no unit that plant.fmu defines, or that is known; mu"),
         ('{ touching = "1" }', "units: 'touching' = '1': is of type Boolean; must be a Real, as o"),
+        (
+            '{ gap = "-mM" }',
+            "units: 'gap' = '-mM': no unit that plant.fmu defines, or that is known; did",
+        ),
         ("{ gap = 1 }", "units: 'gap' = 1: must be the name of a unit, like 'mm'"),
         ('"mm"', "units: 'mm'; must be a table"),
     ],
@@ -99,31 +106,89 @@ def test_a_name_that_is_wrong_is_one_line(tmp_path, units, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("unit", "end"),
-    [("CM", "did you mean cm?"), ("-mM", "did you mean mm, Mm?"), ("DEGC", "did you mean degC?")],
-)
-def test_a_unit_in_other_capitals_is_asked_about(tmp_path, unit, end):
-    with pytest.raises(InputError, match=r"or that is known; ") as caught:
-        load(tmp_path, BARE, f'units = {{ gap = "{unit}" }}')
-    assert str(caught.value).endswith(f"; {end}")
-
-
-# ------------------------------------------------------------------------- another FMU in its place
-
-
-def in_mm(folder, name="other.fmu"):
+def test_values_are_converted_for_an_fmu_in_other_units(tmp_path):
     plant = {n: text.replace('unit="m"', 'unit="mm"') for n, text in PLANT.items()}
     plant["width"] = plant["width"].replace('start="0.05"', 'start="50"').replace(' max="1"', "")
-    return write_fmu(folder / name, plant)
-
-
-def test_values_are_converted_for_an_fmu_in_other_units(tmp_path):
+    in_mm = write_fmu(tmp_path / "other.fmu", plant)
     system = load(tmp_path, dict(PLANT))
-    swapped = system.swap("plant", in_mm(tmp_path))
+    swapped = system.swap("plant", in_mm)
     assert swapped.start("plant.width") == pytest.approx(70.0, rel=1e-15)
     assert gap_to_position(swapped) == (1e-3, 0.0)
     again = swapped.swap("plant", tmp_path / "plant.fmu")
     assert again.start("plant.width") == pytest.approx(0.07, rel=1e-15)
-    revised = system.with_settings({"components.plant.fmu": in_mm(tmp_path), "plant.width": 60.0})
+    revised = system.with_settings({"components.plant.fmu": in_mm, "plant.width": 60.0})
     assert revised.start("plant.width") == 60.0
+
+
+HEAD = '[experiment]\nstep = 0.1\nstop = 1.0\n[components.x]\nfmu = "dahlquist.fmu"\n'
+
+
+def solved(folder, solver, *kinds):
+    build_model("dahlquist", folder, "2.0", kinds or ("CoSimulation", "ModelExchange"))
+    path = folder / "system.toml"
+    path.write_text(f"{HEAD}values = {{ u = 0.0 }}\n{solver}\n", "utf-8")
+    return System.load(path)
+
+
+@needs_gcc
+def test_what_a_system_file_says(tmp_path):
+    text = "solver = { relative_tolerance = 1e-6, absolute_tolerance = 1e-9, maximum_step = 0.01 }"
+    system = solved(tmp_path, text)
+    assert system.components[0].integrated == Solver(1e-6, 1e-9, 0.01)
+    assert remarks(system) == (
+        "x: dahlquist.fmu runs by model exchange, integrated by CVode with a relative tolerance "
+        "of 1e-06",
+    )
+    assert solved(tmp_path, "solver = {}").components[0].integrated == Solver()
+    assert solved(tmp_path, "").components[0].integrated is None
+    assert solved(tmp_path, "", "ModelExchange").components[0].integrated == Solver()
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("solver", "message"),
+    [
+        ("1e-6", r"\[components.x\]: solver: 1e-06; must be a table"),
+        (
+            "{ tolerance = 1e-6 }",
+            "unknown entry 'tolerance'; did you mean absolute_tolerance, ",
+        ),
+        ("{ relative_tolerance = 0 }", "relative_tolerance = 0: must be a number from 1e-13 to 0"),
+        ("{ relative_tolerance = '1' }", "relative_tolerance = '1': must be a number from"),
+        ("{ absolute_tolerance = 0.0 }", "absolute_tolerance = 0.0: must be a number greater than"),
+        ("{ maximum_step = -1.0 }", "maximum_step = -1.0 s: must be a number greater than 0"),
+    ],
+)
+def test_a_mistake_is_one_line(tmp_path, solver, message):
+    with pytest.raises(InputError, match=message) as caught:
+        solved(tmp_path, f"solver = {solver}")
+    assert "\n" not in str(caught.value)
+
+
+@needs_gcc
+def test_a_solver_for_co_simulation_alone(tmp_path):
+    message = "x: solver: dahlquist.fmu is for co-simulation alone; must be left out"
+    with pytest.raises(InputError, match=message):
+        solved(tmp_path, "solver = {}", "CoSimulation")
+
+
+@needs_gcc
+def test_another_fmu_takes_the_solver_that_it_can(tmp_path):
+    system = solved(tmp_path, "solver = { relative_tolerance = 1e-6 }")
+    for kind, solver in (("CoSimulation", None), ("ModelExchange", Solver(1e-6))):
+        other = build_model("dahlquist", tmp_path, kinds=[kind], file="other")
+        assert system.swap("x", other).components[0].solver == solver
+
+
+@needs_gcc
+@pytest.mark.parametrize("solver", ["solver = { relative_tolerance = 1e-6 }", ""])
+@pytest.mark.parametrize("kinds", [("ModelExchange",), ("CoSimulation", "ModelExchange")])
+def test_an_archive_keeps_it(tmp_path, solver, kinds):
+    system, path = solved(tmp_path, solver, *kinds), tmp_path / "system.ssp"
+    write_ssp(system, path)
+    again = System.load(path)
+    assert again.components[0].solver == system.components[0].solver
+    assert simulate(again)["x.x"].tolist() == simulate(system)["x.x"].tolist()
+    assert replace(again.components[0], solver=None).integrated == (
+        None if "CoSimulation" in kinds else Solver()
+    )
