@@ -221,7 +221,7 @@ def test_the_times_of_fmus_alone(tmp_path):
     assert times(span, 'stopTime="5"') == (
         ["step = 0.3", "stop = 5.1"],
         [
-            "c0: its default experiment begins at 1 s, the run at 0 s",
+            "the default experiments begin at other times, the run at 0 s",
             "stop = 5 s: 5.1 s is a whole number of steps",
         ],
     )

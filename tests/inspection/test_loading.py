@@ -16,7 +16,6 @@ from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.loading import Finding, unpack
 from support import native_fmus
 from support.marks import slow
-from support.native_fmus import build_model
 
 SCRIPT = """\
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -148,49 +147,34 @@ def test_a_temporary_folder_from_which_nothing_loads(
     assert not fix or f"/tmp/{name}" in verdict[1]
 
 
+ASK = "ask the vendor for an export as FMI 2.0 or 3.0, for co-simulation or model exchange"
+BOTH = '<ModelExchange modelIdentifier="M"/><CoSimulation modelIdentifier="N"/>'
+
+
 @pytest.mark.parametrize(
-    ("version", "kinds"),
+    ("version", "kinds", "status", "text", "fix"),
     [
-        ("3.0", '<ScheduledExecution modelIdentifier="N"/>'),
-        ("2.0", ""),
-        ("1.0", ""),
+        ("2.0", BOTH, "ok", "FMI 2.0, CoSimulation, ModelExchange, made by an unknown", None),
+        ("2.0", '<ModelExchange modelIdentifier="N"/>', "ok", "run here by a solver", None),
+        ("3.0", '<ScheduledExecution modelIdentifier="N"/>', "problem", "scheduled exec", ASK),
+        ("2.0", "", "problem", "declares no kind of FMU", ASK),
+        ("1.0", "", "problem", "is FMI 1.0, for model exchange", ASK),
     ],
 )
-def test_an_fmu_of_another_kind_is_not_loaded(version, kinds, tmp_path):
+def test_versions_and_kinds(version, kinds, status, text, fix, tmp_path):
+    described = DESCRIPTION.format(version=version, kinds=kinds)
+    if version == "3.0":
+        described = described.replace('<Real start="0"/>', "").replace("ScalarVariable", "Float64")
     with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
-        text = DESCRIPTION.format(version=version, kinds=kinds)
-        if version == "3.0":
-            text = text.replace('<Real start="0"/>', "").replace("ScalarVariable", "Float64")
-        archive.writestr("modelDescription.xml", text)
-        archive.writestr("binaries/x86_64-linux/N.so", Path(sys.executable).read_bytes()[:64])
-    found = examined(tmp_path / "n.fmu")
-    assert found["fmu"].status == "problem"
-    assert f"FMI {version}" in found["fmu"].text
-    assert "ask the vendor for an export as FMI 2.0 or 3.0" in (found["fmu"].fix or "")
-    assert found["binary"].status == ("ok" if version == "3.0" else "problem")
-    assert found["trial"].status == "warning"
-    assert "not loaded" in found["trial"].text
-
-
-@gcc
-@pytest.mark.slow
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_one_for_model_exchange_runs_here_by_a_solver(version, tmp_path):
-    fmu = build_model("bouncing_ball", tmp_path, version, ("ModelExchange",))
-    found = examined(fmu)
-    checks = ("fmu", "binary", "libraries", "trial")
-    assert {found[check].status for check in checks} == {"ok"}
-    assert "run here by a solver, elsewhere ask the vendor" in found["fmu"].text
-
-
-def test_both_kinds_are_a_cosimulation(tmp_path):
-    kinds = '<ModelExchange modelIdentifier="M"/><CoSimulation modelIdentifier="C"/>'
-    with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
-        text = DESCRIPTION.format(version="2.0", kinds=kinds)
-        archive.writestr("modelDescription.xml", text)
+        archive.writestr("modelDescription.xml", described)
     fmu = unpack(tmp_path / "n.fmu", tmp_path)
-    assert loading.description(fmu)[0] == "ok"
-    assert fmu.binary.stem == "C"
+    found = loading.description(fmu)
+    assert (found[0], found[2], fmu.binary.stem == "N") == (status, fix, bool(kinds))
+    assert text in found[1]
+    assert loading.trial(fmu)[:2] == (
+        "warning",
+        "not loaded: of a kind that is not run here, or without a binary",
+    )
 
 
 @gcc

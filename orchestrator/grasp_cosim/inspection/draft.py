@@ -233,26 +233,19 @@ def _experiment(interfaces: Mapping[str, Interface]) -> tuple[float, float, floa
     """Step, start and stop time in s: the shortest step and the longest span that the FMUs
     recommend, from where all of them begin; and notes.
     """
-    steps, spans, notes = [], [], []
-    begins = {_finite(i.experiment.get("start_time")) for i in interfaces.values()}
+    keys = ("start_time", "stop_time", "step_size")
+    times = [[_finite(i.experiment.get(key)) for key in keys] for i in interfaces.values()]
+    begins = {begin for begin, _, _ in times}
     start = begins.pop() if len(begins) == 1 else 0.0
-    for name, interface in interfaces.items():
-        told = interface.experiment
-        begin, end, step = (_finite(told.get(k)) for k in ("start_time", "stop_time", "step_size"))
-        if begin != start:
-            notes.append(
-                f"{name}: its default experiment begins at {begin:g} s, the run at {start:g} s"
-            )
-        spans += [end - begin] if end > begin else []
-        steps += [step] if step > 0.0 else []
+    notes = [f"the default experiments begin at other times, the run at {start:g} s"] * bool(begins)
+    spans = [end - begin for begin, end, _ in times if end > begin]
+    steps = [step for _, _, step in times if step > 0.0]
     span = max(spans, default=1.0)
     step = min(steps, default=span / STEPS)
     missing = [word for word, given in (("step", steps), ("stop time", spans)) if not given]
     if missing:
-        notes.append(
-            f"no FMU recommends a {' and a '.join(missing)}: chosen, step = {step:g} s, "
-            f"stop = {start + span:g} s"
-        )
+        chosen = f"chosen, step = {step:g} s, stop = {start + span:g} s"
+        notes.append(f"no FMU recommends a {' and a '.join(missing)}: {chosen}")
     step_ns = max(1, round(step * NANOSECONDS))
     span_ns = max(1, round(span * NANOSECONDS / step_ns)) * step_ns
     stop = (round(start * NANOSECONDS) + span_ns) / NANOSECONDS

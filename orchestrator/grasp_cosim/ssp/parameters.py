@@ -210,18 +210,7 @@ def _passed(network: Connectors, hop: Hop, given: Parameter) -> Parameter:
         given = replace(given, value=number, unit=carried.unit, settled=carried.settled)
     elif hop.transformation:
         raise InputError(f"{hop.place}: transforms a {given.type}; must be Real")
-    _check_type(network, hop.target, given)
     return given
-
-
-def _check_type(network: Connectors, node: Node, given: Parameter) -> None:
-    """InputError where a connector of a system is of another type."""
-    if node.path in network.parts:
-        return
-    connector = network.systems[node.path].connectors[node.name]
-    whole = (connector.type, given.type) == ("Real", "Integer")
-    if connector.value_kind not in (None, given.type) and not whole:
-        raise InputError(f"{given.place}: {given.type}; {node} is {connector.type}")
 
 
 def _adapted(network: Connectors, node: Node, given: Given) -> Parameter:
@@ -234,9 +223,7 @@ def _adapted(network: Connectors, node: Node, given: Given) -> Parameter:
     if given.transformation is not None:
         parameter = _transformed(parameter, given.transformation)
     settled = unit is not None or given.transformation is None
-    parameter = replace(parameter, unit=unit or own, settled=settled)
-    _check_type(network, node, parameter)
-    return parameter
+    return replace(parameter, unit=unit or own, settled=settled)
 
 
 def _own_unit(network: Connectors, node: Node, parameter: Parameter) -> Unit | None:
