@@ -22,7 +22,7 @@ from grasp_cosim.system.settings import settings
 from hypothesis import given
 from hypothesis import strategies as st
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, peak, play, rows
-from support.marks import examples
+from support.marks import examples, slow
 
 FORMATS = {
     "csv": (CsvListener, lambda path: read_csv(path, {"a.s"})),
@@ -232,7 +232,8 @@ def test_a_full_disk_is_said_and_leaves_whole_lines_or_nothing(tmp_path, form, m
 
 
 @pytest.mark.parametrize(
-    ("form", "size"), [("csv", 4000), ("arrow", 4000), ("mdf", 4000), ("json", 100), ("png", 100)]
+    ("form", "size"),
+    [("csv", 4000), ("arrow", 4000), ("mdf", 4000), ("json", 100), slow("png", 100)],
 )
 def test_a_full_disk_leaves_the_file_of_a_result_that_was_there(tmp_path, form, size):
     made = {

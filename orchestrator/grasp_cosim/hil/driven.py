@@ -32,6 +32,8 @@ class DrivenFmu:
         self.time = 0.0
         self._signature = signature
         self._outputs = [interface.by_name[v.name] for v in signature.answer]
+        self._booleans = [i for i, v in enumerate(signature.answer) if v.kind == "Boolean"]
+        self._first_parameter = len(signature.of("input"))
         self._instance: Instance | None = None
         self._stepping = False
         self._values: list[Value] = []
@@ -72,9 +74,8 @@ class DrivenFmu:
             data[:] = [values[i] for i in places]
             if (status := call()) > WARNING:
                 raise instance.failure(status, 0.0)
-        parameters = len(self._signature.of("input"))
-        if values[parameters:] != self._values[parameters:]:
-            self._set_changed(values, parameters)
+        if values[self._first_parameter :] != self._values[self._first_parameter :]:
+            self._set_changed(values, self._first_parameter)
 
     def advance(self, time: float, step: float) -> None:
         """Advance by `step` from `time`, both in s, with the values as they are."""
@@ -98,6 +99,8 @@ class DrivenFmu:
         """Return the outputs now, in the order of the signature."""
         instance = self._required()
         values = self._get(instance) if self._stepping else instance.get(self._outputs)
+        if isfinite(sum(values)):  # type: ignore[arg-type]  # none is a text
+            return values
         for v, value in zip(self._outputs, values, strict=True):
             if isinstance(value, float) and not isfinite(value):
                 raise SimulationError(
@@ -123,7 +126,9 @@ class DrivenFmu:
             if (status := call()) > WARNING:
                 raise instance.failure(status, 0.0)
             for i, value in zip(places, data.tolist(), strict=True):
-                values[i] = bool(value) if self._outputs[i].kind == "Boolean" else value
+                values[i] = value
+        for i in self._booleans:
+            values[i] = bool(values[i])
         return values
 
     def _set_changed(self, values: Sequence[Value], first: int = 0) -> None:
