@@ -97,17 +97,6 @@ def test_behind_the_low_pass_it_is_the_same(count, end):
     assert float(chi2.ppf(1e-4, trials)) < trials * squares < float(chi2.ppf(1.0 - 1e-4, trials))
 
 
-def test_weights_of_one_over_the_noise_are_the_best():
-    """q = 2 + 2/n; the default costs 1.9 times the variance, and looks more at what is near."""
-    best = 2.0 + 2.0 / N
-    variances = {}
-    for q in (best, 3.0, 4.5, 5.0):
-        samples = approach((1.0, 1.0), end=0.0, count=400)
-        variances[q] = run(law(q, 5e-5, 10.0), samples)[-1][0].estimate.deviation ** 2
-    assert min(variances, key=lambda q: variances[q]) == best
-    assert variances[5.0] / variances[best] == pytest.approx(1.86, abs=0.1)
-
-
 SURE = Params(
     reflectance=reflectance_ratio.Params(time_constant=1e-6, intensity_noise=1e-12, limit=10.0),
     hold=holding.Params(squeeze=1e12),

@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from support.approach import ANY_SAMPLES, assert_mirrored, mirrored
-from support.declared import parameters
 from support.marks import examples
 
 QUICK = examples(60)
@@ -121,15 +120,6 @@ def test_case_0_heads_for_the_middle_directly():
         assert y.force == pytest.approx(expected, rel=1e-13)
 
 
-def test_case_2_has_a_target_of_its_own():
-    """Drawn towards finger 1, which sees more, while the middle does not move."""
-    still = [Inputs((0.11, -0.11), (0.0, 0.0), (0.030, 0.010))] * 200
-    targets = [y.target_position for _, y in run(CASE_2, still)]
-    assert targets[0] == 0.0
-    assert all(after > before for before, after in pairwise(targets))
-    assert targets[-1] == pytest.approx(3.0 * tanh(0.5) / 36.0, rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ("before", "after"),
     [(CASE_1, CASE_2), (CASE_0, NO_IMPACT_REDUCTION), (CASE_0, CASE_1),
@@ -166,12 +156,6 @@ def test_the_force_follows_the_sample_it_is_asked_for(p):
         assert now.force[j] - y.force[j] == pytest.approx(push, rel=1e-12)
 
 
-def test_the_first_sample_is_no_approach():
-    """The rate of the intensity starts at zero, however bright the start."""
-    u = Inputs((0.11, -0.11), (0.0, 0.0), (2.0, 1.0))
-    assert run(CASE_2, [u, u])[1][1].impact_reduction_force == (0.0, 0.0)
-
-
 @st.composite
 def controllers(draw):
     """Any of the cases; the viscosities +D_p and -D_p map onto each other."""
@@ -202,32 +186,3 @@ def test_the_mirrored_controller_does_exactly_the_mirrored_thing(p, samples, h):
     images = run(p, [mirrored(u) for u in samples], h)
     for (_, y), (_, z) in zip(run(p, samples, h), images, strict=True):
         assert_mirrored(y, z)
-
-
-LAYERS = {
-    "simultaneous_contact": layer_3.Params,
-    "impact_reduction": layer_2.Params,
-    "contact_force": layer_1.Params,
-}
-
-PARAMETERS = [(layer, p) for layer, block in LAYERS.items() for p in parameters(block)]
-
-
-@pytest.mark.parametrize(("layer", "parameter"), PARAMETERS)
-def test_a_value_outside_its_range_is_refused(layer, parameter):
-    for number, value in parameter.invalid():
-        with pytest.raises(ValueError, match=r"^\w+\.\w+ = ") as caught:
-            LAYERS[layer](**{parameter.name: value})
-        assert str(caught.value) == (
-            f"{layer}.{parameter.name} = {number!r} {parameter.unit}: {parameter.valid}"
-        )
-
-
-def test_the_published_parameters():
-    p = Params()
-    three, two, one = p.simultaneous_contact, p.impact_reduction, p.contact_force
-    assert (three.mass, three.damping, three.stiffness, three.gain) == (1.0, 12.0, 36.0, 3.0)
-    assert (two.mass, two.damping, two.stiffness) == (1.0, 10.0, 25.0)
-    assert two.viscosity == (0.6, -0.6)
-    assert (one.damping, one.stiffness) == (14.0, 98.0)
-    assert (three.enabled, two.enabled) == (True, True)

@@ -31,18 +31,6 @@ STEP = 1e-3
 FINGER = (1, 2)
 
 
-# ---------------------------------------------------------------- where there is little to see
-
-
-@pytest.mark.parametrize("alpha", [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0)])
-def test_a_blind_sensor(natives, alpha):
-    """0 V tells nothing: what is learnt stays 1, and nothing is not a number."""
-    result = run(adaptive_grasp(natives), values_of(alpha), STEP, 3.0)
-    assert set(result["controller.reflectance_ratio"]) == {1.0}
-    for name in ("controller.force[1]", "controller.force[2]", "controller.estimated_gap[1]"):
-        assert np.all(np.isfinite(result[name]))
-
-
 @pytest.mark.parametrize("volts", [0.2, 0.5])
 @pytest.mark.parametrize("alpha", [(0.57, 1.0), (1.0, 0.57)])
 def test_a_sensor_that_saturates(natives, alpha, volts):
