@@ -11,13 +11,12 @@ from typing import Annotated, NamedTuple
 from block_variables import Output, Parameter
 
 from . import contact_laws, fingers, friction
-from . import substeps as own
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 from .fingers import Side
 
-LONGEST_STEP = own.LONGEST_STEP
+LONGEST_STEP = fingers.LONGEST_STEP
 
 ITERATIONS = 8
 """To find the contact force: each leaves 1/19 of the error, or less."""
@@ -79,8 +78,8 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance both fingers by h seconds (h > 0), the forces held; each in its opening direction."""
-    n = own.count(_rate(p, x, u, h), h)
-    if n > own.MOST:
+    n = fingers.count(_rate(p, x, u, h), h)
+    if n > fingers.MOST:
         return x._replace(position=fingers.UNRESOLVED)
     x_1, x_2 = x.position
     v_1, v_2 = x.velocity

@@ -7,8 +7,7 @@ m·g'' = f + f_c, with the actuator's force f and the contact's f_c >= 0. Card: 
 from math import inf, nan, sqrt
 from typing import NamedTuple
 
-from . import friction
-from . import substeps as own
+from . import fingers, friction
 from .fingers import Side
 
 Finger = tuple[float, float, float]
@@ -60,8 +59,8 @@ def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) ->
         return _advance_rubbing(side, rates, s, v, f, h)
     if time_to_contact(s - surface, v, f / m) >= h:
         return _fly(s, v, f / m, h)
-    n = own.count(fastest(rates), h)
-    if n > own.MOST:
+    n = fingers.count(fastest(rates), h)
+    if n > fingers.MOST:
         return UNRESOLVED
     contact_force = 0.0
     d = h / n
@@ -80,8 +79,8 @@ def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) ->
 def _advance_rubbing(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
     """advance() of a finger with friction, which acts beside the contact force."""
     surface, m, rub = side
-    n = own.count(max(fastest(rates), friction.rate(rub, m)), h)
-    if n > own.MOST:
+    n = fingers.count(max(fastest(rates), friction.rate(rub, m)), h)
+    if n > fingers.MOST:
         return UNRESOLVED
     contact_force = 0.0
     d = h / n

@@ -1,4 +1,4 @@
-"""The two fingers, Eq. (1):  m_j·x_j'' = u_j + f_cj,  and what every plant with them declares.
+"""The two fingers, Eq. (1):  m_j·x_j'' = u_j + f_cj,  and what every plant has: outputs, sub-steps.
 
 The x axis is fixed to the wrist and points right. Finger 1 is the right one: it closes with
 u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Card: plant/README.md
@@ -6,13 +6,22 @@ u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Card:
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import copysign, nan
+from math import ceil, copysign, nan
 from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Group, Input, Output, Parameter, check
 
 from . import friction as finger_friction
 from .friction import Pair as Pair
+
+LONGEST_STEP = 2.0
+"""s, of every plant; a longer communication step is discarded."""
+
+RATIO = 0.1
+"""Longest sub-step as a fraction of the fastest time constant."""
+
+MOST = 20_000
+"""In a communication step, so that none is endless; one that needs more has no result."""
 
 UNRESOLVED = (nan, nan)
 """Where the fingers are after more sub-steps than a plant takes: nowhere, so the step is refused.
@@ -157,3 +166,8 @@ def deepest(p: Params, position: Pair, velocity: Pair, faces: Pair, u: Inputs, h
 
 def _limited(u: float, most: float) -> float:
     return u if most == 0.0 or abs(u) <= most else copysign(most, u)
+
+
+def count(rate: float, h: float) -> int:
+    """Number of equal sub-steps that resolve a rate in 1/s within h seconds."""
+    return max(1, ceil(h * rate / RATIO - 1e-9))

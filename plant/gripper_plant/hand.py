@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from . import contact, hand_fingers, rigid
-from . import substeps as own
+from . import contact, fingers, hand_fingers, rigid
 from .fingers import Side
 from .friction import NONE
 from .hand_fingers import FINGERS, Each
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
 
-LONGEST_STEP = own.LONGEST_STEP
+LONGEST_STEP = fingers.LONGEST_STEP
 
 if TYPE_CHECKING:
     Sides = tuple[Side, ...]

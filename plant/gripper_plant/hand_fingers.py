@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from math import cos, fmod, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Input, Output, Parameter, check
 
@@ -228,51 +228,47 @@ class Inputs(NamedTuple):
     ] = ZEROS
 
 
-Position: TypeAlias = Annotated[
-    Each,
-    Output("s_k, way of the fingertip from the wrist", unit="m", nominal=0.1, depends_on=set()),
-]
-Velocity: TypeAlias = Annotated[
-    Each,
-    Output("s_k', velocity of the fingertip, opening", unit="m/s", nominal=0.1, depends_on=set()),
-]
-Gap: TypeAlias = Annotated[
-    Each,
-    Output(
-        "l_k, distance from the sensor face to the object surface along the ray",
-        unit="m",
-        nominal=0.1,
-        depends_on=set(),
-    ),
-]
-ContactForce: TypeAlias = Annotated[
-    Each,
-    Output(
-        "f_ck, force of the object on the finger along the ray",
-        unit="N",
-        nominal=1.0,
-        depends_on=set(),
-    ),
-]
-Contact: TypeAlias = Annotated[Touches, Output("the finger touches the object", depends_on=set())]
-ObjectPosition: TypeAlias = Annotated[
-    Plane, Output("c, centre of the object, x and y", unit="m", nominal=0.1, depends_on=set())
-]
-ObjectAngle: TypeAlias = Annotated[
-    float,
-    Output(
-        "theta, turn of the object, counter-clockwise", unit="rad", nominal=0.1, depends_on=set()
-    ),
-]
-
-
 class Outputs(NamedTuple):
     """Measured at the fingers and at the object."""
 
-    position: Position
-    velocity: Velocity
-    gap: Gap
-    contact_force: ContactForce
-    contact: Contact
-    object_position: ObjectPosition
-    object_angle: ObjectAngle
+    position: Annotated[
+        Each,
+        Output("s_k, way of the fingertip from the wrist", unit="m", nominal=0.1, depends_on=set()),
+    ]
+    velocity: Annotated[
+        Each,
+        Output(
+            "s_k', velocity of the fingertip, opening", unit="m/s", nominal=0.1, depends_on=set()
+        ),
+    ]
+    gap: Annotated[
+        Each,
+        Output(
+            "l_k, distance from the sensor face to the object surface along the ray",
+            unit="m",
+            nominal=0.1,
+            depends_on=set(),
+        ),
+    ]
+    contact_force: Annotated[
+        Each,
+        Output(
+            "f_ck, force of the object on the finger along the ray",
+            unit="N",
+            nominal=1.0,
+            depends_on=set(),
+        ),
+    ]
+    contact: Annotated[Touches, Output("the finger touches the object", depends_on=set())]
+    object_position: Annotated[
+        Plane, Output("c, centre of the object, x and y", unit="m", nominal=0.1, depends_on=set())
+    ]
+    object_angle: Annotated[
+        float,
+        Output(
+            "theta, turn of the object, counter-clockwise",
+            unit="rad",
+            nominal=0.1,
+            depends_on=set(),
+        ),
+    ]

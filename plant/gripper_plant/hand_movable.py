@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Parameter
 
-from . import contact_laws, hand_fingers
-from . import substeps as own
+from . import contact_laws, fingers, hand_fingers
 from .box import GRAVITY
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .friction import NONE, move
@@ -23,7 +22,7 @@ from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
 from .movable import ITERATIONS
 
-LONGEST_STEP = own.LONGEST_STEP
+LONGEST_STEP = fingers.LONGEST_STEP
 
 SHALLOW = 1e-3
 """m; a finger that comes through a face is not deeper when it is first seen below it."""
@@ -118,8 +117,8 @@ def initial_state(p: Params, u: Inputs) -> State:
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and object by h seconds (h > 0), the forces held."""
     rays = p.rays
-    n = own.count(_rate(p, rays, x, u, h), h)
-    if n > own.MOST:
+    n = fingers.count(_rate(p, rays, x, u, h), h)
+    if n > fingers.MOST:
         return x._replace(position=tuple(s + inf - inf for s in x.position))
     for _ in range(n):
         x = _substep(p, rays, x, u.force, h / n)
@@ -176,13 +175,13 @@ def _substep(p: Params, rays: Rays, x: State, u: Each, d: float) -> State:
     forces, body, moved = x.normal_force, x.body, x
     for _ in range(ITERATIONS):
         body = _pushed(p, rays, x, normals, forces, d)
-        fingers = tuple(
+        reached = tuple(
             move(s, v, m, f + share * push, NONE, d)
             for s, v, m, f, share, push in zip(
                 x.position, x.velocity, p.finger_mass, u, along, forces, strict=True
             )
         )
-        tips, rates = tuple(s for s, _ in fingers), tuple(v for _, v in fingers)
+        tips, rates = tuple(s for s, _ in reached), tuple(v for _, v in reached)
         moved = State(tips, rates, forces, x.inside, body)
         after = _raw_normals(p, rays, moved)
         found = tuple(

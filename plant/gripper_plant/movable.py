@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 from . import box as standing
 from . import contact_laws, fingers, friction
-from . import substeps as own
 from .box import Box, Pushes, Shape
 from .box import Outputs as Outputs
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 
-LONGEST_STEP = own.LONGEST_STEP
+LONGEST_STEP = fingers.LONGEST_STEP
 
 ITERATIONS = 16
 """To find the contact forces: each leaves 1/19 of the error, or less; 1/5 where the box tilts."""
@@ -60,8 +59,8 @@ def initial_state(p: Params, u: Inputs) -> State:
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and box by h seconds (h > 0), the forces held."""
     q = standing.shape(p)
-    n = own.count(_rate(p, q, x, u, h), h)
-    if n > own.MOST:
+    n = fingers.count(_rate(p, q, x, u, h), h)
+    if n > fingers.MOST:
         return x._replace(position=fingers.UNRESOLVED)
     forces = fingers.forces(p.actuator, u)
     for _ in range(n):

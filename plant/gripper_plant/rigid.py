@@ -10,11 +10,10 @@ from typing import Annotated, NamedTuple
 from block_variables import Parameter
 
 from . import contact, fingers
-from . import substeps as own
 from .fingers import Inputs as Inputs
 from .fingers import Pair as Pair
 
-LONGEST_STEP = own.LONGEST_STEP
+LONGEST_STEP = fingers.LONGEST_STEP
 
 
 Alpha = Annotated[

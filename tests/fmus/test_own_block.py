@@ -90,8 +90,8 @@ def test_a_change_is_built_and_both_run_in_one_process(tmp_path):
 
 
 def test_packages_of_our_blocks_come_along(tmp_path):
-    text = LAG.replace("from math", "from gripper_plant import substeps\nfrom math")
-    text = text.replace("State(0.0)", "State(float(substeps.count(30.0, 1.0)))")
+    text = LAG.replace("from math", "from gripper_plant import fingers\nfrom math")
+    text = text.replace("State(0.0)", "State(float(fingers.count(30.0, 1.0)))")
     built = build_block(write(tmp_path, text), tmp_path)
     expected = 1.0 + 299.0 * exp(-0.6)  # 30 1/s over 1 s, sub-steps of 0.1
     assert answer(built.path, tmp_path / "a") == pytest.approx(expected, rel=1e-14)
@@ -105,7 +105,7 @@ WRONG = [
     ("from math", "from .x import y\nfrom math", "line 7: imports .x, which would not be in "),
     *(("from math", f"{line}\nfrom math", "line 7: gripper_plant must be imported at the top level,"
        " with single spaces, as: from gripper_plant import ...\n")
-      for line in ("import gripper_plant", "from  gripper_plant import substeps")),
+      for line in ("import gripper_plant", "from  gripper_plant import fingers")),
     ("def step(", "def step((", "line 36: is not Python: "),
     ("from math", "1 / 0\nfrom math", "line 7: import: ZeroDivisionError: division by zero"),
     ("from math", "raise SystemExit('a\\nb')\nfrom math", "line 7: import: SystemExit: a b"),

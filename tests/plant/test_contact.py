@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from gripper_plant import contact, friction, rigid
 from gripper_plant.contact import Rates, time_to_contact
-from gripper_plant.fingers import Side
+from gripper_plant.fingers import MOST, Side, count
 from gripper_plant.rigid import Inputs, Params
-from gripper_plant.substeps import MOST, count
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
