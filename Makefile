@@ -17,7 +17,7 @@ BIN := .venv/bin
 PIP := PIP_CONSTRAINT=constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python -m pip install --quiet
 
 # Tests start hundreds of Pythons: none should compile all modules anew, whatever the environment, nor
-# start threads for large matrices. Limits on CI's machine: tests/support/budget.py.
+# start threads for large matrices.
 PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 \
 	$(BIN)/python -m pytest -n 2 --dist worksteal $(TESTS)
 

@@ -27,7 +27,7 @@ from support.fmi2 import Fmu
 from support.kinds import Kind
 from support.marks import skip_without_pythonfmu
 
-pytest_plugins = ("support.platforms", "support.budget")
+pytest_plugins = ("support.platforms",)
 
 Run = Callable[..., tuple[int, str, str]]
 """A command line without its program; exit code, standard output, standard error."""

@@ -270,11 +270,12 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Bo
     Model *m = c;
     Status status = step_to(m, time, step);
     (void)no_set;
-    *needed = false;
+    *needed = *terminate = *early = false;
+    if (status) return status;
     *terminate = m->ended;
-    *early = !status && m->time < time + step;
+    *early = m->time < time + step;
     *last = m->time;
-    return status;
+    return fmi3OK;
 }
 #endif
 #endif
