@@ -2,7 +2,6 @@
 
 import sys
 from ctypes import c_double
-from math import exp
 from pathlib import Path
 
 import fmpy
@@ -13,9 +12,8 @@ from fmpy.validation import validate_fmu
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.cli import main
 from grasp_cosim.system.parts import Component, Connection, Event, Port, Solver
-from scipy.integrate import solve_ivp
 from support.marks import ENGINES
-from support.native_fmus import KINDS, MODELS, build_model, needs_cvode, needs_gcc, state_space
+from support.native_fmus import MODELS, build_model, needs_cvode, needs_gcc, state_space
 
 Floats = npt.NDArray[np.float64]
 
@@ -73,39 +71,10 @@ def test_a_ball_bounces_as_it_should(tmp_path, step):
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_van_der_pol(tmp_path, version):
-    result = run(part("van_der_pol", tmp_path, version, mu=5.0), 0.1, 20.0)
-
-    def slopes(_, x):
-        return [x[1], 5.0 * (1.0 - x[0] ** 2) * x[1] - x[0]]
-
-    times, tight = result.time, {"rtol": 1e-12, "atol": 1e-13}
-    exact = solve_ivp(slopes, (0.0, 20.0), [2.0, 0.0], "DOP853", times, **tight).y
-    for name, states in zip(("x0", "x1"), exact, strict=True):
-        assert result[f"van_der_pol.{name}"] == pytest.approx(states, abs=WITHIN * np.ptp(states))
-
-
 @versions
 def test_an_exponential_to_its_tail(tmp_path, version):
     result = run(part("dahlquist", tmp_path, version), 0.1, 10.0)
     assert result["dahlquist.x"] == pytest.approx(np.exp(-result.time), rel=WITHIN, abs=0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-@pytest.mark.parametrize("name", ["bouncing_ball", "van_der_pol", "dahlquist"])
-def test_fmpy_gets_the_same(tmp_path, name, version):
-    component = part(name, tmp_path, version)
-    result = run(component, 0.1, 3.0)
-    theirs = fmpy.simulate_fmu(
-        str(component.fmu), stop_time=3.0, output_interval=0.1, relative_tolerance=1e-10,
-        record_events=False,
-    )  # fmt: skip
-    for output in theirs.dtype.names[1:]:
-        found = np.interp(result.time, theirs["time"], theirs[output])
-        assert result[f"{name}.{output}"] == pytest.approx(found, abs=1e-5)
 
 
 @pytest.mark.parametrize(("width", "step"), [(1.0, 0.2), (0.1, 0.01), (0.3, 0.1)])
@@ -312,15 +281,6 @@ SOLVING = ("grasp_cosim.fmi.cvode", "grasp_cosim.fmi.model_exchange")
 @pytest.mark.parametrize("name", MODELS)
 def test_is_valid(name, version, tmp_path):
     assert validate_fmu(str(build_model(name, tmp_path, version))) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_either_kind_alone_runs_in_fmpy(version, kind, tmp_path):
-    fmu = build_model("dahlquist", tmp_path, version, [kind])
-    run = fmpy.simulate_fmu(str(fmu), stop_time=1.0, relative_tolerance=1e-9)
-    assert run["x"][-1] == pytest.approx(exp(-1.0), rel=1e-7)
 
 
 def test_without_cvode_it_is_refused_by_name(tmp_path, monkeypatch, capsys):

@@ -202,10 +202,6 @@ MODELS = {
         indicators=("h",),
         stop=3.0,
     ),
-    "van_der_pol": Model(
-        (_TIME, *_state("x0", 2.0), *_state("x1", 0.0), _parameter("mu", 1.0, tunable=True)),
-        stop=20.0,
-    ),
     "dahlquist": Model(
         (
             _TIME,

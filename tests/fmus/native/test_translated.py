@@ -57,7 +57,7 @@ def test_a_block_by_chance(tmp_path):
 @pytest.mark.slow
 @pytest.mark.campaign
 def test_ten_million_values(tmp_path):
-    """Half of them of shipped blocks, those of docs/ and the hand, half of blocks by chance."""
+    """Half of them of shipped blocks, those of docs/, half of blocks by chance."""
     whole = part(10_000_000)
     for name in NAMES:
         with block_of(name, tmp_path) as block:
