@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.interface.expansion import expanded, flattened, from_text, values_of
-from grasp_cosim.interface.interface import MOST_ELEMENTS, Element, element_names, size_of
+from grasp_cosim.interface.interface import MOST_ELEMENTS, element_names, size_of
 from grasp_cosim.interface.read import read_interface
 from hypothesis import given
 from hypothesis import strategies as st
-from support.native_fmus import ARRAY_TYPES as TYPES
 from support.native_fmus import state_space
 
 SHAPES = st.lists(st.integers(1, 4), min_size=1, max_size=4)
-MATRIX = ("A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]")
 FIXED = '<Float64 name="{}" valueReference="300" causality="{}" {}>{}</Float64>'
 
 
@@ -82,41 +80,44 @@ def declared(folder, more="", types=False):
     return read_interface(state_space(folder, types=types, more=more, binary=False))
 
 
-def test_elements_have_the_reference_and_the_place_in_the_array(tmp_path):
-    found = expanded(declared(tmp_path), {"n": 2})
-    assert found.arrays["A"].shape == (2, 2)
-    assert found.arrays["A"].names == MATRIX
-    for place, name in enumerate(MATRIX):
-        v = found.by_name[name]
-        assert (v.reference, v.element, v.shape) == (5, Element("A", place, 4), ())
-        assert v.supported
-        assert v.settable
-    assert "A" not in found.by_name
+SCALAR = '<Float64 name="F[2]" valueReference="301" causality="input" start="7"/>'
+SMALL = {"m": 2, "n": 1, "r": 1}
+EXPANDED = {
+    "as declared": ({}, {}, {}, {}),
+    "with other inputs than starts": ({}, {"m": 2, "n": 5}, {}, {}),
+    "all types of numbers": ({"types": True}, {"k": 1}, {}, {}),
+    "many dimensions": ({"more": of(*[1] * 20, 2)}, {}, {}, {}),
+    "a variable by the name of an element": ({"more": of(3) + SCALAR}, {}, {}, {}),
+    "renamed whole": ({}, SMALL, {"force": "u"}, {}),
+    "renamed by elements": ({}, SMALL, {"left": "u[2]", "u[2]": "u[1]"}, {}),
+    "units": ({}, {"r": 2}, {}, {"u": "mm", "y[2]": "N"}),
+}
+SHOWN = {"types": ("u_", "y_"), "more": ("F",)}
+"""The variables that are told of, by how they begin, where it is not about all."""
 
 
-def test_starts_go_to_elements_and_one_goes_to_all(tmp_path):
+@pytest.mark.parametrize("name", EXPANDED)
+def test_elements_in_the_place_of_arrays(name, tmp_path, snapshot):
+    """The first and the last of each array."""
+    made, lengths, rename, units = EXPANDED[name]
+    found = expanded(declared(tmp_path, **made), lengths).renamed(rename).in_units(units)
+    about = next((SHOWN[key] for key in made), ("",))
+    arrays = [f"{n}: {a.shape}: {' '.join(a.names)}" for n, a in found.arrays.items()]
+    variables = [
+        f"{v.name} #{v.reference} {v.shape or v.element} {v.type} {v.start} {v.unit}: "
+        f"{' '.join(v.dependencies or ())}; {' '.join(v.initial_dependencies or ())}"
+        for v in found.variables
+        if v.element is None or v.element.place in (0, v.element.size - 1)
+    ]
+    assert [text for text in (*arrays, *variables) if text.startswith(about)] == snapshot
+
+
+def test_a_name_of_an_array_that_is_taken_or_not_there(tmp_path):
     found = expanded(declared(tmp_path), {})
-    assert [found.by_name[n].start for n in found.arrays["u"].names] == ["1", "2", "3"]
-    assert [found.by_name[n].start for n in found.arrays["x0"].names] == ["0"] * 3
-    resized = expanded(declared(tmp_path), {"m": 2, "n": 5})
-    assert [resized.by_name[n].start for n in resized.arrays["u"].names] == [None, None]
-    assert [resized.by_name[n].start for n in resized.arrays["x0"].names] == ["0"] * 5
-
-
-def test_dependencies_on_an_array_are_on_its_elements(tmp_path):
-    found = expanded(declared(tmp_path), {"m": 2, "n": 1, "r": 1})
-    assert found.arrays["y"].names == ("y[1]",)
-    expected = ("C[1,1]", "D[1,1]", "D[1,2]", "u[1]", "u[2]", "x")
-    assert found.by_name["y[1]"].dependencies == expected
-    assert found.by_name["y[1]"].initial_dependencies == (*expected[:3], "x0[1]", *expected[3:5])
-
-
-def test_all_types_of_numbers_are_taken_apart(tmp_path):
-    found = expanded(declared(tmp_path, types=True), {"k": 1})
-    for fmi_type in TYPES:
-        names = found.arrays[f"u_{fmi_type}"].names
-        assert names == (f"u_{fmi_type}[1,1]", f"u_{fmi_type}[2,1]")
-        assert {found.by_name[n].type for n in names} == {fmi_type}
+    with pytest.raises(InputError, match=r"'u\[1\]' is renamed to 'a\[1\]' already"):
+        found.renamed({"a": "u", "b": "u[1]"})
+    with pytest.raises(InputError, match=r"no variable 'u\[4\]'"):
+        found.renamed({"a": "u[4]"})
 
 
 @pytest.mark.parametrize("dimensions", [(2**40,), (2**20, 2**20), (2**63, 3), (1, 10**5 + 1)])
@@ -127,43 +128,6 @@ def test_too_many_elements_are_left_alone_by_name(tmp_path, dimensions):
     assert not found.by_name["F"].supported
     with pytest.raises(InputError, match=f"array of Float64 with more than {MOST_ELEMENTS}"):
         values_of(found, "here", "F", 1.0)
-
-
-def test_many_dimensions(tmp_path):
-    found = expanded(declared(tmp_path, of(*[1] * 60, 2)), {})
-    ones = ",".join(["1"] * 60)
-    assert found.arrays["F"].names == (f"F[{ones},1]", f"F[{ones},2]")
-
-
-def test_a_variable_by_the_name_of_an_element_keeps_it(tmp_path):
-    scalar = '<Float64 name="F[2]" valueReference="301" causality="input" start="7"/>'
-    found = expanded(declared(tmp_path, of(3) + scalar), {})
-    assert "F" not in found.arrays
-    assert found.by_name["F[2]"].reference == 301
-    assert found.by_name["F"].shape == (3,)
-
-
-def test_an_array_is_renamed_whole_and_by_elements(tmp_path):
-    found = expanded(declared(tmp_path), {})
-    whole = found.renamed({"force": "u"})
-    assert whole.arrays["force"].names == ("force[1]", "force[2]", "force[3]")
-    assert whole.by_name["force[2]"].element == Element("force", 1, 3)
-    assert "force[2]" in (whole.by_name["y[1]"].dependencies or ())
-    parts = found.renamed({"left": "u[2]", "u[2]": "u[1]"})
-    assert parts.arrays["u"].names == ("u[2]", "left", "u[3]")
-    assert [parts.by_name[n].element for n in parts.arrays["u"].names] == [
-        Element("u", place, 3) for place in range(3)
-    ]
-    with pytest.raises(InputError, match=r"'u\[1\]' is renamed to 'a\[1\]' already"):
-        found.renamed({"a": "u", "b": "u[1]"})
-    with pytest.raises(InputError, match=r"no variable 'u\[4\]'"):
-        found.renamed({"a": "u[4]"})
-
-
-def test_units_are_named_whole_and_by_elements(tmp_path):
-    found = expanded(declared(tmp_path), {}).in_units({"u": "mm", "y[2]": "N"})
-    assert [found.by_name[n].unit for n in found.arrays["u"].names] == ["mm"] * 3
-    assert [found.by_name[n].unit for n in found.arrays["y"].names] == [None, "N", None]
 
 
 def test_values_of_an_array_are_checked_one_by_one(tmp_path):

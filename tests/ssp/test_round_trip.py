@@ -324,17 +324,6 @@ def test_an_archive_of_others_says_how_many_elements_there_are(tmp_path):
     assert loaded.connections[0].target == Port("b", "Ins[3]")
 
 
-def test_an_archive_of_others_comes_back(tmp_path):
-    top = system(
-        "top",
-        component("a", "output y Real m") + component("b", "input u Real"),
-        connect("a/y", "b/u"),
-    )
-    ends = {"a": fmu("output Real y - m"), "b": fmu("input Real u 0.0 m")}
-    loaded = System.load(archive(tmp_path, structure(top), ends))
-    assert round_trip(loaded, tmp_path) == loaded
-
-
 def test_the_command_writes_an_archive_that_runs_the_same(fmus, tmp_path, command):
     toml, path = tmp_path / "mine.toml", tmp_path / "mine.ssp"
     toml.write_text(SYSTEM.read_text("utf-8"), encoding="utf-8")

@@ -11,10 +11,9 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib.machinery import ModuleSpec, all_suffixes
-from importlib.util import resolve_name
 from pathlib import Path
 from shlex import quote
 from typing import Literal
@@ -199,7 +198,7 @@ def binary(fmu: Unpacked) -> Verdict:
 
 
 def script(fmu: Unpacked) -> Verdict | None:
-    """Check that the script is there, parses here, and has what it imports, which parses too."""
+    """Check that the script is there, parses here, and has what it imports."""
     if not fmu.python:
         return None
     resources, fix = fmu.folder / "resources", "build it again with pythonfmu"
@@ -209,7 +208,7 @@ def script(fmu: Unpacked) -> Verdict | None:
         return "problem", f"no script: resources/slavemodule.txt names {name or 'none'}", fix
     try:
         outside = _outside(resources, name) - sys.stdlib_module_names
-    except (SyntaxError, ValueError, ImportError) as error:
+    except (SyntaxError, ValueError) as error:
         return "problem", f"no Python {VERSION}: {error}", "correct it and build the FMU again"
     if missing := sorted(name for name in outside if not _spec(name)):
         fix = install_command(*(_PACKAGES.get(name, name) for name in missing))
@@ -219,39 +218,18 @@ def script(fmu: Unpacked) -> Verdict | None:
 
 
 def _outside(resources: Path, script: str) -> set[str]:
-    """What a script imports at once from outside of the FMU, itself or by modules packed with it.
+    """What a script imports at once from outside of the FMU.
 
     An import that is allowed to fail, under try or if or in a function, does not count. SyntaxError
-    or ValueError where one of its files does not parse.
+    or ValueError where the script does not parse.
     """
-    outside: set[str] = set()
-    names, seen = [script], {""}
-    while names:
-        name = names.pop()
-        if name in seen:
-            continue
-        seen.add(name)
-        top, parent = name.partition(".")[0], name.rpartition(".")[0]
-        base = resources.joinpath(*name.split("."))
-        files = [p for p in (base / "__init__.py", base.parent / f"{base.name}.py") if p.is_file()]
-        if not any((resources / f"{top}{suffix}").exists() for suffix in ("", *all_suffixes())):
-            outside.add(top)
-        for file in files[:1]:
-            with warnings.catch_warnings(action="ignore"):
-                tree = ast.parse(file.read_bytes(), file.relative_to(resources))
-            package = name if file.stem == "__init__" else parent
-            names += [parent, *_imported(tree, package)]
-    return outside
-
-
-def _imported(tree: ast.Module, package: str) -> Iterator[str]:
-    """Imports without a condition, including names that may be modules of a package."""
-    for node in tree.body:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            module = resolve_name("." * node.level + (node.module or ""), package)
-            yield from (module, *(f"{module}.{alias.name}" for alias in node.names))
+    with warnings.catch_warnings(action="ignore"):
+        tree = ast.parse((resources / f"{script}.py").read_bytes(), f"{script}.py")
+    names = [alias.name for n in tree.body if isinstance(n, ast.Import) for alias in n.names]
+    names += [n.module for n in tree.body if isinstance(n, ast.ImportFrom) and n.module]
+    packed = ("", *all_suffixes())
+    tops = {name.partition(".")[0] for name in names}
+    return {t for t in tops if not any((resources / f"{t}{end}").exists() for end in packed)}
 
 
 def modules(fmu: Unpacked) -> Verdict | None:
