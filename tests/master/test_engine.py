@@ -25,6 +25,7 @@ from support.marks import engines, needs_compiler
 from support.mocks import Mock, Run, make_system
 
 pytestmark = needs_compiler
+pytestmark = needs_compiler
 TYPES = [
     "float32",
     "int8",
@@ -63,7 +64,7 @@ def test_a_copy_keeps_the_sign_of_zero_and_a_scale_computes(engine):
 
 
 @engines
-@pytest.mark.parametrize("name", TYPES)
+@pytest.mark.parametrize("name", engine.ELEMENTS)
 def test_numbers_of_every_type_come_through(engine, name):
     dtype = np.dtype(name)
     ends = [0, 1]

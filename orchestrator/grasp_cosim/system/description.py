@@ -22,7 +22,6 @@ from .structure import Structure, experiment
 from .validity import (
     check_components,
     check_connections,
-    check_initialisation,
     check_solvers,
     check_steps,
 )
@@ -50,7 +49,6 @@ class System(Structure):
         check_stimuli(self)
         check_connections(self)
         check_scenario(self)
-        check_initialisation(self)
         for component in self.components:
             if component.name in SECTIONS:
                 raise InputError(

@@ -27,6 +27,9 @@ Overrun = Literal["catch-up", "continue", "stop"]
 OVERRUNS: tuple[str, ...] = get_args(Overrun)
 Loops = Literal["iterate", "refuse"]
 LOOPS: tuple[str, ...] = get_args(Loops)
+FINEST, COARSEST = 1e-13, 0.1
+"""Relative tolerances of a solver: beyond the first one there is rounding alone."""
+
 NANOSECONDS = 1_000_000_000
 LONGEST = 1e9
 """s; a time in nanoseconds then fits into 64 bits."""
@@ -77,6 +80,16 @@ class Solver:
     relative_tolerance: float = 1e-10
     absolute_tolerance: float | None = None
     maximum_step: float | None = None
+
+    def __post_init__(self) -> None:
+        must = f"a number from {FINEST:g} to {COARSEST:g}"
+        number("relative_tolerance", self.relative_tolerance, FINEST, COARSEST, must=must)
+        if self.absolute_tolerance is not None:
+            must = "a number greater than 0, at most 1"
+            number("absolute_tolerance", self.absolute_tolerance, 0.0, 1.0, above=True, must=must)
+        if self.maximum_step is not None:
+            must = "a number greater than 0"
+            number("maximum_step", self.maximum_step, 0.0, above=True, must=must, unit="s")
 
 
 @dataclass(frozen=True)
@@ -251,6 +264,12 @@ class Initialisation:
     loops: Loops = "iterate"
     tolerance: float = 1e-10
     iterations: int = 50
+
+    def __post_init__(self) -> None:
+        choice("loops", self.loops, LOOPS)
+        below, must = math.nextafter(1.0, 0.0), "a number between 0 and 1"
+        number("tolerance", self.tolerance, 0.0, below, above=True, must=must)
+        whole("iterations", self.iterations, 1, must="a whole number, at least 1")
 
 
 @dataclass(frozen=True, slots=True)

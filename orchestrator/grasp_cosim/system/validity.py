@@ -7,19 +7,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from ..base.checks import choice, known, number, whole
+from ..base.checks import known, number
 from ..base.errors import InputError, choices
 from ..base.text import counted
 from ..interface.interface import SUPPORTED, Interface, Variable, limits
 from ..interface.obstacles import KINDS
 from ..interface.units import conversion
 from .arrays import as_written, unsourced
-from .parts import LOOPS, NANOSECONDS, Connection, Port, seconds
+from .parts import NANOSECONDS, Connection, Port, seconds
 from .stimuli_checks import check_stimuli, driven, stimuli_remarks
 from .structure import Structure
-
-FINEST, COARSEST = 1e-13, 0.1
-"""Relative tolerances of a solver: beyond the first one there is rounding alone."""
 
 FEW = 10
 """Steps; a run of fewer is remarked on."""
@@ -50,25 +47,12 @@ def check_components(system: Structure) -> None:
 def check_solvers(system: Structure) -> None:
     """InputError where a component cannot be integrated as it says."""
     for component in system.components:
-        place, chosen = f"{system.name}: {component.name}: solver", component.solver
-        if chosen is None:
-            continue
         fmu = component.loaded
-        if fmu.exchange is None:
+        if component.solver and fmu.exchange is None:
             raise InputError(
-                f"{place}: {fmu.path.name} is for {choices(KINDS[k] for k in fmu.kinds)} alone; "
-                "must be left out"
+                f"{system.name}: {component.name}: solver: {fmu.path.name} is for "
+                f"{choices(KINDS[k] for k in fmu.kinds)} alone; must be left out"
             )
-        relative, absolute = chosen.relative_tolerance, chosen.absolute_tolerance
-        must = f"a number from {FINEST:g} to {COARSEST:g}"
-        number(f"{place}: relative_tolerance", relative, FINEST, COARSEST, must=must)
-        if absolute is not None:
-            must = "a number greater than 0, at most 1"
-            number(f"{place}: absolute_tolerance", absolute, 0.0, 1.0, above=True, must=must)
-        if chosen.maximum_step is not None:
-            must = "a number greater than 0"
-            longest = chosen.maximum_step
-            number(f"{place}: maximum_step", longest, 0.0, above=True, must=must, unit="s")
 
 
 def check_connections(system: Structure) -> None:
@@ -317,13 +301,3 @@ def check_steps(system: Structure) -> None:
             )
         if (stop - start) % own:
             raise InputError(f"{place} does not divide {until}; must end with a whole step")
-
-
-def check_initialisation(system: Structure) -> None:
-    """InputError where an option of the initialisation is not as it must be."""
-    place, chosen = f"{system.name}: [initialisation]", system.initialisation
-    choice(f"{place}: loops", chosen.loops, LOOPS)
-    below = math.nextafter(1.0, 0.0)
-    must = "a number between 0 and 1"
-    number(f"{place}: tolerance", chosen.tolerance, 0.0, below, above=True, must=must)
-    whole(f"{place}: iterations", chosen.iterations, 1, must="a whole number, at least 1")
