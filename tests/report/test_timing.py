@@ -19,21 +19,12 @@ from report.test_page import Elements
 from support.marks import slow
 
 
-def of_times(times, edges):
-    """A timing whose only part took these times."""
-    counts = np.histogram(times, edges)[0]
-    assert counts.sum() == len(times)
-    median, p99, p999 = np.quantile(times, (0.5, 0.99, 0.999), method="inverted_cdf").tolist()
-    return replace(
-        paced(steps=100, hiccups=0),
-        parts={"step": Spread(median, p99, p999, max(times), 0.0)},
-        histograms={"step": Histogram(tuple(edges), tuple(counts.tolist()))},
-    )
-
-
 def test_a_curve_is_the_share_that_took_at_least_as_long():
-    times = [1e-6, 2e-6, 2e-6, 3e-6, 90e-6]
-    (curve,) = curves(of_times(times, [1e-6, 1.5e-6, 2.5e-6, 4e-6, 50e-6, 100e-6]))
+    """Of 1, 2, 2, 3 and 90 us."""
+    bars = Histogram((1e-6, 1.5e-6, 2.5e-6, 4e-6, 50e-6, 100e-6), (1, 2, 1, 0, 1))
+    spread = Spread(2e-6, 90e-6, 90e-6, 90e-6, 0.0)
+    timing = replace(paced(steps=100), parts={"step": spread}, histograms={"step": bars})
+    (curve,) = curves(timing)
     assert curve.points == (
         (1e-6, 1.0),
         (1.5e-6, 0.8),
@@ -50,99 +41,6 @@ def test_an_axis_begins_where_the_clock_is_exact_and_has_a_decade_at_least():
     assert decades([2e-9, 3e-9, PERIOD]) == pytest.approx((1e-7, 1e-2))
     assert decades([1e-9]) == pytest.approx((1e-7, 1e-6))
     assert decades([0.0]) == decades([]) == pytest.approx((1e-7, 1e-6))
-
-
-SAID = Caption("a run", "from 2026")
-
-
-def figure_of(timing, monkeypatch):
-    """What would be saved of a run of 3 s."""
-    figures = []
-    monkeypatch.setattr(drawn, "save", lambda figure, path: figures.append(figure))
-    draw_timing(timing, 3.0, Path(), SAID)
-    return figures[0]
-
-
-def points(line):
-    """The points of a line."""
-    x, y = (np.asarray(data, float).tolist() for data in line.get_data())
-    return [list(point) for point in zip(x, y, strict=True)]
-
-
-def broken_off():
-    """Of a run that was interrupted in its first step."""
-    return replace(paced(steps=10, hiccups=0), steps=0, parts={}, histograms={})
-
-
-@pytest.mark.parametrize(
-    "timing",
-    [
-        paced(steps=3000, hiccups=0),
-        slow(paced(steps=3000, hiccups=300, listed=100)),
-        slow(paced(steps=3000, components={rf"_$\no_formula_{k}$": 1e-6 for k in range(20)})),
-        broken_off(),
-    ],
-    ids=["none", "unlisted", "many", "nothing"],
-)
-def test_any_timing_can_be_drawn(timing, tmp_path):
-    draw_timing(timing, 3.0, tmp_path / "timing.png", SAID)
-    assert [p.name for p in tmp_path.iterdir()] == ["timing.png"]
-    head = (tmp_path / "timing.png").read_bytes()[:24]
-    assert head.startswith(b"\x89PNG")
-    assert int.from_bytes(head[16:20]) == 1560
-
-
-def test_every_part_has_a_curve_and_the_period_is_a_red_line(monkeypatch):
-    timing = paced(steps=3000)
-    above = figure_of(timing, monkeypatch).axes[0]
-    lines = {str(line.get_label()): line for line in above.lines}
-    for part, spread in timing.parts.items():
-        assert same_color(lines[part].get_color(), looks(timing)[part].color)
-        assert points(lines[part])[-1] == [spread.worst, 1.0 / timing.steps]
-    limits = [line for line in above.lines if same_color(line.get_color(), RED)]
-    assert [points(line) for line in limits] == [[[PERIOD, 0.0], [PERIOD, 1.0]]]
-    assert above.get_xlim()[1] > PERIOD
-
-
-def test_overruns_are_in_the_colours_of_their_culprits(monkeypatch):
-    moments = {"plant": (0.5, 3e-4), "start": (1.5, 2e-3), "backlog": (2.5, 1e-3)}
-    timing = replace(
-        paced(steps=3000, hiccups=0),
-        overruns=5,
-        culprits={"plant": 3, "start": 1, "backlog": 1},
-        listed=tuple(Overrun(0, t, late, name, late) for name, (t, late) in moments.items()),
-    )
-    below = figure_of(timing, monkeypatch).axes[1]
-    lines = {str(line.get_label()): line for line in below.lines}
-    assert list(lines) == ["3 × plant", "1 × late start", "1 × backlog"]
-    for line, name in zip(lines.values(), moments, strict=True):
-        assert points(line) == [list(moments[name])]
-        assert same_color(line.get_color(), looks(timing)[name].color)
-    assert below.get_xlim() == (0.0, 3.0)
-    assert below.get_title(loc="right") == "grey: 2 more, counted only"
-
-
-def test_without_overruns_it_says_so(monkeypatch):
-    below = figure_of(paced(steps=3000, hiccups=0), monkeypatch).axes[1]
-    assert [text.get_text() for text in below.texts] == ["no overruns"]
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [
-        (0.0, "0 s"),
-        (4.2e-8, "42 ns"),
-        (9.994e-7, "999 ns"),
-        (9.996e-7, "1 µs"),
-        (41.23e-6, "41.2 µs"),
-        (1.1e-3, "1.1 ms"),
-        (1.0, "1 s"),
-        (86400.0, "86400 s"),
-        (10.0**-5, "10 µs"),
-    ],
-)
-def test_durations(seconds, text):
-    assert duration(seconds) == text
 
 
 PARTS = {
@@ -167,6 +65,86 @@ SLOW = replace(SOME, parts={**PARTS, "step": Spread(2e-3, 2e-3, 3e-3, 4e-3, 0.7)
 
 
 BROKEN_OFF = replace(NONE_LATE, steps=0, parts={})
+"""Of a run that was interrupted in its first step."""
+
+
+SAID = Caption("a run", "from 2026")
+
+
+def figure_of(timing, monkeypatch):
+    """What would be saved of a run of 3 s."""
+    figures = []
+    monkeypatch.setattr(drawn, "save", lambda figure, path: figures.append(figure))
+    draw_timing(timing, 3.0, Path(), SAID)
+    return figures[0]
+
+
+def points(line):
+    """The points of a line."""
+    x, y = (np.asarray(data, float).tolist() for data in line.get_data())
+    return [list(point) for point in zip(x, y, strict=True)]
+
+
+@pytest.mark.parametrize(
+    "timing",
+    [
+        paced(steps=3000, hiccups=0),
+        slow(paced(steps=3000, hiccups=300, listed=100)),
+        slow(paced(steps=3000, components={rf"_$\no_formula_{k}$": 1e-6 for k in range(20)})),
+        BROKEN_OFF,
+    ],
+    ids=["none", "unlisted", "many", "nothing"],
+)
+def test_any_timing_can_be_drawn(timing, tmp_path):
+    draw_timing(timing, 3.0, tmp_path / "timing.png", SAID)
+    assert [p.name for p in tmp_path.iterdir()] == ["timing.png"]
+    head = (tmp_path / "timing.png").read_bytes()[:24]
+    assert head.startswith(b"\x89PNG")
+    assert int.from_bytes(head[16:20]) == 1560
+
+
+def test_every_part_has_a_curve_and_the_period_is_a_red_line(monkeypatch):
+    timing = paced(steps=3000)
+    above = figure_of(timing, monkeypatch).axes[0]
+    lines = {str(line.get_label()): line for line in above.lines}
+    for part, spread in timing.parts.items():
+        assert same_color(lines[part].get_color(), looks(timing)[part].color)
+        assert points(lines[part])[-1] == [spread.worst, 1.0 / timing.steps]
+    limits = [line for line in above.lines if same_color(line.get_color(), RED)]
+    assert [points(line) for line in limits] == [[[PERIOD, 0.0], [PERIOD, 1.0]]]
+    assert above.get_xlim()[1] > PERIOD
+
+
+def test_overruns_are_in_the_colours_of_their_culprits(monkeypatch):
+    late = replace(paced(steps=100), overruns=5, listed=LISTED, culprits=LATE.culprits)
+    below = figure_of(late, monkeypatch).axes[1]
+    lines = {str(line.get_label()): line for line in below.lines}
+    assert list(lines) == ["2 × backlog", "1 × late start", "1 × plant"]
+    for line, overrun in zip(lines.values(), (LISTED[2], LISTED[0], LISTED[1]), strict=True):
+        assert points(line) == [[overrun.time, overrun.late]]
+        assert same_color(line.get_color(), looks(late)[overrun.culprit].color)
+    assert below.get_xlim() == (0.0, 3.0)
+    assert below.get_title(loc="right") == "grey: 2 more, counted only"
+    below = figure_of(paced(steps=100, hiccups=0), monkeypatch).axes[1]
+    assert [text.get_text() for text in below.texts] == ["no overruns"]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"),
+        (4.2e-8, "42 ns"),
+        (9.994e-7, "999 ns"),
+        (9.996e-7, "1 µs"),
+        (41.23e-6, "41.2 µs"),
+        (1.1e-3, "1.1 ms"),
+        (1.0, "1 s"),
+        (86400.0, "86400 s"),
+        (10.0**-5, "10 µs"),
+    ],
+)
+def test_durations(seconds, text):
+    assert duration(seconds) == text
 
 
 @pytest.mark.parametrize(
