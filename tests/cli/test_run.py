@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import System, load_run, simulate
 from grasp_cosim.ssp.to_archive import write_ssp
-from support.cases import CASES
+from support.grasps import CASES
 from support.marks import slow
 from support.native_fmus import TYPES, build, needs_gcc
 from support.native_systems import driven

@@ -14,7 +14,7 @@ from grasp_fmus.build import build_block
 from gripper_plant import friction
 from gripper_plant.box import GRAVITY
 from mujoco_plant import IMPEDANCE, Inputs, Params
-from support.cases import CASES
+from support.grasps import CASES
 
 FILE = Path(mujoco_plant.__file__)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from grasp_cosim import simulate
 from report.javascript import in_browser
-from support.cases import CASES
+from support.grasps import CASES
 from support.marks import only_whole
 from support.pictures import assert_same_picture
 

@@ -12,9 +12,9 @@ import pytest
 from grasp_controller import holding, reflectance_ratio
 from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
-from support.adaptive import adaptive_grasp, last, run, values_of
 from support.approach import pairs
 from support.continuous import Adaptive, Grasp, solve
+from support.grasps import adaptive_grasp, last, run, values_of
 from support.marks import examples, slow
 
 STEP = 1e-4

@@ -23,7 +23,7 @@ from grasp_cosim.grasp.system import with_controller
 from grasp_cosim.sweeps.rows import grid
 from scipy.stats import qmc
 from support import marks
-from support.adaptive import adaptive_grasp, last, run, values_of
+from support.grasps import adaptive_grasp, last, run, values_of
 
 STEP = 1e-3
 """s, ten times the paper's: nothing below depends on it."""

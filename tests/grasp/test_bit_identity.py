@@ -6,8 +6,8 @@ from grasp_controller import impact_reduction, series, simultaneous_contact
 from grasp_cosim import simulate
 from gripper_plant import rigid
 from proximity_sensor import optics
-from support.cases import CASES
 from support.direct import closed_loop
+from support.grasps import CASES
 
 
 def assert_same_bits(system, plant, sensors, controller, step, steps):

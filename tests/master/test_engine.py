@@ -20,7 +20,7 @@ from grasp_cosim.master.loop import CALL, COPY, LOAD, LOAD_LONG, SCALE, STEP, ST
 from grasp_cosim.master.plan import Plan
 from grasp_cosim.recording.result import Rejection
 from grasp_cosim.system.parts import Connection, Port
-from support.cases import CASES
+from support.grasps import CASES
 from support.marks import engines, needs_compiler
 from support.mocks import Mock, Run, make_system
 

@@ -13,7 +13,7 @@ from grasp_cosim.metrics.metric import Metric, Signals
 from grasp_cosim.sweeps.sweep import sweep
 from hypothesis import given
 from hypothesis import strategies as st
-from support.groups import bring_group
+from support.mocks import bring_group
 
 OUTPUT = 'causality="output" | Real'
 ROOM = {"x": OUTPUT, "y": OUTPUT, "p": 'causality="parameter" | Real start="1"'}

@@ -18,7 +18,7 @@ from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.served import Service
 from grasp_cosim.ssp.to_archive import write_ssp
-from support.cases import CASES
+from support.grasps import CASES
 from support.marks import interop
 from support.proxies import build_proxy, serving
 

@@ -1,7 +1,12 @@
-"""Components without any binary: input u, output y, tunable p; they do what they are told."""
+"""Components without any binary, input u, output y, tunable p, which do what they are told.
 
+And a group of metrics that is there for a test, as if its folder were in the package.
+"""
+
+import sys
 import zipfile
 from collections.abc import Callable
+from types import SimpleNamespace
 
 from grasp_cosim import SimulationError, System
 from grasp_cosim.base.calls import Call
@@ -9,7 +14,10 @@ from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.fmi.instance import DISCARD
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.master.master import Master
+from grasp_cosim.metrics import metric
 from grasp_cosim.recording.memory import MemoryListener
+from grasp_cosim.recording.result import OF_ANY
+from grasp_cosim.system import description
 from grasp_cosim.system.parts import Component
 
 Function = Callable[[float, float], float]
@@ -158,3 +166,12 @@ class Run:
 
     def signals(self):
         return {name: column.tolist() for name, column in self.memory.columns()[1].items()}
+
+
+def bring_group(monkeypatch, name, *metrics):
+    for module in (description, metric):
+        monkeypatch.setattr(module, "groups", lambda: ("grasp", name))
+    has = {"metrics": SimpleNamespace(METRICS=metrics), "view": SimpleNamespace(VIEW=OF_ANY)}
+    for part, module in has.items():
+        monkeypatch.setitem(sys.modules, f"grasp_cosim.{name}.{part}", module)
+    monkeypatch.setitem(sys.modules, f"grasp_cosim.{name}", SimpleNamespace())

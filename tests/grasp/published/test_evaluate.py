@@ -15,7 +15,7 @@ from grasp_cosim.grasp.published import evaluation
 from grasp_cosim.grasp.published.compared import LOOK, close, compared
 from grasp_cosim.grasp.published.evaluation import as_report
 from grasp_cosim.master.simulation import Session
-from support.cases import CASES
+from support.grasps import CASES
 
 QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}
 """Then contact times are those that the fit left, not those of one draw of the noise."""

@@ -1,7 +1,8 @@
-"""The grasp with the adaptive controller, of native FMUs: a run in milliseconds."""
+"""Grasps: values of the built-in cases, and runs with the adaptive controller, in milliseconds."""
 
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.grasp.presets import CASES as NUMBERS
+from grasp_cosim.grasp.presets import SYSTEM, built_in_presets
 
 Pair = tuple[float, float]
 
@@ -33,3 +34,6 @@ def run(grasp, values, step, stop):
 def last(result, name):
     """The last values of a variable that each finger has."""
     return float(result[f"{name}[1]"][-1]), float(result[f"{name}[2]"][-1])
+
+
+CASES = {n: built_in_presets()[f"case_{n}"] for n in NUMBERS}
