@@ -210,6 +210,11 @@ def test_only_where_a_finger_never_touches_is_there_a_gap_that_remains():
     assert not OF_FREE_FINGERS & set(grasp_metrics(time, signals))
 
 
+def test_an_impact_that_is_not_recorded_to_its_end_has_no_impulse():
+    assert pressed(lambda _: 2.0, end=0.119)["impact_impulse"] == [None, None]
+    assert pressed(lambda _: 2.0, end=0.122)["impact_impulse"] != [None, None]
+
+
 @pytest.mark.parametrize(("step", "there"), [(0.019, True), (0.021, False), (0.1, False)])
 def test_an_impact_between_two_samples_has_no_impulse(step, there):
     """The window begins 1 us before a sample: two within it, or that one."""
@@ -272,6 +277,15 @@ def test_the_steps_of_the_plant_are_seen_at_any_of_its_outputs():
     found = first_contact(Signals(time, signals), 1)
     assert found is not None
     assert found.speed == pytest.approx(0.004 / 1e-3, rel=1e-9)
+
+
+def test_fingers_that_touch_from_the_start():
+    time = every(1e-3, 0.5)
+    signals = recorded(time, lambda _: SURFACE, lambda _: 0.0, lambda _: SURFACE, lambda _: 1.5)
+    metrics = grasp_metrics(time, signals)
+    assert metrics["time_to_contact"] == metrics["settling_time"] == [0.0, 0.0]
+    assert metrics["impact_velocity"] == [None, None]
+    assert metrics["impact_impulse"] == pytest.approx([1.5 * IMPACT_WINDOW] * 2, rel=1e-12)
 
 
 def test_the_object_has_the_metrics_that_the_plant_has_outputs_for():

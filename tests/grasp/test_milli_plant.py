@@ -2,7 +2,6 @@
 
 import re
 import zipfile
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -21,13 +20,7 @@ VALUES = (
     "{ object_width = 0.07, initial_object_position = 0.03 }",
     "{ object_width = 70.0, initial_object_position = 30.0 }",
 )
-NAMED = {
-    "gap": "mm",
-    "position": "mm",
-    "velocity": "mm/s",
-    "contact_force": "mN",
-    "force": "mN",
-}
+NAMED = {"gap": "mm", "position": "mm", "velocity": "mm/s", "contact_force": "mN", "force": "mN"}
 ENTRY = ", ".join(
     [f'"{name}[{j}]" = "{unit}"' for name, unit in NAMED.items() for j in (1, 2)]
     + [f'{name} = "mm"' for name in ("object_position", "object_width", "initial_object_position")]
@@ -78,14 +71,10 @@ def original(grasp):
 
 
 @pytest.fixture(scope="module")
-def defined(fmus, plants, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("defined")
-    return System.load(written(folder / "mm.toml", fmus, plants / "defined/MilliPlant.fmu"))
-
-
-@pytest.fixture(scope="module")
-def result(defined):
-    return simulate(defined, metrics=[closest], step=STEP, stop=STOP)
+def result(fmus, plants, tmp_path_factory):
+    file = tmp_path_factory.mktemp("defined") / "mm.toml"
+    system = System.load(written(file, fmus, plants / "defined/MilliPlant.fmu"))
+    return simulate(system, metrics=[closest], step=STEP, stop=STOP)
 
 
 def check(found, expected):
@@ -151,19 +140,12 @@ def test_the_plant_may_take_the_place_of_the_original(grasp, plants, original):
 def test_a_plant_without_units_for_one_that_has_them_is_said(command, plants, arguments):
     plant = plants / "none/MilliPlant.fmu"
     swap = ("--quiet", "--set", f"components.plant.fmu={plant}")
-    values = [f"plant.{name}=0.07" for name in ("object_width",)]
-    _, _, err = command(*arguments, *swap, *(x for v in values for x in ("--set", v)))
+    _, _, err = command(*arguments, *swap, "--set", "plant.object_width=0.07")
     said = [line for line in err.splitlines() if "tells no unit of" in line]
     assert len(said) == 1, err
     assert "MilliPlant.fmu tells no unit of" in said[0]
     assert said[0].endswith("as GripperPlant.fmu does: taken to be in SI; `units` names others")
 
-
-Units = Literal["defined", "named", "none"]
-"""Units with their definitions, as names that are not defined, or none at all."""
-
-FACTORS = {"gap": 1e3, "position": 1e3, "velocity": 1e3, "contact_force": 1e3, "force": 1e-3}
-"""From SI to what the plant puts out, and from what it takes to SI."""
 
 BLOCK = '''"""The gripper plant in mm, mm/s and mN."""
 
@@ -198,18 +180,13 @@ class Outputs(NamedTuple):
     object_position: Annotated[float, Output("x_m", unit="mm", nominal=100.0, depends_on=set())]
 
 
+def _pair(pair: Pair, factor: float = 1e3) -> Pair:
+    return factor * pair[0], factor * pair[1]
+
+
 def _si(p: Params) -> rigid.Params:
-    right, left = p.initial_position
-    return rigid.Params(
-        p.finger_mass,
-        (right / 1e3, left / 1e3),
-        p.object_width / 1e3,
-        p.initial_object_position / 1e3,
-    )
-
-
-def _pair(pair: Pair) -> Pair:
-    return 1e3 * pair[0], 1e3 * pair[1]
+    x_m, width = p.initial_object_position, p.object_width
+    return rigid.Params(p.finger_mass, _pair(p.initial_position, 1e-3), width / 1e3, x_m / 1e3)
 
 
 def initial_state(p: Params, u: Inputs) -> State:
@@ -217,19 +194,13 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
-    return rigid.step(_si(p), x, rigid.Inputs((u.force[0] / 1e3, u.force[1] / 1e3)), h)
+    return rigid.step(_si(p), x, rigid.Inputs(_pair(u.force, 1e-3)), h)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     y = rigid.outputs(_si(p), x, rigid.Inputs())
-    return Outputs(
-        _pair(y.position),
-        _pair(y.velocity),
-        _pair(y.gap),
-        _pair(y.contact_force),
-        y.contact,
-        1e3 * y.object_position,
-    )
+    pairs = (_pair(y.position), _pair(y.velocity), _pair(y.gap), _pair(y.contact_force))
+    return Outputs(*pairs, y.contact, 1e3 * y.object_position)
 '''
 
 
