@@ -1,24 +1,30 @@
-"""--native and --python: which FMUs a command runs, what it says of them, and the same bytes."""
+"""--native and --python: which FMUs are built and run, what is said of it, and the same bytes."""
 
 import json
-import os
 import shutil
+import sys
 import zipfile
 from pathlib import Path
 
+import c_compilers
 import pytest
+from c_compilers import CompilerError
+from grasp_cosim import System
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.interface.obstacles import this_platform
+from grasp_cosim.interface.read import describe
 from grasp_fmus import build as builds
+from grasp_fmus import package
 from grasp_fmus.build import build_block, planned, shipped_twins
 from grasp_fmus.native.targets import here
-from grasp_fmus.shipped import together
-from support.marks import needs_compiler
+from support.kinds import TRANSLATED
+from support.marks import needs_compiler, needs_zig, slow
 
 pytestmark = needs_compiler
 
 SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
-HERE = ("--set", "components.plant.isolation=none")
+SWAP = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
 
 
 def ran(folder):
@@ -32,37 +38,116 @@ def recorded(command, folder, *arguments):
     return Path(folder, "signals.csv").read_bytes()
 
 
+# ------------------------------------------------------------------ build --native
+
+
+@pytest.mark.slow
+def test_builds_all(command):
+    for status in ("new", "unchanged"):
+        code, out, err = command("build", "--native")
+        assert (code, err) == (0, "")
+        assert {*out.splitlines()} == {f"fmus/native/{name}.fmu: {status}" for name in TRANSLATED}
+
+
+def test_json_names_files_and_notes(command, natives):
+    code, out, err = command("build", "--native", "--json", "--out", natives)
+    report = json.loads(out)
+    assert (code, err) == (0, "")
+    assert report["notes"] == []
+    assert report["fmus"] == [*report["built"]]
+    assert {Path(fmu).parent for fmu in report["fmus"]} == {natives}
+
+
+def test_one_by_name_and_one_of_ones_own(command):
+    one = (0, "fmus/native/ProximitySensor.fmu: new\n", "")
+    assert command("build", "--native", "ProximitySensor") == one
+    own = command("build", "--native", SPRING, "--fmi", "3", "--out", "mine")
+    assert own == (0, "mine/SpringPlant.fmu: new\n", "")
+    found = describe(Path("mine/SpringPlant.fmu"))
+    assert (found.version, found.python, found.sources) == ("3.0", False, True)
+
+
+def test_what_is_built_is_said_before_the_compiler_runs(command, monkeypatch):
+    def ended(*_):
+        raise CompilerError("out of patience")
+
+    monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
+    monkeypatch.setattr("grasp_fmus.build.build_native", ended)
+    line = f"building for {here().tuple}, 00:00\ngrasp-cosim: out of patience\n"
+    assert command("build", "--native") == (3, "", line)
+
+
+def test_a_missing_file_without_a_name_is_told(command, monkeypatch):
+    said = "no licenses/LICENSE among its metadata; install it with pip"
+    missing = FileNotFoundError(said)
+    monkeypatch.setattr("grasp_fmus.page.licences", lambda *_: (_ for _ in ()).throw(missing))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(Path("empty").absolute()))
+    assert command("build")[::2] == (2, f"grasp-cosim: {said}\n")
+
+
+@pytest.mark.slow
+def test_c_alone(command):
+    code, out, err = command("build", "--native", "--c-only", "one", "GraspController")
+    assert (code, err) == (0, "")
+    assert "one/GraspController.h: written" in out.splitlines()
+    code, out, _ = command("build", "--native", "--c-only", "own", SPRING, "--json")
+    assert "own/main.c" in json.loads(out)["files"]
+    assert command("build", "--native", "--c-only", "all")[::2] == (0, "")
+    assert {path.parent.name for path in Path("all").glob("*/main.c")} == {*TRANSLATED}
+    for path in Path("one").iterdir():
+        assert path.read_bytes() == (Path("all/GraspController") / path.name).read_bytes()
+    assert not Path("fmus").exists()
+
+
+@needs_zig
+@pytest.mark.platforms
+def test_for_others(command):
+    """The first time in a folder for what is kept, the libraries of zig are made."""
+    ours, fmu = ("build", "--native", "GraspController"), "fmus/native/GraspController.fmu"
+    code, out, err = command(*ours, "--target", "linux64,win64,darwin64,aarch64-linux")
+    assert (code, out, err.count("\n")) == (0, f"{fmu}: new\n", 1)
+    assert err.startswith("FMI 2.0 has one folder for both, linux64: x86_64-linux is there, ")
+    platforms = ("aarch64-linux", "darwin64", "linux64", "win64")
+    assert describe(Path(fmu)).platforms == platforms
+    assert f"there is: {', '.join(platforms)}; this machine: linux64" in command("inspect", fmu)[1]
+    assert command(*ours, "--target", "aarch64-linux", "--fmi", "3")[::2] == (0, "")
+    assert describe(Path(fmu)).platforms == ("aarch64-linux", "x86_64-linux")
+
+
+def test_inspect_says_that_it_needs_no_python(command, natives):
+    fmu = natives / "GripperPlant.fmu"
+    code, out, _ = command("inspect", "--load", fmu)
+    assert (code, "problem " in out) == (0, False)
+    assert "native, needs no Python" in out
+    out = command("inspect", fmu)[1]
+    assert "platforms           linux64; this machine: linux64" in out
+    assert "Python              not needed" in out
+    assert json.loads(command("inspect", fmu, "--json")[1])["sources"] is True
+
+
 # ------------------------------------------------------------------ the same bytes
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-@pytest.mark.parametrize("case", ["0", "1", "2"])
-def test_a_run_has_the_same_bytes(command, case, scheme):
-    asked = ("--case", case, "--scheme", scheme, "--step", "1e-3")
+@pytest.mark.parametrize("preset", ["case_0", "case_1", "case_2", "bench"])
+def test_a_run_has_the_same_bytes(command, preset, scheme):
+    asked = ("--preset", preset, "--scheme", scheme, "--step", "1e-3")
     python = recorded(command, "python", *asked, "--python")
     assert recorded(command, "native", *asked, "--native") == python
     assert all("native_twin_of" in fmu for fmu in ran("native").values())
 
 
-@pytest.mark.slow
-def test_at_the_published_step_with_all_electronics(command):
-    asked = ("--preset", "bench", "--stop", "0.5")
-    assert recorded(command, "a", *asked, "--python") == recorded(command, "b", *asked)
-
-
-# ------------------------------------------------------------------ what each command does
+# ------------------------------------------------------------------ which run
 
 
 @pytest.mark.parametrize(
     ("file", "option", "native"),
     [
         (False, (), True),
-        (False, ("--native",), True),
         (False, ("--python",), False),
         (True, (), False),
         (True, ("--native",), True),
-        (True, ("--python",), False),
     ],
     ids=str,
 )
@@ -72,93 +157,39 @@ def test_which_fmus_run_where_nothing_is_said_of_it(command, fmus, file, option,
     assert command("run", *system, *SHORT, *option, "--out", "a")[::2] == (0, "")
     assert ran("a").keys() == {"plant", "sensor_1", "sensor_2", "controller"}
     assert {"pythonfmu" not in fmu["tool"] for fmu in ran("a").values()} == {native}
+    assert not Path("fmus").exists()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "arguments",
+    "line",
     [
-        ("sweep", "--vary", "plant.finger_mass[1]=0.5,0.6", *SHORT, "--workers", "1"),
-        ("qualify", "plant.fmu", "--as", "plant", *SHORT, *HERE),
+        "sweep --vary plant.finger_mass[1]=0.5,0.6 --workers 1",
+        "qualify plant.fmu --as plant --set components.plant.isolation=none",
     ],
-    ids=lambda arguments: arguments[0],
-)  # fmt: skip
-def test_a_command_of_many_runs_takes_native_ones(command, fmus, arguments):
+)
+def test_a_command_of_many_runs_takes_native_ones(command, fmus, line):
     shutil.copy(fmus / "GripperPlant.fmu", "plant.fmu")
-    first, second, third = (
-        command(*arguments, *option, "--json", *folder(arguments, i))
-        for i, option in enumerate(((), ("--native",), ("--python",)))
-    )
-    assert [first[2], second[2], third[2]] == ["", "", ""]
-    assert first[0] == second[0] == third[0] == 0
-    results = [json.loads(out) for _, out, _ in (first, second, third)]
-    for result in results:
-        result.pop("table", None)
+    results = []
+    for i, option in enumerate(((), ("--native",), ("--python",))):
+        out = ("--out", f"out_{i}.csv") if line.startswith("sweep") else ()
+        code, out, err = command(*line.split(), *SHORT, *option, *out, "--json")
+        assert (code, err) == (0, "")
+        results.append(json.loads(out))
+        results[-1].pop("table", None)
     assert results[0] == results[1] == results[2]
     assert not Path("fmus").exists()
-
-
-def folder(arguments, number):
-    return ("--out", f"out_{number}.csv") if arguments[0] == "sweep" else ()
-
-
-def test_a_log_needs_no_fmu_to_run(command):
-    assert command("run", *SHORT, "--case", "0", "--out", "run")[0] == 0
-    code, _, err = command("identify", "run/signals.csv", "--fit", "coulomb")
-    assert (code, err) == (0, "")
-
-
-# ------------------------------------------------------------------ without a compiler
-
-
-@pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_native_is_refused_in_one_line(command):
-    code, out, err = command("run", *SHORT, "--native")
-    assert (code, out) == (2, "")
-    assert err.startswith("grasp-cosim: native FMUs cannot be built: no C compiler: ")
-    assert err.count("\n") == 1
-    assert "pip install ziglang" in err
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_compiler")
-def test_without_a_compiler_a_sweep_takes_python_and_says_why(command):
-    vary = ("--vary", "plant.object_width=0.06,0.07")
-    code, out, err = command("sweep", *vary, *SHORT, "--workers", "1", "--json")
-    assert (code, json.loads(out)["failed"]) == (0, 0)
-    assert err.startswith("FMUs run in Python, which takes longer: no C compiler: ")
-    assert err.count("\n") == 1
-
-
-@pytest.mark.slow
-def test_where_nothing_can_be_kept_they_are_compiled_for_this_process(
-    command, monkeypatch, tmp_path
-):
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    shipped_twins.cache_clear()
-    code, _, err = command("run", *SHORT, "--native")
-    assert (code, err.count("\n")) == (0, 1)
-    assert err.startswith(f"{tmp_path}/file/grasp-cosim: cannot be written to, so each process")
-    shipped_twins.cache_clear()
-    builds._until_the_end.clear()
-
-
-# ------------------------------------------------------------------ whose FMUs, and where
 
 
 def system_file(folder, plant, fmus):
     """The built-in grasp with FMUs by their paths, whose names are not ours."""
     folder.mkdir(parents=True)
     text = SYSTEM.read_text("utf-8")
-    for name, fmu in (
-        ("GripperPlant", plant),
-        ("ProximitySensor", None),
-        ("GraspController", None),
-    ):
-        other = folder / f"their_{name}.fmu"
-        shutil.copy(fmu or fmus / f"{name}.fmu", other)
-        text = text.replace(f'"{name}.fmu"', f'"{other.name}"')
+    for name in ("GripperPlant", "ProximitySensor", "GraspController"):
+        shutil.copy(
+            plant if "Plant" in name else fmus / f"{name}.fmu", folder / f"their_{name}.fmu"
+        )
+        text = text.replace(f'"{name}.fmu"', f'"their_{name}.fmu"')
     path = folder / "theirs.toml"
     path.write_text(text, "utf-8")
     return path
@@ -178,80 +209,160 @@ def test_one_of_other_sources_stays_as_it_is(command, altered):
     code, _, err = command("run", *asked, "--out", "a")
     assert code == 0
     assert err == "no native FMU runs as plant (GripperPlant.fmu has no native twin)\n"
-    assert "native_twin_of" not in ran("a")["plant"]
-    assert "native_twin_of" in ran("a")["sensor_1"]
+    assert {name for name, fmu in ran("a").items() if "native_twin_of" not in fmu} == {"plant"}
 
 
 @pytest.mark.slow
 def test_one_that_is_native_already_is_no_exception(command, tmp_path):
     twin = build_block(SPRING, tmp_path, planned()).path
     assert command("run", "--swap", f"plant={twin}", *SHORT, "--native")[::2] == (0, "")
-    system = tmp_path / "native.toml"
-    text, kept = SYSTEM.read_text("utf-8"), shipped_twins(together("GripperPlant"))
-    system.write_text(text.replace('fmu = "', f'fmu = "{kept}/'), "utf-8")
-    for option in ("--native", "--python"):
-        assert command("run", system, *SHORT, option)[::2] == (0, "")
-    qualified = command(
-        "qualify", twin, "--as", "plant", *SHORT, "--set", "components.plant.isolation=none"
-    )
-    assert qualified[2] == ""
+    isolated = ("--set", "components.plant.isolation=none")
+    assert command("qualify", twin, "--as", "plant", *SHORT, *isolated)[2] == ""
 
 
 def test_a_block_of_ones_own(command, tmp_path):
     """Its twin is one that the user has built, of the same source."""
-    swap = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
     shutil.copy(SPRING, tmp_path)
     source = tmp_path / SPRING.name
     build_block(source, Path("fmus/build"))
-    python = recorded(command, "a", *swap)
+    python = recorded(command, "a", *SWAP)
     without = "no native FMU runs as plant (SpringPlant.fmu has no native twin)\n"
-    assert command("run", *swap, "--native")[2] == without
+    assert command("run", *SWAP, "--native")[2] == without
     build_block(source, Path("fmus/native"), planned())
-    assert recorded(command, "b", *swap, "--native") == python
+    assert recorded(command, "b", *SWAP, "--native") == python
     assert "native_twin_of" in ran("b")["plant"]
     source.write_text(source.read_text("utf-8") + "\n# another\n", "utf-8")
     build_block(source, Path("fmus/build"))
-    assert command("run", *swap)[2] == (
+    assert command("run", *SWAP)[2] == (
         "no native FMU runs as plant (fmus/native/SpringPlant.fmu is not the twin of this "
         "SpringPlant.fmu, or not for this machine)\n"
     )
-
-
-def test_a_twin_is_found_beside_the_folder_of_its_fmu(command, tmp_path):
-    build_block(SPRING, tmp_path / "project/build")
-    build_block(SPRING, tmp_path / "project/native", planned())
-    swap = f"plant={tmp_path / 'project/build/SpringPlant.fmu'}"
-    assert command("run", "--swap", swap, *SHORT, "--native", "--out", "a")[::2] == (0, "")
-    assert "native_twin_of" in ran("a")["plant"]
 
 
 @pytest.mark.parametrize("wrong", ["processor", "platform", "damaged"])
 def test_a_twin_that_does_not_run_here_is_left_alone(command, tmp_path, wrong):
     """One may have been built for another machine, with --target."""
     build_block(SPRING, Path("fmus/build"))
-    twin = build_block(SPRING, tmp_path / "made", planned()).path
-    with zipfile.ZipFile(twin) as archive:
-        files = {name: archive.read(name) for name in archive.namelist()}
-    (binary,) = (name for name in files if name.startswith("binaries/"))
-    library = files.pop(binary)
-    if wrong == "processor":
-        files[binary] = library[:18] + bytes(255 - b for b in library[18:20]) + library[20:]
-    elif wrong == "platform":
-        files[binary.replace(here().folder, "elsewhere")] = library
-    Path("fmus/native").mkdir()
-    with zipfile.ZipFile("fmus/native/SpringPlant.fmu", "w") as archive:
-        for name, data in files.items():
-            archive.writestr(name, data)
+    twin = build_block(SPRING, Path("fmus/native"), planned()).path
     if wrong == "damaged":
-        Path("fmus/native/SpringPlant.fmu").write_bytes(twin.read_bytes()[:-100])
-    swap = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
-    code, _, err = command("run", *swap, "--native")
+        twin.write_bytes(twin.read_bytes()[:-100])
+    elif wrong == "platform":
+        rewritten(twin, lambda name, data: (name.replace(here().folder, "elsewhere"), data))
+    else:
+        rewritten(twin, for_another)
+    code, _, err = command("run", *SWAP, "--native")
     assert code == 0
     assert "as plant (fmus/native/SpringPlant.fmu is not the twin" in err
 
 
-def test_nothing_is_built_into_the_current_folder(command):
-    """So one that cannot be written to will do."""
-    for option in ("--native", "--python"):
-        assert command("run", *SHORT, option)[0] == 0
-        assert os.listdir() == []  # noqa: PTH208
+def rewritten(fmu, change, to=None):
+    """The FMU with each of its files, by name and content, changed."""
+    with zipfile.ZipFile(fmu) as archive:
+        files = [change(name, archive.read(name)) for name in archive.namelist()]
+    with zipfile.ZipFile(to or fmu, "w") as archive:
+        for name, data in files:
+            archive.writestr(name, data)
+
+
+def for_another(name, data):
+    """A library as it would be for another processor."""
+    changed = data[:18] + (243).to_bytes(2, "little") + data[20:]
+    return name, changed if name.endswith(".so") else data
+
+
+# ------------------------------------------------------------------ without a compiler
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_without_a_compiler_native_is_refused_in_one_line(command):
+    code, out, err = command("run", *SHORT, "--native")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("grasp-cosim: native FMUs cannot be built: no C compiler: ")
+    assert err.endswith(f"{sys.executable} -m pip install ziglang\n")
+    code, _, err = command("build", "--native")
+    assert (code, err.count("\n")) == (2, 1)
+    assert err.endswith(f"{sys.executable} -m pip install ziglang\n")
+
+
+def test_without_zig_there_is_nothing_for_others(command, monkeypatch):
+    monkeypatch.setattr(c_compilers, "find_zig", lambda: None)
+    code, _, err = command("build", "--native", "--target", "win64")
+    fix = f"must be zig; {sys.executable} -m pip install ziglang\n"
+    assert (code, err) == (2, f"grasp-cosim: build: no C compiler for x86_64-windows-gnu: {fix}")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_compiler")
+def test_without_a_compiler_a_sweep_takes_python_and_says_why(command):
+    vary = ("--vary", "plant.object_width=0.06,0.07")
+    code, out, err = command("sweep", *vary, *SHORT, "--workers", "1", "--json")
+    assert (code, json.loads(out)["failed"], err.count("\n")) == (0, 0, 1)
+    assert err.startswith("FMUs run in Python, which takes longer: no C compiler: ")
+
+
+@pytest.mark.slow
+def test_where_nothing_can_be_kept_they_are_compiled_for_this_process(
+    command, monkeypatch, tmp_path
+):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    shipped_twins.cache_clear()
+    code, _, err = command("run", *SHORT, "--native")
+    assert (code, err.count("\n")) == (0, 1)
+    assert err.startswith(f"{tmp_path}/file/grasp-cosim: cannot be written to, so each process")
+    shipped_twins.cache_clear()
+    builds._until_the_end.clear()
+
+
+# ------------------------------------------------------------------ without pythonfmu's binary
+
+LACKS = f"has a binary for linux64 (RISC-V), win64 only; this machine: {this_platform('2.0')}"
+
+
+@pytest.fixture
+def other_machine(command, fmus, monkeypatch, tmp_path):
+    """The command where FMUs of the built-in grasp are for another processor; their folder."""
+    folder = tmp_path / "foreign"
+    folder.mkdir()
+    for name in ("GripperPlant.fmu", "ProximitySensor.fmu", "GraspController.fmu"):
+        rewritten(fmus / name, for_another, folder / name)
+    system = System.load(SYSTEM, folder)
+    monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: system)
+    return folder
+
+
+def test_the_native_twins_run(other_machine, command, monkeypatch, grasp):
+    foreign = recorded(command, "foreign_run", *SHORT)
+    assert all("native_twin_of" in component for component in ran("foreign_run").values())
+    assert command("run", *SHORT, "--native")[::2] == (0, "")
+    monkeypatch.setattr("grasp_cosim.grasp.system.as_named", lambda: grasp)
+    assert foreign == recorded(command, "python", *SHORT, "--python")
+
+
+@pytest.mark.parametrize("line", ["run --python", slow("run"), slow("evaluate")])
+def test_where_they_cannot_one_line_says_why(other_machine, command, request, line):
+    python = "--python" in line
+    if not python:
+        request.getfixturevalue("no_compiler")
+    code, out, err = command(*line.split())
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    said = "its native twin must run" if python else "no C compiler"
+    assert err.startswith(f"grasp-cosim: plant: {other_machine}/GripperPlant.fmu {LACKS}; {said}")
+    assert err.endswith("must run\n" if python else "pip install ziglang\n")
+
+
+@pytest.mark.slow
+def test_build_makes_native_ones_too(command, tmp_path, monkeypatch):
+    folder = tmp_path / "pythonfmu"
+    shutil.copytree(package.package_folder("pythonfmu"), folder)
+    binary = folder / "resources/binaries/linux64/libpythonfmu-export.so"
+    binary.write_bytes(for_another(binary.name, binary.read_bytes())[1])
+    find = package.package_folder
+    monkeypatch.setattr(
+        package, "package_folder", lambda name: folder if name == "pythonfmu" else find(name)
+    )
+    shutil.copy(SPRING, ".")
+    code, out, err = command("build", SPRING.name)
+    assert (code, out) == (0, "fmus/build/SpringPlant.fmu: new\nfmus/native/SpringPlant.fmu: new\n")
+    assert err == f"built native FMUs, too: fmus/build/SpringPlant.fmu {LACKS}\n"
+    assert command("run", *SWAP)[::2] == (0, "")

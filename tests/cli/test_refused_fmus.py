@@ -7,13 +7,7 @@ import fmpy
 import pytest
 from grasp_cosim.inspection.loading import examine
 from support.compiled import binary
-from support.native_fmus import build, library_of, needs_gcc
-
-CODE = """
-double ceil(double), atan2(double, double), tanh(double), licence_check(double);
-double of_libm(double x) { return ceil(x) + atan2(x, 2.0) + tanh(x); }
-"""
-MISSING = "double missing(double x) { return licence_check(x); }\n"
+from support.native_fmus import build, library_of, needs_gcc, starts_text
 
 
 def _described(before, after):
@@ -91,46 +85,11 @@ def changed(fmu, out, change):
     return out
 
 
-def linked(folder, missing=False):
-    """An FMU whose binary leaves libm undefined, as Dymola's do; or also what is nowhere."""
-    options = ("-fno-builtin", "-nostdlib", "-Wl,--unresolved-symbols=ignore-all", "-lc")
-    return _with_library(folder, options, CODE + MISSING * missing)
-
-
-def licensed(folder):
-    """An FMU that logs that it finds no licence, with the path of its resources, and gives up."""
-    return _with_library(folder, ["-DNO_LICENCE"])
-
-
-def _with_library(folder, options, code=""):
-    library = library_of("native", "2.0", more=options, code=code)
-    place = binary("2.0", "native")
-    whole = build(folder, "whole", "2.0")
-    return changed(whole, folder / "x.fmu", lambda files: files | {place: library})
-
-
-SYSTEM = """connections = []
-[experiment]
-step = 0.1
-stop = 1.0
-[components.a]
-fmu = "x.fmu"
-values = { u_Real = 0, u_Integer = 0, u_Boolean = false, u_Enumeration = 1, u_String = "" }
-"""
-NUMBERS = (
-    "Float64",
-    "Float32",
-    "Int8",
-    "UInt8",
-    "Int16",
-    "UInt16",
-    "Int32",
-    "UInt32",
-    "Int64",
-    "UInt64",
-)
-VALUES_3 = ", ".join(f"u_{name} = 0" for name in NUMBERS)
-SYSTEM_3 = SYSTEM.replace("u_Real = 0, u_Integer = 0", VALUES_3)
+def system(version="2.0"):
+    return (
+        "[experiment]\nstep = 0.1\nstop = 1.0\n"
+        f'[components.a]\nfmu = "x.fmu"\nvalues = {{ {starts_text(version)} }}\n'
+    )
 
 
 def found(fmu):
@@ -158,7 +117,7 @@ def test_a_kind_that_no_machine_runs(name, command, tmp_path):
     assert verdict.status == "problem"
     assert what in verdict.text
     assert ask in (verdict.fix or "")
-    (tmp_path / "s.toml").write_text(SYSTEM)
+    (tmp_path / "s.toml").write_text(system())
     for arguments in (
         ("run", "s.toml"),
         ("run", "--swap", "plant=x.fmu"),
@@ -184,7 +143,7 @@ def test_a_binary_for_others(name, command, tmp_path):
     assert what in verdict.text
     assert ask in (verdict.fix or "")
     assert ("fmpy compile" in (verdict.fix or "")) == (name == "sources")
-    (tmp_path / "s.toml").write_text(SYSTEM if version == "2.0" else SYSTEM_3)
+    (tmp_path / "s.toml").write_text(system(version))
     one_line(command("run", "s.toml"), f"a: x.fmu {what}" if name != "windows" else what, ask)
     one_line(command("run", "s.toml", "--set", "components.a.isolation=process"), what, ask)
     code, _, err = command("ssp", "s.toml", "-o", "s.ssp")  # which may be for another machine
@@ -210,7 +169,7 @@ def test_one_that_needs_its_tool(command, tmp_path):
             | {n: d for n, d in f.items() if "/" in n}
         ),
     ).replace(tmp_path / "x.fmu")
-    (tmp_path / "s.toml").write_text(SYSTEM)
+    (tmp_path / "s.toml").write_text(system())
     run = command("run", "s.toml")
     one_line(run, "x.fmu does not load", "ask the vendor for an export that runs by itself")
 
@@ -219,12 +178,15 @@ def test_one_that_needs_its_tool(command, tmp_path):
 @needs_gcc
 @pytest.mark.parametrize("isolation", ["none", "process"])
 def test_one_without_its_licence(isolation, command, tmp_path):
-    licensed(tmp_path)
+    library = library_of("native", "2.0", more=["-DNO_LICENCE"])
+    whole = build(tmp_path, "whole", "2.0")
+    place = binary("2.0", "native")
+    changed(whole, tmp_path / "x.fmu", lambda files: files | {place: library})
     trial = found(tmp_path / "x.fmu")["trial"]
     assert trial.status == "problem"
     assert "No license" in trial.text
     assert "ask the vendor for an export that needs none" in (trial.fix or "")
-    (tmp_path / "s.toml").write_text(SYSTEM)
+    (tmp_path / "s.toml").write_text(system())
     run = command("run", "s.toml", "--set", f"components.a.isolation={isolation}")
     one_line(run, "No license for feature X in resources/key; it needs a licence on", "needs none")
 
@@ -236,7 +198,7 @@ def test_one_that_is_encrypted(command, tmp_path):
     for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
         data[data.index(mark) + place] |= 1
     (tmp_path / "x.fmu").write_bytes(data)
-    (tmp_path / "s.toml").write_text(SYSTEM)
+    (tmp_path / "s.toml").write_text(system())
     for arguments in (("run", "s.toml"), ("inspect", "x.fmu")):
         run = command(*arguments)
         one_line(run, "modelDescription.xml is encrypted", "ask the vendor for it without a pass")
