@@ -1,4 +1,4 @@
-"""Our archive in the two C++ masters of PyPI: they load it and find the same contacts.
+"""Our archive in the two C++ masters of PyPI, which find the same contacts; theirs here.
 
 Both step all components with the values of the last communication point, as our Jacobi scheme does.
 Each runs in a process of its own, where our Python FMUs find the Python they need.
@@ -18,8 +18,20 @@ from grasp_cosim import System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.served import Service
 from grasp_cosim.ssp.to_archive import write_ssp
+from ssp.hand_made import (
+    archive,
+    bind,
+    component,
+    connect,
+    linear,
+    mapping,
+    parameter_set,
+    structure,
+    system,
+)
 from support.grasps import CASES
 from support.marks import interop
+from support.native_fmus import build_model, needs_gcc
 from support.proxies import build_proxy, serving
 
 STEP = 1e-3  # s
@@ -149,3 +161,60 @@ def test_libcosim_takes_the_step_of_a_component(fmus, tmp_path):
     )
     own = replace(grasp, components=tuple(parts))
     check(gaps(COSIM, unpacked(own, tmp_path), own), own)
+
+
+DECAY = "resources/dahlquist.fmu"
+PACKAGE = "application/x-ssp-package"
+RATE = 0.5  # 1/s
+
+
+def inner():
+    """A decay integrated here, whose rate is a parameter of the system."""
+    parts = component(
+        "decay", "parameter k; output x", source=DECAY, implementation="ModelExchange"
+    )
+    drawn = connect("rate", "decay/k", linear(0.001)) + connect("decay/x", "out")
+    return structure(system("inside", parts, drawn, "parameter rate; output out"), "")
+
+
+def outer():
+    """It, and one that steps by itself and passes the other's output on, doubled, plus 1."""
+    elements = component("sub", "output out Float64", source="resources/sub.ssp", type=PACKAGE)
+    given = bind(parameter_set("d Real 1", units=""))
+    elements += component("gate", "input u; output y Real", given, source=DECAY)
+    values = bind(parameter_set("R Real 500", units=""), mapping(("R", "sub.rate", "")))
+    top = system("top", elements, connect("sub/out", "gate/u", linear(2.0, 1.0)), "", values)
+    return structure(top, '<ssd:DefaultExperiment stopTime="2"/>', version="2.0")
+
+
+@pytest.fixture
+def path(tmp_path):
+    """An archive as others pack it, with models in C: nested, integrated here."""
+    fmu = build_model("dahlquist", tmp_path).read_bytes()
+    (tmp_path / "inner").mkdir()
+    sub = archive(tmp_path / "inner", inner(), {}, {DECAY: fmu}).read_bytes()
+    return archive(tmp_path, outer(), {}, {DECAY: fmu, "resources/sub.ssp": sub})
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_an_archive_of_others_follows_the_solution(path):
+    result = simulate(System.load(path, step=0.01))
+    expected = np.exp(-RATE * result.time)
+    np.testing.assert_allclose(result["sub_decay.x"], expected, rtol=1e-6)
+    passed = result["gate.y"] - result["gate.x"]  # y = x + d·u
+    np.testing.assert_allclose(passed[1:], 2.0 * expected[1:] + 1.0, rtol=1e-6)
+
+
+@pytest.mark.slow
+@needs_gcc
+def test_our_archive_of_it_runs_the_same(path, command):
+    own = path.with_name("own.ssp")
+    assert command("ssp", str(path), "-o", str(own), "--set", "experiment.step=0.01")[0] == 0
+    with zipfile.ZipFile(own) as file:
+        assert sum(name.endswith(".fmu") for name in file.namelist()) == 1
+    first, second = simulate(System.load(path, step=0.01)), simulate(System.load(own))
+    for name in first:
+        assert second[name].tobytes() == first[name].tobytes(), name
+    code, out, _ = command("run", str(own), "--json")
+    assert (code, json.loads(out)["steps"]) == (0, 200)
