@@ -1,17 +1,22 @@
-"""A component: the units that a system file names, and its solver."""
+"""A component: units that a system file names, its solver, its native twin with the same bits."""
 
+import logging
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from comparison.made import PLANT, write_fmu
-from grasp_cosim import InputError, System, simulate
+from grasp_cosim import InputError, System, grasp_system, simulate
+from grasp_cosim.grasp.system import with_controller
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Solver
 from grasp_cosim.system.settings import settings
 from grasp_cosim.system.validity import connection_transform, remarks
 from si_units import Unit
+from support.marks import needs_compiler
 from support.native_fmus import build_model, needs_gcc
+from support.native_systems import write_oscillator
 
 SPRING = {
     "position": 'causality="input" | Real start="0" unit="m"',
@@ -192,3 +197,53 @@ def test_an_archive_keeps_it(tmp_path, solver, kinds):
     assert replace(again.components[0], solver=None).integrated == (
         None if "CoSimulation" in kinds else Solver()
     )
+
+
+def natives(system):
+    return {c.name for c in system.components if c.native}
+
+
+@needs_compiler
+def test_it_is_asked_for_anew_as_often_as_one_likes(grasp):
+    everything = {"plant", "sensor_1", "sensor_2", "controller"}
+    assert natives(grasp) == natives(grasp.natively(False)) == set()
+    for native in (None, True):
+        assert natives(grasp.natively(native)) == everything
+        assert grasp.natively(native).natively(False) == grasp
+    assert grasp.natively().natively() == grasp.natively()
+
+
+@needs_compiler
+def test_what_is_swapped_in_afterwards_runs_as_it_is(grasp):
+    adaptive = with_controller(grasp.natively(), "adaptive")
+    assert natives(adaptive) == {"plant", "sensor_1", "sensor_2"}
+    assert natives(adaptive.natively()) == natives(grasp.natively())
+
+
+@needs_compiler
+@pytest.mark.parametrize("law", ["published", "adaptive"])
+def test_the_built_in_grasp_runs_natively(law):
+    native, python = (grasp_system(law, native) for native in (None, False))
+    assert natives(native) == {c.name for c in python.components}
+    assert natives(python) == set()
+    ours, theirs = (simulate(s, step=1e-3, stop=0.2) for s in (native, python))
+    assert all(np.array_equal(ours[name], theirs[name]) for name in theirs)
+
+
+@needs_compiler
+def test_a_system_of_others_is_none_of_our_business(tmp_path, caplog):
+    """Its FMUs need no Python."""
+    system = System.load(write_oscillator(tmp_path))
+    assert system.natively() == system == system.natively(True)
+    assert caplog.text == ""
+
+
+@needs_compiler
+@pytest.mark.usefixtures("no_compiler")
+def test_without_a_compiler_they_run_in_python_unless_asked(grasp, caplog):
+    assert natives(grasp.natively()) == set()
+    ((_, level, said),) = caplog.record_tuples
+    assert level == logging.WARNING
+    assert said.startswith("FMUs run in Python, which takes longer: no C compiler: must be one of")
+    with pytest.raises(InputError, match=r"^native FMUs cannot be built: no C compiler: must"):
+        grasp.natively(True)

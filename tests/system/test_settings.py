@@ -1,10 +1,11 @@
-"""What a run was asked to do, as plain data; what of a system is not as it was read."""
+"""Settings, roles, presets, groups of metrics; what of a system is not as it was read."""
 
 import json
 
 import pytest
-from grasp_cosim import System, grasp_system, simulate
+from grasp_cosim import InputError, System, grasp_system, load_run, simulate
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.settings import changed, settings
 
 SPECIAL = """
@@ -90,3 +91,157 @@ def test_a_result_tells_it(system):
     values = {"plant.initial_object_position": 0.02}
     result = simulate(system.with_values(values), step=1e-3, stop=0.01)
     assert result.settings["changed"] == {**values, "step": 1e-3, "stop": 0.01}
+
+
+SENSOR = """
+[experiment]
+step = 1e-3
+stop = 0.02
+[components.eye]
+fmu = "{fmu}"
+values = {{ gap = 0.02 }}
+"""
+
+
+@pytest.fixture
+def load_with(fmus, tmp_path):
+    """The system of one sensor, with more text at the end of its file."""
+
+    def load(more):
+        path = tmp_path / "eye.toml"
+        path.write_text(SENSOR.format(fmu=fmus / "ProximitySensor.fmu") + more, "utf-8")
+        return System.load(path)
+
+    return load
+
+
+PRESETS = """
+[presets.dim]
+"eye.reflectance" = 0.5
+"eye.gain" = 0.001
+[presets.bright]
+"eye.reflectance" = 2.0
+"eye.adc.enabled" = true
+"""
+
+
+def test_roles_are_those_of_the_file_and_in_the_settings(load_with):
+    system = load_with('[roles]\nsensor_1 = "eye"\nlook = "eye"\n')
+    assert system.roles == {"sensor_1": "eye", "look": "eye"}
+    assert settings(system)["roles"] == {"sensor_1": "eye", "look": "eye"}
+    assert load_with("").roles == {}
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (
+            '[roles]\nsensor_1 = "ear"\n',
+            "eye.toml: [roles]: sensor_1 = 'ear': no component 'ear'; valid: eye",
+        ),
+        (
+            "[roles]\nsensor_1 = 1\n",
+            "eye.toml: [roles]: sensor_1 = 1: must be the name of a component",
+        ),
+        (
+            '[roles]\nsensor_1 = ["eye"]\n',
+            "eye.toml: [roles]: sensor_1 = ['eye']: must be the name of a component",
+        ),
+        ("[[roles]]\n", "eye.toml: [roles]: [{}]; must be a table"),
+        ("[[presets]]\n", "eye.toml: [presets]: [{}]; must be a table"),
+        ("[presets]\ndim = 3\n", "eye.toml: [presets.dim]: 3; must be a table"),
+        (
+            '[presets.dim]\n"eye.gain" = [{}]\n',
+            "eye.toml: [presets.dim]: eye.gain = [{}]: must be a number, boolean or string",
+        ),
+        (
+            "[presets.dim]\neye.gain = 1\n",
+            "eye.toml: [presets.dim]: eye = {'gain': 1}: must be a number, boolean or string",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_that_says_where(load_with, more, message):
+    with pytest.raises(InputError) as caught:
+        load_with(more)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_preset_sets_its_values_and_a_later_one_goes_first(load_with):
+    system = load_with(PRESETS)
+    both = system.with_presets("dim", "bright")
+    assert both.component("eye", "").values == {
+        "gap": 0.02, "reflectance": 2.0, "gain": 0.001, "adc.enabled": True,
+    }  # fmt: skip
+    assert system.with_presets("bright", "dim").start("eye.reflectance") == 0.5
+    assert system.with_presets() == system
+    assert both.presets == system.presets
+
+
+def test_a_preset_that_is_not_there_names_those_that_are(load_with):
+    with pytest.raises(InputError) as caught:
+        load_with(PRESETS).with_presets("dim", "dark")
+    assert str(caught.value) == (
+        "eye.toml: no preset 'dark'; valid: dim, bright; a system file has them as [presets.NAME]"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ('"ear.gain" = 1.0', r"\[presets.odd\] ear.gain: no component 'ear'; valid: eye, "),
+        ('"eye.gane" = 1.0', r"\[presets.odd\] eye.gane: .* no input or parameter 'gane'"),
+        ('"eye.gain" = -1.0', r"\[presets.odd\] eye.gain.* = -1.0: must be "),
+        ('"eye.adc.bits" = 1.5', r"\[presets.odd\] eye.adc.bits.* = 1.5: must be a whole number"),
+        ('"eye.intensity" = 1.0', r"\[presets.odd\] eye.intensity: .* no input or parameter"),
+    ],
+)
+def test_a_preset_is_checked_where_it_is_used(load_with, value, message):
+    """A file may have presets that only another swap or build of an FMU takes."""
+    system = load_with(f"{PRESETS}[presets.odd]\n{value}\n")
+    assert system.with_presets("dim").start("eye.gain") == 0.001
+    with pytest.raises(InputError, match=rf"^eye\.toml: {message}") as caught:
+        system.with_presets("odd")
+    assert "\n" not in str(caught.value)
+
+
+def without(fmus, tmp_path, entry):
+    """The built-in grasp with another entry in the place of its metrics."""
+    text = SYSTEM.read_text("utf-8")
+    (line,) = (line for line in text.splitlines() if line.startswith("metrics = "))
+    path = tmp_path / "system.toml"
+    path.write_text(text.replace(line, entry), "utf-8")
+    return System.load(path, fmus)
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ('metrics = ["grasps"]', "system.toml: metrics: no group 'grasps'; did you mean grasp?"),
+        ('metrics = ["foot"]', "system.toml: metrics: no group 'foot'; valid: grasp, hand"),
+        ('metrics = "grasp"', "system.toml: metrics = 'grasp': must be a list of groups, like [\""),
+        ("metrics = [1]", "system.toml: metrics = 1: must be the name of a group of metrics"),
+    ],
+)
+def test_what_is_no_group_is_one_line(fmus, tmp_path, entry, said):
+    with pytest.raises(InputError) as caught:
+        without(fmus, tmp_path, entry)
+    assert str(caught.value).startswith(said)
+
+
+def test_a_system_that_names_none_has_none(fmus, grasp, tmp_path):
+    for system, some in ((grasp, True), (without(fmus, tmp_path, ""), False)):
+        result = simulate(system, step=1e-3, stop=0.01)
+        assert bool(result.measured.values) is some
+        assert result.measured.missing == ()
+
+
+def test_a_recorded_run_and_an_archive_keep_the_groups(grasp, tmp_path):
+    result = simulate(grasp, step=1e-3, stop=0.2)
+    result.to_csv(tmp_path / "signals.csv")
+    result.to_json(tmp_path / "run.json")
+    back = load_run(tmp_path)
+    assert (back.groups, back.more_metrics) == (["grasp"], ())
+    assert back.measured.metrics == result.measured.metrics
+    write_ssp(grasp, tmp_path / "grasp.ssp")
+    assert System.load(tmp_path / "grasp.ssp").metrics == ("grasp",)
