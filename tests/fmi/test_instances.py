@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi.fmi2 import SharedInstance
-from grasp_cosim.fmi.inputs import Inputs
-from grasp_cosim.fmi.instance import DISCARD, OK, dtype
+from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
 from grasp_cosim.fmi.make_instance import load
 from grasp_cosim.interface.interface import Variable
 from grasp_cosim.interface.obstacles import this_platform

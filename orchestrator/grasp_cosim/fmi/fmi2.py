@@ -90,7 +90,7 @@ class FmuInstance(LoadedInstance):
     def _wants_the_end(self) -> bool:
         return bool(self._status(self._slave.getBooleanStatus, fmi2Terminated))
 
-    def _reached(self) -> float | None:
+    def last_successful_time(self) -> float | None:
         return self._status(self._slave.getRealStatus, fmi2LastSuccessfulTime)
 
     def _status(self, inquire: Callable[[int], float], kind: int) -> float | None:

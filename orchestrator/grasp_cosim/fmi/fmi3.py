@@ -111,7 +111,7 @@ class Fmi3Instance(LoadedInstance):
     def _wants_the_end(self) -> bool:
         return bool(self._flags[TERMINATE])
 
-    def _reached(self) -> float | None:
+    def last_successful_time(self) -> float | None:
         """A step that was discarded did nothing; what the flags say is then of an earlier one."""
         said = self._flags[SHORT] or self._flags[TERMINATE]
         return float(self._last[0]) if said else self._time()

@@ -32,8 +32,7 @@ from ..base.files import FULL
 from ..base.scratch import ScratchFolder, without_scratch
 from ..interface.interface import Element, Interface, Value, Variable
 from ..interface.obstacles import of_binary, of_loading, this_machine
-from .inputs import Inputs
-from .instance import EARLY, ERROR, FATAL, OK, STATUS
+from .instance import EARLY, ERROR, FATAL, OK, STATUS, Inputs
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
@@ -121,7 +120,7 @@ class LoadedInstance(ABC):
         """Return True if the FMU asked for the end of the simulation in a step that it rejected."""
 
     @abstractmethod
-    def _reached(self) -> float | None:
+    def last_successful_time(self) -> float | None:
         """Return the end of that step in s, None if the FMU does not say."""
 
     @abstractmethod
@@ -291,14 +290,11 @@ class LoadedInstance(ABC):
         size = variable.element.size if variable.element else 1
         return list(getter([variable.reference], size))
 
-    def last_successful_time(self) -> float | None:
-        return self._reached()
-
     def the_end(self) -> float | None:
         self._said_before = len(self._unread)
         if not self._wants_the_end():
             return None
-        reached = self._reached()
+        reached = self.last_successful_time()
         return self._time() if reached is None else reached
 
     def failure(self, status: int, time: float) -> SimulationError:

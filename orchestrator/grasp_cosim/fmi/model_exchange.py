@@ -95,7 +95,7 @@ class ModelInstance(LoadedInstance):
     def _wants_the_end(self) -> bool:
         return self._ended is not None
 
-    def _reached(self) -> float | None:
+    def last_successful_time(self) -> float | None:
         return self._ended
 
     def _time(self) -> float:
@@ -302,23 +302,26 @@ class ModelInstance(LoadedInstance):
 
     def _slopes_at(self, time: float, states: int, slopes: int) -> int:
         """The derivatives, for the solver."""
-        status = self._set_time(time)
-        if self._states and status <= WARNING:
-            status = self._set_states(states, self._states)
-            if status <= WARNING:
-                status = self._get_slopes(slopes, self._states)
+        status = self._at(time, states)
+        if status <= WARNING and self._states:
+            status = self._get_slopes(slopes, self._states)
         elif status <= WARNING:
             ctypes.c_double.from_address(slopes).value = 0.0
         return self._answer(status)
 
     def _indicators_at(self, time: float, states: int, values: int) -> int:
         """The event indicators, for the solver."""
-        status = self._set_time(time)
-        if self._states and status <= WARNING:
-            status = self._set_states(states, self._states)
+        status = self._at(time, states)
         if status <= WARNING:
             status = self._get_indicators(values, self._indicators)
         return self._answer(status)
+
+    def _at(self, time: float, states: int) -> int:
+        """Set time and states to what the solver tries."""
+        status: int = self._set_time(time)
+        if self._states and status <= WARNING:
+            status = self._set_states(states, self._states)
+        return status
 
     def _answer(self, status: int) -> int:
         """The meaning of a status to the solver: go on, try a shorter step, or give up."""

@@ -27,8 +27,7 @@ from ..base.scratch import ScratchFolder
 from ..base.system_calls import end_group, listener
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Solver
-from .inputs import Inputs
-from .instance import EARLY, WARNING
+from .instance import EARLY, WARNING, Inputs
 from .shared_memory import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, SharedMemory
 
 POSIX = os.name == "posix"
