@@ -75,7 +75,7 @@ dist: .venv/dev
 	$(BIN)/python docs/release.py
 
 cards: .venv/run
-	$(BIN)/python -m grasp_fmus.cards
+	$(BIN)/python -m grasp_fmus.page
 
 pictures: .venv/dev
 	$(BIN)/python docs/pictures.py

@@ -25,8 +25,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 
 from .native.targets import Target, Version, folders, here, universal
-from .package import Built, card_file, package_folder, write_built
-from .shipped import FEWEST, MOST, PACKAGES, SHIPPED, of_fingers, together
+from .package import Built, write_built
+from .shipped import (
+    FEWEST,
+    MOST,
+    PACKAGES,
+    SHIPPED,
+    card_file,
+    of_fingers,
+    package_folder,
+    together,
+)
 
 if TYPE_CHECKING:
     import zipfile

@@ -1,4 +1,4 @@
-"""The declaration of a block, as a flat list of variables.
+"""The declaration of a block, as a flat list of variables: as its slave and descriptions need it.
 
 What a block is, and how its fields are declared: fmus/README.md.
 """
@@ -9,11 +9,65 @@ from enum import IntEnum
 from functools import cache
 from itertools import count, islice
 from math import inf
-from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
-from block_variables import Input, Output, Parameter
+from block_variables import Input, Output, Parameter, check_value
 
-from .variable import Causality, Enumeration, Scalar, Variable
+Scalar = float | bool | int | str
+Causality = Literal["parameter", "input", "output"]
+
+TYPES: dict[type[Scalar], str] = {float: "Real", bool: "Boolean", int: "Integer", str: "String"}
+"""What FMI calls a kind of variable."""
+
+
+class Enumeration(NamedTuple):
+    """A type of whole numbers that have names: the items, in the order they are shown in."""
+
+    name: str
+    items: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A scalar variable; its value reference is its place among all.
+
+    limits are what a host may set; dependencies, by name, what reaches an output without a step,
+    and in initialisation mode. To a relative one the offset of its unit does not apply.
+    """
+
+    name: str
+    kind: type[Scalar]
+    causality: Causality
+    unit: str = ""
+    start: Scalar | None = None
+    variability: str = "continuous"
+    limits: tuple[float, float] | None = None
+    description: str = ""
+    nominal: float | None = None
+    relative: bool = False
+    dependencies: tuple[str, ...] = ()
+    initial_dependencies: tuple[str, ...] = ()
+    enumeration: Enumeration | None = None
+
+    @property
+    def type(self) -> str:
+        """What FMI calls its type."""
+        return "Enumeration" if self.enumeration else TYPES[self.kind]
+
+    @property
+    def in_unit(self) -> str:
+        """Its unit after a number, with a space before it; empty where it has none."""
+        return f" {self.unit}" if self.unit else ""
+
+    def check(self, value: Any) -> None:
+        """Raise ValueError where it may not have this value; the limits of a text are its bytes."""
+        low, high = self.limits or (-inf, inf)
+        if not isinstance(value, str):
+            check_value(self.name, value, self.unit, low, high)
+        elif not low <= len(value.encode()) <= high:
+            valid = f"must have {low:g} to {high:g} bytes in UTF-8"
+            raise ValueError(f"{self.name} = {value!r}: {valid}")
+
 
 DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
     "parameter": Parameter,
@@ -100,27 +154,15 @@ def variables(fields: list[Field]) -> list[Variable]:
     """
     inputs = [f for f in fields if f.causality == "input"]
     parameters = tuple(name for f in fields if f.causality == "parameter" for name in f.names)
-    return [
-        Variable(
-            name,
-            f.kind,
-            f.causality,
-            f.unit,
-            start,
-            f.variability,
-            f.limits,
-            f.description,
-            f.nominal,
-            dependencies=_chosen(inputs, f.feedthrough, index),
-            initial_dependencies=(
-                *_chosen(inputs, f.initial_feedthrough, index),
-                *(parameters if f.causality == "output" else ()),
-            ),
-            enumeration=f.enumeration,
-        )
-        for f in fields
-        for index, (name, start) in enumerate(zip(f.names, f.starts, strict=True))
-    ]
+    found = []
+    for f in fields:
+        always = parameters if f.causality == "output" else ()
+        for index, (name, start) in enumerate(zip(f.names, f.starts, strict=True)):
+            now = _chosen(inputs, f.feedthrough, index)
+            initially = *_chosen(inputs, f.initial_feedthrough, index), *always
+            about = f.variability, f.limits, f.description, f.nominal, False, now, initially
+            found.append(Variable(name, f.kind, f.causality, f.unit, start, *about, f.enumeration))
+    return found
 
 
 def _chosen(inputs: list[Field], sources: frozenset[str], index: int) -> tuple[str, ...]:
@@ -150,26 +192,25 @@ def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
 
     Compiled for the shape of the block, as NamedTuple compiles its constructor: it runs every step.
     """
-    parts = []
-    places = count()
-    for f in fields:
-        if f.causality == "input":
-            items = ", ".join(f"v[{next(places)}]" for _ in f.names)
-            parts.append(items if f.size is None else f"({items},)")
-    items = "".join(f"{part}, " for part in parts)
+    items, _ = _shape(fields, "input", "v[{}]")
     return _compiled(f"(v): return new(cls, ({items}))", new=tuple.__new__, cls=cls)
 
 
 def unpacker(fields: list[Field]) -> Callable[[Any], list[Any]]:
     """A function from Outputs to the list of their scalars, compiled like packer()."""
-    parts: list[str] = []
-    items: list[str] = []
+    items, scalars = _shape(fields, "output", "y{}")
+    return _compiled(f"(y): ({items}) = y; return [{scalars}]")
+
+
+def _shape(fields: list[Field], causality: Causality, name: str) -> tuple[str, str]:
+    """Names for the scalars of a causality, numbered: in the shape of the fields, and in a row."""
+    items, number = "", count()
     for f in fields:
-        if f.causality == "output":
-            own = [f"y{len(items) + i}, " for i in range(len(f.names))]
-            parts.append(own[0] if f.size is None else f"({''.join(own)}), ")
-            items += own
-    return _compiled(f"(y): ({''.join(parts)}) = y; return [{''.join(items)}]")
+        if f.causality != causality:
+            continue
+        own = "".join(f"{name.format(next(number))}, " for _ in f.names)
+        items += own if f.size is None else f"({own}), "
+    return items, "".join(f"{name.format(i)}, " for i in range(next(number)))
 
 
 def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
@@ -188,16 +229,14 @@ def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
 
 
 def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], Any]) -> Any:
-    hints = _types(cls)  # type: ignore[arg-type]  # any type can be hashed
-    fields = {}
-    for name in cls.__dataclass_fields__:
-        kind, at = hints[name], (*path, name)
-        if is_dataclass(kind):
-            fields[name] = _build(hints[name], at, values)
-        elif isinstance(kind, type) and issubclass(kind, IntEnum):
-            fields[name] = kind(values[at])
+    fields: dict[str, Any] = {}
+    for name, kind in _types(cls).items():  # type: ignore[arg-type]  # any type can be hashed
+        at = (*path, name)
+        if hasattr(kind, "__dataclass_fields__"):
+            fields[name] = _build(kind, at, values)
         else:
-            fields[name] = values[at]
+            is_enum = isinstance(kind, type) and issubclass(kind, IntEnum)
+            fields[name] = kind(values[at]) if is_enum else values[at]
     return cls(**fields)
 
 
@@ -236,9 +275,10 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
 
 def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -> Field:
     name, valid = ".".join(path), DECLARATIONS[causality]
-    base, declared = get_args(hint)[:2] if get_origin(hint) is Annotated else (hint, None)
+    declared = getattr(hint, "__metadata__", (None,))[0]
     if not isinstance(declared, valid):
         raise TypeError(f'{name}: must be Annotated[type, {valid.__name__}("meaning", unit=...)]')
+    base = get_args(hint)[0]
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = _kind(name, causality, base)
     limits = enumeration = nominal = None
@@ -254,9 +294,8 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
         nominal = float(declared.nominal)
     if isinstance(declared, Output):
         if declared.depends_on is None:
-            raise TypeError(
-                f"{name}: must have the inputs that reach it without a step, depends_on={{...}}"
-            )
+            must = "must have the inputs that reach it without a step, depends_on={...}"
+            raise TypeError(f"{name}: {must}")
         now = initially = frozenset(declared.depends_on)
         if declared.depends_initially_on is not None:
             initially = frozenset(declared.depends_initially_on)
@@ -266,5 +305,5 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
         limits, kind, start = (min(kind), max(kind)), int, int(start)
     meant = declared.unit, declared.description
     tunable = isinstance(declared, Parameter) and declared.tunable
-    kept = path, causality, kind
-    return Field(*kept, size, *meant, limits, tunable, nominal, now, initially, start, enumeration)
+    kept = path, causality, kind, size, *meant, limits, tunable, nominal
+    return Field(*kept, now, initially, start, enumeration)

@@ -7,8 +7,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from .contract import Block, Field, build_params, declared, packer, unpacker, variables
-from .variable import Variable
+from .contract import Block, Field, Variable, build_params, declared, packer, unpacker, variables
 
 STEP_SIZE = 1.0 / 256.0
 STEPS = 768

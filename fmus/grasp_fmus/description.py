@@ -10,12 +10,12 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from c_compilers import BITS, LIBM
 from si_units import BASE, Unit, known_unit
 
-from .variable import Enumeration, Scalar, Variable
+from .contract import Scalar, Variable
 
 Version = Literal[2, 3]
 """Of FMI."""
 
-TYPES: dict[type[Scalar], str] = {float: "Float64", bool: "Boolean", int: "Int32", str: "String"}
+TYPES: dict[type[Scalar], str] = {float: "Float64", bool: "Boolean", int: "Int32"}
 """What FMI 3.0 calls a kind of variable."""
 
 OPTIONS = " ".join((*BITS, *(f"-fno-builtin-{function}" for function in LIBM)))
@@ -60,11 +60,6 @@ class Description:
     statuses: Sequence[int] = (DISCARD, ERROR)
     """The statuses that are logged with messages."""
 
-    @property
-    def enumerations(self) -> list[Enumeration]:
-        """The types of the variables that are whole numbers with names."""
-        return list(dict.fromkeys(v.enumeration for v in self.variables if v.enumeration))
-
 
 def model_description(
     d: Description, guid: str, fmi: Version = 2, *, native: bool = False
@@ -74,6 +69,7 @@ def model_description(
     In FMI 3.0, which only native ones have, `guid` is the token, and the last variable is the time.
     """
     structured = all(_STRUCTURED.fullmatch(v.name) for v in d.variables)
+    tool = "grasp-cosim" if native else f"grasp-cosim with pythonfmu {version('pythonfmu')}"
     root = Element(
         "fmiModelDescription",
         {
@@ -83,18 +79,21 @@ def model_description(
             "description": d.summary,
             "version": version(),
             "license": "MIT",
-            "generationTool": _tool(native),
+            "generationTool": tool,
             "variableNamingConvention": "structured" if structured else "flat",
+            **({"numberOfEventIndicators": "0"} if fmi == 2 else {}),
         },
     )
-    if fmi == 2:
-        root.set("numberOfEventIndicators", "0")
-        _add_interface_2(root, d, native)
-    else:
-        _add_interface_3(root, d)
+    _add_interface(root, d, fmi, native)
     _add_units(root, d, *(("s",) if fmi == 3 else ()))
     _add_enumerations(root, d, fmi)
-    _add_log_and_experiment(root, d, native)
+    if native:  # pythonfmu logs without categories, which a host must not leave out
+        categories = SubElement(root, "LogCategories")
+        for status in d.statuses:
+            SubElement(categories, "Category", name=CATEGORIES[status])
+    times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
+    if experiment := {key: repr(time) for key, time in times if time is not None}:
+        SubElement(root, "DefaultExperiment", experiment)
     variables = SubElement(root, "ModelVariables")
     for reference, v in enumerate(d.variables):
         _add_variable(variables, v, reference, DISPLAY if d.units is None else {}, fmi)
@@ -111,18 +110,15 @@ def build_description(name: str, networked: bool = False) -> bytes:
     hosts that read a single one take the first, which links everywhere else.
     """
     root = Element("fmiBuildDescription", fmiVersion="3.0")
-    _add_configuration(root, name, modelIdentifier=name)
-    if networked:
-        windows = _add_configuration(root, name, modelIdentifier=name, platform="x86_64-windows")
-        SubElement(windows, "Library", name="ws2_32", description="the sockets of Windows")
+    for only in ({}, {"platform": "x86_64-windows"}) if networked else ({},):
+        of = {"modelIdentifier": name, **only}
+        configuration = SubElement(root, "BuildConfiguration", of)
+        files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions=OPTIONS)
+        SubElement(files, "SourceFile", name=f"{name}.c")
+        if only:
+            sockets = {"name": "ws2_32", "description": "the sockets of Windows"}
+            SubElement(configuration, "Library", sockets)
     return _document(root)
-
-
-def _add_configuration(root: Element, name: str, **attributes: str) -> Element:
-    configuration = SubElement(root, "BuildConfiguration", attributes)
-    files = SubElement(configuration, "SourceFileSet", language="C99", compilerOptions=OPTIONS)
-    SubElement(files, "SourceFile", name=f"{name}.c")
-    return configuration
 
 
 def version(distribution: str = "grasp-cosim") -> str:
@@ -132,10 +128,6 @@ def version(distribution: str = "grasp-cosim") -> str:
     return metadata.version(distribution)
 
 
-def _tool(native: bool) -> str:
-    return "grasp-cosim" if native else f"grasp-cosim with pythonfmu {version('pythonfmu')}"
-
-
 def _document(root: Element) -> bytes:
     indent(root)
     text: bytes = tostring(root, "UTF-8", xml_declaration=True)
@@ -143,52 +135,22 @@ def _document(root: Element) -> bytes:
 
 
 def _literal(value: Scalar) -> str:
-    """Return a value as it stands in an attribute."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-# What an FMU can do
-
-
-def _add_interface_2(root: Element, d: Description, native: bool) -> None:
-    interface = SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=d.name,
-        needsExecutionTool=_literal(not native),
-        canHandleVariableCommunicationStepSize=_literal(d.can_vary_step),
-        canNotUseMemoryManagementFunctions=_literal(not native),
-        canGetAndSetFMUstate=_literal(d.has_states),
-        canSerializeFMUstate=_literal(d.has_states),
-    )
+def _add_interface(root: Element, d: Description, fmi: Version, native: bool) -> None:
+    steps = {"canHandleVariableCommunicationStepSize": _literal(d.can_vary_step)}
+    state = "FMUstate" if fmi == 2 else "FMUState"
+    states = {f"{can}{state}": _literal(d.has_states) for can in ("canGetAndSet", "canSerialize")}
+    if fmi == 3:
+        SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **states, **steps})
+        return
+    tool = {"needsExecutionTool": _literal(not native)}
+    memory = {"canNotUseMemoryManagementFunctions": _literal(not native)}
+    attributes = {"modelIdentifier": d.name, **tool, **steps, **memory, **states}
+    interface = SubElement(root, "CoSimulation", attributes)
     if native:
         SubElement(SubElement(interface, "SourceFiles"), "File", name=f"{d.name}.c")
-
-
-def _add_interface_3(root: Element, d: Description) -> None:
-    SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=d.name,
-        canGetAndSetFMUState=_literal(d.has_states),
-        canSerializeFMUState=_literal(d.has_states),
-        canHandleVariableCommunicationStepSize=_literal(d.can_vary_step),
-    )
-
-
-def _add_log_and_experiment(root: Element, d: Description, native: bool) -> None:
-    """Add the categories of messages; pythonfmu logs without, which a host must not leave out."""
-    if native:
-        categories = SubElement(root, "LogCategories")
-        for status in d.statuses:
-            SubElement(categories, "Category", name=CATEGORIES[status])
-    times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
-    experiment = {key: repr(time) for key, time in times if time is not None}
-    if experiment:
-        SubElement(root, "DefaultExperiment", experiment)
-
-
-# Units and types
 
 
 def _add_units(root: Element, d: Description, *more: str) -> None:
@@ -212,49 +174,43 @@ def _add_units(root: Element, d: Description, *more: str) -> None:
 
 
 def _add_enumerations(root: Element, d: Description, fmi: Version) -> None:
-    if not d.enumerations:
-        return
-    definitions = SubElement(root, "TypeDefinitions")
-    for enumeration in d.enumerations:
-        if fmi == 2:
-            simple = SubElement(definitions, "SimpleType", name=enumeration.name)
-            items = SubElement(simple, "Enumeration")
-        else:
-            items = SubElement(definitions, "EnumerationType", name=enumeration.name)
+    enumerations = dict.fromkeys(v.enumeration for v in d.variables if v.enumeration)
+    definitions = SubElement(root, "TypeDefinitions") if enumerations else root
+    for enumeration in enumerations:
+        tag = "SimpleType" if fmi == 2 else "EnumerationType"
+        items = SubElement(definitions, tag, name=enumeration.name)
+        items = SubElement(items, "Enumeration") if fmi == 2 else items
         for name, number in enumeration.items:
             SubElement(items, "Item", name=name, value=str(number))
-
-
-# Variables
 
 
 def _add_variable(
     parent: Element, v: Variable, reference: int, display: Mapping[str, str], fmi: Version
 ) -> None:
-    role, values = _role(v, reference), _values(v, display)
+    role = {"name": v.name, "valueReference": str(reference)}
+    role |= {"causality": v.causality, "variability": v.variability}
+    role |= {"description": v.description} if v.description else {}
+    role |= {"initial": _initial(v)} if v.causality != "input" else {}
+    values = {"declaredType": v.enumeration.name} if v.enumeration else {}
+    if v.kind is float and v.unit:
+        values["unit"] = v.unit
+        values |= {"displayUnit": display[v.unit]} if v.unit in display else {}
+    if v.relative:
+        values["relativeQuantity"] = "true"
+    if v.kind in (float, int) and v.limits:
+        limits = zip(("min", "max"), v.limits, strict=True)
+        values |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
+    if v.nominal is not None:
+        values["nominal"] = repr(v.nominal)
+    if v.start is not None:
+        values["start"] = _literal(float(v.start) if v.kind is float else v.start)
     if fmi == 2:
         SubElement(SubElement(parent, "ScalarVariable", role), v.type, values)
-        return
-    start = values.pop("start", None) if v.kind is str else None
-    kind = "Enumeration" if v.enumeration else TYPES[v.kind]
-    element = SubElement(parent, kind, {**role, **values})
-    if start is not None:
-        SubElement(element, "Start", value=start)
-
-
-def _role(v: Variable, reference: int) -> dict[str, str]:
-    """Return the attributes of a variable that say what it is for."""
-    found = {
-        "name": v.name,
-        "valueReference": str(reference),
-        "causality": v.causality,
-        "variability": v.variability,
-    }
-    if v.description:
-        found["description"] = v.description
-    if v.causality != "input":
-        found["initial"] = _initial(v)
-    return found
+    elif v.kind is str:
+        SubElement(SubElement(parent, "String", role), "Start", value=values["start"])
+    else:
+        kind = "Enumeration" if v.enumeration else TYPES[v.kind]
+        SubElement(parent, kind, role | values)
 
 
 def _initial(v: Variable) -> str:
@@ -263,42 +219,12 @@ def _initial(v: Variable) -> str:
     return "calculated" if v.start is None else "approx"
 
 
-def _values(v: Variable, display: Mapping[str, str]) -> dict[str, str]:
-    """Return the attributes of a variable that say what values it has."""
-    found: dict[str, str] = {}
-    if v.enumeration:
-        found["declaredType"] = v.enumeration.name
-    if v.kind is float and v.unit:
-        found["unit"] = v.unit
-        if v.unit in display:
-            found["displayUnit"] = display[v.unit]
-    if v.relative:
-        found["relativeQuantity"] = "true"
-    if v.kind in (float, int) and v.limits:
-        limits = zip(("min", "max"), v.limits, strict=True)
-        found |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
-    if v.nominal is not None:
-        found["nominal"] = repr(v.nominal)
-    if v.start is not None:
-        found["start"] = _literal(float(v.start) if v.kind is float else v.start)
-    return found
-
-
 def _time(d: Description) -> dict[str, str]:
     name = "time"
     while name in {v.name for v in d.variables}:
         name += "_"
-    return {
-        "name": name,
-        "valueReference": str(len(d.variables)),
-        "causality": "independent",
-        "variability": "continuous",
-        "description": "t",
-        "unit": "s",
-    }
-
-
-# What depends on what
+    found = {"name": name, "valueReference": str(len(d.variables)), "causality": "independent"}
+    return {**found, "variability": "continuous", "description": "t", "unit": "s"}
 
 
 def _add_structure(root: Element, variables: Sequence[Variable], fmi: Version) -> None:

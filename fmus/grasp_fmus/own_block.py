@@ -17,13 +17,11 @@ from typing import Any
 
 from si_units import refusal
 
-from .cards import variable_tables
-from .contract import declared, longest_step, unpacker, variables
+from .contract import Variable, declared, longest_step, unpacker, variables
 from .description import Description
 from .package import HASH, IMPORT, Model, script
-from .page import BEGIN
+from .page import BEGIN, variable_tables
 from .shipped import FEWEST, MOST, PACKAGES, SHIPPED, of_fingers
-from .variable import Variable
 
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
 """What a block has."""

@@ -15,13 +15,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from one_piece import in_one_piece
 
-from .shipped import block_of, found, sized_source
+from .shipped import block_of, card_file, found, package_folder, sized_source
 
 if TYPE_CHECKING:
     from .description import Description
@@ -186,20 +185,6 @@ def with_imports(sources: Mapping[str, bytes]) -> dict[str, bytes]:
                     found[name] = file.read_bytes()
                     waiting.append(name)
     return found
-
-
-def package_folder(package: str) -> Path:
-    """Return the folder of a package, which is not imported for that; ImportError without one."""
-    spec = find_spec(package)
-    if spec is None or spec.origin is None:
-        raise ImportError(f"{package}: no such package; must be installed")
-    return Path(spec.origin).parent
-
-
-def card_file(package: str) -> Path:
-    """Return the equation card of a package: in it once it is installed, in the sources beside."""
-    inside = package_folder(package) / "README.md"
-    return inside if inside.exists() else inside.parents[1] / "README.md"
 
 
 @cache

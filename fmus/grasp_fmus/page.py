@@ -1,9 +1,10 @@
 """Makes what an FMU holds for its reader: documentation/index.html, the licences, the icon.
 
-A page is Markdown, the card and then the sections that follow here; its frame is page.html.in.
+A page is Markdown, the card and then the sections that follow here; its frame is page.html.in. The
+tables of variables in the cards are made here as well: `make cards` brings them up to date.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from html import escape
 from itertools import cycle
@@ -12,13 +13,15 @@ from re import MULTILINE, search, sub
 from string import Template
 from typing import Any
 
+from .contract import Block, Field, declared
 from .description import version
+from .shipped import blocks, card_file
 
 ICONS = Path(__file__).parent / "icons"
 FRAME = Path(__file__).with_name("page.html.in")
 
-BEGIN = "<!-- variables -->\n"
-"""In a card, before the tables of the variables."""
+BEGIN, END = "<!-- variables -->\n", "<!-- end of variables -->\n"
+"""In a card, around the tables of the variables."""
 
 PYTHON = """\
 ## What the host needs
@@ -189,3 +192,99 @@ def _equation(tokens: Sequence[Any], index: int, *_: object) -> str:
     math = sub(' xmlns="[^"]*"', "", convert(sub(tag, "", tokens[index].content), display="block"))
     number = f"<span>({escape(said[1])})</span>" if said else ""
     return f'<div class="equation"><div>{math}</div>{number}</div>\n'
+
+
+# The tables of variables in the cards
+
+
+def updated(card: str, blocks: Mapping[str, Block]) -> str:
+    """The text of the card of these blocks, by name, with its variables up to date.
+
+    ValueError without the marks.
+    """
+    before, begin, rest = card.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"a card must have {BEGIN.strip()} and {END.strip()} around its table")
+    return f"{before}{BEGIN}{variable_tables(blocks)}{END}{after}"
+
+
+def variable_tables(blocks: Mapping[str, Block]) -> str:
+    """The variables of a block as a Markdown table; of several, what all have, then what each adds.
+
+    The blocks are given by name. Those of a hand follow by themselves.
+    """
+    rows = {name: [_row(f) for f in declared(block)] for name, block in blocks.items()}
+    if len(rows) == 1:
+        return _table(*rows.values())
+    hands = {name: own for name, own in rows.items() if name.startswith("hand")}
+    others = {name: own for name, own in rows.items() if name not in hands}
+    parts = _parts("all have", others)
+    if hands:
+        parts |= _parts("all of a hand of three fingers have", hands)
+    return "\n".join(_tables(parts))
+
+
+def _parts(title: str, rows: Mapping[str, list[str]]) -> dict[str, list[str]]:
+    """What all have, and what each adds, by a title."""
+    first, *others = rows.values()
+    common = [row for row in first if all(row in other for other in others)]
+    added = {f"`{name}` adds": [r for r in own if r not in common] for name, own in rows.items()}
+    return {title: common, **{name: own for name, own in added.items() if own}}
+
+
+def _tables(parts: Mapping[str, list[str]]) -> Iterator[str]:
+    """Each part under its title; a row that stood before is named there, and not shown again."""
+    seen: set[str] = set()
+    for title, rows in parts.items():
+        fresh = [row for row in rows if row not in seen]
+        names = (row.split("`")[1].partition("[")[0] for row in rows if row in seen)
+        groups = dict.fromkeys(
+            f"`{name.partition('.')[0]}{'.*' if '.' in name else ''}`" for name in names
+        )
+        again = f", besides {', '.join(groups)} as above" if groups else ""
+        yield f"What {title}{again}:\n\n{_table(fresh)}" if fresh else f"What {title}{again}.\n"
+        seen |= {*rows}
+
+
+def _table(rows: list[str]) -> str:
+    head = "| variable | causality | unit | start | range | feedthrough of | meaning |"
+    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
+
+
+def _row(f: Field) -> str:
+    name = ".".join(f.path) + (f"[1..{f.size}]" if f.size else "")
+    tunable = "tunable " if f.tunable else ""
+    limits = f"{f.limits[0]:g} to {f.limits[1]:g}" if f.limits else ""
+    items = {}
+    if f.enumeration:
+        items = {number: item for item, number in f.enumeration.items}
+        limits = ", ".join(items.values())
+    starts = ["" if s is None else items.get(s, str(s).lower()) for s in f.starts]
+    start = starts[0] if len(set(starts)) == 1 else ", ".join(starts)
+    reached_by = ", ".join(f"`{source}`" for source in sorted(f.feedthrough))
+    if f.causality == "output" and not reached_by:
+        reached_by = "none"
+    return (
+        f"| `{name}` | {tunable}{f.causality} | {f.unit} "
+        f"| {start} | {limits} | {reached_by} | {f.description} |"
+    )
+
+
+def blocks_by_card() -> dict[Path, dict[str, Block]]:
+    """Return the blocks that have a script, by the names of their modules, card by card."""
+    cards: dict[Path, dict[str, Block]] = {}
+    for block in blocks().values():
+        package, _, name = block.__name__.partition(".")
+        cards.setdefault(card_file(package), {})[name] = block
+    return cards
+
+
+def main() -> None:
+    """Bring the cards up to date."""
+    for card, described in blocks_by_card().items():
+        card.write_text(updated(card.read_text("utf-8"), described), "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple, get_args, get_type_hint
 
 from si_units import BASE, Unit
 
+from .contract import TYPES, Scalar, Variable
 from .description import ERROR, WARNING, Description, Experiment, Version
-from .link.message import PORT
-from .link.signature import LinkVariable, Signature
-from .variable import TYPES, Scalar, Variable
+from .link.message import PORT, LinkVariable, Signature
 
 if TYPE_CHECKING:
     from .build import Plan

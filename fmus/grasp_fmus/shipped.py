@@ -157,6 +157,17 @@ def _origin(module: str) -> str:
     return spec.origin
 
 
+def package_folder(package: str) -> Path:
+    """Return the folder of a package, which is not imported for that; ImportError without one."""
+    return Path(_origin(package)).parent
+
+
+def card_file(package: str) -> Path:
+    """Return the equation card of a package: in it once it is installed, in the sources beside."""
+    inside = package_folder(package) / "README.md"
+    return inside if inside.exists() else inside.parents[1] / "README.md"
+
+
 def blocks() -> dict[str, Any]:
     """Return the blocks, which are modules, by the names of their FMUs."""
     return {name: block_of(name) for name in SHIPPED}

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, NoReturn, TypeVar, cast
 from weakref import ref
 
 from . import contract
-from .variable import TYPES, Scalar, Variable
+from .contract import TYPES, Scalar, Variable
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
 PHASES = "before initialisation", "in initialisation mode", "in step mode", "after fmi2Terminate"

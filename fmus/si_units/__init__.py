@@ -94,13 +94,6 @@ _SIGNS = {
 }  # fmt: skip
 """Signs and how the names above have them; two are of the ohm, one is a Greek mu."""
 
-_WORDS = {
-    "gram": "g", "metre": "m", "meter": "m", "second": "s", "ampere": "A", "kelvin": "K",
-    "radian": "rad", "hertz": "Hz", "newton": "N", "pascal": "Pa", "joule": "J", "watt": "W",
-    "volt": "V", "ohm": "Ohm", "degree": "deg", "percent": "%", "minute": "min", "hour": "h",
-}  # fmt: skip
-_MULTIPLES = {"": "", "kilo": "k", "centi": "c", "milli": "m", "micro": "u", "mega": "M"}
-
 _FACTOR = re.compile(r"(1|-|[^\d\s.*·/^()+-]+)(?:(?<![1-])\^?([+-]?\d))?")
 _PRODUCT = re.compile("[.*·]")
 _UNIT = re.compile(r"([^/()]+)(?:/(?:([^/()]+)|\(([^/()]+)\)))?")
@@ -125,8 +118,7 @@ def known_unit(name: str) -> Unit | None:
         return None  # N/m.s: as (m.s) or as .s, which is not said
     factors = [(text, 1) for text in _PRODUCT.split(above)]
     factors += [(text, -1) for text in _PRODUCT.split(below)] if below else []
-    scale, ten, exponents = 1.0, 0, [0] * len(BASE)
-    offset = 0.0
+    scale, offset, ten, exponents = 1.0, 0.0, 0, [0] * len(BASE)
     for text, sign in factors:
         found = _symbol(text)
         if found is None:
@@ -152,20 +144,10 @@ def refusal(name: str) -> str:
     """Why a name is no unit, and which may be meant; empty for one that is, also for V.m^n."""
     if known_unit(re.sub(r"\^[A-Za-z]\w*", "", name)):  # an exponent that is a parameter
         return ""
-    spelt = re.sub("[A-Za-z]+", lambda word: _short(word[0]), name).replace(" ", ".")
     dotted = (f"{name[:i]}.{name[i:]}" for i in range(1, len(name)))
-    meant = next((unit for unit in (*dotted, spelt) if known_unit(unit)), None)
+    meant = next((unit for unit in (*dotted, *spelt_like(name, ())) if known_unit(unit)), None)
     fix = f"did you mean {meant}?" if meant else "must be one like N, kg, m/s2, N.s/m"
     return f"unit {name!r} is not known; {fix}"
-
-
-def _short(word: str) -> str:
-    """The symbol of a unit that is written out, or in other capitals; else the word."""
-    plain = word.lower().removesuffix("s")
-    for more, prefix in _MULTIPLES.items():
-        if plain.startswith(more) and plain[len(more) :] in _WORDS:
-            return prefix + _WORDS[plain[len(more) :]]
-    return word if known_unit(word) else next(iter(spelt_like(word, ())), word)
 
 
 def _symbol(text: str) -> tuple[tuple[float, float, int, dict[str, int]], int] | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import grasp_cosim
 import pytest
-from grasp_fmus.cards import blocks_by_card, updated
+from grasp_fmus.page import blocks_by_card, updated
 from grasp_fmus.shipped import SHIPPED
 
 ROOT = Path(__file__).parents[2]

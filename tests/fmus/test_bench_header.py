@@ -31,11 +31,12 @@ from grasp_fmus.link.message import (
     VERSION,
     WELCOME,
     Codec,
+    LinkVariable,
     Message,
     Sealer,
+    Signature,
 )
 from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
-from grasp_fmus.link.signature import LinkVariable, Signature
 from grasp_fmus.native.bench_header import bench_header, c_prefix
 from grasp_fmus.native.c_only import write_c
 from grasp_fmus.package import shipped_model

@@ -11,9 +11,9 @@ import pytest
 from grasp_fmus import build as builds
 from grasp_fmus.build import build, build_block, build_native, planned, sources_key
 from grasp_fmus.native.targets import here
-from grasp_fmus.package import HASH, Built, package_folder
+from grasp_fmus.package import HASH, Built
 from grasp_fmus.page import icon
-from grasp_fmus.shipped import SHIPPED
+from grasp_fmus.shipped import SHIPPED, package_folder
 from support.fmi2 import read_members
 from support.kinds import OWN, TRANSLATED
 from support.marks import slow

@@ -8,13 +8,13 @@ from typing import Annotated, NamedTuple
 import pytest
 from block_variables import Input, Output, Parameter
 from grasp_fmus.contract import (
+    Enumeration,
     build_params,
     declared,
     packer,
     unpacker,
     variables,
 )
-from grasp_fmus.variable import Enumeration
 
 Pair = tuple[float, float]
 

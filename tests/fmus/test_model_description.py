@@ -15,10 +15,9 @@ from xml.etree.ElementTree import fromstring
 import fmpy
 import pytest
 from fmpy.validation import validate_fmu
-from grasp_fmus.contract import declared, variables
+from grasp_fmus.contract import Variable, declared, variables
 from grasp_fmus.description import Description, build_description, model_description
 from grasp_fmus.shipped import blocks
-from grasp_fmus.variable import Variable
 from lxml import etree  # type: ignore[import-untyped]
 from support.fmi2 import OK, Instance
 from support.kinds import TRANSLATED, all_kinds

@@ -4,8 +4,8 @@ import math
 from xml.etree.ElementTree import fromstring
 
 import pytest
+from grasp_fmus.contract import Variable
 from grasp_fmus.description import Description, model_description
-from grasp_fmus.variable import Variable
 from hypothesis import given
 from hypothesis import strategies as st
 from si_units import BASE, known_unit, refusal
@@ -99,19 +99,7 @@ def test_a_unit_is_not_refused(name):
 
 @pytest.mark.parametrize(
     ("name", "meant"),
-    [
-        ("newtons", "N"),
-        ("Newton", "N"),
-        ("kilograms", "kg"),
-        ("millimetre", "mm"),
-        ("metres/second", "m/s"),
-        ("newton metres", "N.m"),
-        ("Nm", "N.m"),
-        ("Volts", "V"),
-        ("KG", "kg"),
-        ("hertz", "Hz"),
-        ("kiloohm", "kOhm"),
-    ],
+    [("n", "N"), ("Nm", "N.m"), ("hz", "Hz"), ("KG", "kg")],
 )
 def test_what_is_meant_is_asked(name, meant):
     assert refusal(name) == f"unit {name!r} is not known; did you mean {meant}?"

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from itertools import count
 from threading import Thread
 
+from grasp_fmus.contract import Variable
 from grasp_fmus.link.message import (
     BUSY,
     END,
@@ -27,7 +28,6 @@ from grasp_fmus.link.message import (
     Sealer,
 )
 from grasp_fmus.proxy import shared_signature
-from grasp_fmus.variable import Variable
 
 Act = Callable[["ScriptedPeer", Message], None]
 

@@ -1,15 +1,93 @@
-"""Packs and opens datagrams: a header of 80 bytes, a body, 32 of HMAC-SHA256 if a key is shared."""
+"""The variables that a proxy and its peer exchange, and the datagrams that carry them.
+
+A datagram is a header of 80 bytes, a body, and 32 of HMAC-SHA256 if a key is shared.
+"""
 
 import hmac
 import os
 import stat
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from io import StringIO
+from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from .signature import HASH_SIZE, LinkVariable, Signature
+Kind = Literal["Real", "Integer", "Boolean"]
+Causality = Literal["input", "parameter", "output"]
+
+ORDER: tuple[Causality, ...] = ("input", "parameter", "output")
+"""Requests carry inputs, then parameters; answers carry outputs."""
+
+HASH_SIZE = 16
+
+
+class LinkVariable(NamedTuple):
+    """A variable as both sides must have it; `unit` is None where it has none."""
+
+    name: str
+    kind: Kind
+    causality: Causality
+    unit: str | None = None
+
+
+@dataclass(frozen=True)
+class Signature:
+    """The variables exchanged, in the order of the datagrams: inputs, parameters, outputs.
+
+    ValueError where a name has a character that the text cannot hold, or comes twice.
+    """
+
+    variables: tuple[LinkVariable, ...]
+
+    def __post_init__(self) -> None:
+        ordered = tuple(v for causality in ORDER for v in self.of(causality))
+        object.__setattr__(self, "variables", ordered)
+        seen = set()
+        for v in self.variables:
+            if set("\t\n\r\0") & set(f"{v.name}{v.unit or ''}"):
+                must = "must be without tabs and line ends"
+                raise ValueError(f"variable {v.name!r} [{v.unit}]: {must}")
+            if v.name in seen:
+                raise ValueError(f"variable {v.name!r}: appears twice; must have one name each")
+            seen.add(v.name)
+
+    @cached_property
+    def text(self) -> str:
+        """A line per variable: causality, kind, unit or -, and name, between tabs."""
+        lines = ((v.causality, v.kind, v.unit or "-", v.name) for v in self.variables)
+        return "".join("\t".join(line) + "\n" for line in lines)
+
+    @cached_property
+    def hash(self) -> bytes:
+        """The first 16 bytes of the SHA-256 of the text."""
+        return sha256(self.text.encode()).digest()[:HASH_SIZE]
+
+    @cached_property
+    def request(self) -> tuple[LinkVariable, ...]:
+        """The variables that a request carries: inputs, then parameters."""
+        return self.of("input") + self.of("parameter")
+
+    @cached_property
+    def answer(self) -> tuple[LinkVariable, ...]:
+        """The variables that an answer carries: outputs."""
+        return self.of("output")
+
+    def of(self, causality: Causality) -> tuple[LinkVariable, ...]:
+        """Return the variables of a causality, in order."""
+        return tuple(v for v in self.variables if v.causality == causality)
+
+    def difference(self, proxy: bytes) -> str:
+        """Return the first variable that is another one in a proxy's text, whatever that is."""
+        theirs = proxy.partition(b"\0")[0].decode(errors="replace")
+        pairs = zip_longest(StringIO(theirs), StringIO(self.text), fillvalue="no more")
+        first, own = next((pair for pair in pairs if pair[0] != pair[1]), ("no more", "no more"))
+        return f"the proxy has {first}, the peer {own}".replace("\t", " ").replace("\n", "")
+
 
 Value = float | int | bool | str
 """The value of a variable of FMI; texts are not exchanged."""
@@ -43,7 +121,12 @@ MALFORMED, FORGED = "malformed", "forged"
 
 _TEXT = frozenset((*b"\t\r\n", *range(0x20, 0x7F)))
 
-_CODES = {"Real": "d", "Integer": "q", "Boolean": "Q"}
+_KINDS: dict[str, tuple[str, type[Value], Callable[[Any], bool]]] = {
+    "Real": ("d", float, isfinite),
+    "Integer": ("q", int, lambda x: -(2**31) <= x < 2**31),
+    "Boolean": ("Q", bool, lambda x: x <= 1),
+}
+"""By the kind of a variable: its code for struct, its type in Python, and what values are valid."""
 
 
 class Message(NamedTuple):
@@ -100,12 +183,12 @@ class Codec:
     """Values of variables as a body: Real f64, Integer i64, Boolean u64."""
 
     def __init__(self, variables: Sequence[LinkVariable]) -> None:
-        self._struct = struct.Struct("<" + "".join(_CODES[v.kind] for v in variables))
+        kinds = [_KINDS[v.kind] for v in variables]
+        self._struct = struct.Struct("<" + "".join(code for code, *_ in kinds))
+        self._kinds = [kind for _, kind, _ in kinds]
+        self._valid = [valid for *_, valid in kinds]
         self.pack = self._struct.pack
         self.size = self._struct.size
-        self._reals = [i for i, v in enumerate(variables) if v.kind == "Real"]
-        self._integers = [i for i, v in enumerate(variables) if v.kind == "Integer"]
-        self._booleans = [i for i, v in enumerate(variables) if v.kind == "Boolean"]
 
     def unpack(self, body: bytes) -> list[Value] | None:
         """Return the values of a body; None where its size is wrong or a value is invalid.
@@ -114,18 +197,10 @@ class Codec:
         """
         if len(body) != self.size:
             return None
-        values = list(self._struct.unpack(body))
-        reals = [values[i] for i in self._reals]
-        if not isfinite(sum(reals)) and not all(map(isfinite, reals)):
+        values = self._struct.unpack(body)
+        if not all(valid(x) for valid, x in zip(self._valid, values, strict=True)):
             return None
-        for i in self._integers:
-            if not -(2**31) <= values[i] < 2**31:
-                return None
-        for i in self._booleans:
-            if values[i] > 1:
-                return None
-            values[i] = values[i] == 1
-        return values
+        return [kind(x) for kind, x in zip(self._kinds, values, strict=True)]
 
 
 def read_key(path: Path) -> bytes:
@@ -154,11 +229,12 @@ def exposed(path: Path) -> str:
 
 def check_size(signature: Signature) -> None:
     """ValueError where the variables do not fit into a datagram."""
-    numbers = {"a request": len(signature.request), "an answer": len(signature.answer)}
-    sizes = {name: 8 * n for name, n in numbers.items()} | {"a HELLO": len(signature.text.encode())}
-    for name, size in sizes.items():
+    bodies = {
+        "a request": (signature.request, 8 * len(signature.request)),
+        "an answer": (signature.answer, 8 * len(signature.answer)),
+        "a HELLO": (signature.variables, len(signature.text.encode())),
+    }
+    for name, (variables, size) in bodies.items():
         if (whole := HEAD.size + size + TAG_SIZE) > LARGEST:
-            n = numbers.get(name, len(signature.variables))
-            raise ValueError(
-                f"{name} with {n} variables has {whole} bytes: must be {LARGEST} at most"
-            )
+            said = f"{name} with {len(variables)} variables has {whole} bytes"
+            raise ValueError(f"{said}: must be {LARGEST} at most")

@@ -11,8 +11,7 @@ from secrets import token_bytes
 from typing import NamedTuple
 
 from . import message
-from .message import LARGEST, Codec, Message, Sealer, Value
-from .signature import Signature
+from .message import LARGEST, Codec, Message, Sealer, Signature, Value
 
 ALIVE = 1_000_000_000
 """ns since its last request for which a session keeps others away."""

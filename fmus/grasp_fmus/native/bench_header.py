@@ -14,9 +14,8 @@ from string import Template
 from typing import NamedTuple
 
 from ..link import message
-from ..link.message import Codec, Value, check_size
+from ..link.message import ORDER, Causality, Codec, LinkVariable, Signature, Value, check_size
 from ..link.peer import TOO_LONG
-from ..link.signature import ORDER, Causality, LinkVariable, Signature
 from .text import WORDS, string
 
 TEMPLATE = Path(__file__).with_name("link.h.in")

@@ -12,10 +12,9 @@ from string import Template
 
 from c_compilers import BITS, LIBM
 
-from ..link.message import Value
-from ..link.signature import ORDER, Causality, Kind, LinkVariable, Signature
+from ..contract import Scalar, Variable
+from ..link.message import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file
-from ..variable import Scalar, Variable
 from .bench_header import Group, Member, comment, members, structs
 from .blocks import translated
 

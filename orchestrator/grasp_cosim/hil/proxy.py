@@ -8,9 +8,8 @@ from math import isfinite, isinf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grasp_fmus.link.message import check_size, exposed, read_key
+from grasp_fmus.link.message import ORDER, LinkVariable, Signature, check_size, exposed, read_key
 from grasp_fmus.link.peer import ALIVE
-from grasp_fmus.link.signature import ORDER, LinkVariable, Signature
 
 from ..base.errors import InputError, SimulationError
 from ..base.files import check_file, write_text
@@ -20,10 +19,10 @@ from ..interface.read import read_interface
 from ..system.parts import NANOSECONDS
 
 if TYPE_CHECKING:
+    from grasp_fmus.contract import Variable as ProxyVariable
     from grasp_fmus.native.targets import Version
     from grasp_fmus.package import Built
     from grasp_fmus.proxy import Settings
-    from grasp_fmus.variable import Variable as ProxyVariable
 
 LONGEST_SILENCE = ALIVE / NANOSECONDS
 """s after which another proxy may take over a session."""
@@ -172,8 +171,8 @@ def _check_other(fmu: Path, out: Path) -> None:
 
 def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariable:
     """The variable in the proxy: an output follows inputs and parameters at the start only."""
-    from grasp_fmus.variable import Enumeration
-    from grasp_fmus.variable import Variable as ProxyVariable
+    from grasp_fmus.contract import Enumeration
+    from grasp_fmus.contract import Variable as ProxyVariable
 
     limits = (v.low, v.high)
     initially: tuple[str, ...] = ()

@@ -7,8 +7,7 @@ import struct
 
 import pytest
 from grasp_fmus.link import message
-from grasp_fmus.link.message import Codec, Message, Sealer, exposed, read_key
-from grasp_fmus.link.signature import LinkVariable
+from grasp_fmus.link.message import Codec, LinkVariable, Message, Sealer, exposed, read_key
 from hypothesis import given
 from hypothesis import strategies as st
 

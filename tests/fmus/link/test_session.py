@@ -19,11 +19,12 @@ from grasp_fmus.link.message import (
     TAG_SIZE,
     UNKNOWN,
     VERSION,
+    LinkVariable,
     Message,
     Sealer,
+    Signature,
 )
 from grasp_fmus.link.peer import ALIVE, TOO_LONG, Peer, Request
-from grasp_fmus.link.signature import LinkVariable, Signature
 from hypothesis import given
 from hypothesis import strategies as st
 from support.proxies import HandProxy, RefusedError

@@ -3,7 +3,7 @@
 from hashlib import sha256
 
 import pytest
-from grasp_fmus.link.signature import LinkVariable, Signature
+from grasp_fmus.link.message import LinkVariable, Signature
 
 GAP = LinkVariable("gap", "Real", "input", "m")
 GAIN = LinkVariable("gain", "Real", "parameter", "1")
