@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 from grasp_cosim import System
 from grasp_cosim.ssp.decisions import flow_order
+from grasp_cosim.system import validity
 from grasp_cosim.system.validity import transforms
 from hypothesis import given as drawn
 from hypothesis import strategies as st
@@ -255,7 +256,7 @@ CONNECTIONS = {
 }
 
 
-def bus(first, second, inline):
+def bus(first, second, inline, drawn=""):
     """The output through a dictionary, by one reference in and by another, in a system, out."""
     space = "http://ssp-standard.org/SSP1/SystemStructureSignalDictionary"
     entries = (
@@ -278,7 +279,7 @@ def bus(first, second, inline):
     lists = (
         f'<ssd:SignalDictionaries><ssd:SignalDictionary name="bus"{held}</ssd:SignalDictionaries>'
     )
-    top = system("top", elements, connect("a/y", "in/gap")).removesuffix("</ssd:System>")
+    top = system("top", elements, connect("a/y", "in/gap") + drawn).removesuffix("</ssd:System>")
     files = None if inline else {"resources/bus.ssb": entries}
     return of(f"{top}{lists}</ssd:System>", files, a=METRES, b=IN_METRES)
 
@@ -563,3 +564,11 @@ def test_a_thousand_are_ordered_at_once():
     names = [chr(0x4E00 + i) for i in range(5000)]
     chain = [f"{later}{earlier}" for earlier, later in pairwise(names)]
     assert ordered("".join(names), chain) == "".join(reversed(names))
+
+
+def test_the_place_of_a_connection_is_worked_out_for_errors_only(tmp_path, monkeypatch):
+    """It takes a look at all of them, and there may be thousands."""
+    ssd, fmus, *_ = pair()
+    path = archive(tmp_path, ssd, fmus)
+    monkeypatch.setattr(validity, "as_written", lambda _: pytest.fail("looked for a place"))
+    assert len(System.load(path).connections) == 1

@@ -111,6 +111,8 @@ STRUCTURES = {
     "a step of 0": stepped(osp("0")),
     "no entry": bus("inout gap; inout no", "inout gap", inline=True),
     "both give": bus("output gap", "output gap", inline=True),
+    "two sources of an entry": bus("input gap", "output gap", True, connect("a/y", "in/gap")),
+    "either way": bus("inout gap; inout on", "inout gap", True, connect("in/gap", "in/on")),
 }
 
 
