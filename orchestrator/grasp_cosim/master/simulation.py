@@ -316,11 +316,7 @@ class Session:
 
     def _early(self) -> tuple[str, ...]:
         """The lines of the log that are known before the first step."""
-        return (
-            *self._remarks,
-            *self._in_si.notes,
-            *self._master.log,
-        )
+        return (*self._remarks, *self._in_si.notes, *self._master.log)
 
     def _log(self) -> tuple[str, ...]:
         master = self._master

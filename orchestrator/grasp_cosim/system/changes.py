@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 from ..base.checks import as_table, check_keys, choice, integer, known, real, text
 from ..base.errors import InputError, choices, nearest
-from ..interface.interface import SETTABLE, Interface, Value, Variable
+from ..interface.interface import SETTABLE, Interface, Value
 from ..interface.read import describe
 from ..interface.units import IDENTITY
 from .arrays import with_given
@@ -67,7 +67,9 @@ def as_file(
     names = [component.name for component in system.components]
     for key, value in settings.items():
         if "." not in key:
-            near = nearest(key, _listed(system))
+            entries = [f"{section}.{e}" for section, found in PLACES.items() for e in found]
+            of = [(c.name, v) for c in system.components for v in c.interface.of(*SETTABLE)]
+            near = nearest(key, entries + [f"{name}.{v.name}" for name, v in of])
             raise InputError(f"{place(key)}: no place in a system file; {near}")
         *tables, name = _place(names, key, place(key))
         table = root
@@ -96,12 +98,6 @@ def _place(names: Collection[str], key: str, said: str) -> tuple[str, ...]:
         form = f"components.{name}.{entry}"
         raise InputError(f"{said}: must be {form}{'.NAME' if entry in TABLES else ''}")
     return (section, name, entry, last) if last else (section, name, entry)
-
-
-def _listed(system: Structure) -> list[str]:
-    """The places that are most like what a user means: variables, and the entries of sections."""
-    ports = [f"{c.name}.{v.name}" for c in system.components for v in c.interface.of(*SETTABLE)]
-    return [f"{section}.{entry}" for section, found in PLACES.items() for entry in found] + ports
 
 
 def plain(value: Any) -> Any:
@@ -206,7 +202,9 @@ def with_fmu(
         for name, value in was.values.items()
         if name not in given
     ]
-    if silent := [v.name for v in after.variables if _silent(v, before)]:
+    had = {v.name for v in before.variables if v.unit not in (None, "1")}
+    bare = [v.name for v in after.variables if v.kind == "Real" and not v.unit]
+    if silent := [name for name in bare if name in had]:
         LOGGER.error(
             "%s: %s tells no unit of %s, as %s does: taken to be in SI; `units` names others",
             place, new.fmu.name, choices(silent, 6), was.fmu.name,
@@ -229,14 +227,6 @@ def _check_items(was: Component, now: Component, variables: Sequence[str], place
                 f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
                 f"{choices(items[1])}"
             )
-
-
-def _silent(variable: Variable, before: Interface) -> bool:
-    """True for a Real without a unit that had one before."""
-    was = before.by_name.get(variable.name)
-    return bool(
-        variable.kind == "Real" and not variable.unit and was and was.unit not in (None, "1")
-    )
 
 
 def _check_ends(system: Structure, was: Component, after: Interface, place: str) -> None:

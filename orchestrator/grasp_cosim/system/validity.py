@@ -61,14 +61,10 @@ def check_connections(system: Structure) -> None:
     for connection in system.connections:
         place, source, target = _Place(system, connection), connection.source, connection.target
         connection_transform(system, connection)
-        if target.variable in system.component(target.component, "").values:
-            raise InputError(
-                f"{place}: {target} has two sources, the connection and a value; must have one"
-            )
-        if target in sources:
-            raise InputError(
-                f"{place}: {target} has two sources, {sources[target]} and {source}; must have one"
-            )
+        valued = target.variable in system.component(target.component, "").values
+        if valued or target in sources:
+            two = "the connection and a value" if valued else f"{sources[target]} and {source}"
+            raise InputError(f"{place}: {target} has two sources, {two}; must have one")
         sources[target] = source
     others = driven(system)
     missing = [
@@ -106,29 +102,21 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     given, taken = source.variable.unit, target.variable.unit
     if given is None or taken is None or given == taken:
         return 1.0, 0.0
-
-    def ends() -> str:
-        return f"{place}: {source.port} is in {given} and {target.port} in {taken}"
-
-    advice = (
+    units = source.interface.unit(source.variable), target.interface.unit(target.variable)
+    found = conversion(units[0], units[1]) if units[0] and units[1] else None
+    if None in units:
+        why = "which their FMUs do not define in SI units;"
+    elif found is None:
+        why = "which cannot be converted; must be the same quantity, or"
+    elif found.offset and source.variable.relative != target.variable.relative:
+        why = "and only one of them is a difference (relativeQuantity); must be both, or"
+    else:
+        return found.factor, 0.0 if target.variable.relative else found.offset
+    raise InputError(
+        f"{place}: {source.port} is in {given} and {target.port} in {taken}, {why} "
         f'{{ from = "{source.port}", to = "{target.port}", factor = ... }} '
         f"gives the factor from {given} to {taken}, and a component's units correct a wrong one"
     )
-    units = source.interface.unit(source.variable), target.interface.unit(target.variable)
-    if units[0] is None or units[1] is None:
-        raise InputError(f"{ends()}, which their FMUs do not define in SI units; {advice}")
-    found = conversion(units[0], units[1])
-    if found is None:
-        raise InputError(
-            f"{ends()}, which cannot be converted; must be the same quantity, or {advice}"
-        )
-    factor, offset = found
-    if offset and source.variable.relative != target.variable.relative:
-        raise InputError(
-            f"{ends()}, and only one of them is a difference (relativeQuantity); must be both, or "
-            f"{advice}"
-        )
-    return factor, 0.0 if target.variable.relative else offset
 
 
 def transforms(system: Structure) -> dict[Port, tuple[float, float]]:
