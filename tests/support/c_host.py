@@ -8,16 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree
-from zipfile import ZipFile
 
 import fmpy
 import numpy as np
 import numpy.typing as npt
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
-from grasp_fmus.native.targets import here
 from grasp_fmus.shipped import blocks
+
+from .fmi2 import Fmu
 
 SOURCE = Path(__file__).parents[1] / "fmus" / "native" / "hosts" / "host.c"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -43,63 +42,6 @@ BENCH = {
     "plant.initial_object_position": 0.02,
 }
 """Values that have every function of a block run, and all of libm's that they call."""
-
-
-# FMUs
-
-
-@dataclass(frozen=True)
-class Unpacked:
-    """An FMU, unpacked; nothing of it is loaded."""
-
-    folder: Path
-    name: str
-    token: str
-    fmi: int
-    kinds: Mapping[str, str]
-    """real, boolean or integer, by the name of a variable; the references are their positions."""
-    causalities: Mapping[str, str]
-
-    def reference(self, name):
-        return list(self.kinds).index(name)
-
-    def outputs(self):
-        return [name for name, causality in self.causalities.items() if causality == "output"]
-
-    def sources(self):
-        return {path.name: path.read_bytes() for path in (self.folder / "sources").iterdir()}
-
-    def binary(self, place=""):
-        """The library of a folder in binaries/, by default that of this machine."""
-        place = place or (here().folder if self.fmi == 2 else here().tuple)
-        (found,) = (self.folder / "binaries" / place).iterdir()
-        return found
-
-
-KINDS = {
-    "Real": "real", "Boolean": "boolean", "Integer": "integer", "Enumeration": "integer",
-    "Float64": "real", "Int32": "integer", "String": "string",
-}  # fmt: skip
-
-
-def unpacked(path, folder):
-    """Unpack an FMU, and read what a host needs to know."""
-    with ZipFile(path) as archive:
-        archive.extractall(folder)
-    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
-    fmi = int(root.attrib["fmiVersion"][0])
-    found = root.find("ModelVariables")
-    assert found is not None
-    rows = [(v, (v[0].tag if fmi == 2 else v.tag)) for v in found]
-    assert [int(v.attrib["valueReference"]) for v, _ in rows] == list(range(len(rows)))
-    return Unpacked(
-        folder,
-        root.attrib["modelName"],
-        root.attrib["guid" if fmi == 2 else "instantiationToken"],
-        fmi,
-        {v.attrib["name"]: KINDS[tag] for v, tag in rows},
-        {v.attrib["name"]: v.attrib["causality"] for v, _ in rows},
-    )
 
 
 # The host
@@ -185,7 +127,7 @@ class Script:
 class Part:
     """A component of the grasp: its FMU, and the library to load."""
 
-    fmu: Unpacked
+    fmu: Fmu
     library: Path
 
 
@@ -213,19 +155,19 @@ class Grasp:
         """Make the instances, connect them, and say what is recorded."""
         for component, part in self.parts.items():
             i, fmu = self.index[component], part.fmu
-            script.add("new", i, i, callbacks, component, fmu.token, resources)
+            script.add("new", i, i, callbacks, component, fmu.guid, resources)
         for source, output, target, name in CONNECTIONS:
             from_, to = self.parts[source].fmu, self.parts[target].fmu
             script.add(
-                "connect", self.index[target], to.reference(name), self.index[source],
-                from_.reference(output),
+                "connect", self.index[target], to.references[name], self.index[source],
+                from_.references[output],
             )  # fmt: skip
 
     def initialise(self, script):
         for name, value in self.values.items():
             component, _, variable = name.partition(".")
             fmu = self.parts[component].fmu
-            place = (self.index[component], fmu.kinds[variable], fmu.reference(variable))
+            place = (self.index[component], fmu.kinds[variable].lower(), fmu.references[variable])
             script.add("set", *place, bits(float(value)))
         for i in self.index.values():
             script.add("init", i, bits(0.0))
@@ -238,9 +180,12 @@ class Grasp:
     def record(self, script, rows):
         """Record from now on; first of all the outputs of now."""
         for component, part in self.parts.items():
-            for name in part.fmu.outputs():
+            for name in part.fmu.names("output"):
                 script.add(
-                    "record", self.index[component], part.fmu.kinds[name], part.fmu.reference(name)
+                    "record",
+                    self.index[component],
+                    part.fmu.kinds[name].lower(),
+                    part.fmu.references[name],
                 )
         script.add("rows", rows).add("row")
 
@@ -271,7 +216,9 @@ class Grasp:
 
     def columns(self):
         """The outputs in a row, as COMPONENT.VARIABLE."""
-        return [f"{c}.{name}" for c, part in self.parts.items() for name in part.fmu.outputs()]
+        return [
+            f"{c}.{name}" for c, part in self.parts.items() for name in part.fmu.names("output")
+        ]
 
 
 def good(answers):

@@ -4,6 +4,7 @@ import ctypes
 import platform
 import re
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import cached_property
 from math import sin
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -54,7 +55,7 @@ def read_members(fmu):
 
 
 class Fmu:
-    """An FMU, extracted into a folder and loaded."""
+    """An FMU, extracted into a folder, and loaded when it is first called."""
 
     def __init__(self, path, folder):
         with ZipFile(path) as archive:
@@ -82,9 +83,13 @@ class Fmu:
         self.booleans = {name for name, kind in self.kinds.items() if kind == "Boolean"}
         self.tunable = [v.get("name", "") for v in variables if v.get("variability") == "tunable"]
         self.binary = folder / "binaries" / HERE[self.fmi] / f"{self.name}.so"
-        self.library = ctypes.CDLL(str(self.binary))
+
+    @cached_property
+    def library(self):
+        found = ctypes.CDLL(str(self.binary))
         if self.fmi == 2:
-            self.library.fmi2Instantiate.restype = c_void_p
+            found.fmi2Instantiate.restype = c_void_p
+        return found
 
     def names(self, causality):
         """The variables of a causality."""

@@ -14,8 +14,9 @@ from c_compilers import Compiler, compile_all
 from grasp_fmus.build import compiler_for, job
 from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
 
-from .c_host import HEADERS, SOURCE, Host, Part, unpacked
+from .c_host import HEADERS, SOURCE, Host, Part
 from .compiled import compile_c
+from .fmi2 import Fmu
 from .marks import needs_zig, slow
 
 ZIG = ("zig",)
@@ -47,7 +48,8 @@ class Platform:
         library = folder / f"{fmu.name}{self.target.suffix}"
         if self.compiler == ZIG:
             zig = compiler_for(self.target, asked=True)
-            (made,) = compile_all([job(fmu.name, fmu.sources(), self.target, zig)], folder)
+            sources = {f.name: f.read_bytes() for f in (fmu.folder / "sources").iterdir()}
+            (made,) = compile_all([job(fmu.name, sources, self.target, zig)], folder)
             library.write_bytes(made.read_bytes())
             return library
         line = job(fmu.name, {}, self.target, Compiler(self.compiler)).command
@@ -152,10 +154,10 @@ def parts_of(folder_of, tmp_path_factory):
         if fmi not in known:
             folder = folder_of("native" if fmi == 2 else "native FMI 3")
             fmus = [
-                unpacked(path, tmp_path_factory.mktemp(path.stem))
+                Fmu(path, tmp_path_factory.mktemp(path.stem))
                 for path in sorted(folder.glob("*.fmu"))
             ]
-            known[fmi] = {fmu.name: Part(fmu, fmu.binary()) for fmu in fmus}
+            known[fmi] = {fmu.name: Part(fmu, fmu.binary) for fmu in fmus}
         return known[fmi]
 
     return parts

@@ -157,7 +157,7 @@ def test_where_a_decimal_point_is_a_comma(grasp, expected, host, tmp_path):
     grasp.initialise(script)
     grasp.record(script, tmp_path / "rows")
     script.add("loop", 0, STEPS, bits(H))
-    plant = grasp.parts["plant"].fmu.reference("object_width")
+    plant = grasp.parts["plant"].fmu.references["object_width"]
     script.add("step", 0, bits(9.25), bits(0.125)).add("set", 0, "real", plant, bits(0.5))
     (answers,) = host.run(script, folder=tmp_path, **environment)
     good(answers[:-2])

@@ -33,7 +33,7 @@ from grasp_fmus.native.targets import (
     Target,
     here,
 )
-from support.c_host import BENCH, Grasp, Host, Script, bits, good, number, rows_in_python, unpacked
+from support.c_host import BENCH, Grasp, Host, Script, bits, good, number, rows_in_python
 from support.fmi2 import Fmu, Instance, read_members
 from support.marks import needs_zig
 from support.platforms import ARM, WIN, X86, Parts, Platform, cases, needs_programs, windows
@@ -159,10 +159,11 @@ def test_steps_of_a_proxy(fmus, host_for, tmp_path, target, fmi, place):  # fmt:
     with serving(original, Service(lockstep=True)) as server:
         options = ["--target", target.tuple, "--fmi", str(fmi)]
         path = build_proxy(original, tmp_path / "Bench.fmu", server.address[1], *options)
-        fmu = unpacked(path, tmp_path / "unpacked")
-        gap, intensity = fmu.reference("gap"), fmu.reference("intensity")
-        script.add("load", 0, fmi, f"{'Z:' if target == WINDOWS else ''}{fmu.binary(place)}")
-        script.add("new", 0, 0, "full", "bench", fmu.token, None)
+        fmu = Fmu(path, tmp_path / "unpacked")
+        gap, intensity = fmu.references["gap"], fmu.references["intensity"]
+        binary = fmu.folder / f"binaries/{place}/{fmu.name}{target.suffix}"
+        script.add("load", 0, fmi, f"{'Z:' if target == WINDOWS else ''}{binary}")
+        script.add("new", 0, 0, "full", "bench", fmu.guid, None)
         script.add("init", 0, bits(0.0)).add("leave", 0)
         for k in range(STEPS):
             script.add("set", 0, "real", gap, bits(0.01 + 1e-4 * k))
@@ -189,10 +190,10 @@ def test_a_peer_that_is_gone_on_windows(fmus, host_for, tmp_path):
     with serving(original, Service(lockstep=True)) as server:
         port = server.address[1]
     options = ["--target", "win64"]
-    fmu = unpacked(build_proxy(original, tmp_path / "B.fmu", port, *options), tmp_path / "u")
-    script = Script().add("load", 0, 2, f"Z:{fmu.binary('win64')}")
-    script.add("new", 0, 0, "full", "bench", fmu.token, None)
-    script.add("set", 0, "real", fmu.reference("proxy.connect_timeout"), bits(0.2))
+    fmu = Fmu(build_proxy(original, tmp_path / "B.fmu", port, *options), tmp_path / "u")
+    script = Script().add("load", 0, 2, f"Z:{fmu.folder}/binaries/win64/{fmu.name}.dll")
+    script.add("new", 0, 0, "full", "bench", fmu.guid, None)
+    script.add("set", 0, "real", fmu.references["proxy.connect_timeout"], bits(0.2))
     script.add("init", 0, bits(0.0)).add("free", 0)
     (answers,) = host_for(WINDOWS).run(script, folder=tmp_path)
     assert [a.status for a in answers] == [0, 0, 0, 3, 0]

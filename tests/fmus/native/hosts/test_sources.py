@@ -8,8 +8,8 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from copy import copy
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -77,13 +77,9 @@ def test_three_fmus_in_one_program_are_the_grasp(given, parts_of, tmp_path):
     command = ["gcc", "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", whole]
     subprocess.run(command, check=True)
     for component, name in COMPONENTS.items():
-        library = Prefixed(ctypes.CDLL(str(whole)), f"rt_{name}_" if given else f"{name}_")
-        fmu = fmus[name]
-        references = {n: fmu.reference(n) for n in fmu.kinds}
-        grasp[component] = Instance(SimpleNamespace(
-            python=False, folder=fmu.folder, fmi=2, guid=fmu.token, library=library,
-            references=references,
-        ))  # fmt: skip
+        fmu = copy(fmus[name])
+        fmu.library = Prefixed(ctypes.CDLL(str(whole)), f"rt_{name}_" if given else f"{name}_")
+        grasp[component] = Instance(fmu)
         assert (grasp[component].setup(), grasp[component].enter()) == (OK, OK)
 
     def feed(component):
