@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from importlib import import_module
 from io import BytesIO, StringIO
 from itertools import cycle
 from pathlib import Path
@@ -50,12 +49,12 @@ MOST_LINES = 6
 MOST_SIGNALS = 36
 """So many signals at most are in a picture where none are asked for by name."""
 
-_FORMATS = {
-    "png": ("agg", "Agg", ("Software",)),
-    "svg": ("svg", "SVG", ("Creator", "Date", "Format", "Type")),
-    "pdf": ("pdf", "Pdf", ("Creator", "Producer", "CreationDate")),
+UNSAID = {
+    "png": ("Software",),
+    "svg": ("Creator", "Date", "Format", "Type"),
+    "pdf": ("Creator", "Producer", "CreationDate"),
 }
-"""The module and the canvas of matplotlib that write it, and what would not be the same again."""
+"""What would not be the same in a picture of the same figure, by its format."""
 
 DASHES = {1: "-", 2: "--"}
 """How finger 1 and 2 are drawn: they can be told apart in grey."""
@@ -190,13 +189,13 @@ def save(figure: Figure, path: Path) -> None:
 def _write(figure: Figure, kind: str, file: Any) -> None:
     """Write a figure; a letter that the font lacks is a box, which says it without a warning."""
     from matplotlib import rc_context
+    from matplotlib.backend_bases import get_registered_canvas_class
 
-    module, canvas, unsaid = _FORMATS[kind]
-    made = getattr(import_module(f"matplotlib.backends.backend_{module}"), f"FigureCanvas{canvas}")
+    canvas: Any = get_registered_canvas_class(kind)(figure)
     how: Any = {"svg.hashsalt": "grasp-cosim", "svg.fonttype": "path"}
     with warnings.catch_warnings(), rc_context(how):
         warnings.filterwarnings("ignore", "Glyph .* missing")
-        getattr(made(figure), f"print_{kind}")(file, metadata=dict.fromkeys(unsaid))
+        getattr(canvas, f"print_{kind}")(file, metadata=dict.fromkeys(UNSAID[kind]))
 
 
 def as_svg(figure: Figure) -> str:
