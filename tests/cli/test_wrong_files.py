@@ -77,7 +77,7 @@ def test_in_the_place_of_a_system(arguments, command, things):
             "a file unpacked from an FMU",
             "> unpacked.fmu` packs it",
         ),
-        ("OspSystemStructure.xml", "a system structure of OSP, which is not SSP", ""),
+        ("OspSystemStructure.xml", "an XML file", ""),
         ("drive.csv", "a CSV file", "`grasp-cosim run --input drive.csv` drives"),
         (".", "a folder", "there is: a.ssp, a.toml"),
         ("b.py", "a Python file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block"),

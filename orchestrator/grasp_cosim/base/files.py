@@ -57,9 +57,14 @@ WANTED = {
 }
 """The natures of files that a command may want, in words."""
 
-_SUFFIXES = {"fmu": (".fmu",), "system": (".toml", ".ssp")}
-_IN_A_RUN = {"run.json", "signals.csv", "signals.arrow"}
-_IN_AN_ARCHIVE = {"modelDescription.xml": "an FMU", "SystemStructure.ssd": "an SSP archive"}
+_OF_A_RUN = {"run.json", "signals.csv", "signals.arrow"}
+_OF_AN_ARCHIVE = {"modelDescription.xml": "an FMU", "SystemStructure.ssd": "an SSP archive"}
+_OF_A_SUFFIX = {
+    ".toml": ("a TOML file", "`grasp-cosim run {}` runs it, if it is a system"),
+    ".py": ("a Python file", "`grasp-cosim build {}` makes an FMU of it, if it is a block"),
+    ".csv": ("a CSV file", "`grasp-cosim run --input {}` drives inputs of the grasp with it"),
+    ".xml": ("an XML file", ""),
+}
 
 
 def check_nature(path: Path, wanted: str) -> None:
@@ -69,51 +74,43 @@ def check_nature(path: Path, wanted: str) -> None:
     """
     found, advice = _nature(path, wanted)
     if found not in ("", {"fmu": "an FMU", "run": WANTED["run"]}.get(wanted)):
-        raise InputError(f"{path}: is {found}; must be {WANTED[wanted]}{advice and f'; {advice}'}")
+        said = advice and "; " + advice.replace("{}", quote(str(path)))
+        raise InputError(f"{path}: is {found}; must be {WANTED[wanted]}{said}")
 
 
 def _nature(path: Path, wanted: str) -> tuple[str, str]:
-    """The nature of a file, and what to do with it; empty where that is not plain."""
-    name, parent = quote(str(path)), quote(str(path.parent))
-    if path.is_dir():
+    """The nature of a file, and what to do with it, {} for its name; empty where not plain."""
+    suffix = path.suffix.lower()
+    folder = path if path.is_dir() else path.parent
+    report = f"`grasp-cosim report {quote(str(folder))}` shows the run"
+    if (folder / "run.json").is_file() and (folder == path or path.name in _OF_A_RUN):
+        return WANTED["run"] if folder == path else "a file of a run", report
+    for file, what in _OF_AN_ARCHIVE.items():
+        if path in (folder, folder / file) and (folder / file).is_file():
+            archive = f"{folder.resolve().name}.{'fmu' if what == 'an FMU' else 'ssp'}"
+            again = f"`(cd {quote(str(folder))} && zip -r - .) > {quote(archive)}` packs it again"
+            return f"{'a folder,' if folder == path else 'a file'} unpacked from {what}", again
+    if folder == path:
         return _folder_nature(path, wanted)
-    if path.name in _IN_A_RUN and (path.parent / "run.json").is_file():
-        return "a file of a run", f"`grasp-cosim report {parent}` shows the run"
-    if path.is_file() and path.name in _IN_AN_ARCHIVE:
-        what = _IN_AN_ARCHIVE[path.name]
-        return f"a file unpacked from {what}", _packs(path.parent, what)
     found = _archive_nature(path)
     if found == "an FMU" and wanted == "system":
         return found, (
-            f"`grasp-cosim init my_system.toml --fmu NAME={name}` makes a system of it alone, "
-            f"`--as COMPONENT={name}` the grasp with it, `grasp-cosim run --swap COMPONENT={name}` "
-            "runs that"
+            "`grasp-cosim init my_system.toml --fmu NAME={}` makes a system of it alone, "
+            "`--as COMPONENT={}` the grasp with it, `grasp-cosim run --swap COMPONENT={}` runs "
+            "that"
         )
     if found == "an FMU":
-        return found, f"`grasp-cosim inspect {name}` shows it"
+        return found, "`grasp-cosim inspect {}` shows it"
     if found and wanted == "system":
-        return ("", "") if path.suffix.lower() == ".ssp" else (found, "its name must end in .ssp")
+        return ("", "") if suffix == ".ssp" else (found, "its name must end in .ssp")
     if found:
-        return found, f"`grasp-cosim run {name}` runs it; its FMUs are in it, below resources/"
-    if path.suffix.lower() == ".toml" and path.is_file() and wanted in ("fmu", "run"):
-        return "a TOML file", f"`grasp-cosim run {name}` runs it, if it is a system"
-    if path.suffix.lower() == ".py" and path.is_file():
-        return "a Python file", f"`grasp-cosim build {name}` makes an FMU of it, if it is a block"
-    if path.suffix.lower() == ".csv" and path.is_file() and wanted == "system":
-        return "a CSV file", f"`grasp-cosim run --input {name}` drives inputs of the grasp with it"
-    if path.name == "OspSystemStructure.xml" and path.is_file():
-        return "a system structure of OSP, which is not SSP", ""
-    return "", ""
+        return found, "`grasp-cosim run {}` runs it; its FMUs are in it, below resources/"
+    own = {"system": ".toml", "run": ".csv", "fmu": ".csv"}[wanted]
+    return _OF_A_SUFFIX.get(suffix, ("", "")) if suffix != own and path.is_file() else ("", "")
 
 
 def _folder_nature(path: Path, wanted: str) -> tuple[str, str]:
-    name = quote(str(path))
-    if (path / "run.json").is_file():
-        return WANTED["run"], f"`grasp-cosim report {name}` shows the run"
-    for file, what in _IN_AN_ARCHIVE.items():
-        if (path / file).is_file():
-            return f"a folder, unpacked from {what}", _packs(path, what)
-    suffixes = _SUFFIXES.get(wanted, ())
+    suffixes = {"fmu": (".fmu",), "system": (".toml", ".ssp")}.get(wanted, ())
     inside = sorted(str(p) for p in path.iterdir() if p.suffix.lower() in suffixes)
     inside += sorted(str(p.parent) for p in path.glob("*/run.json")) if wanted == "run" else []
     if wanted == "run" and not inside:
@@ -121,19 +118,13 @@ def _folder_nature(path: Path, wanted: str) -> tuple[str, str]:
     return "a folder", f"there is: {choices(inside, 6)}" if inside else ""
 
 
-def _packs(folder: Path, what: str) -> str:
-    """How a folder becomes the archive again that was unpacked there."""
-    archive = quote(f"{folder.resolve().name}.{'fmu' if what == 'an FMU' else 'ssp'}")
-    return f"`(cd {quote(str(folder))} && zip -r - .) > {archive}` packs it again"
-
-
 def _archive_nature(path: Path) -> str:
     """The nature of an archive by its content; empty for another file, or a damaged one."""
     with suppress(OSError, ValueError, RuntimeError, NotImplementedError, zipfile.BadZipFile):
-        if path.is_file() and zipfile.is_zipfile(path):
+        if zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as archive:
                 names = set(archive.namelist())
-            return next((what for file, what in _IN_AN_ARCHIVE.items() if file in names), "")
+            return next((what for file, what in _OF_AN_ARCHIVE.items() if file in names), "")
     return ""
 
 

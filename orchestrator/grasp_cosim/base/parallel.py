@@ -1,9 +1,8 @@
 """Jobs spread over processes of this machine: the same results, to the bit, on any number of them.
 
-The processes are new ones: a fork of one that has loaded FMUs would share their state. Each has one
-pipe to us. One that dies takes its own job with it and no other: a new one takes its place. Where
-we die, they die, whatever they are at. Where we stand, the current folder, they import nothing
-from.
+The processes are new ones: a fork of one that has loaded FMUs would share their state. One that
+dies takes its own job with it and no other, and a new one takes its place. Where we die, they die,
+whatever they are at. From the current folder they import nothing.
 """
 
 import os
@@ -38,22 +37,17 @@ class Lost(NamedTuple):
     end: str
 
 
-Keep = Callable[[int, Run], None]
-"""Gets the index of a job and its result as soon as it is there."""
-
-
 def run_all(
     run: Callable[[Job], Run],
     jobs: Sequence[Job],
     workers: int,
     progress: bool,
     what: str,
-    keep: Keep[Run] = lambda *_: None,
 ) -> list[Run]:
     """Return the results of Crew.map; `progress` shows how far they are, named `what`."""
     bar = Progress(what, len(jobs), shown=progress)
     with phase(f"{what}, {len(jobs)} runs on {workers} processes"), bar, Crew(workers) as crew:
-        return crew.map(run, jobs, bar, keep)
+        return crew.map(run, jobs, bar)
 
 
 class Crew:
@@ -70,13 +64,7 @@ class Crew:
         """End the processes."""
         _end(self._idle)
 
-    def map(
-        self,
-        run: Callable[[Job], Run],
-        jobs: Iterable[Job],
-        bar: Progress,
-        keep: Keep[Run] = lambda *_: None,
-    ) -> list[Run]:
+    def map(self, run: Callable[[Job], Run], jobs: Iterable[Job], bar: Progress) -> list[Run]:
         """Return the results of run(job), in the order of the jobs; `bar` counts them.
 
         `run` is a function of a module. What it raises is raised, and ends the other jobs;
@@ -90,7 +78,6 @@ class Crew:
                 if isinstance(result, _Raised):
                     raise result.error
                 found[index] = result
-                keep(index, result)
                 bar.update()
         return [found[index] for index in sorted(found)]
 
@@ -104,28 +91,21 @@ class Crew:
         """
         left = iter(jobs)
         busy: dict[_Worker, Job] = {}
-
-        def give(job: Job) -> None:
-            worker = self._idle.pop() if self._idle else _Worker()
-            busy[worker] = job
-            worker.give(run, job)
-
         try:
-            for job in islice(left, self._most):
-                give(job)
-            while busy:
+            while True:
+                for job in islice(left, self._most - len(busy)):
+                    worker = self._idle.pop() if self._idle else _Worker()
+                    busy[worker] = job
+                    worker.give(run, job)
+                if not busy:
+                    break
                 heard = wait([worker.pipe for worker in busy])
-                for worker in [w for w in busy if w.pipe in heard]:
-                    if not worker.started():
-                        continue
-                    result = worker.received()
-                    job = busy.pop(worker)
+                for worker in [w for w in busy if w.pipe in heard and w.started()]:
+                    result, job = worker.received(), busy.pop(worker)
                     if isinstance(result, Lost):
                         _end([worker])
                     else:
                         self._idle.append(worker)
-                    for following in islice(left, 1):
-                        give(following)
                     yield job, result
         finally:
             _end(busy)
@@ -150,10 +130,10 @@ class _Worker:
         context = get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self._started = False
-        self._process: BaseProcess = context.Process(target=_work, args=(theirs,))
+        self.process: BaseProcess = context.Process(target=_work, args=(theirs,))
         try:
             with closing(theirs), held_back(interruption.SIGNALS), _safe_path():  # they are for us
-                self._process.start()
+                self.process.start()
         except BaseException:  # of a signal that came meanwhile
             _end([self])
             raise
@@ -180,22 +160,10 @@ class _Worker:
         except (EOFError, OSError):
             return Lost(self._end())
 
-    def stop(self) -> None:
-        """End the process, whatever it does."""
-        self.pipe.close()
-        if self._process.pid:
-            self._process.kill()
-
-    def join(self) -> None:
-        """Wait for the end of a stopped process."""
-        if self._process.pid:
-            self._process.join()
-            self._process.close()
-
     def _end(self) -> str:
         """Return how the process, whose pipe has ended, came to its end."""
-        self._process.join(PATIENCE)
-        code = self._process.exitcode
+        self.process.join(PATIENCE)
+        code = self.process.exitcode
         return "closed its pipe" if code is None else ended(code)
 
 
@@ -205,24 +173,26 @@ def _safe_path() -> Iterator[None]:
 
     multiprocessing starts them with `python -c`, which looks there first.
     """
-    before = os.environ.get(_SAFE_PATH)
+    before = {name: value for name, value in os.environ.items() if name == _SAFE_PATH}
     os.environ[_SAFE_PATH] = "1"
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[_SAFE_PATH]
-        else:
-            os.environ[_SAFE_PATH] = before
+        del os.environ[_SAFE_PATH]
+        os.environ.update(before)
 
 
 def _end(workers: Iterable[_Worker]) -> None:
     """End processes, all at once."""
     ended = list(workers)
     for worker in ended:
-        worker.stop()
-    for worker in ended:
-        worker.join()
+        worker.pipe.close()
+    processes = [worker.process for worker in ended if worker.process.pid]  # which has started
+    for process in processes:
+        process.kill()
+    for process in processes:
+        process.join()
+        process.close()
     if ended:  # a process that is killed leaves its folders
         sweep.cache_clear()
         sweep(gettempdir())
