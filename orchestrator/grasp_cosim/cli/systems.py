@@ -1,33 +1,25 @@
 """The commands that write systems: init a file to start from, ssp an archive."""
 
-from __future__ import annotations
-
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from ..base.checks import real
 from ..base.errors import InputError
 from ..base.files import check_file, write_text
-from ..base.text import counted
-from ..inspection.draft import with_paths
+from ..inspection.draft import Draft, alone, replacing, with_paths
 from ..interface.read import read_interface
 from ..system.description import System
 from ..system.toml import to_do
 from .frame import PATH, json_option, pair, say, show
 from .options import chosen_system, set_option
 
-if TYPE_CHECKING:
-    from ..inspection.draft import Draft
-
 NAME = re.compile(r"[A-Za-z0-9_-]+")
-
-MOST = 24
-"""So many lines with a TODO at most are listed; --json and the file have all."""
 
 
 @click.command()
@@ -67,7 +59,11 @@ def init(
     An FMU alone: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
     A hand: grasp-cosim init hand.toml --fingers 3 --angles 0,90,225
     """
-    _check_file(file, force)
+    if file.suffix.lower() != ".toml":
+        raise InputError(f"{file}: must end in .toml, a system file")
+    if file.is_file() and not force:
+        raise InputError(f"{file}: is there already; give another name, or --force")
+    check_file(file)
     foreign = _paired("--as", candidates)
     own = _paired("--fmu", fmus)
     if own and foreign:
@@ -78,37 +74,28 @@ def init(
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
-        from ..inspection.draft import alone
-
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
     elif hand:
         text, notes = _hand(file.parent, fingers, angles)
     else:
         text, drafts = _grasp(file.parent, foreign)
     write_text(file, text)
-    open_lines = to_do(text)
-    if not open_lines and file.is_file():
-        _read_back(file)
-    show(
-        as_json,
-        _report(file, drafts, open_lines, notes),
-        "\n    ".join(_lines(file, drafts, open_lines)),
-    )
+    left = to_do(text)
+    if not left and file.is_file():
+        try:
+            System.load(file)
+        except InputError as error:
+            raise InputError(f"{file}: written, but not yet a system: {error}") from error
+    report = {
+        "file": str(file),
+        "components": {name: _found(draft) for name, draft in drafts.items()},
+        "todo": [{"line": number, "text": line} for number, line in left.items()],
+        "notes": notes,
+    }
+    show(as_json, report, "\n    ".join(_lines(file, drafts, left)))
     for note in notes if not as_json else ():
         say(note)
     return 0
-
-
-def _report(
-    file: Path, drafts: Mapping[str, Draft], open_lines: Mapping[int, str], notes: Sequence[str]
-) -> dict[str, Any]:
-    """What was written, for --json."""
-    return {
-        "file": str(file),
-        "components": {name: _found(draft) for name, draft in drafts.items()},
-        "todo": [{"line": number, "text": line} for number, line in open_lines.items()],
-        "notes": notes,
-    }
 
 
 def shown(fmu: Path, folder: Path) -> str:
@@ -118,25 +105,9 @@ def shown(fmu: Path, folder: Path) -> str:
     """
     here = folder.resolve()
     there = fmu.parent.resolve() / fmu.name
-    near = there.is_relative_to(here) or (
-        there.is_relative_to(here.parent) and here.parent != Path(here.anchor)
-    )
+    beside = here.parent != Path(here.anchor) and there.is_relative_to(here.parent)
+    near = beside or there.is_relative_to(here)
     return Path(os.path.relpath(there, here) if near else there).as_posix()
-
-
-def _read_back(file: Path) -> None:
-    try:
-        System.load(file)
-    except InputError as error:
-        raise InputError(f"{file}: written, but not yet a system: {error}") from error
-
-
-def _check_file(file: Path, force: bool) -> None:
-    if file.suffix.lower() != ".toml":
-        raise InputError(f"{file}: must end in .toml, a system file")
-    if file.is_file() and not force:
-        raise InputError(f"{file}: is there already; give another name, or --force")
-    check_file(file)
 
 
 def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
@@ -153,7 +124,6 @@ def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
 
 def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, list[str]]:
     """The text of a hand, and what is to be said of it."""
-    from ..base.checks import real
     from ..grasp.system import built
     from ..hand.system import directions_of, faint, hand_text, sized
 
@@ -173,7 +143,6 @@ def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Dr
     """The text of the built-in grasp, with foreign FMUs in the place of components."""
     from ..grasp.presets import SYSTEM, built_in_presets
     from ..grasp.system import built
-    from ..inspection.draft import replacing
 
     fmus = built(folder)
     built_in = System.load(SYSTEM, fmus)
@@ -203,14 +172,11 @@ def _lines(file: Path, drafts: Mapping[str, Draft], left: Mapping[int, str]) -> 
     lines = [f"{file}: written"]
     for name, draft in drafts.items():
         doubtful = sum(bool(match.doubt) for match in draft.found.values())
-        lines.append(
-            f"{name}: {len(draft.found)} of the FMU's variables found"
-            + (f", {doubtful} of them to check: CHECK" if doubtful else "")
-        )
-    listed = [f"line {number}: {line}" for number, line in left.items()]
-    more = [f"and {counted(len(listed) - MOST, 'line')} more"] if len(listed) > MOST else []
+        check = f", {doubtful} of them to check: CHECK" if doubtful else ""
+        lines.append(f"{name}: {len(draft.found)} of the FMU's variables found{check}")
+    lines += [f"line {number}: {line}" for number, line in left.items()]
     then = "when no TODO is left" if left else "then"
-    return [*lines, *listed[:MOST], *more, f"{then}: grasp-cosim run {quote(str(file))}"]
+    return [*lines, f"{then}: grasp-cosim run {quote(str(file))}"]
 
 
 @click.command()
