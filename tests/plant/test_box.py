@@ -36,14 +36,8 @@ def after(q, box, push, d, n):
 
 @st.composite
 def shapes(draw):
-    a = draw(st.floats(0.02, 0.1))
-    return Shape(
-        draw(st.floats(0.01, 0.1)),
-        a,
-        draw(st.floats(0.02, 2.0)),
-        draw(st.floats(0.0, 1.0)),
-        2.0 * a * draw(st.floats(0.0, 1.0)),
-    )
+    b, a, share = (draw(st.floats(low, high)) for low, high in ((0.01, 0.1), (0.02, 0.1), (0, 1)))
+    return Shape(b, a, draw(st.floats(0.02, 2.0)), draw(st.floats(0.0, 1.0)), 2.0 * a * share)
 
 
 @st.composite

@@ -112,13 +112,14 @@ def test_a_long_step_is_made_of_sub_steps(case, rates, law):
 @given(
     st.floats(1e-3, 1e3), st.floats(-1e-3, 1e-3), st.floats(-1.0, 1.0), st.floats(-50.0, 50.0),
     st.floats(0.0, 2000.0), st.floats(0.0, 2000.0), st.floats(1e-5, 5e-3),
+    st.sampled_from([friction.NONE, VISCOUS, (0.4, 0.7, 2.0, 0.02)]),
 )  # fmt: skip
-def test_the_object_never_pulls_and_gives_no_energy(m, s, v, a, alpha, beta, h):
+def test_the_object_never_pulls_and_gives_no_energy(m, s, v, a, alpha, beta, h, law):
     """Without an actuator: that of the motion, and of the depth as of a spring m beta^2."""
     rates = Rates(alpha, beta)
-    assert all(force >= 0.0 for _, _, force in islice(run(s, v, m * a, rates, h, m=m), 10))
+    assert all(force >= 0.0 for _, _, force in islice(run(s, v, m * a, rates, h, law, m), 10))
     before = inf
-    for after, rate, _ in [(s, v, 0.0), *islice(run(s, v, 0.0, rates, h, m=m), 10)]:
+    for after, rate, _ in [(s, v, 0.0), *islice(run(s, v, 0.0, rates, h, law, m), 10)]:
         stored = 0.5 * m * (rate**2 + (beta * min(after, 0.0)) ** 2)
         assert stored <= before * (1.0 + 1e-12) + 1e-300
         before = stored

@@ -58,14 +58,13 @@ def of_scipy(p, forces, seconds):
         for i, angle in enumerate(ANGLES):
             e = np.array([math.cos(angle), math.sin(angle)])
             n = np.array([math.cos(angle + turn), math.sin(angle + turn)])
-            at, arm = s[i] * e, s[i] * e - (x, y)
+            arm = s[i] * e - (x, y)
             speed_there = np.array([vx, vy]) + w * np.array([-arm[1], arm[0]])
             depth = p.half_width[i] - arm @ n
             sinking = (speed_there - v[i] * e) @ n
             f = max(0.0, k * depth + c * sinking) if depth > 0.0 else 0.0
             push, moment = push - f * n, moment - f * (arm[0] * n[1] - arm[1] * n[0])
             on_fingers.append((forces[i] + f * (n @ e)) / p.finger_mass[i])
-            assert at.shape == (2,)
         speed = math.hypot(vx, vy)
         slide = drag * math.tanh(speed / 1e-5) / speed if speed > 0.0 else 0.0
         held = drag * p.floor_contact_radius * math.tanh(w / 1e-4)
@@ -73,17 +72,8 @@ def of_scipy(p, forces, seconds):
                 (push[0] - slide * vx) / m, (push[1] - slide * vy) / m,
                 (moment - held) / (m * r * r)]  # fmt: skip
 
-    start = [
-        *p.initial_position,
-        0,
-        0,
-        0,
-        *p.initial_object_position,
-        p.initial_object_angle,
-        0,
-        0,
-        0,
-    ]
+    pose = (*p.initial_object_position, p.initial_object_angle)
+    start = [*p.initial_position, *(0.0,) * 3, *pose, *(0.0,) * 3]
     return solve_ivp(rates, (0.0, seconds), start, method="LSODA", rtol=1e-8, atol=1e-10).y[:, -1]
 
 
