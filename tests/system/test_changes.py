@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from comparison.made import PLANT, write_fmu, write_system
-from grasp_cosim import InputError, Realtime, System
+from grasp_cosim import InputError, System
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.system.toml import to_do
 
@@ -121,13 +121,6 @@ def test_a_section_is_no_name_of_a_component(fmus, tmp_path):
     text = TEXT.replace("plant.", "input.").replace("[components.plant]", "[components.input]")
     with pytest.raises(InputError, match=r"^grasp.toml: component 'input': is the name of a sec"):
         written(text, tmp_path, fmus)
-
-
-def test_the_pacing_is_read_and_checked(fmus, tmp_path):
-    paced = written(f'{TEXT}\n[realtime]\noverrun = "stop"\ncpu = 1\n', tmp_path, fmus)
-    assert paced.realtime == Realtime(overrun="stop", cpu=1)
-    with pytest.raises(InputError, match=r"^grasp.toml: \[realtime\]: factor = 0: must be"):
-        written(f"{TEXT}\n[realtime]\nfactor = 0\n", tmp_path, fmus)
 
 
 VENDOR = {{"gap": "luft", "force": "kraft"}.get(n, n): text for n, text in PLANT.items()}

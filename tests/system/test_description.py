@@ -42,6 +42,17 @@ kind = "saturation"
 high = 0.4
 """
 MISTAKES = [
+    ("system", '["grasp"]', '["grasps"]'),
+    ("system", '["grasp"]', '["foot"]'),
+    ("system", '["grasp"]', '"grasp"'),
+    ("system", '["grasp"]', "[1]"),
+    ("more", "X", "[realtime]\nfactor = 0"),
+    ("more", "X", '[roles]\nsensor_1 = "ear"'),
+    ("more", "X", "[roles]\nsensor_1 = 1"),
+    ("more", "X", "[[roles]]"),
+    ("system", "[presets.case_0]", "[presets]\ndim = 3\n[presets.case_0]"),
+    ("more", "X", '[presets.dim]\n"sensor_1.gain" = [{}]'),
+    ("more", "X", "[presets.dim]\nsensor_1.gain = 1"),
     ("system", "[experiment]", "[experment]"),
     ("system", "step = 1e-4", "stepp = 1e-4"),
     ("system", "step = 1e-4", "step = 0"),
