@@ -17,7 +17,6 @@ import pytest
 from grasp_cosim.hil.driven import MOST_LOST
 from grasp_fmus.contract import declared
 from grasp_fmus.link.message import (
-    BUSY,
     END,
     FAILED,
     HEAD,
@@ -27,7 +26,6 @@ from grasp_fmus.link.message import (
     REFUSE,
     STEP,
     TAG_SIZE,
-    UNKNOWN,
     VERSION,
     WELCOME,
     Codec,
@@ -340,10 +338,10 @@ def session(number=99, key=None):
     return proxy
 
 
-def known(number=99, begun=0):
-    """One with its cookie, where so many sessions have begun."""
+def known(number=99):
+    """One with its cookie, where no session has begun."""
     proxy = session(number)
-    numbers = number.to_bytes(8, "little") + begun.to_bytes(8, "little")
+    numbers = number.to_bytes(8, "little") + bytes(8)
     digest = hmac.digest(RANDOM, numbers, "sha256")
     proxy._cookie = int.from_bytes(digest[:8], "little") | 1
     return proxy
@@ -402,17 +400,6 @@ def test_the_watchdog_is_fed_by_new_requests_alone(driver):
           (6, step(proxy, 0.5)), (6, proxy.pack(END))]  # fmt: skip
     records, _ = linked(driver, at)
     assert [r.alive for r in records] == [True, False, True, False, False, True, False]
-
-
-def test_of_two_that_were_greeted_the_later_one_waits_and_is_greeted_anew(driver):
-    one, other, again = known(1), known(2), known(2, begun=1)
-    at = [(0, initialise(one)), (0, initialise(other)), (ALIVE - 1, initialise(other))]
-    at += [(ALIVE, initialise(other)), (ALIVE, initialise(again)), (ALIVE, step(one, 0.0))]
-    records, counters = linked(driver, at)
-    assert [r.event for r in records] == [DO_INITIALISE, SEND, SEND, SEND, DO_INITIALISE, SEND]
-    codes = [r.answer[6:8] for r in records[1:4] + records[5:]]
-    assert codes == [bytes([REFUSE, BUSY])] * 2 + [bytes([REFUSE, UNKNOWN])] * 2
-    assert counters == PeerCounters(initialisations=2, busy=2, foreign=2)
 
 
 def test_outputs_that_are_none_fail_and_are_named(tmp_path):

@@ -1,13 +1,22 @@
-"""Datagrams to the byte, as the card has them; what is not one of them is none."""
+"""Variables and datagrams to the byte, as the card has them; what is not one of them is none."""
 
 import hashlib
 import hmac
 import math
 import struct
+from hashlib import sha256
 
 import pytest
 from grasp_fmus.link import message
-from grasp_fmus.link.message import Codec, LinkVariable, Message, Sealer, exposed, read_key
+from grasp_fmus.link.message import (
+    Codec,
+    LinkVariable,
+    Message,
+    Sealer,
+    Signature,
+    exposed,
+    read_key,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -160,3 +169,49 @@ def test_a_key_is_read_without_the_line_end(tmp_path):
     (tmp_path / "key").write_bytes(b"fifteen bytes!!\n")
     with pytest.raises(ValueError, match="key of 15 bytes: must have 16 or more"):
         read_key(tmp_path / "key")
+
+
+# The signature
+
+GAP = LinkVariable("gap", "Real", "input", "m")
+GAIN = LinkVariable("gain", "Real", "parameter", "1")
+OUT = LinkVariable("intensity", "Real", "output", "V")
+SENSOR = Signature((OUT, GAP, GAIN))
+
+
+def test_text_and_hash_are_those_of_the_card():
+    assert SENSOR.text == (
+        "input\tReal\tm\tgap\nparameter\tReal\t1\tgain\noutput\tReal\tV\tintensity\n"
+    )
+    assert SENSOR.hash == sha256(SENSOR.text.encode()).digest()[:16]
+    assert Signature((LinkVariable("b", "Boolean", "input"),)).text == "input\tBoolean\t-\tb\n"
+    assert (SENSOR.request, SENSOR.answer) == ((GAP, GAIN), (OUT,))
+
+
+@pytest.mark.parametrize(
+    ("proxy", "difference"),
+    [
+        ((GAP, OUT),
+         "the proxy has output Real V intensity, the peer parameter Real 1 gain"),
+        ((GAP, GAIN), "the proxy has no more, the peer output Real V intensity"),
+        ((GAP._replace(unit="mm"), GAIN, OUT),
+         "the proxy has input Real mm gap, the peer input Real m gap"),
+        ((GAP, GAIN, OUT, OUT._replace(name="y", kind="Boolean", unit=None)),
+         "the proxy has output Boolean - y, the peer no more"),
+    ],
+)  # fmt: skip
+def test_the_first_difference_is_named(proxy, difference):
+    assert SENSOR.difference(Signature(proxy).text.encode() + bytes(9)) == difference
+
+
+@pytest.mark.parametrize(
+    ("variables", "reason"),
+    [
+        ((GAP, GAP._replace(causality="output")), "variable 'gap': appears twice"),
+        ((GAP._replace(name="a\tb"),), r"variable 'a\\tb' \[m\]: must be without tabs"),
+        ((GAP._replace(unit="m\n"),), r"\[m\n\]: must be without tabs and line ends"),
+    ],
+)
+def test_what_the_text_cannot_hold(variables, reason):
+    with pytest.raises(ValueError, match=reason):
+        Signature(variables)
