@@ -8,7 +8,6 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -24,21 +23,9 @@ from hypothesis import find, settings
 from hypothesis import strategies as st
 from support import kinds, marks
 from support.fmi2 import Fmu
-from support.kinds import Kind
 from support.marks import skip_without_pythonfmu
 
 pytest_plugins = ("support.platforms",)
-
-Run = Callable[..., tuple[int, str, str]]
-"""A command line without its program; exit code, standard output, standard error."""
-
-Load = Callable[[str], Fmu]
-LoadAs = Callable[[str, Kind], Fmu]
-Folder = Callable[[Kind], Path]
-MadeOnce = Callable[[str, Callable[[Path], object]], Path]
-UnpackIn = Callable[[str], Path]
-Altered = Callable[[str, str, str, str], Path]
-
 
 os.environ["XDG_CACHE_HOME"] = str(Path(sys.prefix, "cache_of_the_tests"))
 """Native FMUs are compiled once for all test processes and runs, too."""

@@ -1,10 +1,13 @@
-"""The names nearest to one that is not known, and where all are listed."""
+"""Public names, the names nearest to one that is not known, and those of packages."""
 
 import re
 import shlex
+import subprocess
 import sys
 from importlib.metadata import metadata
+from pathlib import Path
 
+import grasp_cosim
 import pytest
 from grasp_cosim.base.checks import install_command, packages
 from grasp_cosim.base.errors import FEW, MANY, nearest
@@ -67,3 +70,24 @@ def test_the_command_is_for_the_python_that_runs(monkeypatch):
     command = install_command("scipy>=1.15", "pandas")
     assert command == "'/my folder/python' -m pip install 'scipy>=1.15' pandas"
     assert shlex.split(command)[0] == sys.executable
+
+
+ROOMS = {path.stem for path in Path(grasp_cosim.__file__).parent.iterdir()}
+
+
+def test_no_room_has_the_name_of_a_public_name():
+    """`from grasp_cosim import sweep` would be a module, once somebody had imported that."""
+    assert {"master", "sweeps", "comparison"} <= ROOMS
+    assert not ROOMS & {*grasp_cosim.__all__}
+
+
+@pytest.mark.parametrize("name", grasp_cosim.__all__)
+def test_a_public_name_is_one_that_its_home_has(name):
+    value = getattr(grasp_cosim, name)
+    home = grasp_cosim._HOMES.get(name, "base.errors")
+    assert getattr(sys.modules[f"grasp_cosim.{home}"], name) is value
+
+
+def test_importing_the_package_imports_no_numbers():
+    program = "import sys, grasp_cosim; print('numpy' in sys.modules, 'fmpy' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", program], text=True) == "False False\n"

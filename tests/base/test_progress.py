@@ -60,16 +60,6 @@ def test_what_is_not_to_be_shown_is_not(stream, monkeypatch):
     assert stream.getvalue() == ""
 
 
-@pytest.mark.usefixtures("at_once")
-def test_without_a_terminal_there_are_whole_lines(monkeypatch):
-    monkeypatch.setattr(sys, "stderr", stream := io.StringIO())
-    with Progress("map", 3, ticking=False) as bar:
-        bar.update()
-        bar.update()
-    heads = [line.partition(",")[0] for line in stream.getvalue().splitlines()]
-    assert {"map: 1 of 3 runs", "map: 2 of 3 runs"} <= set(heads)
-
-
 def test_what_is_said_meanwhile_stands_above_the_bar(monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream := Terminal())
     with Progress("map", 3, delay=0.0, ticking=False) as bar:
