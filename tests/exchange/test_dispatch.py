@@ -4,7 +4,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.exchange.dispatch import DECADES, FAR, Divergence, Runaway, largest
@@ -45,7 +44,6 @@ def test_where_a_listener_fails_the_others_keep_their_rows(grasp, tmp_path):
         with full_disk(20_000), pytest.raises(SimulationError, match=r"s\.csv: cannot b") as caught:
             session.step(900)
     result = caught.value.result
-    assert result is not None
     assert not result.complete
     rows = len((tmp_path / "s.csv").read_text().splitlines()) - 1
     assert 10 < rows < len(memory.columns()[0]) == len(result.time)
@@ -78,8 +76,6 @@ def test_where_a_listener_does_not_end_the_others_do(grasp, tmp_path):
     assert [len(path.read_text().splitlines()) for path in (paths[0], paths[2])] == [12, 12]
 
 
-Floats = npt.NDArray[Any]
-
 UNITS = {
     "N": Unit("N", (1, 1, -2, 0, 0, 0, 0, 0)),
     "uN": Unit("uN", (1, 1, -2, 0, 0, 0, 0, 0), 1e-6),
@@ -94,7 +90,7 @@ def watch(*columns, block=1000, unit=None, nominal=None, kind="Real", factor=Non
     variables = tuple(
         Variable(n, "Real", "output", 1, unit, None, None, None, magnitude=nominal) for n in names
     )
-    interface = Interface(Any, "", "", variables, units=UNITS)  # type: ignore[arg-type]
+    interface = Interface(Any, "", "", variables, units=UNITS)
     system = SimpleNamespace(
         component=lambda name, place: SimpleNamespace(interface=interface),
         connections=(Connection(Port("a", "y0"), Port("b", "u"), factor),),

@@ -177,7 +177,6 @@ def test_an_fmu_that_fails_is_the_same_error(grasp, altered, engine):
     )
     with pytest.raises(SimulationError, match=r"^sensor_1: .* at t = 0\.061 s: ") as caught:
         simulate(grasp.swap("sensor_1", fmu), engine=engine)
-    assert caught.value.result is not None
     assert len(caught.value.result.time) == 611
     assert not caught.value.result.complete
 
@@ -221,7 +220,6 @@ def test_a_value_that_is_not_finite_at_t_0_is_kept_too(tmp_path, engine, monkeyp
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
     with pytest.raises(SimulationError, match=r"^a\.y = nan at step 0: must be finite") as caught:
         simulate(make_system([mock], []), engine=engine)
-    assert caught.value.result is not None
     assert caught.value.result.time.tolist() == [0.0]
     assert not caught.value.result.complete
     assert mock.calls[-1] == "close"

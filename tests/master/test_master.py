@@ -161,7 +161,7 @@ def run(tmp_path):
 
 def steps(run):
     """Begin and length of each step that was tried."""
-    calls = run.master.instances[0].calls  # type: ignore[attr-defined]
+    calls = run.master.instances[0].calls
     pairs = (call.split()[1:] for call in calls if call.startswith("step"))
     return [(float(begin), float(length)) for begin, length in pairs]
 

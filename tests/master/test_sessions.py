@@ -78,13 +78,13 @@ def test_steps_are_counted_in_whole_numbers(grasp, steps):
     with simulate.session(grasp, stop=0.01) as session:
         with pytest.raises(InputError, match=r"steps = .*: must be a whole number from 1 to"):
             session.step(steps)
-        assert session.step(np.int64(3))  # type: ignore[arg-type]
+        assert session.step(np.int64(3))
         assert session.time == 3e-4
 
 
 def test_an_engine_that_does_not_exist_is_refused(grasp):
     with pytest.raises(InputError, match="engine = 'complied': must be one of auto, python, comp"):
-        simulate(grasp, stop=1e-3, engine="complied")  # type: ignore[arg-type]
+        simulate(grasp, stop=1e-3, engine="complied")
 
 
 @engines
@@ -100,7 +100,6 @@ def test_a_value_that_is_not_finite_is_found_in_its_step(tmp_path, monkeypatch, 
             SimulationError, match=r"^a\.y = inf at step 5: must be finite"
         ) as error:
             session.step(5)
-        assert error.value.result is not None
         assert len(error.value.result.time) == 6
 
 
@@ -123,20 +122,17 @@ LOOP = "algebraic loop at t = 0 through a.u: solved in "
 
 def ring(folder, monkeypatch, **more):
     """y = 1 - 5 u, u = y; and its second mock."""
-    mocks = [
-        Mock(folder, "a", lambda u, t: 1.0 - 5.0 * u),
-        Mock(folder, "b", lambda u, t: u),
-    ]
+    mocks = [Mock(folder, "a", lambda u, t: 1.0 - 5.0 * u), Mock(folder, "b", lambda u, t: u)]
     by_name = {m.name: m for m in mocks}
     monkeypatch.setattr(
         "grasp_cosim.master.simulation.load", lambda component: by_name[component.name]
     )
     ends = [(Port("a", "y"), Port("b", "u")), (Port("b", "y"), Port("a", "u"))]
-    return make_system(mocks, [Connection(*e) for e in ends], 10, **more), mocks[1]  # type: ignore[arg-type]
+    return make_system(mocks, [Connection(*e) for e in ends], 10, **more), mocks[1]
 
 
-def test_a_loop_is_told_before_the_first_step(tmp_path, monkeypatch):
-    system, b = ring(tmp_path, monkeypatch)
+def test_a_loop_is_told_before_the_first_step_and_what_is_known_is_not(tmp_path, monkeypatch):
+    system, b = ring(tmp_path, monkeypatch, notes=("read in a way",))
     told = []
 
     def note(line):
@@ -146,7 +142,7 @@ def test_a_loop_is_told_before_the_first_step(tmp_path, monkeypatch):
     ((line, stepped),) = told
     assert line.startswith(LOOP)
     assert not stepped
-    assert result.log == (line,)
+    assert result.log == ("read in a way", line)
 
 
 def test_a_run_that_fails_has_told_it_and_what_came_later_once(tmp_path, monkeypatch):
@@ -164,10 +160,3 @@ def test_a_run_that_fails_has_told_it_and_what_came_later_once(tmp_path, monkeyp
     assert told[0].startswith(LOOP)
     assert len(told) == len(set(told)) == 2
     assert "a.p" in told[1]
-
-
-def test_what_the_reader_of_the_file_noted_is_not_told_again(tmp_path, monkeypatch):
-    system, _ = ring(tmp_path, monkeypatch, notes=("read in a way",))
-    told = []
-    result = simulate(system, note=told.append)
-    assert result.log == ("read in a way", *told)

@@ -160,7 +160,7 @@ def stair(folder, kind="CoSimulation", step=0.2, **values):
 def test_a_run_ends_with_the_last_sample(tmp_path, kind, engine, step, end, said):
     """The other components are then at the same communication point."""
     system = stair(tmp_path, kind, step)
-    result = simulate(system, engine=engine)  # type: ignore[arg-type]
+    result = simulate(system, engine=engine)
     assert result.complete
     assert result.time[-1] == end
     assert result["stair.counter"][[-2, -1]].tolist() == [9, 10]

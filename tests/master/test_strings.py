@@ -19,7 +19,7 @@ TEXTS = ("=1+1", 'a "b", c\r\n\\n', "\x1b[31mred\u202e", "", "ü\u2028", "@x", "
 
 @engines
 def test_a_text_that_changes_at_every_own_step(tmp_path, engine):
-    mock = Mock(tmp_path, "a", lambda u, t: f"t = {t:g}", "String")  # type: ignore[arg-type, return-value]
+    mock = Mock(tmp_path, "a", lambda u, t: f"t = {t:g}", "String")
     run = Run(make_system([mock], [], own={"a": 200_000_000}), [mock], engine)
     first, second = "t = 0", "t = 0.2"
     texts = {"a.y": [first, first, second, second, "t = 0.4"]}

@@ -131,7 +131,6 @@ def test_an_integer_that_gets_too_long_on_the_way_ends_the_run(tmp_path, source,
     message = rf"^a\.y_{source} = {value} at step 6: must be smaller than 2\*\*53 in magnitude, "
     with pytest.raises(SimulationError, match=message) as caught:
         simulate(replace(system, events=(event,)), engine=engine)
-    assert caught.value.result is not None
     assert caught.value.result[f"a.y_{source}"].tolist() == [7] * 6
 
 

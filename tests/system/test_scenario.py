@@ -62,7 +62,7 @@ def mock_system(kind, faults):
 
 
 def mock_interface(path):
-    kind = path.stem  # type: ignore[assignment]
+    kind = path.stem
     u = Variable("u", kind, "input", 0, None, "0", -math.inf, 5.0, kind)
     y = Variable("y", kind, "output", 1, None, None, -math.inf, math.inf, kind)
     return Interface(path, "", "mock", (u, y))
