@@ -1,7 +1,10 @@
-"""What an FMU brings along follows from its script's imports: nothing missing, nothing else."""
+"""What an FMU brings along follows from its imports, and runs beside others of its names."""
 
+import os
 import subprocess
 import sys
+from itertools import zip_longest
+from math import sin
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -9,6 +12,8 @@ import pytest
 from grasp_fmus.build import build_block
 from grasp_fmus.package import IMPORT, with_imports
 from grasp_fmus.shipped import SHIPPED
+from support.fmi2 import OK, Fmu, Instance
+from support.kinds import all_kinds
 
 SPRING = Path(__file__).parents[2] / "docs" / "spring_plant.py"
 
@@ -82,10 +87,153 @@ def test_imports_are_followed_in_whatever_form_they_come(tmp_path, monkeypatch):
 
 
 def test_a_package_that_is_not_installed_is_no_surprise_of_the_host(tmp_path):
-    with pytest.raises(ImportError, match="no_such_package: no such package; must be installed"):
+    with pytest.raises(ImportError, match="no_such_package: no such module; must be installed"):
         with_imports({"Script.py": b"from no_such_package import block\n"})
 
 
 def test_an_import_is_none_in_the_middle_of_a_text():
     text = 'from a import b\nfrom c.d import (\n  e\n)\n"""\nfrom the start, import is\n"""\n'
     assert IMPORT.findall(text) == ["a", "c"]
+
+
+# All Python FMUs of a process share one sys.modules: each runs its own code all the same
+
+TESTS = Path(__file__).parents[1]
+ROOT = TESTS.parent
+H = 1e-3
+
+PARAMETERS = {
+    "GraspControllerAdaptive": [
+        {},
+        {"contact_force.stiffness": 60.0, "reflectance.prior_deviation": 0.1},
+        {"simultaneous_contact.gain": 0.0, "hold.squeeze": 1.0},
+    ],
+    "GripperPlant": [
+        {},
+        {"finger_mass[1]": 0.8, "object_width": 0.1, "initial_object_position": 0.0},
+        {"finger_mass[2]": 0.2, "baumgarte_alpha": 350.0},
+    ],
+    "ProximitySensor": [{}, {"reflectance": 0.3}, {"gain": 0.01, "diffusion_exponent": 2.0}],
+}
+
+
+def driven(instance, steps):
+    """All outputs, step by step, under inputs that change; the plant gets into contact."""
+    fmu = instance.fmu
+    flags = [fmu.references[n] for n in fmu.names("output") if n in fmu.booleans]
+    for k in range(steps):
+        inputs = {
+            n: (-5.0 if n == "force[1]" else 3.0) + sin(k)
+            if n.startswith("force")
+            else 0.05 + 0.04 * sin(0.3 * k + i)
+            for i, n in enumerate(fmu.names("input"))
+        }
+        assert instance.set(inputs) == OK
+        assert instance.step(k * H, H) == OK
+        status, contacts = instance.get_boolean(flags)
+        assert status == OK
+        yield [*instance.outputs(), *contacts]
+
+
+@all_kinds
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_interleaved_instances_are_as_each_one_alone(load, name):
+    """Bit for bit, with other parameters and other numbers of steps."""
+    steps = (300, 200, 250)
+    alone = []
+    for values, n in zip(PARAMETERS[name], steps, strict=True):
+        with Instance(load(name)).initialise(**values) as instance:
+            alone.append(list(driven(instance, n)))
+    assert len({str(trajectory[:200]) for trajectory in alone}) == 3
+    instances = [Instance(load(name)).initialise(**values) for values in PARAMETERS[name]]
+    runs = [driven(instance, n) for instance, n in zip(instances, steps, strict=True)]
+    rounds = list(zip_longest(*runs))
+    for instance in instances:
+        instance.call("FreeInstance")
+    together = [[row for row in run if row is not None] for run in zip(*rounds, strict=True)]
+    assert together == alone
+
+
+@all_kinds
+def test_two_builds_of_one_fmu_run_their_own_code(load, tmp_path, altered):
+    """Alive at the same time and step by step in turn; whichever came first."""
+    change = "p.gain * p.alpha", "2.0 * p.gain * p.alpha"
+    other = altered("ProximitySensor", "proximity_sensor/optics.py", *change)
+    ours, theirs = load("ProximitySensor"), Fmu(other, tmp_path / "theirs")
+    assert ours.guid != theirs.guid
+    for order in ((ours, theirs, ours), (theirs, ours, theirs)):
+        instances = [Instance(fmu).initialise(gap=0.02) for fmu in order]
+        for values in zip(*(driven(instance, 50) for instance in instances), strict=True):
+            one = values[order.index(ours)][0]
+            assert [v[0] for v in values] == [one if f is ours else 2.0 * one for f in order]
+        for instance in instances:
+            instance.call("FreeInstance")
+
+
+# Other hosts, and other people's FMUs: each in a process of its own
+
+HOST = """
+import sys
+from pathlib import Path
+{before}
+from support.fmi2 import Fmu, Instance
+from math import sin
+folder, *fmus = map(Path, sys.argv[1:])
+for path in fmus:
+    fmu = Fmu(path, folder / path.stem)
+    with Instance(fmu).initialise() as instance:
+        for k in range(100):
+            values = {{name: -0.1 * i + 0.03 * sin(k) for i, name in enumerate(fmu.names("input"))}}
+            assert instance.set(values) == 0
+            assert instance.step(k * 1e-3, 1e-3) == 0
+            print(path.stem, *map(float.hex, instance.outputs()))
+"""
+
+GARBLED = """
+import gripper_plant.rigid, proximity_sensor.channel, grasp_controller.adaptive, grasp_fmus.slave
+OURS = "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_fmus", "block_variables"
+MODULES = {name: m for name, m in sys.modules.items() if name.partition(".")[0] in OURS}
+
+def garbage(*_, **__):
+    raise AssertionError("the host's function was called")
+
+for name, module in MODULES.items():
+    for key, value in list(vars(module).items()):
+        if isinstance(value, type) and value.__module__ in MODULES:
+            for method, function in list(vars(value).items()):
+                if callable(function):
+                    setattr(value, method, garbage)
+        if callable(value):
+            setattr(module, key, garbage)
+assert gripper_plant.rigid.step is garbage
+"""
+
+REPLACED = """
+from types import ModuleType
+for name in MODULES:
+    sys.modules[name] = ModuleType(name, "nothing in it")
+"""
+
+
+def run(script, *arguments):
+    """What a host prints; it must end with exit code 0."""
+    roots = [ROOT / folder for folder in ("plant", "sensor", "controller", "fmus")]
+    done = subprocess.run(
+        [sys.executable, "-c", script, *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, [TESTS, *roots]))},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_a_host_does_not_change_what_an_fmu_computes(fmus, tmp_path):
+    """That has garbled the same packages, or has other modules of their names."""
+    nothing = 'assert not {m for m in sys.modules if m.startswith(("grasp", "gripper", "prox"))}'
+    printed = [
+        run(HOST.format(before=before), tmp_path / str(k), *sorted(fmus.glob("*.fmu")))
+        for k, before in enumerate((nothing, GARBLED, GARBLED + REPLACED))
+    ]
+    assert len(set(printed[0].splitlines())) > 250
+    assert printed[0] == printed[1] == printed[2]
