@@ -38,31 +38,29 @@ def passed(function, values, steps=None):
     return np.array([function(v, k) for v, k in zip(listed, numbers, strict=True)])
 
 
-def test_stuck_holds_the_value_where_it_begins():
-    expected = SIGNAL.copy()
-    expected[20:50] = SIGNAL[20]
-    assert (passed(on_connection(fault("stuck", 20, 50)), SIGNAL) == expected).all()
+WITHIN = SIGNAL[20:50]
 
 
-def test_stuck_at_a_value():
-    expected = SIGNAL.copy()
-    expected[20:50] = -3.0
-    assert (passed(on_connection(fault("stuck", 20, 50, value=-3.0)), SIGNAL) == expected).all()
+@pytest.mark.parametrize(
+    ("kind", "given", "expected"),
+    [
+        ("stuck", {}, SIGNAL[20]),
+        ("stuck", {"value": -3.0}, -3.0),
+        ("bias", {"value": 0.25}, WITHIN + 0.25),
+        ("saturation", {"low": -0.5}, np.maximum(WITHIN, -0.5)),
+        ("saturation", {"high": 0.5}, np.minimum(WITHIN, 0.5)),
+        ("saturation", {"low": -0.2, "high": 0.3}, np.clip(WITHIN, -0.2, 0.3)),
+        ("delay", {"time": 0.007}, SIGNAL[13:43]),  # it knows what was passed before it began
+        ("dropout", {"probability": 1.0}, SIGNAL[19]),
+    ],
+)
+def test_what_a_fault_makes_of_values_in_its_window(kind, given, expected):
+    whole = np.concatenate([SIGNAL[:20], np.broadcast_to(expected, 30), SIGNAL[50:]])
+    assert (passed(on_connection(fault(kind, 20, 50, **given)), SIGNAL) == whole).all()
 
 
 def test_a_boolean_is_stuck_as_a_number():
     assert repr(on_connection(fault("stuck", value=True))(0.0, 3)) == "1.0"
-
-
-def test_bias():
-    expected = np.where(np.arange(100) < 30, SIGNAL, SIGNAL + 0.25)
-    assert (passed(on_connection(fault("bias", 30, value=0.25)), SIGNAL) == expected).all()
-
-
-@pytest.mark.parametrize("limits", [{"low": -0.5}, {"high": 0.5}, {"low": -0.2, "high": 0.3}])
-def test_saturation(limits):
-    expected = np.clip(SIGNAL, limits.get("low"), limits.get("high"))
-    assert (passed(on_connection(Fault(WIRE, "saturation", limits)), SIGNAL) == expected).all()
 
 
 @QUICK
@@ -84,12 +82,6 @@ def test_quantisation_between_two_levels_takes_the_even_one():
 def test_delay_is_exact(steps):
     expected = SIGNAL[np.maximum(np.arange(100) - steps, 0)]
     assert (passed(on_connection(fault("delay", time=steps / 1000)), SIGNAL) == expected).all()
-
-
-def test_a_delay_knows_what_was_passed_before_it_began():
-    expected = SIGNAL.copy()
-    expected[20:50] = SIGNAL[13:43]
-    assert (passed(on_connection(fault("delay", 20, 50, time=0.007)), SIGNAL) == expected).all()
 
 
 @pytest.mark.parametrize("delay", [1, 2, 5, 7])
@@ -132,13 +124,6 @@ def test_how_many_a_dropout_loses(share):
     assert abs(hits.mean() - share) <= 5 * math.sqrt(share * (1 - share) / n)
     variance = share**2 * (1 - share**2) + 2 * (share**3 - share**4)
     assert abs((hits[1:] & hits[:-1]).mean() - share**2) <= 5 * math.sqrt(variance / n)
-
-
-def test_a_dropout_holds_what_was_passed_before_its_window():
-    result = passed(on_connection(fault("dropout", 20, 50, probability=1.0)), SIGNAL)
-    expected = SIGNAL.copy()
-    expected[20:50] = SIGNAL[19]
-    assert (result == expected).all()
 
 
 def noise(seed=1, target=WIRE, n=20_000):
