@@ -24,11 +24,6 @@ def is_number(value: Any) -> bool:
     return isinstance(value, float | int) and not isinstance(value, bool)
 
 
-def is_whole(value: Any) -> bool:
-    """Return True if `value` is an int; a bool is no number."""
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
 def number(
     place: str,
     value: Any,
@@ -62,7 +57,7 @@ def whole(
 
     InputError otherwise.
     """
-    if not is_whole(value) or not low <= value <= high:
+    if not is_number(value) or not isinstance(value, int) or not low <= value <= high:
         raise InputError(f"{place} = {value!r}: must be {must}")
     return int(value)
 

@@ -24,15 +24,14 @@ from ..base.text import printable
 from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
 
-NAME = "grasp-cosim"
 COMPLETE = "_GRASP_COSIM_COMPLETE"
-"""The environment variable in which click's completion script for a shell says what it wants."""
+"""The environment variable by which a shell asks click what may come next."""
 
 
 def entry() -> NoReturn:
     """The command grasp-cosim, see __main__.py."""
-    if COMPLETE in os.environ:  # the shell asks what may come next
-        cli.main(prog_name=NAME, complete_var=COMPLETE)
+    if COMPLETE in os.environ:
+        cli.main(prog_name="grasp-cosim", complete_var=COMPLETE)
     keep_output_for_us()
     interruption.command()
     try:
@@ -62,7 +61,9 @@ def main(arguments: list[str]) -> int:
     debug = "--debug" in arguments
     with harmless_streams():
         try:
-            return int(cli.main(arguments, NAME, standalone_mode=False, obj=arguments) or 0)
+            return int(
+                cli.main(arguments, "grasp-cosim", standalone_mode=False, obj=arguments) or 0
+            )
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.ctx.get_help(), err=True)
             return WRONG
