@@ -14,7 +14,6 @@ import pytest
 from grasp_cosim import SimulationError, simulate
 from grasp_cosim.base.interruption import AT_ONCE
 from grasp_cosim.base.scratch import PREFIX, lock_of
-from grasp_cosim.fmi.process import ProcessInstance
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.recording.load import load_run
 from support.marks import slow
@@ -229,20 +228,3 @@ entry()
     done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True)
     assert (done.returncode, done.stderr[: len(said)]) == (code, said)
     assert len(done.stderr.splitlines()) == bool(said)
-
-
-@needs_gcc
-@pytest.mark.parametrize(("said", "started"), [("none", 0), ("process", 1), (None, 1)])
-def test_the_option_goes_before_the_file(tmp_path, said, started, monkeypatch, command):
-    names = []
-    start = ProcessInstance.__init__
-
-    def noted(part, name, *rest):
-        names.append(name)
-        start(part, name, *rest)
-
-    monkeypatch.setattr(ProcessInstance, "__init__", noted)
-    path = driven(tmp_path, "time\n0\n", own='isolation = "process"')
-    given = ["--set", f"components.a.isolation={said}"] if said else []
-    assert command("run", path, *given)[0] == 0
-    assert names == ["a"] * started

@@ -82,7 +82,6 @@ _UNSEEN = (
 _RAW = re.compile(f"[{_UNSEEN}]")
 _IN_A_CELL = re.compile(f"[\\\\\t\n{_UNSEEN}]|\\A[=+\\-@\uff1d\uff0b\uff0d\uff20]")
 _WRITTEN = re.compile(r"\\(x[0-9a-f]{2}|u[0-9a-f]{4}|U[0-9a-f]{8}|.)", re.DOTALL)
-_SHORT = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
 _MEANT = {"n": "\n", "r": "\r", "t": "\t"}
 
 
@@ -111,16 +110,8 @@ def from_cell(text: str) -> str:
 
 
 def _code(match: re.Match[str]) -> str:
-    letter, number = match[0], ord(match[0])
-    if letter in _SHORT:
-        return _SHORT[letter]
-    if letter.isprintable():
-        return f"\\{letter}"
-    return (
-        f"\\x{number:02x}"
-        if number < 0x100
-        else f"\\{f'u{number:04x}' if number < 0x10000 else f'U{number:08x}'}"
-    )
+    letter = match[0]
+    return f"\\{letter}" if letter.isprintable() else letter.encode("unicode_escape").decode()
 
 
 def _character(match: re.Match[str]) -> str:

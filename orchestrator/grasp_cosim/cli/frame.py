@@ -109,22 +109,19 @@ class _Said(logging.Handler):
         say(record.getMessage(), always=record.levelno >= logging.ERROR)
 
 
-_SAID = _Said()
-
-
 @contextmanager
 def told(level: int) -> Iterator[None]:
     """Have what our modules log at this level or above said meanwhile."""
     loggers = [logging.getLogger(name) for name in ("grasp_cosim", "grasp_fmus")]
-    before = [logger.level for logger in loggers]
+    before = [(logger, logger.level, [*logger.handlers]) for logger in loggers]
     for logger in loggers:
-        logger.addHandler(_SAID)  # once, if it is there already
+        if not any(isinstance(handler, _Said) for handler in logger.handlers):
+            logger.addHandler(_Said())
         logger.setLevel(min(level, logger.level or level))  # --verbose may be the earlier one
     try:
         yield
     finally:
-        for logger, was in zip(loggers, before, strict=True):
-            logger.removeHandler(_SAID)
+        for logger, was, logger.handlers in before:
             logger.setLevel(was)
 
 
