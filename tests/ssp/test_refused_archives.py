@@ -206,6 +206,15 @@ CONNECTIONS = {
         a=CALCULATED,
         b=TAKES,
     ),
+    "a transformed value": of(
+        system(
+            "top",
+            component("a", "parameter active"),
+            connect("on", "a/active", linear(2.0)),
+            "parameter on Boolean",
+            given("on Boolean true"),
+        )
+    ),
     "no definition": pair(fmu("output Real y - cubit")),
 }
 LABEL = system("top", component("a", bindings=values_2("label String x")))
