@@ -167,6 +167,12 @@ def test_what_grows_exponentially_trips_whatever_its_rate_and_frequency(
     assert np.abs(curve[: found.row + 1]).max() >= 10.0**DECADES
 
 
+@pytest.mark.parametrize("rate", [1.0 / 500.0, 1.0 / 40.0, 0.1, 0.7])
+def test_what_grows_evenly_trips_at_six_decades(rate):
+    curve = 10.0 ** (rate * K[K * rate < 20.0])
+    assert 6.0 <= np.log10(curve[watch(curve).row]) < 7.5
+
+
 def test_the_scale_is_the_nominal_or_the_first_value():
     curve = 10.0 ** (K / 500.0)  # up to 1e8
     assert watch(curve) is not None

@@ -142,9 +142,11 @@ def test_noise_is_gaussian_and_white():
         assert abs((x[lag:] * x[:-lag]).mean()) < 5 / math.sqrt(n)
 
 
-def test_noise_of_another_seed_or_connection_is_independent():
+def test_noise_of_another_seed_or_connection_or_beside_it_is_independent():
     x = noise()
-    for y in (noise(seed=2), noise(target=OTHER)):
+    one = fault("noise", seed=1, standard_deviation=2.0)
+    both = passed(on_connection(one, one), np.zeros(len(x)))
+    for y in (noise(seed=2), noise(target=OTHER), both - x):
         assert abs(np.corrcoef(x, y)[0, 1]) < 5 / math.sqrt(len(x))
 
 
