@@ -15,8 +15,7 @@ from ..base.progress import phase
 from ..system.changes import plain
 from ..system.description import System
 from ..system.stimuli import Stimuli, read_stimuli
-from ..system.structure import SCHEMES
-from .frame import PATH, pair, say, waiting
+from .frame import pair, say, waiting
 
 Command = Callable[..., Any]
 
@@ -63,10 +62,6 @@ controller_option = click.option(
     help="Take the published controller or the adaptive one in the place of the system's.",
 )
 
-input_option = click.option(
-    "--input", type=PATH, help="Drive inputs by a CSV file: time, then columns like plant.force."
-)
-
 preset_option = click.option(
     "--preset", "presets", multiple=True, metavar="NAME", help="Take a preset of the system file."
 )
@@ -74,12 +69,6 @@ preset_option = click.option(
 step_option = click.option("--step", type=float, help="Communication step in s.")
 
 stop_option = click.option("--stop", type=float, help="Stop time in s.")
-
-scheme_option = click.option(
-    "--scheme",
-    type=click.Choice(SCHEMES),
-    help="Step the components one after the other (by default), or all at once.",
-)
 
 SYSTEM_OPTIONS = (
     controller_option,

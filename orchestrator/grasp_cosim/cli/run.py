@@ -13,6 +13,7 @@ from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..report import terminal
 from ..report.timing import draw_result
+from ..system.structure import SCHEMES
 from .frame import (
     INTERRUPTED,
     NEGATIVE,
@@ -27,23 +28,21 @@ from .frame import (
     show,
     waiting,
 )
-from .options import (
-    chosen_system,
-    input_option,
-    native_option,
-    natively,
-    scheme_option,
-    swap_option,
-    system_options,
-)
+from .options import chosen_system, native_option, natively, swap_option, system_options
 
 
 @click.command()
 @click.argument("system", required=False, type=PATH)
 @system_options
-@scheme_option
+@click.option(
+    "--scheme",
+    type=click.Choice(SCHEMES),
+    help="Step the components one after the other (by default), or all at once.",
+)
 @swap_option
-@input_option
+@click.option(
+    "--input", type=PATH, help="Drive inputs by a CSV file: time, then columns like plant.force."
+)
 @metrics_option
 @native_option("as SYSTEM names them, but native for the built-in grasp.")
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")

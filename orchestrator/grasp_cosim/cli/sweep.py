@@ -28,13 +28,7 @@ from .frame import (
     show,
     waiting,
 )
-from .options import (
-    Settings,
-    chosen_system,
-    many_runs_option,
-    swap_option,
-    system_options,
-)
+from .options import Settings, chosen_system, many_runs_option, swap_option, system_options
 
 TABLE = Path("sweep.csv")
 
