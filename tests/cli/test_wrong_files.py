@@ -1,6 +1,5 @@
 """A file of another kind than a command takes: it says what that is and what to do with it."""
 
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ FMU = [
 ]
 SYSTEM = ["run {}", "ssp {} -o out.ssp", "qualify plant.fmu --as a --system {}"]
 BLOCK = ("b.py", "a Python file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block")
-UNPACKED = ("unpacked", "a folder, unpacked from an FMU", "zip -r - .) > unpacked.fmu` packs it")
 REPORT = "`grasp-cosim report run` shows the run"
 OF_THE_RUN = [
     ("run", "a folder that `grasp-cosim run --out` wrote", REPORT),
@@ -24,38 +22,31 @@ NOT_A_SYSTEM = [
     ("plant.fmu", "an FMU", "`grasp-cosim run --swap COMPONENT=plant.fmu` runs that"),
     ("my.zip", "an FMU", "--as COMPONENT=my.zip`"),
     ("b.zip", "an SSP archive", "its name must end in .ssp"),
-    ("structure", "a folder, unpacked from an SSP archive", "> structure.ssp` packs it"),
-    ("structure/SystemStructure.ssd", "a file unpacked from an SSP archive", "> structure.ssp`"),
-    ("unpacked/modelDescription.xml", "a file unpacked from an FMU", "> unpacked.fmu` packs it"),
     ("run/run.json", "a file of a run", REPORT),
     ("OspSystemStructure.xml", "an XML file", ""),
     ("drive.csv", "a CSV file", "`grasp-cosim run --input drive.csv` drives"),
-    (".", "a folder", "there is: a.ssp, a.toml"),
-    *(BLOCK, UNPACKED, *OF_THE_RUN),
+    (".", "a folder", ""),
+    *(BLOCK, *OF_THE_RUN),
 ]
 NOT_AN_FMU = [
-    (".", "a folder", "there is: plant.fmu"),
-    *(BLOCK, UNPACKED, *OF_THE_RUN),
+    (".", "a folder", ""),
+    *(BLOCK, *OF_THE_RUN),
     ("a.ssp", "an SSP archive", "`grasp-cosim run a.ssp` runs it; its FMUs are in it"),
     ("a.toml", "a TOML file", "`grasp-cosim run a.toml` runs it, if it is a system"),
 ]
 NOT_A_RUN = [
     ("plant.fmu", "an FMU", "`grasp-cosim inspect plant.fmu` shows it"),
     *NOT_AN_FMU[-2:],
-    (".", "a folder", "there is: run"),
 ]
 
 
 @pytest.fixture
 def things(grasp, fmus, tmp_path):
-    """One of each: plant.fmu, my.zip, the same; the folder unpacked; a.ssp; a.toml; b.py; run/."""
+    """One of each: plant.fmu, my.zip, the same; a.ssp; a.toml; b.py; run/."""
     for name in ("plant.fmu", "my.zip"):
         (tmp_path / name).write_bytes((fmus / "GripperPlant.fmu").read_bytes())
     write_ssp(grasp, tmp_path / "a.ssp")
     (tmp_path / "b.zip").write_bytes((tmp_path / "a.ssp").read_bytes())
-    for file, folder in (("plant.fmu", "unpacked"), ("a.ssp", "structure")):
-        with zipfile.ZipFile(tmp_path / file) as archive:
-            archive.extractall(tmp_path / folder)
     (tmp_path / "a.toml").write_text("connections = []\n")
     (tmp_path / "drive.csv").write_text("time,plant.u\n")
     (tmp_path / "OspSystemStructure.xml").write_text("<OspSystemStructure/>\n")

@@ -13,7 +13,7 @@ from typing import Any
 
 from one_piece import in_one_piece, is_stream
 
-from .errors import InputError, choices
+from .errors import InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of a disk, not of the input."""
@@ -80,42 +80,27 @@ def check_nature(path: Path, wanted: str) -> None:
 
 def _nature(path: Path, wanted: str) -> tuple[str, str]:
     """The nature of a file, and what to do with it, {} for its name; empty where not plain."""
-    suffix = path.suffix.lower()
     folder = path if path.is_dir() else path.parent
-    report = f"`grasp-cosim report {quote(str(folder))}` shows the run"
     if (folder / "run.json").is_file() and (folder == path or path.name in _OF_A_RUN):
-        return WANTED["run"] if folder == path else "a file of a run", report
-    for file, what in _OF_AN_ARCHIVE.items():
-        if path in (folder, folder / file) and (folder / file).is_file():
-            archive = f"{folder.resolve().name}.{'fmu' if what == 'an FMU' else 'ssp'}"
-            again = f"`(cd {quote(str(folder))} && zip -r - .) > {quote(archive)}` packs it again"
-            return f"{'a folder,' if folder == path else 'a file'} unpacked from {what}", again
-    if folder == path:
-        return _folder_nature(path, wanted)
+        what = WANTED["run"] if folder == path else "a file of a run"
+        return what, f"`grasp-cosim report {quote(str(folder))}` shows the run"
+    if folder == path:  # in the place of a run, what is missing in it is to be said
+        return ("", "") if wanted == "run" else ("a folder", "")
     found = _archive_nature(path)
     if found == "an FMU" and wanted == "system":
         return found, (
             "`grasp-cosim init my_system.toml --fmu NAME={}` makes a system of it alone, "
-            "`--as COMPONENT={}` the grasp with it, `grasp-cosim run --swap COMPONENT={}` runs "
-            "that"
+            "`--as COMPONENT={}` the grasp with it, `grasp-cosim run --swap COMPONENT={}` runs that"
         )
     if found == "an FMU":
         return found, "`grasp-cosim inspect {}` shows it"
+    suffix = path.suffix.lower()
     if found and wanted == "system":
         return ("", "") if suffix == ".ssp" else (found, "its name must end in .ssp")
     if found:
         return found, "`grasp-cosim run {}` runs it; its FMUs are in it, below resources/"
     own = {"system": ".toml", "run": ".csv", "fmu": ".csv"}[wanted]
     return _OF_A_SUFFIX.get(suffix, ("", "")) if suffix != own and path.is_file() else ("", "")
-
-
-def _folder_nature(path: Path, wanted: str) -> tuple[str, str]:
-    suffixes = {"fmu": (".fmu",), "system": (".toml", ".ssp")}.get(wanted, ())
-    inside = sorted(str(p) for p in path.iterdir() if p.suffix.lower() in suffixes)
-    inside += sorted(str(p.parent) for p in path.glob("*/run.json")) if wanted == "run" else []
-    if wanted == "run" and not inside:
-        return "", ""  # what is missing in it is to be said
-    return "a folder", f"there is: {choices(inside, 6)}" if inside else ""
 
 
 def _archive_nature(path: Path) -> str:
