@@ -15,20 +15,20 @@ from typing import NamedTuple
 
 import pytest
 from grasp_cosim.hil.driven import MOST_LOST
-from grasp_fmus.contract import declared
+from grasp_fmus.contract import declared, unpacker
+from grasp_fmus.contract import variables as variables_of
 from grasp_fmus.link.message import (
     END,
     FAILED,
     HEAD,
+    HELLO,
     INITIALISE,
     LONGEST_STEP,
-    OUTPUTS,
     REFUSE,
     STEP,
     TAG_SIZE,
     VERSION,
     WELCOME,
-    Codec,
     LinkVariable,
     Message,
     Sealer,
@@ -38,6 +38,7 @@ from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
 from grasp_fmus.native.bench_header import bench_header, c_prefix
 from grasp_fmus.native.c_only import write_c
 from grasp_fmus.package import shipped_model
+from grasp_fmus.proxy import shared_signature
 from gripper_plant import rigid
 from support import compiled
 from support.marks import slow
@@ -81,17 +82,8 @@ EVERY_KIND = Signature(
 
 def plant():
     """The gripper plant's variables and their start values."""
-    listed = [
-        (f, name, start)
-        for f in declared(rigid)
-        for name, start in zip(f.names, f.starts, strict=True)
-    ]
-    return Signature(
-        tuple(
-            LinkVariable(name, "Boolean" if f.kind is bool else "Real", f.causality, f.unit or None)
-            for f, name, _ in listed
-        )
-    ), {name: start for _, name, start in listed if start is not None}
+    listed = variables_of(declared(rigid))
+    return shared_signature(listed), {v.name: v.start for v in listed if v.start is not None}
 
 
 def compile_c(folder, header, name, source, *options):
@@ -276,19 +268,10 @@ def linked(driver, received, key=None):
     out = driven(driver, "link", key.decode() if key else "-", pipe=pipe)
     records = []
     for _ in received:
-        time, step, behind, event, alive, fresh, size = RECORD.unpack_from(out)
-        answer = out[RECORD.size : RECORD.size + size]
+        *found, size = RECORD.unpack_from(out)
+        records.append(Record(*found, out[RECORD.size : RECORD.size + size]))
         out = out[RECORD.size + size :]
-        records.append(Record(time, step, behind, event, alive == 1, fresh == 1, answer))
     return records, PeerCounters(*struct.unpack(f"={len(fields(PeerCounters))}Q", out))
-
-
-def computed(values):
-    """The outputs of the driver's model."""
-    real, integer, boolean, p_boolean, p_integer, p_real = map(float, values)
-    return [
-        not boolean, int(integer) ^ 0x55, -real, int(p_integer) ^ 0x55, -p_real, not p_boolean,
-    ]  # fmt: skip
 
 
 class Reference:
@@ -298,19 +281,21 @@ class Reference:
         self.peer = Peer(EVERY_KIND, key, RANDOM)
 
     def receive(self, datagram, now):
-        """Event and answer."""
+        """Event, answer, and whether a session begins."""
         action = self.peer.receive(datagram, now)
         if isinstance(action, Request):
             event = {INITIALISE: DO_INITIALISE, STEP: DO_STEP, END: ENDED}[action.kind]
-            return event, b"" if event == ENDED else self._answer(action)
-        return (SEND, action) if action else (NOTHING, b"")
+            return event, b"" if event == ENDED else self._answer(action), action.fresh
+        return (SEND, action, False) if action else (NOTHING, b"", False)
 
     def _answer(self, request):
         if request.values[4] == SILENT:
             return b""
         if request.values[4] == FAIL:
             return self.peer.failed("thirteen")
-        return self.peer.outputs(computed(request.values), request.time + request.step)
+        u, ui, ub, pb, pi, p = request.values
+        outputs = [not ub, ui ^ 0x55, -u, pi ^ 0x55, -p, not pb]
+        return self.peer.outputs(outputs, request.time + request.step)
 
 
 VALUES = [0.5, 3, True, False, -7, 1e-300]
@@ -347,59 +332,22 @@ def known(number=99):
     return proxy
 
 
-def initialise(proxy, time=0.0):
-    return proxy.request(INITIALISE, time, VALUES)
-
-
 def step(proxy, time, size=0.5):
     return proxy.request(STEP, time, VALUES, size)
 
 
-INVALID = {
-    "a Real that is inf": (0, struct.pack("<d", float("inf"))),
-    "a Real that is NaN": (0, struct.pack("<d", float("nan"))),
-    "a parameter that is NaN": (40, struct.pack("<d", float("nan"))),
-    "an Integer beyond 32 bits": (8, struct.pack("<q", 2**31)),
-    "another": (8, struct.pack("<q", -(2**31) - 1)),
-    "a Boolean that is 2": (16, struct.pack("<Q", 2)),
-    "a Boolean that is 2**32": (16, struct.pack("<Q", 2**32)),
-    "a byte more": (48, b"\0"),
-}
-
-
-@pytest.mark.parametrize("what", INVALID)
-def test_no_value_is_taken_from_what_is_malformed(driver, what):
-    proxy, (place, value) = known(), INVALID[what]
-    received = [initialise(proxy), step(proxy, 0.0)]
-    body = bytearray(Codec(EVERY_KIND.request).pack(*VALUES))
-    body[place : place + len(value)] = value
-    bad = proxy.request(STEP, 0.5, VALUES, 0.5, body=bytes(body))
-    records, counters = linked(driver, [(0, d) for d in (*received, bad, step(proxy, 0.5))])
-    assert (records[2].event, records[2].answer, records[2].time) == (NOTHING, b"", 0.0)
-    assert (records[3].event, records[3].behind) == (DO_STEP, 0.0)
-    assert counters == PeerCounters(steps=2, initialisations=1, malformed=1)
-
-
-def test_lost_requests_are_told(driver):
-    proxy = known()
-    received = [initialise(proxy, 2.0), step(proxy, 2.0, 0.25)]
-    step(proxy, 2.25)
-    received += [step(proxy, 2.75, 0.1), step(proxy, 2.85 + 1e-12, 0.1), step(proxy, 1.0, 0.5)]
-    records, _ = linked(driver, [(0, d) for d in received])
-    assert [r.event for r in records] == [DO_INITIALISE, *[DO_STEP] * 4]
-    assert [r.behind for r in records[:4]] == [0.0, 0.0, 0.5, 0.0]
-    assert records[4].behind == pytest.approx(-1.95)
-    assert [r.fresh for r in records[:2]] == [True, False]
-
-
-def test_the_watchdog_is_fed_by_new_requests_alone(driver):
+def test_lost_requests_are_told_and_new_ones_alone_feed_the_watchdog(driver):
     """A recorded one, sent again and again, does not keep the inputs from being made safe."""
     proxy = known()
-    first, second = initialise(proxy), step(proxy, 0.0)
+    first, second = proxy.request(INITIALISE, 2.0, VALUES), step(proxy, 2.0, 0.25)
+    step(proxy, 2.25)
     at = [(1, first), (2, first), (3, second), (4, second), (5, session().hello(99)),
-          (6, step(proxy, 0.5)), (6, proxy.pack(END))]  # fmt: skip
+          (6, step(proxy, 2.75, 0.1)), (6, step(proxy, 2.85 + 1e-12, 0.1)), (6, step(proxy, 1.0)),
+          (6, proxy.pack(END))]  # fmt: skip
     records, _ = linked(driver, at)
-    assert [r.alive for r in records] == [True, False, True, False, False, True, False]
+    assert [r.alive for r in records] == [True, False] * 2 + [False, *[True] * 3, False]
+    behind = [r.behind for r in records if r.event == DO_STEP]
+    assert behind == [0.0, 0.5, 0.0, pytest.approx(-1.95)]
 
 
 def test_outputs_that_are_none_fail_and_are_named(tmp_path):
@@ -429,6 +377,12 @@ def test_outputs_that_are_none_fail_and_are_named(tmp_path):
 
 STEPS = (*(0.1, 1e-3, 1e-9, 0.0, -1.0) * 4, LONGEST_STEP, 1e300)
 """The last is too long."""
+INVALID = {
+    "Real": [struct.pack("<d", float(x)) for x in ("inf", "-inf", "nan")],
+    "Integer": [struct.pack("<q", n) for n in (2**31, -(2**31) - 1)],
+    "Boolean": [struct.pack("<Q", n) for n in (2, 2**32)],
+}
+"""What is next to the values of a kind, and none."""
 
 
 class Proxies:
@@ -479,16 +433,21 @@ class Proxies:
         rng = self.rng
         tag = TAG_SIZE if self.key else 0
         data = bytearray(datagram[: len(datagram) - tag])
-        kind = rng.randrange(4)
+        kind = rng.randrange(8)
         if kind == 0:
             data[rng.randrange(HEAD.size)] ^= 1 << rng.randrange(8)
         elif kind == 1:
             data = data[: rng.randrange(len(data))]
         elif kind == 2:
-            data += rng.randbytes(rng.randrange(1, 40))
-        else:
+            data += bytes(rng.randrange(1, 40))
+            data[72:76] = struct.pack("<I", len(data) - HEAD.size - rng.randrange(2))
+        elif kind == 3 or data[6] == HELLO:
             at = rng.choice((40, 48, 56, 72, 76))
             data[at : at + 8] = rng.choice((bytes(8), b"\xff" * 8, rng.randbytes(8)))
+        else:
+            place, variable = rng.choice([*enumerate(EVERY_KIND.request)])
+            at = HEAD.size + 8 * place
+            data[at : at + 8] = rng.choice(INVALID[variable.kind])
         sealed = self.key if rng.random() < 0.8 else b"another key of another"
         return bytes(data) + (hmac.digest(sealed, data, "sha256") if self.key and sealed else b"")
 
@@ -513,12 +472,13 @@ def test_the_same_as_the_peer_in_python(driver, key):
         expected.append(reference.receive(datagram, now))
         proxies.hear(expected[-1][1])
     records, counters = linked(driver, received, key)
-    for i, (record, (event, answer)) in enumerate(zip(records, expected, strict=True)):
-        assert (record.event, record.answer) == (event, answer), i
+    for i, (record, what) in enumerate(zip(records, expected, strict=True)):
+        fresh = record.event == DO_INITIALISE and record.fresh
+        assert (record.event, record.answer, fresh) == what, i
     assert counters == reference.peer.counters
     seen = asdict(counters)
     assert min(seen[name] for name in seen if key or name != "forged") > 5, seen
-    assert {event for event, _ in expected} == {NOTHING, SEND, DO_INITIALISE, DO_STEP, ENDED}
+    assert {event for event, *_ in expected} == {NOTHING, SEND, DO_INITIALISE, DO_STEP, ENDED}
 
 
 # The example, as the target with the gripper plant
@@ -579,16 +539,9 @@ class Target:
         return self.proxy.begin(session, values or self.values())
 
 
-def flat(outputs):
-    """The outputs in the order of the wire."""
-    return [
-        *outputs.position, *outputs.velocity, *outputs.gap, *outputs.contact_force,
-        *outputs.contact, outputs.object_position,
-    ]  # fmt: skip
-
-
 def test_the_plant_in_c_to_the_last_bit(target):
     """In free flight, at the impact, pressed and let go again."""
+    flat = unpacker(declared(rigid))
     p, u = rigid.Params(), rigid.Inputs()
     x = rigid.initial_state(p, u)
     h, seen = 1e-3, set()
@@ -680,16 +633,12 @@ def test_a_target_called_wrongly(target, words, code, said):
     assert said in done.stderr
 
 
-def test_the_constants_are_those_of_the_protocol():
-    text = bench_header("M", EVERY_KIND)
-    assert f"M_HEAD_SIZE = {HEAD.size}," in text
-    assert f"#define M_MOST_LOST {float(MOST_LOST)} " in text
-    assert f"INT64_C({ALIVE})" in text
-    assert "M_LARGEST_REASON = 256 " in text
-    assert OUTPUTS == 6
-
-
-def test_descriptions_are_in_the_comments():
+def test_the_constants_of_the_protocol_and_descriptions_in_the_comments():
     signature = Signature((LinkVariable("gap", "Real", "input", "m"),))
     header = bench_header("M", signature, descriptions={"gap": "l, to the */ surface"})
-    assert "double gap;                              /* gap, m: l, to the * / surface */" in header
+    for text in (
+        f"M_HEAD_SIZE = {HEAD.size},", f"#define M_MOST_LOST {float(MOST_LOST)} ",
+        f"INT64_C({ALIVE})", "M_LARGEST_REASON = 256 ",
+        "double gap;                              /* gap, m: l, to the * / surface */",
+    ):  # fmt: skip
+        assert text in header
