@@ -202,6 +202,12 @@ def test_a_metric_of_its_own_says_what_it_lacks():
     assert found.metrics == (there,)
 
 
+def test_a_metric_that_says_why_others_have_no_value_is_left_out_without_one():
+    values = {"a": None, "b": [None, None], "c": [1.0, None], "d": 2.0}
+    found = measure(signals(), [made(n, lambda _, v=v: v, reason=True) for n, v in values.items()])
+    assert dict(found.values) == {"c": [1.0, None], "d": 2.0}
+
+
 # ------------------------------------------------------------------------- names
 
 
