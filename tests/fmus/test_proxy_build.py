@@ -4,7 +4,7 @@ import json
 import shutil
 import sys
 import zipfile
-from collections.abc import Callable
+from operator import attrgetter
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,12 +19,11 @@ from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Component
 from grasp_fmus.native.bench_header import bench_header
 from grasp_fmus.page import icon
+from si_units import known_unit
 from support import native_fmus
 from support.marks import platforms, slow
 from support.native_fmus import state_space
 from support.proxies import ANY_PORT, build_proxy, serving
-
-Proxy = Callable[..., Path]
 
 pytestmark = native_fmus.needs_gcc
 
@@ -36,7 +35,7 @@ OWN_PARAMETERS = {
     "proxy.connect_timeout": ("Real", 5.0),
     "proxy.misses_tolerated": ("Integer", 3),
     "proxy.on_loss": ("String", "stop"),
-    "proxy.resume": ("Boolean", "false"),
+    "proxy.resume": ("Boolean", False),
     "proxy.key_file": ("String", ""),
 }
 OWN_OUTPUTS = dict.fromkeys(
@@ -92,102 +91,52 @@ def rewritten(fmu, change):
 
 # The variables of the original
 
-KINDS = {"Float64": "Real", "Float32": "Real", "Enumeration": "Integer"}
-KINDS |= {f"{u}Int{bits}": "Integer" for u in ("", "U") for bits in (8, 16, 32)}
+SAME = (
+    "kind", "causality", "variability", "description", "unit", "nominal", "relative",
+    "start_value", "minimum", "maximum",
+)  # fmt: skip
 
 
-def variables(fmu):
-    """Inputs, parameters and outputs by name, read from FMI 2 or 3."""
-    found = {}
-    for element in read(fmu).iterfind("ModelVariables/*"):
-        (typed,) = list(element) if element.tag == "ScalarVariable" else [element]
-        if element.get("causality") not in ("input", "parameter", "output"):
-            continue
-        start = typed.get("start", next((e.get("value") for e in element.iter("Start")), None))
-        kind = KINDS.get(typed.tag, typed.tag)
-        convert = {"Real": float, "Integer": int}.get(kind, str)
-        numbers = {k: convert(typed.attrib[k]) for k in ("min", "max") if k in typed.attrib}
-        found[element.attrib["name"]] = {
-            "kind": kind,
-            "causality": element.get("causality"),
-            "variability": element.get("variability"),
-            "description": element.get("description"),
-            "unit": typed.get("unit"),
-            "nominal": float(typed.get("nominal", "1")),
-            "relative": typed.get("relativeQuantity", "false"),
-            "start": None if start is None else convert(start),
-            **numbers,
-        }
-    return found
+def exchanged(fmu):
+    """Inputs, parameters and outputs but texts, by name."""
+    found = read_interface(fmu).of("input", "parameter", "output")
+    return {v.name: v for v in found if v.kind != "String" or v.name.startswith("proxy.")}
 
 
 def check(original, proxy):
-    """Everything of the original is in the proxy, and what it has beside, and it is valid."""
-    theirs, ours = variables(original), variables(proxy)
-    theirs = {name: v for name, v in theirs.items() if v["kind"] != "String"}
-    assert {name: ours.get(name) for name in theirs} == theirs
-    outputs = {name: v for name, v in theirs.items() if v["causality"] == "output"}
+    """Everything of the original is in the proxy, and what it has beside, and it is valid.
+
+    Outputs follow nothing while stepping, and nothing of the proxy's own at the start.
+    """
+    theirs, ours, same = exchanged(original), exchanged(proxy), attrgetter(*SAME)
+    assert {n: same(ours[n]) for n in theirs} == {n: same(v) for n, v in theirs.items()}
+    outputs = {name: v for name, v in theirs.items() if v.causality == "output"}
     own = {name: v for name, v in ours.items() if name not in theirs}
     expected = {name: (kind, "parameter") for name, (kind, _) in OWN_PARAMETERS.items()}
     expected |= {f"proxy.hold.{name}": ("Boolean", "parameter") for name in outputs}
-    expected |= {f"proxy.failsafe.{n}": (v["kind"], "parameter") for n, v in outputs.items()}
+    expected |= {f"proxy.failsafe.{n}": (v.kind, "parameter") for n, v in outputs.items()}
     expected |= {f"proxy.{name}": (kind, "output") for name, kind in OWN_OUTPUTS.items()}
-    assert {name: (v["kind"], v["causality"]) for name, v in own.items()} == expected
+    assert {name: (v.kind, v.causality) for name, v in own.items()} == expected
     for name, v in outputs.items():
         failsafe = ours[f"proxy.failsafe.{name}"]
-        assert (failsafe["unit"], failsafe["relative"]) == (v["unit"], v["relative"])
-    assert all(v["description"] for v in own.values())
+        assert (failsafe.unit, failsafe.relative) == (v.unit, v.relative)
+    assert all(v.description for v in own.values())
+    assert {n: (own[n].kind, own[n].start_value) for n in OWN_PARAMETERS} == OWN_PARAMETERS
     assert validate_fmu(proxy) == []
-    check_units(original, proxy)
-    check_structure(proxy)
-
-
-def check_units(original, proxy):
-    """Units that the proxy uses are defined as the original does."""
-
-    def bases(fmu):
-        return {
-            unit.attrib["name"]: None if base is None else {k: float(x) for k, x in base.items()}
-            for unit in read(fmu).iter("Unit")
-            for base in [unit.find("BaseUnit")]
-        }
-
-    theirs, ours = bases(original), bases(proxy)
-    used = {v["unit"] for v in variables(proxy).values() if v["unit"]}
-    assert set(ours) == used
-    for name, base in ours.items():
-        assert base == theirs.get(name, {"s": 1.0}), name
-
-
-def unknowns(fmu, section):
-    """What is declared of outputs, or at the start, in FMI 2 or 3; None: nothing."""
-    root = read(fmu)
-    names = [v.attrib["name"] for v in root.iterfind("ModelVariables/*")]
-    if root.get("fmiVersion") == "2.0":
-        found, place = root.iterfind(f"ModelStructure/{section}s/Unknown"), "index"
-        names.insert(0, "")  # it counts from 1
-    else:
-        found, place = root.iterfind(f"ModelStructure/{section}"), "valueReference"
-    listed = [(names[int(u.attrib[place])], u.get("dependencies")) for u in found]
-    return {name: d if d is None else {names[int(i)] for i in d.split()} for name, d in listed}
-
-
-def check_structure(proxy):
-    """Outputs follow nothing while stepping, and nothing of the proxy's own at the start."""
-    outputs = [n for n, v in variables(proxy).items() if v["causality"] == "output"]
-    for section in ("Output", "InitialUnknown"):
-        found = unknowns(proxy, section)
-        exact = {"n, °C | 1"} if section == "InitialUnknown" else set()
-        assert list(found) == [name for name in outputs if name not in exact]
-        for known in found.values():
-            assert known is not None
-            assert section == "InitialUnknown" or not known
-            assert not [name for name in known if name.startswith("proxy.")]
+    defined, used = read_interface(original).units, {v.unit for v in ours.values()}
+    units = {"s": known_unit("s"), **defined}
+    assert read_interface(proxy).units == {n: unit for n, unit in units.items() if n in used}
+    for name, v in ours.items():
+        if v.causality == "output":
+            assert v.dependencies == ()
+            assert (v.initial_dependencies is None) == (name == "n, °C | 1")
+            assert not [n for n in v.initial_dependencies or () if n.startswith("proxy.")]
 
 
 def initial(fmu):
     """What is declared of outputs at the start."""
-    return {n: known for n, known in unknowns(fmu, "InitialUnknown").items() if known is not None}
+    found = exchanged(fmu).values()
+    return {v.name: {*v.initial_dependencies} for v in found if v.initial_dependencies is not None}
 
 
 @pytest.mark.parametrize("name", [slow(n) if n != "ProximitySensor" else n for n in BLOCKS])
@@ -198,10 +147,7 @@ def test_the_proxy_of_one_of_ours(fmus, proxy, name):
     declared = initial(made)
     assert {n: declared[n] for n in initial(original)} == initial(original)
     assert read(made).get("variableNamingConvention") == "structured"
-    theirs, ours = (read(f).find("DefaultExperiment") for f in (original, made))
-    assert theirs is not None
-    assert ours is not None
-    assert {k: float(v) for k, v in ours.items()} == {k: float(v) for k, v in theirs.items()}
+    assert read_interface(made).experiment == read_interface(original).experiment
 
 
 def test_the_proxy_of_an_fmu_with_every_type_of_fmi_2(tmp_path, proxy):
@@ -211,7 +157,6 @@ def test_the_proxy_of_an_fmu_with_every_type_of_fmi_2(tmp_path, proxy):
         for v in root.iter("ScalarVariable"):
             v.set("description", f"a <{v.get('name')}> & more")
             typed = v[0]
-            typed.attrib.pop("declaredType", None)
             if typed.tag == "Enumeration":
                 typed.set("declaredType", "Choice")
             if typed.tag in ("Real", "Integer"):
@@ -233,14 +178,10 @@ def test_the_proxy_of_an_fmu_with_every_type_of_fmi_2(tmp_path, proxy):
     original = rewritten(native_fmus.build(tmp_path, version="2.0", units=units), describe)
     made = proxy(original)
     check(original, made)
-    parameters = {
-        n for n, v in variables(original).items()
-        if v["causality"] == "parameter" and v["kind"] != "String"
-    }  # fmt: skip
+    parameters = {n for n, v in exchanged(original).items() if v.causality == "parameter"}
     declared = initial(made)
     assert declared["y_Real"] == {"u_Real", *parameters}
     assert declared["x"] == parameters
-    assert "n, °C | 1" not in declared
     assert read(made).get("variableNamingConvention") == "flat"
     assert read(made).find("DefaultExperiment") is None
 
@@ -252,10 +193,9 @@ def test_dependencies_that_are_not_declared_are_all(tmp_path, proxy):
 
     original = rewritten(native_fmus.build(tmp_path, version="2.0"), undeclare)
     made = proxy(original)
-    found = {n: v for n, v in variables(original).items() if v["kind"] != "String"}
-    everything = {n for n, v in found.items() if v["causality"] != "output"}
-    declared = initial(made)
-    assert all(declared[n] == everything for n, v in found.items() if v["causality"] == "output")
+    found, declared = exchanged(original), initial(made)
+    everything = {n for n, v in found.items() if v.causality != "output"}
+    assert all(declared[n] == everything for n, v in found.items() if v.causality == "output")
 
 
 def test_arrays_are_exchanged_by_element(tmp_path, run):
@@ -268,7 +208,7 @@ def test_arrays_are_exchanged_by_element(tmp_path, run):
     with serving(original, Service(lockstep=True)) as server:
         made = build_proxy(original, tmp_path / "Bench.fmu", ANY_PORT)
         port = {"proxy.port": server.address[1]}
-        assert [n for n in variables(made) if not n.startswith("proxy.")][:3] == [
+        assert [n for n in exchanged(made) if not n.startswith("proxy.")][:3] == [
             "u[1]", "u[2]", "u[3]",
         ]  # fmt: skip
         found = [
@@ -324,7 +264,7 @@ def test_start_values_that_no_datagram_holds(tmp_path, run):
     code, _, err = run(original, "-o", "TheProxy.fmu")
     assert code == 0
     assert "native.fmu: hang_at: INF at the start: left out\n" in err
-    assert "hang_at" not in variables(Path("TheProxy.fmu"))
+    assert "hang_at" not in exchanged(Path("TheProxy.fmu"))
     rewritten(original, endless("u_Real"))
     code, _, err = run(original, "-o", "TheProxy.fmu")
     assert code == 2
@@ -362,8 +302,9 @@ def test_the_peers_side_as_a_c_header(fmus, run):
     both = ("-o", "P.fmu", "--c-header", "sub/bench.h")
     assert run(original, *both)[:2] == (0, "P.fmu: new\nsub/bench.h: written\n")
     text = Path("sub/bench.h").read_text("ascii")
-    starts = {n: v["start"] for n, v in variables(original).items() if v["start"] is not None}
-    said = {v.name: v.description or "" for v in read_interface(original).variables}
+    found = exchanged(original)
+    starts = {n: v.start_value for n, v in found.items() if v.start is not None}
+    said = {n: v.description or "" for n, v in found.items()}
     assert text == bench_header("GripperPlant", signature, starts, said)
     Path("P.fmu").unlink()
     code, out, _ = run(original, "--c-header", "other.h", "--json")
