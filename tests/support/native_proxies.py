@@ -1,7 +1,6 @@
 """Proxies with the clock and the network of a test, called by the names of their variables."""
 
 import ctypes
-import errno
 import shutil
 import tempfile
 import zipfile
@@ -30,7 +29,6 @@ FMI = 2
 COUNTS = ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected")
 
 _CLOCK = ctypes.CFUNCTYPE(ctypes.c_int64)
-_SEND = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t)
 _C = {
     "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
@@ -44,27 +42,30 @@ def on_each_version(request, monkeypatch):
     monkeypatch.setattr("support.native_proxies.FMI", request.param)
 
 
-def original(variables=VARIABLES):
-    return Original("Original.fmu", variables, {}, Experiment(), True)
+def original():
+    return Original("Original.fmu", VARIABLES, {}, Experiment(), True)
+
+
+def _sources(members):
+    """The sources of a proxy by name."""
+    return {n.removeprefix("sources/"): d for n, d in members.items() if n.startswith("sources/")}
 
 
 def write_sources(folder, fmi=2):
     """The sources of a proxy, into a folder that is there."""
-    for file, data in proxy_members(Path(f"{NAME}.fmu"), original(), fmi).items():
-        if file.startswith("sources/"):
-            (folder / file.removeprefix("sources/")).write_bytes(data)
+    for file, data in _sources(proxy_members(Path(f"{NAME}.fmu"), original(), fmi)).items():
+        (folder / file).write_bytes(data)
 
 
 @cache
-def _fmu(variables, fmi):
+def _fmu(fmi):
     """Built once per process, compiled once for all."""
-    files = proxy_members(Path(f"{NAME}.fmu"), original(variables), fmi)
-    sources = {n.removeprefix("sources/"): d for n, d in files.items() if n.startswith("sources/")}
+    files = proxy_members(Path(f"{NAME}.fmu"), original(), fmi)
     if not shutil.which("gcc"):
         pytest.skip("NO gcc")
     compiler = compiler_for(here(), asked=False)
     shimmed = Compiler((*compiler.command, *STRICT, "-include", SHIM.name))
-    sources = {**sources, SHIM.name: SHIM.read_bytes()}
+    sources = {**_sources(files), SHIM.name: SHIM.read_bytes()}
     folder = Path(tempfile.mkdtemp(prefix="native_proxy_"))
     made = compile_all([job(NAME, sources, here(), shimmed, networked=True)], folder)
     place = here().folder if fmi == 2 else here().tuple
@@ -77,30 +78,19 @@ def _fmu(variables, fmi):
 class Host:
     """A host with one instance of a proxy; what is refused raises RefusedError."""
 
-    def __init__(self, port, clock, variables=VARIABLES, **settings):
-        self._fmu = _fmu(tuple(variables), FMI)
-        self._outputs = [v.name for v in variables if v.causality == "output"]
-        self._hooks = {"clock": _CLOCK(clock), "send": _SEND(self._sent)}
-        self.intercept = lambda datagram: None
-        """Called with what is sent; it may raise an OSError instead."""
+    def __init__(self, port, clock, **settings):
+        self._fmu = _fmu(FMI)
+        self._clock = _CLOCK(clock)
         self._instance = Instance(self._fmu, "proxy")
         self.time = 0.0
         self.set(**{"proxy.port": port, "proxy.timeout": 100.0, "proxy.connect_timeout": 100.0})
         settings = {"on_loss": "failsafe", **settings}
         self.set(**{f"proxy.{name}": value for name, value in settings.items()})
 
-    def _sent(self, at, size):
-        try:
-            self.intercept(ctypes.string_at(at, size))
-        except OSError as error:
-            return error.errno or errno.EIO
-        return 0
-
     def call(self, function, *arguments):
         """Any function of FMI 2.0, by its name without fmi2; its status."""
-        for name, hook in self._hooks.items():
-            place = ctypes.c_void_p.in_dll(self._fmu.library, f"shim_{name}")
-            place.value = ctypes.cast(hook, ctypes.c_void_p).value
+        place = ctypes.c_void_p.in_dll(self._fmu.library, "shim_clock")
+        place.value = ctypes.cast(self._clock, ctypes.c_void_p).value
         return self._instance.call(function, *arguments)
 
     def must(self, function, *arguments):
@@ -126,7 +116,7 @@ class Host:
         return self._access("Get", name)
 
     def outputs(self):
-        return [self.get(name) for name in self._outputs]
+        return [self.get(v.name) for v in VARIABLES if v.causality == "output"]
 
     def own(self):
         return [self.get(name) for name in self._fmu.references if name.startswith("proxy.")]

@@ -41,15 +41,9 @@ VARIABLES = (
     Variable("passed", int, "output", "", None, "discrete"),
     Variable("denied", bool, "output", "", None, "discrete"),
 )
-"""One of each kind and causality; what the peer answers is in answers()."""
+"""One of each kind and causality; what the peer answers is in outputs()."""
 
 SIGNATURE = shared_signature(VARIABLES)
-
-
-def answers(values):
-    """The outputs to a request."""
-    force, mode, armed, gain, _ = values
-    return [gain * force, mode, not armed]
 
 
 class Clock:
@@ -65,11 +59,10 @@ class Clock:
 
 
 class ScriptedPeer:
-    """Answers requests by answers(), but for those for which something else is in the script."""
+    """Answers requests by outputs(), but for those for which something else is in the script."""
 
-    def __init__(self, clock=None, signature=SIGNATURE, outputs=answers, key=None):
+    def __init__(self, clock=None, key=None):
         self.clock = clock or Clock()
-        self.signature = signature
         self.got = []
         self.datagrams = []
         self.script = {kind: deque() for kind in (HELLO, INITIALISE, STEP)}
@@ -77,10 +70,8 @@ class ScriptedPeer:
         self.failures = []
         self.offset = 0.0
         """s by which the outputs belong to another time."""
-        self._outputs = outputs
         self._sealer = Sealer(key)
-        self._cookies = count(1000)
-        self._cookie = 0
+        self.cookies = count(1000)
         self._source = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -104,9 +95,7 @@ class ScriptedPeer:
 
     def values(self, m):
         """What a request holds."""
-        values = Codec(self.signature.request).unpack(m.body)
-        assert values is not None
-        return values
+        return Codec(SIGNATURE.request).unpack(m.body)
 
     def told(self, kind, *acts):
         """Put acts into the script for the next requests of a kind."""
@@ -117,12 +106,13 @@ class ScriptedPeer:
 
     def pack(self, m, kind, body=b"", code=0, **changed):
         """The datagram of an answer to m."""
-        answer = m._replace(kind=kind, code=code, interface=self.signature.hash, body=body)
+        answer = m._replace(kind=kind, code=code, interface=SIGNATURE.hash, body=body)
         return self._sealer.pack(answer._replace(step=0.0, **changed))
 
     def outputs(self, m):
         """The OUTPUTS to m."""
-        body = Codec(self.signature.answer).pack(*self._outputs(self.values(m)))
+        force, mode, armed, gain, _ = self.values(m)
+        body = Codec(SIGNATURE.answer).pack(gain * force, mode, not armed)
         return self.pack(m, OUTPUTS, body, time=m.time + m.step - self.offset)
 
     def _run(self):
@@ -146,17 +136,12 @@ class ScriptedPeer:
         act = script.popleft() if script else welcome if m.kind == HELLO else answer
         act(self, m)
 
-    def new_cookie(self):
-        """A cookie for a new session."""
-        self._cookie = next(self._cookies)
-        return self._cookie
-
 
 # What a peer may do
 
 
 def welcome(peer, m):
-    peer.send(peer.pack(m, WELCOME, cookie=peer.new_cookie()))
+    peer.send(peer.pack(m, WELCOME, cookie=next(peer.cookies)))
 
 
 def answer(peer, m):
@@ -204,14 +189,3 @@ def busy(peer, m):
 
 def refuse(code, reason=b"", **changed):
     return lambda peer, m: peer.send(peer.pack(m, REFUSE, reason, code, **changed))
-
-
-def datagrams(first, then=answer):
-    """Send these first."""
-
-    def act(peer, m):
-        for datagram in first:
-            peer.send(datagram)
-        then(peer, m)
-
-    return act
