@@ -17,14 +17,11 @@ from grasp_fmus.package import write_file
 from grasp_fmus.proxy import Original, proxy_members
 
 from .fmi2 import ERROR, OK, Fmu, Instance
-from .marks import platforms
 from .scripted_peer import VARIABLES, Clock, ScriptedPeer
 
 SHIM = Path(__file__).parents[1] / "fmus/native/proxy_shim.h"
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 NAME = "AnyProxy"
-FMI = 2
-"""Of the proxies that are made; a test module chooses it with on_each_version."""
 
 COUNTS = ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected")
 
@@ -34,12 +31,6 @@ _C = {
     "String": ctypes.c_char_p,
 }  # fmt: skip
 _PYTHON = {"Boolean": bool, "String": bytes.decode}
-
-
-@pytest.fixture(autouse=True, params=[2, platforms(3)])
-def on_each_version(request, monkeypatch):
-    """To import into a test module: its proxies are of this version of FMI."""
-    monkeypatch.setattr("support.native_proxies.FMI", request.param)
 
 
 def original():
@@ -58,9 +49,9 @@ def write_sources(folder, fmi=2):
 
 
 @cache
-def _fmu(fmi):
+def _fmu():
     """Built once per process, compiled once for all."""
-    files = proxy_members(Path(f"{NAME}.fmu"), original(), fmi)
+    files = proxy_members(Path(f"{NAME}.fmu"), original(), 2)
     if not shutil.which("gcc"):
         pytest.skip("NO gcc")
     compiler = compiler_for(here(), asked=False)
@@ -68,10 +59,9 @@ def _fmu(fmi):
     sources = {**_sources(files), SHIM.name: SHIM.read_bytes()}
     folder = Path(tempfile.mkdtemp(prefix="native_proxy_"))
     made = compile_all([job(NAME, sources, here(), shimmed, networked=True)], folder)
-    place = here().folder if fmi == 2 else here().tuple
     with zipfile.ZipFile(folder / f"{NAME}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", files["modelDescription.xml"])
-    write_file(folder / f"u/binaries/{place}/{NAME}.so", made[0].read_bytes())
+    write_file(folder / f"u/binaries/{here().folder}/{NAME}.so", made[0].read_bytes())
     return Fmu(folder / f"{NAME}.fmu", folder / "u")
 
 
@@ -79,7 +69,7 @@ class Host:
     """A host with one instance of a proxy; what is refused raises RefusedError."""
 
     def __init__(self, port, clock, **settings):
-        self._fmu = _fmu(FMI)
+        self._fmu = _fmu()
         self._clock = _CLOCK(clock)
         self._instance = Instance(self._fmu, "proxy")
         self.time = 0.0
