@@ -13,7 +13,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import redirect_stdout, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -25,7 +26,7 @@ from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.system.parts import Realtime
 
-from benchmarks.harness import Program, by_turns, spread
+from benchmarks.harness import by_turns, spread
 
 STEPS = 2000
 ROUNDS = 5
@@ -33,7 +34,6 @@ KILLS = 200
 TOLERATED, TIMEOUT = 3, 0.02
 PRIORITY = 80
 TARGET = Path(__file__).parent.parent / "docs/controller_target.c"
-PEERS = Path(__file__).parent.parent / "tests/hil/peers.py"
 
 
 def _made(command: list[str]) -> int:
@@ -42,12 +42,17 @@ def _made(command: list[str]) -> int:
         return cli.main(command)
 
 
-def peers(system: System, name: str) -> Program:
-    """A program that starts processes which serve a component in lockstep, and kills them.
-
-    It ends them all when it ends itself.
-    """
-    return Program(sys.executable, str(PEERS), str(system.component(name, name).fmu))
+@contextmanager
+def serving(system: System, name: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A process that serves a component in lockstep, and its port; it is ended with the block."""
+    fmu = str(system.component(name, name).fmu)
+    command = [sys.executable, "-m", "grasp_cosim", "serve", fmu, "--lockstep", "--port", "0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            said = next(line for line in process.stderr or () if line.startswith("serving "))
+            yield process, int(said.partition(", ")[0].rpartition(":")[2])
+        finally:
+            process.kill()
 
 
 def proxied(system: System, name: str, folder: Path) -> System:
@@ -74,8 +79,7 @@ def compare(direct: System, there: System, where: str) -> None:
 
 def cost(system: System, folder: Path) -> None:
     """Print what a step costs in Python with the plant here and there."""
-    with peers(system, "plant") as program:
-        port = int(program.ask("start").split()[1])
+    with serving(system, "plant") as (_, port):
         there = proxied(system, "plant", folder).with_values({"plant.proxy.port": port})
         compare(system, there, "plant")
 
@@ -122,15 +126,15 @@ def kills(system: System, folder: Path) -> None:
     alone = replace(whole, components=(part,), connections=())
     alone = alone.with_values({"controller.proxy.on_loss": "failsafe"})
     took = []
-    with peers(system, "controller") as program:
-        for seed in range(KILLS):
-            child, port = map(int, program.ask("start").split())
+    for seed in range(KILLS):
+        with serving(system, "controller") as (process, port):
             served = alone.with_values({"controller.proxy.port": port})
             with simulate.session(served) as session:
                 moment = time.perf_counter() + random.Random(seed).uniform(0.0, 0.02)  # noqa: S311
                 while time.perf_counter() < moment:
                     session.step()
-                program.ask(f"end {child}")
+                process.kill()
+                process.wait()
                 start = time.perf_counter()
                 while session["controller.proxy.state"] != 3 and session.step():
                     pass
