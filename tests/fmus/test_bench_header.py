@@ -6,12 +6,12 @@ import shutil
 import socket
 import struct
 import subprocess
+from collections import namedtuple
 from dataclasses import asdict, fields
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from select import select
-from typing import NamedTuple
 
 import pytest
 from grasp_cosim.hil.driven import MOST_LOST
@@ -250,16 +250,8 @@ def test_sha256_and_hmac(driver, key, size):
     assert driven(driver, "hmac", pipe=sized(secret) + sized(data)) == expected
 
 
-class Record(NamedTuple):
-    """What the driver did with a datagram."""
-
-    time: float
-    step: float
-    behind: float
-    event: int
-    alive: bool
-    fresh: bool
-    answer: bytes
+Record = namedtuple("Record", "time step behind event alive fresh answer")
+"""What the driver did with a datagram."""
 
 
 def linked(driver, received, key=None):
@@ -283,17 +275,17 @@ class Reference:
     def receive(self, datagram, now):
         """Event, answer, and whether a session begins."""
         action = self.peer.receive(datagram, now)
-        if isinstance(action, Request):
-            event = {INITIALISE: DO_INITIALISE, STEP: DO_STEP, END: ENDED}[action.kind]
-            return event, b"" if event == ENDED else self._answer(action), action.fresh
-        return (SEND, action, False) if action else (NOTHING, b"", False)
+        if not isinstance(action, Request):
+            return (SEND, action, False) if action else (NOTHING, b"", False)
+        event = {INITIALISE: DO_INITIALISE, STEP: DO_STEP, END: ENDED}[action.kind]
+        return event, b"" if event == ENDED else self._answer(action), action.fresh
 
     def _answer(self, request):
-        if request.values[4] == SILENT:
-            return b""
-        if request.values[4] == FAIL:
-            return self.peer.failed("thirteen")
         u, ui, ub, pb, pi, p = request.values
+        if pi == SILENT:
+            return b""
+        if pi == FAIL:
+            return self.peer.failed("thirteen")
         outputs = [not ub, ui ^ 0x55, -u, pi ^ 0x55, -p, not pb]
         return self.peer.outputs(outputs, request.time + request.step)
 
@@ -302,18 +294,14 @@ VALUES = [0.5, 3, True, False, -7, 1e-300]
 REALS = (0.0, -0.0, 1.0, -1 / 3, 5e-324, 1.7976931348623157e308, 2.2250738585072014e-308)
 
 
+INTEGERS = (0, -1, 2**31 - 1, -(2**31))
+
+
 def drawn_values(rng):
-    def real():
-        [value] = struct.unpack("<d", rng.randbytes(8))
-        return rng.choice((*REALS, value)) if abs(value) <= REALS[5] else rng.choice(REALS)
-
-    def integer():
-        return rng.choice((0, -1, 2**31 - 1, -(2**31), rng.randrange(-(2**31), 2**31)))
-
-    def boolean():
-        return rng.random() < 0.5
-
-    return [real(), integer(), boolean(), boolean(), integer(), real()]
+    drawn = [value for value in struct.unpack("<2d", rng.randbytes(16)) if abs(value) <= REALS[5]]
+    integers = (*INTEGERS, rng.randrange(-(2**31), 2**31))
+    u, p = (rng.choice((*REALS, *drawn)) for _ in range(2))
+    return [u, rng.choice(integers), *rng.choices((False, True), k=2), rng.choice(integers), p]
 
 
 def session(number=99, key=None):
@@ -323,26 +311,19 @@ def session(number=99, key=None):
     return proxy
 
 
-def known(number=99):
-    """One with its cookie, where no session has begun."""
-    proxy = session(number)
-    numbers = number.to_bytes(8, "little") + bytes(8)
-    digest = hmac.digest(RANDOM, numbers, "sha256")
-    proxy._cookie = int.from_bytes(digest[:8], "little") | 1
-    return proxy
-
-
-def step(proxy, time, size=0.5):
-    return proxy.request(STEP, time, VALUES, size)
-
-
 def test_lost_requests_are_told_and_new_ones_alone_feed_the_watchdog(driver):
     """A recorded one, sent again and again, does not keep the inputs from being made safe."""
-    proxy = known()
-    first, second = proxy.request(INITIALISE, 2.0, VALUES), step(proxy, 2.0, 0.25)
-    step(proxy, 2.25)
+    proxy = session()
+    digest = hmac.digest(RANDOM, struct.pack("<QQ", 99, 0), "sha256")
+    proxy._cookie = int.from_bytes(digest[:8], "little") | 1
+
+    def step(time, size=0.5):
+        return proxy.request(STEP, time, VALUES, size)
+
+    first, second = proxy.request(INITIALISE, 2.0, VALUES), step(2.0, 0.25)
+    step(2.25)
     at = [(1, first), (2, first), (3, second), (4, second), (5, session().hello(99)),
-          (6, step(proxy, 2.75, 0.1)), (6, step(proxy, 2.85 + 1e-12, 0.1)), (6, step(proxy, 1.0)),
+          (6, step(2.75, 0.1)), (6, step(2.85 + 1e-12, 0.1)), (6, step(1.0)),
           (6, proxy.pack(END))]  # fmt: skip
     records, _ = linked(driver, at)
     assert [r.alive for r in records] == [True, False] * 2 + [False, *[True] * 3, False]
@@ -515,21 +496,20 @@ class Target:
     def __enter__(self):
         return self
 
-    def __exit__(self, *error):
+    def __exit__(self, *_):
         self.socket.close()
         self.process.kill()
         self.process.communicate()
 
     def said(self, stream):
         """The next line on a stream of the target's; waits for it."""
-        assert stream is not None
         assert select([stream], [], [], 10.0)[0]
         return stream.readline()
 
     def values(self, force=(0.0, 0.0), finger_mass=0.5):
         """What a request carries; the mass is that of finger 1."""
         own = {"force[1]": force[0], "force[2]": force[1], "finger_mass[1]": finger_mass}
-        return [{**self.starts, **own}[v.name] for v in self.signature.request]
+        return [(self.starts | own)[v.name] for v in self.signature.request]
 
     def _ask(self, request):
         self.socket.send(request)
