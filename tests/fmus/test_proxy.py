@@ -490,14 +490,10 @@ def test_a_peer_that_was_started_anew_is_greeted_anew(steps, hellos, initialisat
 def test_the_end_is_said_once_and_values_stay():
     with connected() as (host, peer):
         host.step()
+        line = host.refused(host.must, "SetFMUstate", None)
+        assert line.endswith(": is not supported by this FMU")
         host.terminate()
         assert (host.outputs(), host.state()) == (START, 0)
         assert "force: set after fmi" in host.refused(lambda: host.set(force=1.0))
         assert "after fmi" in host.refused(host.do_step, 0.25, 0.25)
     assert peer.kinds() == [HELLO, INITIALISE, STEP, END]
-
-
-def test_there_are_no_states():
-    with hosted(9) as host:
-        line = host.refused(host.must, "SetFMUstate", None)
-        assert line.endswith(": is not supported by this FMU")
