@@ -5,14 +5,16 @@ and never fatal; where a call was refused the log says why; a fresh life of the 
 computes what it always does. And the native FMU does in all what the one in Python does.
 """
 
+from ctypes import Array, c_char_p
+from typing import TypeVar
+
 import pytest
 from grasp_fmus.shipped import SHIPPED
-from hypothesis import HealthCheck, given
+from hypothesis import HealthCheck, given, reject
 from support.drawn_calls import SEQUENCES, Drawn
-from support.fmi2 import OK, Instance, drive
+from support.fmi2 import OK, Instance, State, drive
 from support.kinds import NAMES, all_kinds
 from support.marks import examples, slow
-from support.twins import Twins
 
 FIRST, *OTHERS = SHIPPED
 
@@ -53,6 +55,92 @@ def test_any_sequence_of_calls(load, name):
 
 
 # An FMU that Python runs and the native one, call by call: values, refusals, bytes of states
+
+
+R = TypeVar("R")
+
+
+class Twins(Instance):
+    """An instance in Python and its native twin; AssertionError where they do not do the same."""
+
+    def __init__(self, python, native):
+        self.fmu = python
+        self.both = Instance(python, "twins"), Instance(native, "twins")
+
+    def __exit__(self, *_):
+        for instance in self.both:
+            instance.__exit__()
+
+    def call(self, function, *arguments):
+        """Also what they leave in arrays is the same, to the bit."""
+        arrays = [a for a in arguments if isinstance(a, Array)]
+
+        def called(instance):
+            status = instance.call(function, *arguments)
+            return status, [_exact(array) for array in arrays]
+
+        return self._agreed(called, alone=all(len(a) == 1 for a in arrays))[0]
+
+    def state(self):
+        return TwinState(*(instance.state() for instance in self.both))
+
+    def restore(self, state):
+        """Each goes on from its own."""
+        assert isinstance(state, TwinState)
+        states = dict(zip(self.both, state.both, strict=True))
+        return self._agreed(lambda i: (i.restore(states[i]), []))[0]
+
+    def from_bytes(self, data):
+        states = []
+
+        def made(instance):
+            status, state = instance.from_bytes(data)
+            states.append(state)
+            return status, []
+
+        return self._agreed(made)[0], TwinState(*states)
+
+    def _agreed(self, call, alone=True):
+        """What both return; the status is that of Python. Of several wrong ones they name one."""
+        for instance in self.both:
+            instance.log.clear()
+        (status, found), (native, same) = map(call, self.both)
+        said, reason = (" ".join(i.log[-1].text.split()) if i.log else "" for i in self.both)
+        if status != OK and ": must be" not in said and "state of" not in said:
+            reject()  # an operation raised in Python: C has IEEE's value and may go on
+        assert (status == OK) == (native == OK), (said, reason)
+        assert found == same or status != OK
+        assert len(self.both[1].log) == (native != OK)
+        assert not alone or _named(said) == _named(reason), (said, reason)
+        return status, found
+
+
+class TwinState(State):
+    """A state of each, of the same bytes."""
+
+    def __init__(self, one, other):
+        self.both = one, other
+
+    def to_bytes(self):
+        one, other = (state.to_bytes() for state in self.both)
+        assert one == other
+        return one
+
+    def free(self):
+        for state in self.both:
+            state.free()
+
+
+def _exact(array):
+    """Numbers by their bytes, texts by what they are."""
+    return list(array) if array._type_ is c_char_p else bytes(array)
+
+
+def _named(said):
+    """The first word of a reason, which is mostly a variable, and where its range begins."""
+    reason = said.partition(" s: ")[2]
+    return reason.partition(" ")[0], reason.partition("must be from ")[2].partition(" ")[0]
+
 
 twins = pytest.mark.kinds("native", "native FMI 3")
 
