@@ -135,7 +135,8 @@ class Table:
             arrow.field(name, array.type, metadata={"unit": self.units.get(name) or ""})
             for name, array in zip(self.columns, arrays, strict=True)
         ]
-        parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields)), path)
+        with path.open("wb") as file:  # pyarrow closes its own when it likes; Windows minds
+            parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields)), file)
 
 
 def made(
