@@ -181,3 +181,19 @@ def test_neither_the_gain_nor_the_offset_is_used(alpha, l_0, gaps):
     assert learnt(samples) == pytest.approx(log(alpha[0] / alpha[1]), abs=1e-6)
     other = replace(SURE.reflectance, gain=1.0, offset_distance=0.5)
     assert run(replace(SURE, reflectance=other), samples)[-1][0].estimate.beta == learnt(samples)
+
+
+def test_the_gaps_are_those_of_the_light():
+    """Behind the low-pass as well, by the slopes; and by a white face before there are any."""
+    samples = approach((0.5, 1.0), (0.06, 0.08), 0.01)
+    for p, off in ((SURE, 1e-5), (replace(Params(), hold=NEVER_HOLDS), 5e-4)):
+        (_, first), *_, (_, last) = run(p, samples)
+        assert last.estimated_gap == pytest.approx((0.01, 0.01), abs=off)
+        right = (0.06 + L_0) * 0.5 ** (-1.0 / N) - L_0
+        assert first.estimated_gap == pytest.approx((right, 0.08), rel=1e-12)
+
+
+def test_a_retreat_teaches_as_much_as_an_approach():
+    samples = approach(ALPHA)
+    there, back = (run(Params(), way)[-1][0].estimate for way in (samples, samples[::-1]))
+    assert back == pytest.approx(there, rel=0.2)
