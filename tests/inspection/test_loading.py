@@ -1,6 +1,5 @@
 """What is said of this machine and of an FMU, sound or damaged, and that it is right."""
 
-import dataclasses
 import shutil
 import subprocess
 import sys
@@ -82,14 +81,6 @@ def examined(fmu):
     return {f.check: f for f in loading.examine(fmu, load=True)}
 
 
-def with_byte(fmu, offset, value):
-    """The binary of an FMU with one byte of its ELF header replaced."""
-    with zipfile.ZipFile(fmu) as archive:
-        data = bytearray(archive.read(LINUX64))
-    data[offset] = value
-    return bytes(data)
-
-
 def test_of_the_file_alone_nothing_is_run(fmus, monkeypatch):
     monkeypatch.setattr(loading, "_run", None)
     findings = loading.examine(fmus / "GripperPlant.fmu")
@@ -124,27 +115,6 @@ def test_text_is_one_line_each_with_the_fix_below():
     ]
     said = "loads on this machine: yes, as far as the file says; --load tries"
     assert loading.as_text(findings[:1], tried=False).splitlines()[0] == said
-
-
-@pytest.mark.parametrize(
-    ("name", "noexec", "python", "fix"),
-    [
-        *((name, False, True, "export TMPDIR=/tmp") for name in ("a#b", "a+b", "é", "a,b", "(a)")),
-        *((name, False, True, None) for name in ("a b", "a_b", "a-b.c~1")),
-        ("a#b", False, False, None),
-        ("a", True, False, "mkdir -p ~/tmp && export TMPDIR=~/tmp"),
-        ("a", True, True, "mkdir -p ~/tmp && export TMPDIR=~/tmp"),
-    ],
-)
-def test_a_temporary_folder_from_which_nothing_loads(
-    name, noexec, python, fix, monkeypatch, opened
-):
-    fmu = dataclasses.replace(opened(), python=python)
-    monkeypatch.setattr(tempfile, "tempdir", f"/tmp/{name}")
-    monkeypatch.setattr(loading, "forbids_programs", lambda _: noexec)
-    verdict = loading.temporary_folder(fmu)
-    assert (verdict and (verdict[0], verdict[2])) == (fix and ("problem", fix))
-    assert not fix or f"/tmp/{name}" in verdict[1]
 
 
 ASK = "ask the vendor for an export as FMI 2.0 or 3.0, for co-simulation or model exchange"
@@ -196,16 +166,10 @@ OTHERS = {"binaries/linux64/Other.so": b"", LINUX64: None}
     [
         ({LINUX64: None}, "has a binary for win64 only; this machine: linux64", "ask the vendor"),
         ({LINUX64: None, "sources/all.c": b""}, "has a binary for win64", "-lm fmpy compile FMU"),
-        (OTHERS, "there is: linux64/Other.so, win64/Stock.dll; this machine: linux64", "linux64"),
-        ((4, 1), "is x86-64, 32 bit; must be", "or as a native FMU"),
-        ((18, 183), "is AArch64, 64 bit; must be", "build it again for x86-64, 64 bit"),
-        ((18, 200), "is ELF machine 200, 64 bit; must be", "build it again"),
-        ((0, 0), "is no ELF file; must be", "build it again"),
+        (OTHERS, "Stock.so, but Other.so; there is: linux64, win64; this machine: ", "for linux64"),
     ],
 )
-def test_no_binary_for_this_machine(changes, text, fix, stock, opened):
-    if isinstance(changes, tuple):
-        changes = {LINUX64: with_byte(stock, *changes)}
+def test_no_binary_for_this_machine(changes, text, fix, opened):
     fmu = opened(changes)
     status, said, remedy = loading.binary(fmu)
     assert status == "problem"
@@ -219,27 +183,24 @@ NEWER = "x.so: /lib/libc.so.6: version `GLIBC_9.1' not found (required by x.so)\
 
 
 @pytest.mark.parametrize(
-    ("linked", "expected"),
+    ("linked", "status", "text"),
     [
-        ("\tlibm.so.9 => not found\n", ("problem", "not found: libm.so.9")),
-        ("\tlibpython9.so => not found\n", ("problem", "not found: libpython9.so")),
-        (NEWER, ("problem", "not on this system: GLIBC_9.1")),
-        ("undefined symbol: gsl_sin\t(x.so)\n", ("problem", "undefined symbols: gsl_sin")),
-        ("undefined symbol: PyLong_AsLong\t(x.so)\n", ("ok", "the dynamic linker finds all")),
-        ("", ("ok", "the dynamic linker finds all")),
+        ("\tlibm.so.9 => not found\n" + NEWER, "problem", "not found: libm.so.9"),
+        (NEWER, "problem", "not on this system: GLIBC_9.1"),
+        ("undefined symbol: gsl_sin\t(x.so)\n", "problem", "undefined symbols: gsl_sin"),
+        ("undefined symbol: PyLong_AsLong\t(x.so)\n", "ok", "the dynamic linker finds all"),
     ],
 )
-def test_libraries_that_are_missing(linked, expected, opened):
-    fmu = dataclasses.replace(opened(), linked=LOADER + linked)
-    assert loading.libraries(fmu)[:2] == expected
-    loaded = loading.libraries(dataclasses.replace(fmu, loads=True))
-    assert loaded[0] == ("ok" if expected[0] == "ok" else "warning")
-    assert loading.libraries(dataclasses.replace(fmu, linked="ldd: not found")) is None
+def test_libraries_that_are_missing(linked, status, text):
+    assert loading.libraries(LOADER + linked, loads=False)[:2] == (status, text)
+    loaded = loading.libraries(LOADER + linked, loads=True)
+    assert loaded[0] == ("ok" if status == "ok" else "warning")
+    assert loading.libraries("ldd: not found", loads=False) is None
 
 
 def test_a_binary_that_is_bound_to_a_libpython_needs_none_from_its_host(opened):
     linked = "\tlibpython3.9.so => /lib/libpython3.9.so\nundefined symbol: PyLong_New\t(x.so)\n"
-    assert loading.host(dataclasses.replace(opened(), linked=linked)) is None
+    assert loading.host(opened(), linked) is None
 
 
 @pytest.mark.parametrize(
@@ -249,13 +210,9 @@ def test_a_binary_that_is_bound_to_a_libpython_needs_none_from_its_host(opened):
         ({"resources/Stock.py": None}, "resources/slavemodule.txt names Stock"),
         ({"resources/Stock.py": b"class Stock(:"}, "invalid syntax (Stock.py, line 1)"),
         ({"resources/Stock.py": b"x = '\0'"}, "null bytes"),
-        (None, "resources/slavemodule.txt names none"),
     ],
 )
-def test_a_script_that_is_not_there_or_no_python(changes, text, stock, opened):
-    if changes is None:
-        with zipfile.ZipFile(stock) as archive:
-            changes = {n: None for n in archive.namelist() if n.startswith("resources/")}
+def test_a_script_that_is_not_there_or_no_python(changes, text, opened):
     verdict = loading.script(opened(changes))
     assert verdict[0] == "problem"
     assert text in verdict[1]
@@ -264,12 +221,10 @@ def test_a_script_that_is_not_there_or_no_python(changes, text, stock, opened):
 @pytest.mark.parametrize(
     ("files", "missing"),
     [
-        ({"Stock": "import nope.x"}, "nope"),
         ({"Stock": "from nope.x import y, z"}, "nope"),
-        ({"Stock": "import nope, yaml_"}, "nope, yaml_"),
+        ({"Stock": "import nope.x, yaml_"}, "nope, yaml_"),
         ({"Stock": "try:\n import nope\nexcept ImportError: pass"}, None),
         ({"Stock": "from typing import *\nif TYPE_CHECKING:\n import nope"}, None),
-        ({"Stock": "def f():\n import nope"}, None),
         ({"Stock": "import a.b, c", "a/b": "", "c": ""}, None),
         ({"Stock": "import math, numpy.linalg, xml.etree, __future__"}, None),
         ({"Stock": "'\\d'"}, None),
@@ -301,15 +256,6 @@ def test_a_packed_module_of_the_name_of_another(name, other, opened):
     status, text, fix = loading.modules(opened({f"resources/{name}.py": b""}))
     assert status == ("warning" if other else "ok")
     assert f"{other} too: the first one imported" in text if other else fix is None
-
-
-@pytest.mark.slow
-def test_a_temporary_folder_that_crashes_is_predicted_and_found(stock, unpack_in):
-    folder = unpack_in("a#b")
-    found = examined(stock)
-    assert found["temp folder"].status == found["trial"].status == "problem"
-    assert "a Python FMU crashes on its characters" in found["trial"].text
-    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -369,7 +315,3 @@ def test_a_native_fmu_without_a_library(tmp_path):
     assert found["trial"].text.startswith(
         "does not instantiate: Failed to load shared library binaries/linux64/N.so. liblost.so: "
     )
-    packed = altered(fmu, tmp_path / "packed.fmu", {"binaries/linux64/liblost.so": b""})
-    verdict = examined(packed)["libraries"]
-    assert (verdict.status, verdict.text) == ("problem", "not found though packed: liblost.so")
-    assert "$ORIGIN" in verdict.fix

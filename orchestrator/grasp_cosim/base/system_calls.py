@@ -159,13 +159,3 @@ def when_c_exits(call: Any) -> None:
     """Have a C function called where exit() ends this process; on Windows it is not."""
     with suppress(NotPossible):
         c_library().__cxa_atexit(call, None, None)
-
-
-# ------------------------------------------------------------------ the file system
-
-
-def forbids_programs(folder: Path) -> bool:
-    """Return True if nothing in a folder may be run or loaded, as far as the system says so."""
-    with suppress(NotPossible):
-        return bool(_os.statvfs(folder).f_flag & _os.ST_NOEXEC)
-    return False

@@ -9,10 +9,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
 
 from ..base.errors import choices
 from ..base.text import on_one_line
@@ -31,8 +30,6 @@ MOST = 100
 STEPS = 1000
 """Steps of an experiment for which no FMU recommends one."""
 
-ISOLATED = "in a process of its own, until you trust its binary"
-
 HEAD = """# A system of FMUs. Run it: grasp-cosim run FILE
 
 # From an output to an input. Each input has one source: a connection, or a value below its
@@ -49,19 +46,6 @@ stop = {stop}  # s, a whole number of steps
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _FMU = re.compile(r'^(fmu = )"([^"]*)"', re.MULTILINE)
-
-
-class _Row(NamedTuple):
-    """An entry of a table as TOML has it, and its comment; without a key a comment alone."""
-
-    key: str
-    value: str
-    comment: str = ""
-
-    @property
-    def open(self) -> bool:
-        """True if it is left to do."""
-        return self.value.startswith('"TODO')
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,87 +99,84 @@ def replacing(system: Structure, name: str, fmu: Path, path: str, presets: Itera
     needed = {port.variable for port in ends if port.component == name} | stated(system, name)
     asked = {*needed, *was.values, *presets, *(v.name for v in ours.of("output"))}
     variables = [v for v in ours.of(*SETTABLE, "output") if v.supported]
-    found = matches(ours, [v.name for v in variables], theirs)
-    found = {n: m for n, m in found.items() if n in asked or not m.doubt}
-    rename = [*_names(variables, ours, theirs, found, needed)]
-    own = {n: m.variable.name for n, m in found.items() if m.variable.name != n}
-    theirs = theirs.renamed(own)
-    wanted = [*(n for n in found if n in asked), *(row.key for row in rename if row.open)]
-    units = [*_units(ours, theirs, wanted, found)]
-    draft = Draft(name, "", found, ours, theirs, {row.key for row in units})
-    tables = [
-        _component_table(name, path),
-        _table(f"[components.{name}.rename]  # the system's name = the FMU's", rename),
-        _table(f"[components.{name}.units]  # what the FMU does not declare", units),
-        _table(f"[components.{name}.values]  # in the FMU's units", [*_values(draft, was)]),
+    likely = matches(ours, theirs)
+    names = [v.name for v in variables if v.name in likely]
+    found = {n: likely[n] for n in names if n in asked or not likely[n].doubt}
+    own = {n: m.variable.name for n, m in found.items()}
+    theirs = theirs.renamed({n: its for n, its in own.items() if its != n})
+    draft = Draft(name, "", found, ours, theirs, {})
+    listed = [v.name for v in variables if v.name in asked]
+    units = {n: text for n in listed if (text := _unit(draft, n, n in needed))}
+    draft = replace(draft, unknown=units)
+    rename = [
+        _line(n, _quoted(m.variable.name), m.check + _told(m.variable))
+        for n, m in found.items()
+        if m.variable.name != n or m.doubt
     ]
-    return replace(draft, text="\n\n".join(t for t in tables if t))
+    rename += [_lost(draft, v, v.name in needed) for v in variables if v.name not in found]
+    tables = [
+        _component(name, path),
+        _table(f"[components.{name}.rename]  # the system's name = the FMU's", rename),
+        _table(
+            f"[components.{name}.units]  # what the FMU does not declare",
+            [_line(n, text) for n, text in units.items()],
+        ),
+        _table(f"[components.{name}.values]  # in the FMU's units", _values(draft, was)),
+    ]
+    return replace(draft, text="\n\n".join(filter(None, tables)))
 
 
-def _names(
-    variables: Iterable[Variable],
-    ours: Interface,
-    theirs: Interface,
-    found: Mapping[str, Match],
-    needed: Collection[str],
-) -> Iterator[_Row]:
-    """The entries of rename."""
-    own = [m.variable.name for m in found.values()]
-    for variable in variables:
-        name, match = variable.name, found.get(variable.name)
-        if match and (match.variable.name != name or match.doubt):
-            check = f"CHECK, found {match.doubt}; " if match.doubt else ""
-            yield _Row(name, _quoted(match.variable.name), check + _told(match.variable))
-        elif not match and (name in needed or variable.causality == "output"):
-            there = [v.name for v in candidates(ours, name, theirs, own)]
-            kind = "" if variable.kind == "Real" else f"{variable.type} "
-            a = f"{kind}{variable.causality}{f' in {variable.unit}' if variable.unit else ''}"
-            what = f"the FMU's name of {'an' if a[0] in 'aeiouEI' else 'a'} {a}"
-            if name in needed:
-                none = f"{what}; it has none left: without it, no line here and no connection"
-                yield _Row(name, _todo(what if there else none, there))
-            else:
-                such = f": {choices(there, FEW)}" if there else "; it has none left"
-                text = f"TODO {_key(name)} = {what}{such}; metrics and figures may want it"
-                yield _Row("", "", text)
+def _lost(draft: Draft, variable: Variable, needed: bool) -> str:
+    """The line of rename of a variable that is not found; empty where nobody may want it."""
+    name, there = variable.name, _names(draft, variable.name)
+    kind = "" if variable.kind == "Real" else f"{variable.type} "
+    unit = f" in {variable.unit}" if variable.unit else ""
+    what = f"the FMU's name of the {kind}{variable.causality}{unit}: {there or 'it has none left'}"
+    if needed:
+        return _line(name, _todo(what if there else f"{what}; then no line, and no connection"))
+    entry = f"# TODO {_key(name)} = {what}; metrics and figures may want it"
+    return entry if variable.causality == "output" else ""
 
 
-def _units(
-    ours: Interface, theirs: Interface, names: Iterable[str], found: Collection[str]
-) -> Iterator[_Row]:
-    """The entries of units of variables that declare none.
+def _unit(draft: Draft, name: str, needed: bool) -> str:
+    """What is to be done for the unit of a variable that declares none; empty if nothing is.
 
     One that is not found is one that none of those that it could be declares a unit of.
     """
-    for name in names:
-        here, unit = ours.by_name[name], ours.unit(ours.by_name[name])
-        able = [theirs.by_name[name]] if name in found else candidates(ours, name, theirs, found)
-        if unit is None or here.unit == "1" or here.kind != "Real":
-            continue
-        if able and not any(map(theirs.unit, able)):
-            declared = f"{able[0].unit!r}, which is not known" if able[0].unit else "none"
-            yield _Row(name, _todo(f"its unit, like {here.unit}; the FMU declares {declared}"))
+    here, found = draft.ours.by_name[name], name in draft.found
+    if here.kind != "Real" or draft.ours.unit(here) is None or here.unit == "1":
+        return ""
+    able = [draft.theirs.by_name[name]] if found else needed and _able(draft, name)
+    if not able or any(map(draft.theirs.unit, able)):
+        return ""
+    declared = f"{able[0].unit!r}, which is not known" if able[0].unit else "none"
+    return _todo(f"its unit, like {here.unit}; the FMU declares {declared}")
 
 
-def _values(draft: Draft, was: Component) -> Iterator[_Row]:
+def _able(draft: Draft, name: str) -> list[Variable]:
+    return candidates(draft.ours, name, draft.theirs, draft.found)
+
+
+def _values(draft: Draft, was: Component) -> list[str]:
     """The values of the component in the units of the FMU, and inputs that have no source."""
-    found = draft.found
+    lines = []
     for name, value in was.values.items():
-        before = draft.ours.by_name[name]
-        meant = f"{_number(value)}{f' {before.unit}' if before.unit else ''}"
+        unit = draft.ours.by_name[name].unit
+        meant = f"{_number(value)}{f' {unit}' if unit else ''}"
         if name in draft.unknown:
-            yield _Row(name, _todo(f"{meant}, in the unit that it has"))
-        elif name in found:
+            lines.append(_line(name, _todo(f"{meant}, in the unit that it has")))
+        elif name in draft.found:
             new = converted({name: value}, draft.ours, draft.theirs)[name]
-            yield _Row(name, _number(_neat(new)), _told(draft.theirs.by_name[name]))
+            lines.append(_line(name, _number(_neat(new)), _told(draft.theirs.by_name[name])))
         else:
-            there = [v.name for v in candidates(draft.ours, name, draft.theirs, found)]
-            meant = f"TODO {_key(name)} = {meant} in the system: not found in the FMU, left out"
-            yield _Row("", "", f"{meant}; it has {choices(there, FEW)}" if there else meant)
+            there = _names(draft, name)
+            said = f"# TODO {_key(name)} = {meant} in the system: not found in the FMU, left out"
+            lines.append(f"{said}; it has {there}" if there else said)
     for v in draft.theirs.of("input"):
-        if v.supported and v.name not in found:
+        if v.supported and v.name not in draft.found:
             what = f"{_start(v)} or another value; no line here if connected or named above"
-            yield _Row(v.name, _todo(f"{what}; {_told(v)}"))
+            lines.append(_line(v.name, _todo(f"{what}; {_told(v)}")))
+    return lines
 
 
 def alone(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]]:
@@ -204,7 +185,7 @@ def alone(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]]:
     It has their default experiment, and each input at its start value.
     """
     interfaces = {name: Component(name, fmu, {}).interface for name, (fmu, _) in fmus.items()}
-    step, start, stop, notes = _experiment(interfaces)
+    step, start, stop, notes = _experiment(interfaces.values())
     head = HEAD.format(
         name=next(iter(fmus)), step=step, stop=stop, start=f"start = {start}  # s\n" * bool(start)
     )
@@ -215,48 +196,40 @@ def alone(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]]:
 def _listed(name: str, interface: Interface, path: str) -> str:
     """The tables of an FMU alone: its inputs, and in comments what else there is."""
     variables = [v for v in interface.variables if v.supported]
-    rows = [_Row(v.name, _start(v), _told(v)) for v in variables if v.causality == "input"]
+    lines = [_line(v.name, _start(v), _told(v)) for v in variables if v.causality == "input"]
     said = [
-        f"{_key(v.name)} = {_start(v)}  # {_told(v)}"
-        for v in interface.of(*PARAMETERS)
-        if v.supported
+        f"# {_line(v.name, _start(v), _told(v))}" for v in variables if v.causality in PARAMETERS
     ]
-    said += [f"{v.name}, recorded: {_told(v)}" for v in variables if v.causality == "output"]
-    rows += [_Row("", "", text) for text in said[:MOST]]
+    said += [f"# {v.name}, recorded: {_told(v)}" for v in variables if v.causality == "output"]
+    lines += said[:MOST]
     if len(said) > MOST:
-        rows.append(_Row("", "", f"and {len(said) - MOST} more: grasp-cosim inspect {path}"))
-    tables = _component_table(name, path), _table(f"[components.{name}.values]", rows)
+        lines.append(f"# and {len(said) - MOST} more: grasp-cosim inspect {path}")
+    tables = _component(name, path), _table(f"[components.{name}.values]", lines)
     return "".join(f"{text}\n\n" for text in tables if text)[:-1]
 
 
-def _experiment(interfaces: Mapping[str, Interface]) -> tuple[float, float, float, list[str]]:
-    """Step, start and stop time in s: the shortest step and the longest span that the FMUs
-    recommend, from where all of them begin; and notes.
+def _experiment(fmus: Collection[Interface]) -> tuple[float, float, float, list[str]]:
+    """Step, start and stop time in s, and notes: the shortest step that an FMU recommends, from
+    where the first one begins until the last one ends.
     """
     keys = ("start_time", "stop_time", "step_size")
-    times = [[_finite(i.experiment.get(key)) for key in keys] for i in interfaces.values()]
-    begins = {begin for begin, _, _ in times}
-    start = begins.pop() if len(begins) == 1 else 0.0
-    notes = [f"the default experiments begin at other times, the run at {start:g} s"] * bool(begins)
-    spans = [end - begin for begin, end, _ in times if end > begin]
-    steps = [step for _, _, step in times if step > 0.0]
-    span = max(spans, default=1.0)
-    step = min(steps, default=span / STEPS)
-    missing = [word for word, given in (("step", steps), ("stop time", spans)) if not given]
-    if missing:
-        chosen = f"chosen, step = {step:g} s, stop = {start + span:g} s"
-        notes.append(f"no FMU recommends a {' and a '.join(missing)}: {chosen}")
+    begins, ends, steps = ([_finite(i.experiment.get(key)) for i in fmus] for key in keys)
+    start = min(begins)
+    stop, step = max(ends), min((s for s in steps if s > 0.0), default=0.0)
+    missing = [word for word, none in (("step", not step), ("stop time", stop <= start)) if none]
+    stop = stop if stop > start else start + 1.0
+    step = step or (stop - start) / STEPS
     step_ns = max(1, round(step * NANOSECONDS))
-    span_ns = max(1, round(span * NANOSECONDS / step_ns)) * step_ns
-    stop = (round(start * NANOSECONDS) + span_ns) / NANOSECONDS
-    if abs(span_ns / NANOSECONDS - span) > 1e-9:
-        notes.append(f"stop = {start + span:g} s: {stop:g} s is a whole number of steps")
-    return step_ns / NANOSECONDS, start, stop, notes
+    span_ns = max(1, round((stop - start) * NANOSECONDS / step_ns)) * step_ns
+    step, stop = step_ns / NANOSECONDS, (round(start * NANOSECONDS) + span_ns) / NANOSECONDS
+    chosen = f"chosen, step = {step:g} s, stop = {stop:g} s"
+    notes = [f"no FMU recommends a {' and a '.join(missing)}: {chosen}"] if missing else []
+    return step, start, stop, notes
 
 
-def _finite(value: Any) -> float:
+def _finite(value: Value | None) -> float:
     """A number of a default experiment; 0 where there is none."""
-    return float(value) if isinstance(value, float) and math.isfinite(value) else 0.0
+    return value if isinstance(value, float) and math.isfinite(value) else 0.0
 
 
 def with_paths(text: str, paths: Mapping[str, str]) -> str:
@@ -264,23 +237,32 @@ def with_paths(text: str, paths: Mapping[str, str]) -> str:
     return _FMU.sub(lambda m: m[1] + _quoted(paths.get(m[2], m[2])), text)
 
 
-def _table(heading: str, rows: Sequence[_Row]) -> str:
-    """The text of a table, comments below each other; empty without rows."""
-    if not rows:
-        return ""
-    entries = [f"{_key(r.key)} = {r.value}" if r.key else "" for r in rows]
-    width = max((len(e) for e, r in zip(entries, rows, strict=True) if not r.open), default=0)
-    lines = [
-        f"{entry:{width if entry else 0}}  # {row.comment}".lstrip() if row.comment else entry
-        for entry, row in zip(entries, rows, strict=True)
-    ]
-    return "\n".join([heading, *lines])
+def _table(heading: str, lines: Iterable[str]) -> str:
+    """The text of a table; empty without lines."""
+    there = [line for line in lines if line]
+    return "\n".join([heading, *there]) if there else ""
 
 
-def _component_table(name: str, path: str) -> str:
+def _line(key: str, value: str, comment: str = "") -> str:
+    """An entry of a table; value as TOML has it."""
+    return f"{_key(key)} = {value}{comment and f'  # {comment}'}"
+
+
+def _component(name: str, path: str) -> str:
     """The table of a component with a foreign FMU."""
-    rows = _Row("fmu", _quoted(path)), _Row("isolation", _quoted("process"), ISOLATED)
-    return _table(f"[components.{name}]", rows)
+    trust = _line("isolation", '"process"', "in a process of its own, until you trust its binary")
+    return f"[components.{name}]\n{_line('fmu', _quoted(path))}\n{trust}"
+
+
+def _names(draft: Draft, name: str) -> str:
+    """The variables that one could be, as messages list them; empty if there are none."""
+    there = [v.name for v in _able(draft, name)]
+    return choices(there, FEW) if there else ""
+
+
+def _todo(what: str) -> str:
+    """The value that says what is to be put in its place."""
+    return _quoted(f"TODO: {what}")
 
 
 def _quoted(text: str) -> str:
@@ -291,11 +273,6 @@ def _quoted(text: str) -> str:
 def _key(name: str) -> str:
     """A key of a table as TOML writes it."""
     return name if _BARE.fullmatch(name) else _quoted(name)
-
-
-def _todo(what: str, names: Collection[str] = ()) -> str:
-    """The value that says what is to be put in its place, and names what that may be."""
-    return _quoted(f"TODO: {what}: {choices(names, FEW)}" if names else f"TODO: {what}")
 
 
 def _number(value: Value) -> str:

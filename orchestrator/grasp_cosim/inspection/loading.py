@@ -8,11 +8,10 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from importlib.machinery import ModuleSpec, all_suffixes
 from pathlib import Path
 from shlex import quote
@@ -21,25 +20,16 @@ from typing import Literal
 from ..base.checks import install_command
 from ..base.errors import choices
 from ..base.scratch import ScratchFolder
-from ..base.system_calls import forbids_programs
 from ..fmi import fmpy
 from ..interface.document import unreadable
 from ..interface.interface import Interface
-from ..interface.obstacles import (
-    HEAD,
-    of_binary,
-    of_kind,
-    of_loading,
-    processor,
-    this_machine,
-)  # fmt: skip
+from ..interface.obstacles import of_binary, of_kind, of_loading, this_machine
 from ..interface.read import describe
 
 Status = Literal["ok", "warning", "problem"]
 Verdict = tuple[Status, str, str | None]
 """What a check says: status, text, and the fix where one is needed."""
 
-LINUX = sys.platform == "linux"
 VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
 LIBPYTHON = f"libpython{VERSION}{getattr(sys, 'abiflags', '')}.so.1.0"
 """What a host that is not Python needs of this Python."""
@@ -73,19 +63,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Unpacked:
-    """An unpacked FMU: what its description says, and the binary it would have to have here.
-
-    python is True if pythonfmu made it, in any version. linked is what the dynamic linker says of
-    the binary outside of Python, and loads is True if the trial has loaded it.
-    """
+    """An unpacked FMU: what its description says, and the binary it would have to have here."""
 
     path: Path
     folder: Path
     declared: Interface
     binary: Path
-    python: bool
-    linked: str = ""
-    loads: bool = False
 
 
 def examine(fmu: Path, load: bool = False) -> list[Finding]:
@@ -95,13 +78,16 @@ def examine(fmu: Path, load: bool = False) -> list[Finding]:
     InputError where fmu is no readable FMU.
     """
     with ScratchFolder() as scratch:
-        unpacked, last = unpack(fmu, Path(scratch.name)), {}
+        unpacked = unpack(fmu, Path(scratch.name))
+        verdicts: dict[str, Verdict | None]
+        verdicts = {"fmu": description(unpacked), "binary": binary(unpacked)}
+        if unpacked.declared.python:
+            verdicts |= {"script": script(unpacked), "modules": modules(unpacked)}
         if load:
             tried = trial(unpacked)
             linked = linker(unpacked.binary)
-            unpacked = replace(unpacked, linked=linked, loads=tried[0] == "ok")
-            last = {"host": host(unpacked), "libraries": libraries(unpacked), "trial": tried}
-        verdicts = {name: check(unpacked) for name, check in CHECKS.items()} | last
+            needs = libraries(linked, loads=tried[0] == "ok")
+            verdicts |= {"host": host(unpacked, linked), "libraries": needs, "trial": tried}
         return [Finding(name, *verdict) for name, verdict in verdicts.items() if verdict]
 
 
@@ -128,30 +114,12 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
     except Exception as error:  # FMPy and zipfile raise whatever they like
         raise unreadable(fmu, str(error).replace(f"{folder}/", "")) from error
     file = f"{found.identifier}{fmpy.sharedLibraryExtension}"
-    binary = folder / "binaries" / this_machine(found.version) / file
-    made = [folder / "resources" / name for name in ("slavemodule.txt", "pythonfmu")]
-    python = any(p.exists() for p in made)
-    python = python or (binary.is_file() and b"/slavemodule.txt" in binary.read_bytes())
-    return Unpacked(fmu, folder, found, binary, python)
-
-
-def temporary_folder(fmu: Unpacked) -> Verdict | None:
-    """The folder where FMPy and most hosts unpack an FMU and load it from, where it does harm."""
-    folder = Path(tempfile.gettempdir())
-    path = folder.as_posix().removeprefix(folder.drive)
-    odd = "".join(dict.fromkeys(re.findall(r"[^\w/ .~-]", path, re.ASCII)))
-    if forbids_programs(folder):
-        text = f"{folder} is mounted with noexec: no FMU loads from there"
-        return "problem", text, "mkdir -p ~/tmp && export TMPDIR=~/tmp"
-    if fmu.python and odd:
-        text = f"{folder}: a Python FMU crashes its host on {odd!r} in this path"
-        return "problem", text, "export TMPDIR=/tmp"
-    return None
+    return Unpacked(fmu, folder, found, folder / "binaries" / this_machine(found.version) / file)
 
 
 def description(fmu: Unpacked) -> Verdict:
     """FMI version and kind."""
-    source = "needs Python" if fmu.python else "native, needs no Python"
+    source = "needs Python" if fmu.declared.python else "native, needs no Python"
     kind = ", ".join([f"FMI {fmu.declared.version}", *fmu.declared.kinds])
     text = f"{kind}, made by {fmu.declared.tool or 'an unknown tool'}; {source}"
     if obstacle := of_kind(fmu.declared):
@@ -163,46 +131,22 @@ def description(fmu: Unpacked) -> Verdict:
     return "ok", text, None
 
 
-def _processor(path: Path) -> str:
-    """The processor for which a binary is made, from its ELF header; empty where it is missing."""
-    if not path.is_file():
-        return ""
-    with path.open("rb") as file:
-        head = file.read(HEAD)
-    if not LINUX:
-        return "a binary"
-    return f"{its}, {32 * head[4]} bit" if (its := processor(head)) else "no ELF file"
-
-
-HERE = _processor(Path(sys.executable))
-"""The processor of this Python."""
-
-
 def binary(fmu: Unpacked) -> Verdict:
-    """Check that there is a binary for this system and processor."""
-    wanted, its = fmu.binary.relative_to(fmu.folder).as_posix(), _processor(fmu.binary)
-    ours = fmu.binary.parent.name
-    there = [path.relative_to(fmu.folder / "binaries") for path in fmu.folder.glob("binaries/*/*")]
-    if its == HERE:
-        folders = choices(sorted({path.parent.name for path in there}))
-        return "ok", f"{wanted}, {its}; there is: {folders}; this machine: {ours}", None
-    if its:
-        fix = f"build it again for {HERE}"
-        fix += ", or as a native FMU: grasp-cosim build --native" if fmu.python else ""
-        return "problem", f"{wanted} is {its}; must be {HERE}", fix
+    """Check that there is a binary for this system and processor, of the name that it must have."""
+    wanted, ours = fmu.binary.relative_to(fmu.folder).as_posix(), fmu.binary.parent.name
     if obstacle := of_binary(fmu.declared):
         return "problem", obstacle.what, obstacle.remedy
-    files = choices(sorted(map(Path.as_posix, there)))
-    text = f"no {wanted}; there is: {files}; this machine: {ours}"
-    return "problem", text, f"build it again for {ours}"
+    there = f"there is: {choices(fmu.declared.platforms)}; this machine: {ours}"
+    if fmu.binary.is_file():
+        return "ok", f"{wanted}; {there}", None
+    files = choices(sorted(path.name for path in fmu.binary.parent.glob("*")))
+    return "problem", f"no {wanted}, but {files}; {there}", f"build it again for {ours}"
 
 
-def script(fmu: Unpacked) -> Verdict | None:
-    """Check that the script is there, parses here, and has what it imports."""
-    if not fmu.python:
-        return None
+def script(fmu: Unpacked) -> Verdict:
+    """Check that the script of a Python FMU is there, parses here, and has what it imports."""
     resources, fix = fmu.folder / "resources", "build it again with pythonfmu"
-    named = resources / "slavemodule.txt"
+    named = resources / "slavemodule.txt"  # which is elsewhere where a name has backslashes
     name = named.read_text("utf-8", "replace").partition("\n")[0] if named.is_file() else ""
     if not (name and (resources / f"{name}.py").is_file()):
         return "problem", f"no script: resources/slavemodule.txt names {name or 'none'}", fix
@@ -232,10 +176,8 @@ def _outside(resources: Path, script: str) -> set[str]:
     return {t for t in tops if not any((resources / f"{t}{end}").exists() for end in packed)}
 
 
-def modules(fmu: Unpacked) -> Verdict | None:
+def modules(fmu: Unpacked) -> Verdict:
     """Check module names, for all Python FMUs of a host share sys.modules."""
-    if not fmu.python:
-        return None
     files = [*fmu.folder.glob("resources/*.py"), *fmu.folder.glob("resources/*/__init__.py")]
     names = {p.parent.name if p.stem == "__init__" else p.stem for p in files}
     for name in sorted(names - {"pythonfmu"}):
@@ -250,13 +192,6 @@ def modules(fmu: Unpacked) -> Verdict | None:
 def _spec(name: str) -> ModuleSpec | None:
     """File this Python would import under a name; sys.modules may hold an earlier one."""
     return next(filter(None, (f.find_spec(name, None) for f in sys.meta_path)), None)
-
-
-CHECKS: dict[str, Callable[[Unpacked], Verdict | None]] = {
-    "temp folder": temporary_folder, "fmu": description, "binary": binary, "script": script,
-    "modules": modules,
-}  # fmt: skip
-"""The checks of the file of an FMU; None where one does not apply."""
 
 
 def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple[int | None, str]:
@@ -277,12 +212,12 @@ def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple
 
 def linker(binary: Path) -> str:
     """Words of the dynamic linker on a binary outside of Python; empty where it cannot tell."""
-    return _run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1] if LINUX else ""
+    return _run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1]
 
 
-def host(fmu: Unpacked) -> Verdict | None:
+def host(fmu: Unpacked, linked: str) -> Verdict | None:
     """What a host that is not Python needs for the binary of a Python FMU."""
-    if "libpython" in fmu.linked or not re.search("undefined symbol: _?Py", fmu.linked):
+    if "libpython" in linked or not re.search("undefined symbol: _?Py", linked):
         return None
     beside = Path(sys.base_prefix, "lib", LIBPYTHON)
     fix = f"LD_PRELOAD={quote(str(beside) if beside.is_file() else LIBPYTHON)} HOST"
@@ -292,33 +227,37 @@ def host(fmu: Unpacked) -> Verdict | None:
     return "warning", text, fix
 
 
-def libraries(fmu: Unpacked) -> Verdict | None:
-    """Check that the dynamic linker finds what the binary needs."""
-    if not re.search("=>|statically linked", fmu.linked):
+_LACKS = {
+    r"(\S+) => not found": (
+        "not found",
+        "install the packages that hold them; of what is packed beside the binary: patchelf "
+        "--set-rpath '$ORIGIN' BINARY, and pack the FMU again",
+    ),
+    r"version `(\S+)' not found": ("not on this system", "build it again on this system"),
+    "undefined symbol: (?!_?Py)(\\S+)": (
+        "undefined symbols",
+        "link the binary with the libraries that define them",
+    ),
+}
+"""What the dynamic linker says, that in our words, and the fix; the first goes before the rest."""
+
+
+def libraries(linked: str, loads: bool) -> Verdict | None:
+    """Check that the dynamic linker finds what the binary needs; loads says that it loads here."""
+    if not re.search("=>|statically linked", linked):
         return None
-    missing = re.findall(r"(\S+) => not found", fmu.linked)
-    newer = dict.fromkeys(re.findall(r"version `(\S+)' not found", fmu.linked))
-    symbols = re.findall(r"undefined symbol: (?!_?Py)(\S+)", fmu.linked)
-    if missing and fmu.binary.with_name(missing[0]).exists():
-        text = f"not found though packed: {choices(missing)}"
-        fix = f"patchelf --set-rpath '$ORIGIN' {fmu.binary.name}, and pack the FMU again"
-    elif missing:
-        text, fix = f"not found: {choices(missing)}", "install the packages that hold them"
-    elif newer:
-        text, fix = f"not on this system: {choices(newer)}", "build it again on this system"
-    elif symbols:
-        text = f"undefined symbols: {choices(symbols, 5)}"
-        fix = "link the binary with the libraries that define them"
-    else:
-        return "ok", "the dynamic linker finds all", None
-    if fmu.loads:  # a host that has libm, say, has them
-        return "warning", f"{text}; this host has them, others may not", fix
-    return "problem", text, fix
+    for pattern, (what, fix) in _LACKS.items():
+        if names := dict.fromkeys(re.findall(pattern, linked)):
+            text = f"{what}: {choices(names, 5)}"
+            if loads:  # a host that has libm, say, has them
+                return "warning", f"{text}; this host has them, others may not", fix
+            return "problem", text, fix
+    return "ok", "the dynamic linker finds all", None
 
 
 def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     """Load, instantiate and free the FMU in a child process, which gets timeout in s."""
-    if of_kind(fmu.declared) or _processor(fmu.binary) != HERE:
+    if of_kind(fmu.declared) or of_binary(fmu.declared) or not fmu.binary.is_file():
         return "warning", "not loaded: of a kind that is not run here, or without a binary", None
     started = time.monotonic()
     arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.path.absolute())]
