@@ -94,40 +94,25 @@ class Block(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
-    """One field of a declaration: a scalar, or an array of size scalars."""
+class Field(Variable):
+    """One field of a declaration: a scalar, or an array of size scalars, all alike.
 
-    path: tuple[str, ...]
-    causality: Causality
-    kind: type[Scalar]
-    size: int | None
-    unit: str
-    description: str
-    limits: tuple[float, float] | None
-    tunable: bool
-    nominal: float | None
-    feedthrough: frozenset[str]
-    initial_feedthrough: frozenset[str]
-    start: Any
-    enumeration: Enumeration | None = None
+    Its start has the shape of the field; dependencies are as the block declares them: "force[j]".
+    """
+
+    start: Any = None
+    size: int | None = None
 
     @property
     def names(self) -> list[str]:
         """The names of its scalar variables, in FMI's structured naming convention."""
-        name = ".".join(self.path)
+        name = self.name
         return [name] if self.size is None else [f"{name}[{i + 1}]" for i in range(self.size)]
 
     @property
     def starts(self) -> list[Any]:
         """The start values of its scalar variables; None where there is none."""
         return [self.start] if self.size is None else list(self.start or [None] * self.size)
-
-    @property
-    def variability(self) -> str:
-        """That of its scalar variables, as FMI calls it."""
-        if self.causality == "parameter":
-            return "tunable" if self.tunable else "fixed"
-        return "continuous" if self.kind is float else "discrete"
 
 
 def longest_step(block: Block) -> float:
@@ -143,8 +128,12 @@ def declared(block: Block) -> list[Field]:
     inputs = list(_fields(block.Inputs, "input", block.Inputs._field_defaults))
     outputs = list(_fields(block.Outputs, "output", {}))
     for f in outputs:
-        _check_feedthrough(f, inputs)
-    return [*inputs, *outputs, *_parameters(block.Params(), ())]
+        valid = {i.name for i in inputs}
+        valid |= {f"{i.name}[j]" for i in inputs if f.size and i.size == f.size}
+        if unknown := {*f.dependencies, *f.initial_dependencies} - valid:
+            known = ", ".join(sorted(valid)) or "nothing, there are no inputs"
+            raise TypeError(f"{f.name}: depends on {', '.join(sorted(unknown))}; valid: {known}")
+    return [*inputs, *outputs, *_parameters(block.Params(), "")]
 
 
 def variables(fields: list[Field]) -> list[Variable]:
@@ -153,38 +142,24 @@ def variables(fields: list[Field]) -> list[Variable]:
     At the start outputs depend on all parameters, beside the inputs that are declared.
     """
     inputs = [f for f in fields if f.causality == "input"]
-    parameters = tuple(name for f in fields if f.causality == "parameter" for name in f.names)
+    parameters = [name for f in fields if f.causality == "parameter" for name in f.names]
+
+    def chosen(sources: tuple[str, ...], index: int) -> Iterator[str]:
+        for f in inputs:
+            if f.name in sources:
+                yield from f.names
+            elif f"{f.name}[j]" in sources:
+                yield f.names[index]
+
     found = []
     for f in fields:
         always = parameters if f.causality == "output" else ()
         for index, (name, start) in enumerate(zip(f.names, f.starts, strict=True)):
-            now = _chosen(inputs, f.feedthrough, index)
-            initially = *_chosen(inputs, f.initial_feedthrough, index), *always
+            now = tuple(chosen(f.dependencies, index))
+            initially = *chosen(f.initial_dependencies, index), *always
             about = f.variability, f.limits, f.description, f.nominal, False, now, initially
             found.append(Variable(name, f.kind, f.causality, f.unit, start, *about, f.enumeration))
     return found
-
-
-def _chosen(inputs: list[Field], sources: frozenset[str], index: int) -> tuple[str, ...]:
-    """Return the scalar inputs that `sources` of the output element `index` stand for."""
-    found: list[str] = []
-    for f in inputs:
-        if f.path[0] in sources:
-            found += f.names
-        elif f"{f.path[0]}[j]" in sources:
-            found.append(f.names[index])
-    return tuple(found)
-
-
-def _check_feedthrough(output: Field, inputs: list[Field]) -> None:
-    valid = {i.path[0] for i in inputs}
-    valid |= {f"{i.path[0]}[j]" for i in inputs if output.size and i.size == output.size}
-    unknown = (output.feedthrough | output.initial_feedthrough) - valid
-    if unknown:
-        raise TypeError(
-            f"{output.path[0]}: depends on {', '.join(sorted(unknown))}; "
-            f"valid: {', '.join(sorted(valid)) or 'nothing, there are no inputs'}"
-        )
 
 
 def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
@@ -221,42 +196,39 @@ def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
 
 def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
     """Params from the list of all values; ValueError as the block raises it."""
-    by_path: dict[tuple[str, ...], Any] = {}
     rest = iter(values)
-    for f in fields:
-        by_path[f.path] = next(rest) if f.size is None else tuple(islice(rest, f.size))
-    return _build(block.Params, (), by_path)
+    by_name = {f.name: next(rest) if f.size is None else (*islice(rest, f.size),) for f in fields}
+    return _build(block.Params, "", by_name)
 
 
-def _build(cls: type[Any], path: tuple[str, ...], values: dict[tuple[str, ...], Any]) -> Any:
-    fields: dict[str, Any] = {}
+def _build(cls: type[Any], above: str, values: dict[str, Any]) -> Any:
+    made: dict[str, Any] = {}
     for name, kind in _types(cls).items():  # type: ignore[arg-type]  # any type can be hashed
-        at = (*path, name)
         if hasattr(kind, "__dataclass_fields__"):
-            fields[name] = _build(kind, at, values)
+            made[name] = _build(kind, f"{above}{name}.", values)
         else:
             is_enum = isinstance(kind, type) and issubclass(kind, IntEnum)
-            fields[name] = kind(values[at]) if is_enum else values[at]
-    return cls(**fields)
+            value = values[above + name]
+            made[name] = kind(value) if is_enum else value
+    return cls(**made)
 
 
 _types = cache(get_type_hints)
 """Read once, as Params are made whenever one is set."""
 
 
-def _parameters(params: Any, path: tuple[str, ...]) -> Iterator[Field]:
-    hints = get_type_hints(type(params), include_extras=True)
-    for name, hint in hints.items():
+def _parameters(params: Any, above: str) -> Iterator[Field]:
+    for name, hint in get_type_hints(type(params), include_extras=True).items():
         value = getattr(params, name)
         if is_dataclass(value):
-            yield from _parameters(value, (*path, name))
+            yield from _parameters(value, f"{above}{name}.")
         else:
-            yield _field((*path, name), "parameter", hint, value)
+            yield _field(above + name, "parameter", hint, value)
 
 
 def _fields(cls: type[Any], causality: Causality, starts: dict[str, Any]) -> Iterator[Field]:
     for name, hint in get_type_hints(cls, include_extras=True).items():
-        yield _field((name,), causality, hint, starts.get(name))
+        yield _field(name, causality, hint, starts.get(name))
 
 
 def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
@@ -273,17 +245,20 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
     raise TypeError(f"{name} is {got}: must be {valid}, a tuple of one of them{besides}")
 
 
-def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -> Field:
-    name, valid = ".".join(path), DECLARATIONS[causality]
+def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
+    valid = DECLARATIONS[causality]
     declared = getattr(hint, "__metadata__", (None,))[0]
     if not isinstance(declared, valid):
         raise TypeError(f'{name}: must be Annotated[type, {valid.__name__}("meaning", unit=...)]')
     base = get_args(hint)[0]
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = _kind(name, causality, base)
+    variability = "continuous" if kind is float else "discrete"
     limits = enumeration = nominal = None
-    now = initially = frozenset[str]()
+    now: tuple[str, ...] = ()
+    initially = now
     if isinstance(declared, Parameter):
+        variability = "tunable" if declared.tunable else "fixed"
         if (declared.low, declared.high) != (-inf, inf):
             limits = (declared.low, declared.high)
         if kind is float:
@@ -296,14 +271,12 @@ def _field(path: tuple[str, ...], causality: Causality, hint: Any, start: Any) -
         if declared.depends_on is None:
             must = "must have the inputs that reach it without a step, depends_on={...}"
             raise TypeError(f"{name}: {must}")
-        now = initially = frozenset(declared.depends_on)
-        if declared.depends_initially_on is not None:
-            initially = frozenset(declared.depends_initially_on)
+        later = declared.depends_initially_on
+        now = tuple(sorted(declared.depends_on))
+        initially = now if later is None else tuple(sorted(later))
     if issubclass(kind, IntEnum):
         items = tuple((member.name.lower(), int(member)) for member in kind)
         enumeration = Enumeration(kind.__name__, items)
         limits, kind, start = (min(kind), max(kind)), int, int(start)
-    meant = declared.unit, declared.description
-    tunable = isinstance(declared, Parameter) and declared.tunable
-    kept = path, causality, kind, size, *meant, limits, tunable, nominal
-    return Field(*kept, now, initially, start, enumeration)
+    about = variability, limits, declared.description, nominal, False, now, initially
+    return Field(name, kind, causality, declared.unit, start, *about, enumeration, size)

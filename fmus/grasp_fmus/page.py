@@ -253,8 +253,8 @@ def _table(rows: list[str]) -> str:
 
 
 def _row(f: Field) -> str:
-    name = ".".join(f.path) + (f"[1..{f.size}]" if f.size else "")
-    tunable = "tunable " if f.tunable else ""
+    name = f.name + (f"[1..{f.size}]" if f.size else "")
+    tunable = "tunable " if f.variability == "tunable" else ""
     limits = f"{f.limits[0]:g} to {f.limits[1]:g}" if f.limits else ""
     items = {}
     if f.enumeration:
@@ -262,7 +262,7 @@ def _row(f: Field) -> str:
         limits = ", ".join(items.values())
     starts = ["" if s is None else items.get(s, str(s).lower()) for s in f.starts]
     start = starts[0] if len(set(starts)) == 1 else ", ".join(starts)
-    reached_by = ", ".join(f"`{source}`" for source in sorted(f.feedthrough))
+    reached_by = ", ".join(f"`{source}`" for source in f.dependencies)
     if f.causality == "output" and not reached_by:
         reached_by = "none"
     return (

@@ -13,7 +13,6 @@ import struct
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from math import inf, isclose, isfinite
 from typing import Any, NamedTuple, NoReturn, TypeVar, cast
@@ -33,21 +32,6 @@ HEAD = 24
 """Bytes of a state before its numbers: the magic, and the content hash of the FMU."""
 
 REASONS = (ValueError, ArithmeticError, ImportError)
-
-
-@dataclass(frozen=True, slots=True)
-class Access:
-    """How a list of value references is read or set; worked out where it is not the last one."""
-
-    vrs: list[int]
-    where: slice | None
-    """None: not in a row."""
-    outputs: bool
-    parameters: bool
-
-
-_NOTHING = Access([], None, False, False)
-"""How to read or set nothing, which is always allowed."""
 
 
 class Snapshot(NamedTuple):
@@ -87,46 +71,40 @@ def reported(call: _F) -> _F:
 
 
 def _getter(kind: type[Scalar]) -> Callable[["Slave", list[int]], list[Any]]:
-    place = [*TYPES].index(kind)
-
     def get(self: "Slave", vrs: list[int]) -> list[Any]:
         """Values of the given references."""
         try:
-            access = self._last_read[place]
-            if vrs != access.vrs:
-                access = self._last_read[place] = self._access(vrs, kind)
-            if self._inputs is None and access.outputs:
+            if vrs != self._last_read.get(kind):
+                self._check_kind(vrs, kind)
+                self._last_read[kind] = [*vrs]
+            if self._inputs is None and not self._output_vrs.isdisjoint(vrs):
                 self._refresh()
         except BaseException as error:
             self._report(error)
-        where = access.where
-        return self._values[where] if where is not None else [self._values[vr] for vr in vrs]
+        return [self._values[vr] for vr in vrs]
 
     return get
 
 
 def _setter(kind: type[Scalar]) -> Callable[["Slave", list[int], list[Any]], None]:
-    real, place = kind is float, [*TYPES].index(kind)
-
     def set_(self: "Slave", vrs: list[int], values: list[Any]) -> None:
         """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
         try:
-            access = self._last_set[place]
-            if vrs != access.vrs:
-                access = self._access(vrs, kind)
+            only_inputs = vrs == self._last_set.get(kind)
+            if not only_inputs:
+                self._check_kind(vrs, kind)
                 self._check_settable(vrs)
-                self._last_set[place] = access
-            if access.parameters or (real and not isfinite(sum(values))):
+                only_inputs = max(vrs, default=0) < self._first_parameter
+                if only_inputs:
+                    self._last_set[kind] = [*vrs]
+            if not only_inputs or (kind is float and not isfinite(sum(values))):
                 for vr, value in zip(vrs, values, strict=True):
                     self._variables[vr].check(value)
         except BaseException as error:
             self._report(error)
-        if access.where is not None:
-            self._values[access.where] = values
-        else:
-            for vr, value in zip(vrs, values, strict=True):
-                self._values[vr] = value
-        if access.parameters:
+        for vr, value in zip(vrs, values, strict=True):
+            self._values[vr] = value
+        if not only_inputs:
             self._params = None
         self._inputs = None
 
@@ -144,8 +122,11 @@ class Slave:
         self._inputs: Any = None  # None: something was set and the outputs are out of date
         self._fields, self._variables, self._functions = _shape(self._block)
         causalities = [v.causality for v in self._variables]
-        first = causalities.count("input")
-        self._outputs = slice(first, first + causalities.count("output"))
+        first, number = causalities.count("input"), causalities.count("output")
+        self._first_parameter = first + number
+        self._outputs = slice(first, self._first_parameter)
+        self._output_vrs = frozenset(range(first, self._first_parameter))
+        self._settable = [vr for vr, _ in enumerate(causalities) if vr not in self._output_vrs]
         self._longest_step = contract.longest_step(self._block)
         self._values = [v.start for v in self._variables]
         self._state = self._block.initial_state(self._block.Params(), self._block.Inputs())
@@ -153,8 +134,9 @@ class Slave:
 
     def _enter(self, phase: int) -> None:
         self._phase = phase
-        # The host nearly always asks for the same again
-        self._last_read, self._last_set = ([_NOTHING] * len(TYPES) for _ in range(2))
+        # The host nearly always asks for the same again, and sets the same inputs
+        self._last_read: dict[type[Scalar], list[int]] = {}
+        self._last_set: dict[type[Scalar], list[int]] = {}
 
     # The life cycle
 
@@ -226,8 +208,9 @@ class Slave:
     get_integer, set_integer = _getter(int), _setter(int)
     get_string, set_string = _getter(str), _setter(str)
 
-    def _access(self, vrs: list[int], kind: type[Scalar]) -> Access:
-        """How to read or set these variables, which must be of this kind."""
+    # Checks
+
+    def _check_kind(self, vrs: list[int], kind: type[Scalar]) -> None:
         for vr in vrs:
             if not 0 <= vr < len(self._variables):
                 last = len(self._variables) - 1
@@ -236,17 +219,6 @@ class Slave:
             if v.kind is not kind:
                 wrong, right = TYPES[kind], TYPES[v.kind]
                 raise ValueError(f"{v.name}: accessed as {wrong}: must be as {right}")
-        first = vrs[0] if vrs else 0
-        in_a_row = vrs == [*range(first, first + len(vrs))]
-        causalities = {self._variables[vr].causality for vr in vrs}
-        return Access(
-            list(vrs),
-            slice(first, first + len(vrs)) if in_a_row else None,
-            "output" in causalities,
-            "parameter" in causalities,
-        )
-
-    # Checks
 
     def _require(self, call: str, phase: int) -> None:
         if self._phase != phase:
@@ -290,14 +262,14 @@ class Slave:
     # States
 
     def _get_fmu_state(self) -> Snapshot:
-        before, after = self._values[: self._outputs.start], self._values[self._outputs.stop :]
-        return Snapshot(self._phase, self._time, (*before, *after), self._state)
+        settable = tuple(self._values[vr] for vr in self._settable)
+        return Snapshot(self._phase, self._time, settable, self._state)
 
     @reported
     def _set_fmu_state(self, snapshot: object) -> None:
         phase, self._time, settable, self._state = self._ours(snapshot)
-        self._values[: self._outputs.start] = settable[: self._outputs.start]
-        self._values[self._outputs.stop :] = settable[self._outputs.start :]
+        for vr, value in zip(self._settable, settable, strict=True):
+            self._values[vr] = value
         self._params = self._inputs = None
         self._enter(phase)
 
@@ -321,9 +293,8 @@ class Slave:
         found: Snapshot = _shaped(like, iter(struct.unpack(f"<{size // 8 - 3}d", data[HEAD:])))
         if found.phase not in range(len(PHASES)) or not isfinite(found.time):
             raise ValueError(f"state in phase {found.phase} at {found.time} s: must be of a run")
-        settable = [v for v in self._variables if v.causality != "output"]
-        for v, value in zip(settable, found.settable, strict=True):
-            v.check(value)
+        for vr, value in zip(self._settable, found.settable, strict=True):
+            self._variables[vr].check(value)
         return found
 
     def _ours(self, snapshot: object) -> Snapshot:

@@ -68,7 +68,7 @@ def block(params=Params, inputs=Inputs, outputs=Outputs):
 
 
 FIELDS = declared(block())
-BY_NAME = {".".join(f.path): f for f in FIELDS}
+BY_NAME = {f.name: f for f in FIELDS}
 NAMES = [name for f in FIELDS for name in f.names]
 
 
@@ -91,7 +91,7 @@ def test_what_a_field_holds():
     never = BY_NAME["never"]
     assert (never.causality, never.kind, never.size) == ("output", bool, None)
     assert (BY_NAME["gap"].limits, armed.limits) == (None, None)
-    assert [name for name, f in BY_NAME.items() if f.tunable] == ["offset"]
+    assert [name for name, f in BY_NAME.items() if f.variability == "tunable"] == ["offset"]
 
 
 def test_starts_are_the_defaults_and_outputs_have_none():

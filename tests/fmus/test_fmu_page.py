@@ -69,7 +69,7 @@ def test_the_page_is_well_formed_complete_and_stands_alone(name):
 
 
 def shown(f):
-    return ".".join(f.path) + (f"[1..{f.size}]" if f.size else "")
+    return f.name + (f"[1..{f.size}]" if f.size else "")
 
 
 @pytest.mark.parametrize(

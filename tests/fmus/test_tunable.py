@@ -126,7 +126,7 @@ def values(f):
 
 def changes(block):
     """Values of some tunable parameters, and how many steps follow; several times."""
-    tunable = [(n, f) for f in declared(block) if f.tunable for n in f.names]
+    tunable = [(n, f) for f in declared(block) if f.variability == "tunable" for n in f.names]
     one = st.sampled_from(tunable).flatmap(lambda t: values(t[1]).map(lambda v: (t[0], v)))
     some = st.lists(one, min_size=1, max_size=4).map(dict)
     return st.lists(st.tuples(some, st.integers(0, 3)), min_size=1, max_size=6)

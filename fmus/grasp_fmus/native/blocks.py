@@ -136,7 +136,7 @@ def _conversions(program: Program, described: list[Field]) -> Iterator[str]:
     place = 0
     for f in described:
         own = lines[f.causality]
-        path = ".".join(map(identifier, f.path))
+        path = ".".join(map(identifier, f.name.split(".")))
         for member in [path] if f.size is None else [f"{path}.at[{i}]" for i in range(f.size)]:
             if f.causality == "output":
                 own.append(f"values[{len(own)}] = y->{member};")
