@@ -3,26 +3,11 @@
 import math
 import struct
 from random import Random
+from threading import Event
 
 import pytest
-from grasp_fmus.link.message import (
-    END,
-    FAILED,
-    HELLO,
-    INITIALISE,
-    OTHER_INTERFACE,
-    OTHER_VERSION,
-    OUTPUTS,
-    REFUSE,
-    SHORTEST_HELLO,
-    STEP,
-    UNKNOWN,
-    VERSION,
-    WELCOME,
-    Codec,
-    Message,
-    Sealer,
-)
+from grasp_fmus.link import message
+from grasp_fmus.link.message import END, HELLO, INITIALISE, OUTPUTS, STEP, VERSION, Message, Sealer
 from support.native_proxies import connected, hosted
 from support.processes import kept_port
 from support.scripted_peer import (
@@ -57,7 +42,7 @@ def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_doe
         assert (host.state(), peer.kinds()) == (0, [])
         host.enter()
         assert host.outputs() == START
-        assert peer.got[0].body == SIGNATURE.text.encode().ljust(SHORTEST_HELLO, b"\0")
+        assert peer.got[0].body == SIGNATURE.text.encode().ljust(message.SHORTEST_HELLO, b"\0")
         assert peer.values(peer.got[1]) == [1.5, 3, True, 2.0, 0.5]
         diagnostics = host.own()
         host.set(force=-2.0)
@@ -78,7 +63,7 @@ def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_doe
 
 def nothing_yet(peer, m):
     peer.clock.now += 60_000_000
-    peer.send(peer.pack(m, WELCOME, cookie=0))  # wakes, and is none
+    peer.send(peer.pack(m, message.WELCOME, cookie=0))  # wakes, and is none
 
 
 def test_hello_and_initialise_are_repeated_as_they_are():
@@ -96,12 +81,12 @@ def test_hello_and_initialise_are_repeated_as_they_are():
     ("act", "reason"),
     [
         (busy, "the peer is busy with another proxy"),
-        (refuse(OTHER_INTERFACE, b"the proxy has one\n%d, the peer an\xc3\xb6ther\x7f"),
+        (refuse(message.OTHER_INTERFACE, b"the proxy has one\n%d, the peer an\xc3\xb6ther\x7f"),
          "another interface: the proxy has one %d, the peer an??ther?"),
-        (refuse(OTHER_INTERFACE, b"x" * 2000), f"another interface: {'x' * 1024}"),
-        (refuse(OTHER_VERSION, version=1), f"the peer speaks protocol 1: must be {VERSION}"),
-        (refuse(OTHER_VERSION, version=9999), f"the peer speaks protocol 9999: must be {VERSION}"),
-        (refuse(FAILED, b"hot"), "the peer failed: hot"),
+        (refuse(message.OTHER_INTERFACE, b"x" * 2000), f"another interface: {'x' * 1024}"),
+        (refuse(message.OTHER_VERSION, version=9999),
+         f"the peer speaks protocol 9999: must be {VERSION}"),
+        (refuse(message.FAILED, b"hot"), "the peer failed: hot"),
     ],
 )  # fmt: skip
 def test_a_peer_that_refuses_is_named_with_its_reason(act, reason):
@@ -144,10 +129,9 @@ def test_settings_may_change_in_initialisation_mode():
         ({"on_loss": "panic"}, "proxy.on_loss = panic: must be hold, failsafe, stop"),
         ({"key_file": "/no/such"}, "proxy.key_file = /no/such: No such file or directory"),
         ({"key_file": __file__}, f"proxy.key_file = {__file__}: file of more than 4096 bytes: is"),
-        ({"host": "a..b"}, "a..b:9: no connection: "),
         ({"host": "no such host"}, "no such host:9: no connection: "),
     ],
-)  # fmt: skip
+)
 def test_settings_that_are_none(setting, reason):
     with hosted(9, **setting) as host:
         assert host.refused(host.enter).startswith(f"proxy, t = 0 s: {reason}")
@@ -157,7 +141,6 @@ def test_settings_that_are_none(setting, reason):
     ("name", "value", "reason"),
     [
         ("proxy.port", 0, "proxy.port = 0: must be from 1 to 65535"),
-        ("proxy.timeout", math.nan, "proxy.timeout = nan s: must be from 1e-06 to 3600 s"),
         ("force", math.inf, "force = inf N: must be a finite number"),
         ("proxy.key_file", "k" * 1024, "proxy.key_file: too long: must have 0 to 1023 bytes"),
     ],
@@ -210,37 +193,22 @@ def test_a_key_must_be_long_enough_and_the_same(tmp_path):
 # Steps
 
 
-def test_a_step_carries_the_hosts_numbers_to_the_bit():
-    random = Random(1)
-    with connected() as (host, peer):
-        time = 0.0
-        for _ in range(50):
-            forces = [random.gauss(0.0, 1e300), random.gauss(0.0, 5e-324), -0.0, 5e-324]
-            force, gain = random.choice(forces), random.uniform(1.0, 2.0)
-            mode, armed = random.randrange(-(2**31), 2**31), random.random() < 0.5
-            host.set(force=force, gain=gain, mode=mode, armed=armed)
-            size = random.uniform(1e-6, 1.0)
-            if not math.isfinite(force * gain):
-                continue
-            host.do_step(time, size)
-            m = peer.got[-1]
-            assert (m.kind, m.time, m.step) == (STEP, time, size)
-            assert m.body == Codec(SIGNATURE.request).pack(force, mode, armed, gain, 0.5)
-            assert host.outputs() == [force * gain, mode, not armed]
-            assert math.copysign(1.0, host.get("doubled")) == math.copysign(1.0, force * gain)
-            time += size
-        assert host.counts() == {}
-
-
 def test_outputs_follow_a_step_and_tunable_parameters_may_change():
-    with connected() as (host, _):
+    """To the bit what the host has; the least number is one, and zero has a sign."""
+    with connected() as (host, peer):
         for name in ("mass", "proxy.timeout"):
             line = host.refused(lambda name=name: host.set(**{name: 1.0}))
             assert f"{name}: fixed parameter set in step mode" in line
-        host.set(force=4.0, gain=10.0)
-        assert host.get("doubled") == 3.0
-        host.step()
-        assert host.get("doubled") == 40.0
+        for force, size in ((4.0, 0.25), (-5e-324, 1e-6), (-0.0, 1.0)):
+            shown, time = host.get("doubled"), host.time
+            host.set(force=force, gain=10.0, mode=-(2**31), armed=False)
+            assert host.get("doubled") == shown
+            host.step(size)
+            m = peer.got[-1]
+            assert (m.kind, m.time, m.step) == (STEP, time, size)
+            assert repr(peer.values(m)) == repr([force, -(2**31), False, 10.0, 0.5])
+            assert repr(host.outputs()) == repr([10.0 * force, -(2**31), True])
+        assert host.counts() == {}
 
 
 def test_round_trip_and_age():
@@ -351,15 +319,14 @@ def test_what_is_none_of_the_session_is_counted_and_changes_nothing():
     other = Message(OUTPUTS, 0, SIGNATURE.hash, 5, 5, 1, 0.0, 0.0, 0, b"")
     whole, older = (Sealer().pack(other._replace(version=v)) for v in (VERSION, VERSION - 1))
     many = [b"", b"x", bytes(80), whole, older, whole[:-1], whole * 800, *[b"x"] * 80]
-
     no_values = [(0, "<d", math.nan), (0, "<d", -math.inf), (8, "<q", 2**31), (16, "<Q", 2)]
 
     def odd(peer, m):
-        bodies = [bytearray(24) for _ in no_values]
-        for body, (at, kind, value) in zip(bodies, no_values, strict=True):
+        for at, kind, value in no_values:
+            body = bytearray(24)
             struct.pack_into(kind, body, at, value)
-        bad = [peer.pack(m, OUTPUTS, bytes(body)) for body in bodies]
-        for datagram in (peer.pack(m, REFUSE, b"", 99), *bad, *many):
+            peer.send(peer.pack(m, OUTPUTS, bytes(body)))
+        for datagram in (peer.pack(m, message.REFUSE, b"", 99), *many):
             peer.send(datagram)
         answer(peer, m)
 
@@ -370,34 +337,30 @@ def test_what_is_none_of_the_session_is_counted_and_changes_nothing():
         assert host.counts() == {"rejected": len(many) + 5}
         for datagram in many:  # between two steps
             peer.send(datagram)
-        host.set(force=10.0)
         host.step()
-        assert (host.state(), host.get("doubled")) == (1, 20.0)
         assert host.counts() == {"rejected": 2 * len(many) + 5}
 
 
 def test_a_flood_does_not_put_off_the_deadline():
     """However much comes, with each look at the clock a step is nearer to its end."""
-    clock = Clock()
+    clock, over = Clock(), Event()
+
+    def flood(peer, m):
+        while not over.is_set():
+            peer.send(bytes(80))
+
     with connected(clock, timeout=1e-3) as (host, peer):
-        over = False
-
-        def flood(peer, m):
-            while not over:
-                peer.send(bytes(80))
-
         peer.told(STEP, flood)
-        clock.tick = 20_000
-        begin = clock.now
+        begin, clock.tick = clock.now, 20_000
         try:
             host.step()
         finally:
-            over = True
+            over.set()
         looks = (clock.now - begin) // clock.tick
-        assert looks <= 1e-3 * 1e9 / clock.tick + 6
+        clock.tick = 0
+        assert looks <= 56
         assert host.get("proxy.missed") == 1
         assert 0 < host.get("proxy.rejected") <= looks
-        clock.tick = 0
 
 
 # All of that in any order
@@ -458,7 +421,7 @@ def test_a_lost_peer_may_come_back_but_not_by_a_late_answer():
         ([forget, forget], [], [], [[STEP], [STEP, HELLO, INITIALISE, STEP]]),
         ([forget, forget], [miss], [miss, miss],  # longer than a step may take
          [[STEP], [STEP, HELLO], [HELLO, INITIALISE], [INITIALISE], [INITIALISE, STEP]]),
-        ([forget, forget], [], [refuse(UNKNOWN), miss],
+        ([forget, forget], [], [refuse(message.UNKNOWN), miss],
          [[STEP], [STEP, *[HELLO, INITIALISE] * 2], [INITIALISE, STEP]]),
         ([fail, forget], [], [fail],
          [[STEP], [STEP, HELLO, INITIALISE], [HELLO, INITIALISE, STEP]]),
