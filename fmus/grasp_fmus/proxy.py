@@ -9,7 +9,7 @@ from si_units import BASE, Unit
 
 from .contract import TYPES, Scalar, Variable
 from .description import ERROR, WARNING, Description, Experiment, Version
-from .link.message import PORT, LinkVariable, Signature
+from .link import PORT, LinkVariable, Signature
 
 if TYPE_CHECKING:
     from .build import Plan

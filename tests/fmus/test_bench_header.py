@@ -15,11 +15,21 @@ from select import select
 
 import pytest
 from grasp_cosim.hil.driven import MOST_LOST
+from grasp_fmus import link
 from grasp_fmus.contract import declared, unpacker
 from grasp_fmus.contract import variables as variables_of
-from grasp_fmus.link import message
-from grasp_fmus.link.message import INITIALISE, STEP, LinkVariable, Message, Sealer, Signature
-from grasp_fmus.link.peer import ALIVE, Peer, PeerCounters, Request
+from grasp_fmus.link import (
+    ALIVE,
+    INITIALISE,
+    STEP,
+    LinkVariable,
+    Message,
+    Peer,
+    PeerCounters,
+    Request,
+    Sealer,
+    Signature,
+)
 from grasp_fmus.native.bench_header import bench_header, c_prefix
 from grasp_fmus.native.c_only import write_c
 from grasp_fmus.package import shipped_model
@@ -252,7 +262,7 @@ class Reference:
         action = self.peer.receive(datagram, now)
         if not isinstance(action, Request):
             return (SEND, action, False) if action else (NOTHING, b"", False)
-        event = {INITIALISE: DO_INITIALISE, STEP: DO_STEP, message.END: ENDED}[action.kind]
+        event = {INITIALISE: DO_INITIALISE, STEP: DO_STEP, link.END: ENDED}[action.kind]
         return event, b"" if event == ENDED else self._answer(action), action.fresh
 
     def _answer(self, request):
@@ -297,7 +307,7 @@ def test_lost_requests_are_told_and_new_ones_alone_feed_the_watchdog(driver):
     step(2.25)
     at = [(1, first), (2, first), (3, second), (4, second), (5, session().hello(99)),
           (6, step(2.75, 0.1)), (6, step(2.85 + 1e-12, 0.1)), (6, step(1.0)),
-          (6, proxy.pack(message.END))]  # fmt: skip
+          (6, proxy.pack(link.END))]  # fmt: skip
     records, _ = linked(driver, at)
     assert [r.alive for r in records] == [True, False] * 2 + [False, *[True] * 3, False]
     behind = [r.behind for r in records if r.event == DO_STEP]
@@ -323,13 +333,13 @@ def test_outputs_that_are_none_fail_and_are_named(tmp_path):
     done = subprocess.run([compile_c(tmp_path, header, "M", source)], capture_output=True)
     assert done.returncode == 0
     assert done.stdout[80:].decode() == "output with no valid value: µ"
-    assert done.stdout[6:8] == bytes([message.REFUSE, message.FAILED])
+    assert done.stdout[6:8] == bytes([link.REFUSE, link.FAILED])
 
 
 # Against link/peer.py
 
 
-STEPS = (*(0.1, 1e-3, 1e-9, 0.0, -1.0) * 4, message.LONGEST_STEP, 1e300)
+STEPS = (*(0.1, 1e-3, 1e-9, 0.0, -1.0) * 4, link.LONGEST_STEP, 1e300)
 """The last is too long."""
 WRONG = [
     *(struct.pack("<d", x) for x in (math.inf, math.nan)), struct.pack("<q", 2**31),
@@ -368,7 +378,7 @@ class Proxies:
         if chosen < 0.2 or not s._sequence:
             return s.request(INITIALISE, rng.choice((0.0, 2.5)), values)
         if chosen < 0.21:
-            return s.pack(message.END)
+            return s.pack(link.END)
         return s.request(STEP, rng.uniform(-1.0, 1e6), values, rng.choice(STEPS))
 
     def _hello(self, s):
@@ -378,31 +388,31 @@ class Proxies:
         odd = {"body": text[: rng.randrange(len(text))], "interface": bytes(16)}
         odd = odd if rng.random() < 0.2 else {"body": text}
         cookie = s._cookie
-        datagram = s.hello(s._session, version=rng.choice((*[message.VERSION] * 9, 1, 3)), **odd)
+        datagram = s.hello(s._session, version=rng.choice((*[link.VERSION] * 9, 1, 3)), **odd)
         s._cookie = cookie
         return datagram
 
     def _damaged(self, datagram):
         rng = self.rng
-        data = bytearray(datagram[: len(datagram) - (message.TAG_SIZE if self.key else 0)])
+        data = bytearray(datagram[: len(datagram) - (link.TAG_SIZE if self.key else 0)])
         kind = rng.randrange(4)
         if kind == 0:
-            data[rng.randrange(message.HEAD.size)] ^= 1 << rng.randrange(8)
+            data[rng.randrange(link.HEAD.size)] ^= 1 << rng.randrange(8)
         elif kind == 1:
             data = data[: rng.randrange(len(data))]
         elif kind == 2:
             data += bytes(rng.randrange(1, 40))
-            data[72:76] = struct.pack("<I", len(data) - message.HEAD.size - rng.randrange(2))
+            data[72:76] = struct.pack("<I", len(data) - link.HEAD.size - rng.randrange(2))
         else:
-            at = rng.randrange(40, min(len(data), message.HEAD.size + 48), 8)
+            at = rng.randrange(40, min(len(data), link.HEAD.size + 48), 8)
             data[at : at + 8] = rng.choice(WRONG)
         sealed = self.key if rng.random() < 0.8 else b"another key of another"
         return bytes(data) + (hmac.digest(sealed, data, "sha256") if self.key else b"")
 
     def hear(self, answer):
-        """Takes the cookie of a message.WELCOME."""
+        """Takes the cookie of a link.WELCOME."""
         opened = Sealer(self.key).open(answer)
-        if isinstance(opened, Message) and opened.kind == message.WELCOME and opened.session < 4:
+        if isinstance(opened, Message) and opened.kind == link.WELCOME and opened.session < 4:
             self.sessions[opened.session]._cookie = opened.cookie
 
 
@@ -517,7 +527,7 @@ def test_a_failure_says_why_and_the_next_session_is_served(target, time, mass, w
         call = partial(bench.proxy.step, time, 2**-4) if time else partial(bench.proxy.begin, 5)
         with pytest.raises(RefusedError) as refused:
             call(values)
-        assert refused.value.args == (message.FAILED, why)
+        assert refused.value.args == (link.FAILED, why)
         bench.begin(session=2)
         bench.proxy.step(0.0, 2**-4, bench.values())
 
@@ -575,7 +585,7 @@ def test_the_constants_of_the_protocol_and_descriptions_in_the_comments():
     signature = Signature((LinkVariable("gap", "Real", "input", "m"),))
     header = bench_header("M", signature, descriptions={"gap": "l, to the */ surface"})
     for text in (
-        f"M_HEAD_SIZE = {message.HEAD.size},", f"#define M_MOST_LOST {float(MOST_LOST)} ",
+        f"M_HEAD_SIZE = {link.HEAD.size},", f"#define M_MOST_LOST {float(MOST_LOST)} ",
         f"INT64_C({ALIVE})", "M_LARGEST_REASON = 256 ",
         "double gap;                              /* gap, m: l, to the * / surface */",
     ):  # fmt: skip

@@ -6,8 +6,8 @@ from random import Random
 from threading import Event
 
 import pytest
-from grasp_fmus.link import message
-from grasp_fmus.link.message import END, HELLO, INITIALISE, OUTPUTS, STEP, VERSION, Message, Sealer
+from grasp_fmus import link
+from grasp_fmus.link import END, HELLO, INITIALISE, OUTPUTS, STEP, VERSION, Message, Sealer
 from support.native_proxies import connected, hosted
 from support.processes import kept_port
 from support.scripted_peer import (
@@ -42,7 +42,7 @@ def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_doe
         assert (host.state(), peer.kinds()) == (0, [])
         host.enter()
         assert host.outputs() == START
-        assert peer.got[0].body == SIGNATURE.text.encode().ljust(message.SHORTEST_HELLO, b"\0")
+        assert peer.got[0].body == SIGNATURE.text.encode().ljust(link.SHORTEST_HELLO, b"\0")
         assert peer.values(peer.got[1]) == [1.5, 3, True, 2.0, 0.5]
         diagnostics = host.own()
         host.set(force=-2.0)
@@ -63,7 +63,7 @@ def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_doe
 
 def nothing_yet(peer, m):
     peer.clock.now += 60_000_000
-    peer.send(peer.pack(m, message.WELCOME, cookie=0))  # wakes, and is none
+    peer.send(peer.pack(m, link.WELCOME, cookie=0))  # wakes, and is none
 
 
 def test_hello_and_initialise_are_repeated_as_they_are():
@@ -81,12 +81,12 @@ def test_hello_and_initialise_are_repeated_as_they_are():
     ("act", "reason"),
     [
         (busy, "the peer is busy with another proxy"),
-        (refuse(message.OTHER_INTERFACE, b"the proxy has one\n%d, the peer an\xc3\xb6ther\x7f"),
+        (refuse(link.OTHER_INTERFACE, b"the proxy has one\n%d, the peer an\xc3\xb6ther\x7f"),
          "another interface: the proxy has one %d, the peer an??ther?"),
-        (refuse(message.OTHER_INTERFACE, b"x" * 2000), f"another interface: {'x' * 1024}"),
-        (refuse(message.OTHER_VERSION, version=9999),
+        (refuse(link.OTHER_INTERFACE, b"x" * 2000), f"another interface: {'x' * 1024}"),
+        (refuse(link.OTHER_VERSION, version=9999),
          f"the peer speaks protocol 9999: must be {VERSION}"),
-        (refuse(message.FAILED, b"hot"), "the peer failed: hot"),
+        (refuse(link.FAILED, b"hot"), "the peer failed: hot"),
     ],
 )  # fmt: skip
 def test_a_peer_that_refuses_is_named_with_its_reason(act, reason):
@@ -326,7 +326,7 @@ def test_what_is_none_of_the_session_is_counted_and_changes_nothing():
             body = bytearray(24)
             struct.pack_into(kind, body, at, value)
             peer.send(peer.pack(m, OUTPUTS, bytes(body)))
-        for datagram in (peer.pack(m, message.REFUSE, b"", 99), *many):
+        for datagram in (peer.pack(m, link.REFUSE, b"", 99), *many):
             peer.send(datagram)
         answer(peer, m)
 
@@ -421,7 +421,7 @@ def test_a_lost_peer_may_come_back_but_not_by_a_late_answer():
         ([forget, forget], [], [], [[STEP], [STEP, HELLO, INITIALISE, STEP]]),
         ([forget, forget], [miss], [miss, miss],  # longer than a step may take
          [[STEP], [STEP, HELLO], [HELLO, INITIALISE], [INITIALISE], [INITIALISE, STEP]]),
-        ([forget, forget], [], [refuse(message.UNKNOWN), miss],
+        ([forget, forget], [], [refuse(link.UNKNOWN), miss],
          [[STEP], [STEP, *[HELLO, INITIALISE] * 2], [INITIALISE, STEP]]),
         ([fail, forget], [], [fail],
          [[STEP], [STEP, HELLO, INITIALISE], [HELLO, INITIALISE, STEP]]),

@@ -17,8 +17,8 @@ from grasp_cosim.hil.driven import DrivenFmu
 from grasp_cosim.hil.proxy import exchanged, link_signature
 from grasp_cosim.hil.served import BACKLOG, ServedFmu, Server, Service
 from grasp_cosim.interface.read import read_interface
-from grasp_fmus.link.message import STEP as STEP_REQUEST
-from grasp_fmus.link.peer import TOO_LONG
+from grasp_fmus.link import STEP as STEP_REQUEST
+from grasp_fmus.link import TOO_LONG
 from support import native_fmus
 from support.proxies import HandProxy, RefusedError, UdpAsk, serving, wait_until
 

@@ -11,7 +11,7 @@ from grasp_cosim import cli
 from grasp_cosim.hil.proxy import exchanged
 from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.served import ServedFmu, Server
-from grasp_fmus.link.message import (
+from grasp_fmus.link import (
     END,
     HELLO,
     INITIALISE,

@@ -11,7 +11,7 @@ from itertools import count
 from threading import Thread
 
 from grasp_fmus.contract import Variable
-from grasp_fmus.link.message import (
+from grasp_fmus.link import (
     BUSY,
     END,
     FAILED,

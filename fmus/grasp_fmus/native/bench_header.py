@@ -1,7 +1,7 @@
 """Writes the bench side of a proxy FMU as one C99 header, for a target that is programmed in C.
 
 link.h.in is the header itself, as C for a model called model; here it gets the name and the
-variables. What it does is what link/peer.py does. wire.h.in is what it has in common with a native
+variables. It does what the peer in link does. wire.h.in is what it has in common with a native
 proxy: datagrams, values and keys. Protocol: link/README.md
 """
 
@@ -13,9 +13,8 @@ from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
-from ..link import message
-from ..link.message import ORDER, Causality, Codec, LinkVariable, Signature, Value, check_size
-from ..link.peer import TOO_LONG
+from .. import link
+from ..link import ORDER, TOO_LONG, Causality, Codec, LinkVariable, Signature, Value, check_size
 from .text import WORDS, string
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
@@ -81,7 +80,7 @@ def bench_header(
         inputs_size=inputs.size,
         parameters_size=parameters.size,
         outputs_size=outputs.size,
-        answer_size=message.HEAD.size + message.TAG_SIZE + max(outputs.size, LARGEST_REASON),
+        answer_size=link.HEAD.size + link.TAG_SIZE + max(outputs.size, LARGEST_REASON),
     )
 
 
@@ -93,10 +92,10 @@ def wire(prefix: str, signature: Signature) -> str:
         first_half_of_the_hash=", ".join(octets[:8]),
         second_half_of_the_hash=", ".join(octets[8:]),
         signature_lines="".join(f"        {line},\n" for line in lines),
-        version=message.VERSION,
-        shortest_hello=message.SHORTEST_HELLO,
-        longest_step=message.LONGEST_STEP,
-        largest_key=message.LARGEST_KEY,
+        version=link.VERSION,
+        shortest_hello=link.SHORTEST_HELLO,
+        longest_step=link.LONGEST_STEP,
+        largest_key=link.LARGEST_KEY,
     )
 
 

@@ -13,7 +13,7 @@ from string import Template
 from c_compilers import BITS, LIBM
 
 from ..contract import Scalar, Variable
-from ..link.message import ORDER, Causality, Kind, LinkVariable, Signature, Value
+from ..link import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file
 from .bench_header import Group, Member, comment, members, structs
 from .blocks import translated

@@ -5,7 +5,7 @@ from math import isclose, isfinite
 
 import numpy as np
 import numpy.typing as npt
-from grasp_fmus.link.message import LinkVariable, Signature
+from grasp_fmus.link import LinkVariable, Signature
 
 from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype

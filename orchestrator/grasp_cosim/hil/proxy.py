@@ -8,8 +8,7 @@ from math import isfinite, isinf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grasp_fmus.link.message import ORDER, LinkVariable, Signature, check_size, exposed, read_key
-from grasp_fmus.link.peer import ALIVE
+from grasp_fmus.link import ALIVE, ORDER, LinkVariable, Signature, check_size, exposed, read_key
 
 from ..base.errors import InputError, SimulationError
 from ..base.files import check_file, write_text

@@ -4,8 +4,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
-from grasp_fmus.link.message import END, INITIALISE, PORT, VERSION
-from grasp_fmus.link.peer import TOO_LONG, Peer, Request
+from grasp_fmus.link import END, INITIALISE, PORT, TOO_LONG, VERSION, Peer, Request
 
 from ..base.errors import InputError, SimulationError, nearest
 from ..interface.interface import Interface, Value

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from grasp_fmus.build import planned
-from grasp_fmus.link.message import END, HELLO, INITIALISE, STEP
+from grasp_fmus.link import END, HELLO, INITIALISE, STEP
 from grasp_fmus.proxy import Settings, build_proxy
 from support.fmi2 import OK, WARNING, Fmu, Instance
 from support.marks import platforms

@@ -1,0 +1,402 @@
+"""The link without sockets: variables, datagrams and keys to the byte, and the bench's side."""
+
+import hmac
+import math
+import struct
+from hashlib import sha256
+
+import pytest
+from grasp_fmus import link
+from grasp_fmus.link import (
+    ALIVE,
+    END,
+    INITIALISE,
+    STEP,
+    VERSION,
+    Codec,
+    LinkVariable,
+    Message,
+    Peer,
+    Request,
+    Sealer,
+    Signature,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+from support.proxies import HandProxy, RefusedError
+
+KEY, OTHER_KEY = b"sixteen bytes...", b"another 16 bytes"
+HASH = b"0123456789abcdef"
+EXAMPLE = Message(STEP, 0, HASH, 2**63 + 1, 7, 3, 0.25, 1e-3, -5, b"12345678")
+
+U = LinkVariable("u", "Real", "input", "m")
+P = LinkVariable("p", "Boolean", "parameter")
+Y = LinkVariable("y", "Real", "output", "N")
+SIGNATURE = Signature((Y, U, P))
+VALUES = [0.5, True]
+ALL = [LinkVariable(kind, kind, "input") for kind in ("Real", "Integer", "Boolean")]
+
+keyed = pytest.mark.parametrize("key", [None, KEY])
+reals = st.floats(allow_nan=False, allow_infinity=False)
+whole = st.integers(0, 2**64 - 1)
+messages = st.builds(
+    Message, st.integers(1, 7), st.integers(0, 255), st.binary(min_size=16, max_size=16),
+    whole, whole, whole, st.floats(-1e300, 1e300), st.floats(-1e300, 1e300),
+    st.integers(-(2**63), 2**63 - 1), st.binary(max_size=300), st.integers(0, 2**16 - 1),
+)  # fmt: skip
+
+
+# Datagrams
+
+
+def test_the_bytes_are_those_of_the_card():
+    datagram = Sealer().pack(EXAMPLE)
+    assert datagram[:8] == b"GRSP\x02\x00\x05\x00"
+    assert datagram[8:24] == HASH
+    assert struct.unpack_from("<QQQ", datagram, 24) == (2**63 + 1, 7, 3)
+    assert struct.unpack_from("<dd", datagram, 48) == (0.25, 1e-3)
+    assert struct.unpack_from("<qII", datagram, 64) == (-5, 8, 0)
+    assert datagram[80:] == b"12345678"
+    assert Sealer(KEY).pack(EXAMPLE) == datagram + hmac.digest(KEY, datagram, "sha256")
+
+
+@given(messages, st.sampled_from([None, KEY]))
+def test_what_is_packed_is_opened(m, key):
+    assert Sealer(key).open(Sealer(key).pack(m)) == m
+
+
+@given(messages, st.integers(0), st.integers(1, 255))
+def test_one_changed_byte_is_noticed_with_a_key(m, place, change):
+    datagram = bytearray(Sealer(KEY).pack(m))
+    datagram[place % len(datagram)] ^= change
+    assert Sealer(KEY).open(bytes(datagram)) in (link.FORGED, link.MALFORMED)
+
+
+@pytest.mark.parametrize(
+    ("place", "data"),
+    [
+        (0, b"grsp"), (6, b"\x00"), (6, b"\x08"), (72, b"\x07"), (76, b"\x01"),
+        *((at, struct.pack("<d", x)) for at in (48, 56) for x in (math.nan, math.inf, -math.inf)),
+    ],
+)  # fmt: skip
+def test_malformed(place, data):
+    datagram = bytearray(Sealer().pack(EXAMPLE))
+    datagram[place : place + len(data)] = data
+    assert Sealer().open(bytes(datagram)) == link.MALFORMED
+
+
+def test_the_largest_datagram():
+    body = bytes(link.LARGEST - 80)
+    assert len(Sealer().pack(EXAMPLE._replace(body=body))) == link.LARGEST
+    with pytest.raises(ValueError, match=r"65508 bytes: must be 65507 at most"):
+        Sealer().pack(EXAMPLE._replace(body=body + b"\0"))
+    with pytest.raises(ValueError, match=r"must be 65507 at most"):
+        Sealer(KEY).pack(EXAMPLE._replace(body=body))
+
+
+@given(reals, st.integers(-(2**31), 2**31 - 1), st.booleans())
+def test_values_there_and_back(a, b, c):
+    codec = Codec(ALL)
+    body = codec.pack(a, b, c)
+    assert len(body) == codec.size == 24
+    assert repr(codec.unpack(body)) == repr([a, b, c])
+
+
+@pytest.mark.parametrize(
+    ("place", "bad"),
+    [
+        (0, struct.pack("<d", math.nan)), (0, struct.pack("<d", -math.inf)),
+        (8, struct.pack("<q", 2**31)), (8, struct.pack("<q", -(2**31) - 1)),
+        (16, struct.pack("<Q", 2)), (24, b"\0"), (17, b""), (8, b""), (0, b""),
+    ],
+)  # fmt: skip
+def test_what_is_no_value(place, bad):
+    """A body that holds one, or has another size."""
+    body = bytearray(Codec(ALL).pack(1.0, 1, True))
+    body[place : place + len(bad) if bad else None] = bad
+    assert Codec(ALL).unpack(bytes(body)) is None
+
+
+def test_the_largest_reals_are_values_though_their_sum_is_not():
+    codec = Codec([U, U])
+    assert codec.unpack(codec.pack(1.7e308, 1.7e308)) == [1.7e308, 1.7e308]
+
+
+# Keys
+
+LINE_ENDS = (b"\n", b"\r\n", b" ", b"\xff")
+
+
+@pytest.mark.parametrize(
+    ("data", "key"),
+    [
+        (KEY + b"\n", KEY),
+        (b" a key with spaces \r\n", b" a key with spaces "),
+        *((data, data) for end in LINE_ENDS for data in (KEY + b"\0" + end, end + b"\xe9" + KEY)),
+    ],
+)
+def test_a_key_is_read_without_the_line_end_if_it_is_text(tmp_path, data, key):
+    """Every byte counts of one that is no text, and every space of one that is."""
+    (tmp_path / "key").write_bytes(data)
+    assert link.read_key(tmp_path / "key") == key
+
+
+def test_a_key_has_16_bytes(tmp_path):
+    (tmp_path / "key").write_bytes(b"fifteen bytes!!\n")
+    with pytest.raises(ValueError, match="key of 15 bytes: must have 16 or more"):
+        link.read_key(tmp_path / "key")
+
+
+@pytest.mark.parametrize(("mode", "said"), [(0o600, ""), (0o640, "640"), (0o604, "604")])
+def test_a_key_that_others_can_read_is_said_to_be_so(tmp_path, mode, said):
+    path = tmp_path / "key"
+    path.write_bytes(KEY)
+    path.chmod(mode)
+    line = f"{path}: others have access to this key, mode {said}; must be 600: chmod 600 {path}"
+    assert link.exposed(path) == (line if said else "")
+
+
+# The signature
+
+
+def test_text_and_hash_are_those_of_the_card():
+    text = "input\tReal\tm\tu\nparameter\tBoolean\t-\tp\noutput\tReal\tN\ty\n"
+    assert (SIGNATURE.text, SIGNATURE.hash) == (text, sha256(text.encode()).digest()[:16])
+    assert (SIGNATURE.request, SIGNATURE.answer) == ((U, P), (Y,))
+
+
+@pytest.mark.parametrize(
+    ("proxy", "difference"),
+    [
+        ((U, Y), "the proxy has output Real N y, the peer parameter Boolean - p"),
+        ((U, P), "the proxy has no more, the peer output Real N y"),
+        ((U._replace(unit="mm"), P, Y), "the proxy has input Real mm u, the peer input Real m u"),
+        ((U, P, Y, Y._replace(name="z")), "the proxy has output Real N z, the peer no more"),
+    ],
+)
+def test_the_first_difference_is_named(proxy, difference):
+    assert SIGNATURE.difference(Signature(proxy).text.encode() + bytes(9)) == difference
+
+
+@pytest.mark.parametrize(
+    ("variables", "reason"),
+    [
+        ((U, U._replace(causality="output")), "variable 'u': appears twice"),
+        ((U._replace(name="a\tb"),), r"variable 'a\\tb' \[m\]: must be without tabs"),
+        ((U._replace(unit="m\n"),), r"\[m\n\]: must be without tabs and line ends"),
+    ],
+)
+def test_what_the_text_cannot_hold(variables, reason):
+    with pytest.raises(ValueError, match=reason):
+        Signature(variables)
+
+
+# Sessions
+
+
+class Bench:
+    """A peer whose model puts out what comes in, and its clock."""
+
+    def __init__(self, key=None):
+        self.peer = Peer(SIGNATURE, key)
+        self.done = []
+        self.now = 5 * ALIVE
+
+    def __call__(self, datagram):
+        action = self.peer.receive(datagram, self.now)
+        if not isinstance(action, Request):
+            return action
+        self.done.append(action)
+        if action.kind == END:
+            return None
+        return self.peer.outputs([action.values[0]], action.time + action.step)
+
+    def proxy(self, signature=SIGNATURE, key=None):
+        return HandProxy(signature, self, key)
+
+    def begun(self, session=99):
+        """A proxy that is about to step."""
+        proxy = self.proxy()
+        proxy.begin(session, VALUES)
+        return proxy
+
+    def counts(self):
+        found = {name: getattr(self.peer.counters, name) for name in self.peer.counters.__slots__}
+        return {name: n for name, n in found.items() if n}
+
+
+def refused(call, *arguments):
+    """Code and reason."""
+    with pytest.raises(RefusedError) as error:
+        call(*arguments)
+    code, reason = error.value.args
+    return code, reason
+
+
+def test_a_session_from_hello_to_end():
+    bench = Bench()
+    proxy = bench.begun()
+    proxy.initialise(0.0, [3.0, True])
+    assert proxy.step(0.0, 0.1, [2.0, False]) == [2.0]
+    assert proxy.outputs_time == 0.1
+    proxy.end()
+    assert bench.done == [
+        Request(INITIALISE, 0.0, 0.0, VALUES, fresh=True),
+        Request(INITIALISE, 0.0, 0.0, [3.0, True], fresh=False),
+        Request(STEP, 0.0, 0.1, [2.0, False], fresh=False),
+        Request(END, 0.0, 0.0, [], fresh=False),
+    ]
+    assert bench.counts() == {"steps": 1, "initialisations": 2}
+
+
+def test_what_is_repeated_is_answered_again_and_done_once():
+    bench = Bench()
+    proxy = bench.proxy()
+    hello = proxy.hello(99)
+    welcome = bench(hello)
+    assert welcome == bench(hello)
+    proxy.take(welcome)
+    request = proxy.request(INITIALISE, 0.0, VALUES)
+    assert bench(request) == bench(request)
+    step, overtaken = (proxy.request(STEP, 0.1 * k, VALUES, 0.1) for k in (1, 0))
+    assert bench(step)
+    assert bench(step) is None
+    proxy._sequence = 1
+    assert bench(proxy.pack(STEP, step=0.1, body=bytes(16))) is None
+    assert bench(overtaken)
+    once = dict.fromkeys(("initialisations", "repeated", "duplicated", "stale"), 1)
+    assert bench.counts() == {**once, "steps": 2}
+
+
+def test_a_live_session_keeps_others_away_until_it_is_silent():
+    bench = Bench()
+    first = bench.begun(session=1)
+    bench.now += ALIVE - 1
+    assert refused(bench.begun, 2) == (link.BUSY, "")
+    recorded = first.request(STEP, 0.0, VALUES, 0.1)
+    bench(recorded)
+    for _ in range(4):  # which keeps nobody away, sent again
+        bench.now += ALIVE // 4
+        bench(recorded)
+    for session in range(2, 500):  # a HELLO alone changes nothing
+        bench(bench.proxy().hello(session))
+    first.step(0.1, 0.1, VALUES)
+    bench.now += ALIVE
+    second = bench.begun(session=2)
+    assert refused(first.step, 0.2, 0.1, VALUES) == (link.UNKNOWN, "")
+    second.step(0.0, 0.1, VALUES)
+
+
+def test_of_two_that_were_greeted_the_later_one_is_greeted_anew():
+    bench = Bench()
+    late = bench.proxy()
+    late.take(bench(late.hello(2)))
+    bench.begun(session=1).end()
+    assert refused(late.initialise, 0.0, VALUES) == (link.UNKNOWN, "")
+    late.begin(2, VALUES)
+
+
+def test_a_recorded_session_cannot_be_played_again():
+    bench = Bench(KEY)
+    proxy = bench.proxy(key=KEY)
+    recorded = [proxy.hello(99)]
+    proxy.take(bench(recorded[0]))
+    recorded += [proxy.request(INITIALISE, 0.0, VALUES), proxy.request(STEP, 0.0, VALUES, 0.1)]
+    for datagram in recorded[1:]:
+        assert bench(datagram)
+    done = list(bench.done)
+    for datagram in recorded:  # while it is under way
+        bench(datagram)
+    proxy.end()
+    bench.now += 5 * ALIVE
+    for datagram in recorded:  # and after its end
+        bench(datagram)
+    assert bench.done[:-1] == done
+
+
+@pytest.mark.parametrize(
+    ("keys", "counter"),
+    [((KEY, OTHER_KEY), "forged"), ((KEY, None), "forged"), ((None, KEY), "malformed")],
+)
+def test_without_the_key_there_is_no_answer(keys, counter):
+    bench = Bench(keys[0])
+    assert bench(bench.proxy(key=keys[1]).hello(1)) is None
+    assert bench.counts() == {counter: 1}
+
+
+@keyed
+def test_another_version_or_interface_is_refused_with_its_reason(key):
+    bench = Bench(key)
+    proxy = bench.proxy(key=key)
+    answer = bench(proxy.hello(1, version=VERSION + 1)) or b""
+    opened = Sealer(key).open(answer)
+    assert isinstance(opened, Message)
+    assert (opened.code, opened.version) == (link.OTHER_VERSION, VERSION)
+    assert len(answer) == link.HEAD.size + (link.TAG_SIZE if key else 0)
+    other = bench.proxy(Signature((U._replace(name="µ"), Y)), key)
+    reason = "the proxy has input Real m ?, the peer input Real m u"
+    assert refused(other.begin, 2, [0.0]) == (link.OTHER_INTERFACE, reason)
+    assert bench.counts() == {"foreign": 1, "other_version": 1}
+
+
+def test_a_failure_ends_the_session_and_says_why_until_it_was_heard():
+    bench = Bench()
+    proxy = bench.proxy()
+    proxy.take(bench(proxy.hello(1)))
+    request = proxy.request(INITIALISE, 0.0, VALUES)
+    assert isinstance(bench.peer.receive(request, bench.now), Request)
+    refusal = bench.peer.failed("no power, " * 200)
+    assert refused(proxy.take, refusal) == (link.FAILED, ("no power, " * 200)[:1024])
+    again = bench(request) or b""
+    assert len(again) == len(request)
+    assert refused(proxy.take, again) == (link.FAILED, "no power, no pow")
+    assert bench.counts() == {"initialisations": 1, "repeated": 1}
+    assert refused(proxy.initialise, 0.0, VALUES) == (link.UNKNOWN, "")
+
+
+BAD = {
+    "malformed": (
+        *({"kind": kind} for kind in (INITIALISE, link.OUTPUTS, link.HELLO)),
+        *({"step": step} for step in (0.0, -1.0)),
+        *({"body": body} for body in (b"", b"\xff" * 16)),
+    ),
+    "other_version": ({"version": 1},),
+    "foreign": (
+        {"session": 1}, {"cookie": 7}, {"interface": bytes(16)}, {"kind": END, "session": 1},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("counter", "spoil"), [(c, s) for c, bad in BAD.items() for s in bad])
+def test_a_bad_step_is_dropped_and_the_next_one_served(counter, spoil):
+    bench = Bench()
+    proxy = bench.begun()
+    proxy.step(0.0, 0.1, VALUES)
+    bench(proxy.request(STEP, 0.1, VALUES, 0.1, **spoil))
+    assert len(bench.done) == 2
+    assert bench.counts()[counter] == 1
+    proxy.step(0.2, 0.1, VALUES)
+
+
+@pytest.mark.parametrize("step", [link.LONGEST_STEP * 1.001, 1e300])
+def test_a_step_that_is_too_long_is_refused_and_not_done(step):
+    bench = Bench()
+    assert refused(bench.begun().step, 0.0, step, VALUES) == (link.FAILED, link.TOO_LONG)
+    assert not bench.peer.in_session
+    assert "steps" not in bench.counts()
+    bench.begun(session=100).step(0.0, link.LONGEST_STEP, VALUES)
+
+
+SMALL = st.integers(0, 3)
+HASHES = st.sampled_from([SIGNATURE.hash, bytes(16)])
+NUMBERS = (st.integers(0, 8), st.integers(0, 255), HASHES, SMALL, SMALL, SMALL)
+ZEROS = (st.just(0.0), st.just(0.0), st.just(0))
+
+
+@given(st.builds(Message, *NUMBERS, *ZEROS, st.binary(max_size=200), SMALL))
+@keyed
+def test_without_a_session_no_answer_is_longer_than_its_request(key, m):
+    bench = Bench(key)
+    request = Sealer(key).pack(m)
+    assert len(bench(request) or b"") <= len(request)
+    assert bench.done == []
