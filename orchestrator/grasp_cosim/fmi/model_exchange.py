@@ -87,11 +87,6 @@ class ModelInstance(LoadedInstance):
         Again, the end of the simulation, new nominals, new states, a next event, and its time in s.
         """
 
-    @property
-    @abstractmethod
-    def _tells_steps(self) -> bool:
-        """True if the FMU has to know of each step of the solver."""
-
     def _wants_the_end(self) -> bool:
         return self._ended is not None
 
@@ -184,7 +179,7 @@ class ModelInstance(LoadedInstance):
             if self._states:
                 self._check(self._set_states(self._x, self._states))
             event = event or self._left_zero()
-        if self._tells_steps:
+        if self.interface.exchange and self.interface.exchange.told:
             wants, ended = self._slave.completedIntegratorStep()
             event = event or wants
             if ended:
@@ -377,10 +372,6 @@ class Fmi2Model(ModelInstance, FmuInstance):
     def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
         return self._slave.newDiscreteStates()  # type: ignore[no-any-return]
 
-    @property
-    def _tells_steps(self) -> bool:
-        return self.interface.capability("completedIntegratorStepNotNeeded") is not True
-
 
 class _Model(Lenient, FMU3Model):  # type: ignore[misc]  # FMPy has no types
     pass
@@ -413,7 +404,3 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
 
     def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
         return self._slave.updateDiscreteStates()  # type: ignore[no-any-return]
-
-    @property
-    def _tells_steps(self) -> bool:
-        return self.interface.capability("needsCompletedIntegratorStep") is True

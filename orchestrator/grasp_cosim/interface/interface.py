@@ -230,20 +230,21 @@ class Variable:
 @dataclass(frozen=True)
 class ModelExchange:
     """Needs of model exchange: the name of the binary, in FMI 2.0 the numbers of states and event
-    indicators. Of FMI 3.0 the instance says these.
+    indicators, and whether it is told of completed steps. Of FMI 3.0 the instance says the numbers.
     """
 
     identifier: str
     states: int = 0
     indicators: int = 0
+    told: bool = True
 
 
 @dataclass(frozen=True)
 class Interface:
     """The interface of an FMU; guid is the instantiation token, tool what it was made with.
 
-    kinds are CoSimulation, ModelExchange, ScheduledExecution. capabilities are those of the first
-    kind and, where a later kind has another value, of that kind, 'FLAG (model exchange)'.
+    kinds are CoSimulation, ModelExchange, ScheduledExecution. capabilities are those that the first
+    kind declares and, where a later kind has another value, of that kind, 'FLAG (model exchange)'.
     experiment is the default one: start_time, stop_time, tolerance and step_size, as typed() gives
     them. platforms are those it has a binary for, sources says that it has C. flaw is the first
     number that could not be read, for which no master takes the FMU. arrays are those that were

@@ -21,6 +21,7 @@ from ..base.errors import InputError
 from ..base.files import check_fmu_file
 from .document import read_document, unreadable
 from .interface import (
+    PARAMETERS,
     SETTABLE,
     TYPES,
     TYPES_3,
@@ -48,18 +49,6 @@ EXPERIMENT = {
     "start_time": "startTime", "stop_time": "stopTime", "tolerance": "tolerance",
     "step_size": "stepSize",
 }  # fmt: skip
-PARAMETERS = {
-    "structuralParameter": "exact", "parameter": "exact", "calculatedParameter": "calculated",
-}  # fmt: skip
-SIGNALS = {"input": "exact", "output": "calculated", "local": "calculated"}
-INITIAL: Mapping[str, Mapping[str, str]] = {
-    "constant": {"output": "exact", "local": "exact"},
-    "fixed": {**PARAMETERS, "local": "calculated"},
-    "tunable": {**PARAMETERS, "local": "calculated"},
-    "discrete": SIGNALS,
-    "continuous": SIGNALS,
-}
-"""By variability and causality, what the initial of a variable is where it is not declared."""
 Names = tuple[str, ...] | None
 """The variables that one depends on; None where that is not declared."""
 
@@ -124,7 +113,7 @@ def describe(path: Path) -> Interface:
         version=version,
         units=units,
         kinds=tuple(kinds),
-        capabilities=capabilities_of(kinds, reader.major),
+        capabilities=capabilities_of(kinds),
         experiment={key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
         platforms=_platforms(files),
         sources=any(re.match(r"sources/.*\.c(c|pp|xx)?$", name) for name in files),
@@ -304,8 +293,8 @@ class _Reader:
             with self.tolerated():
                 for text in start.split() if element.find("Dimension") is not None else [start]:
                     self.check_start(f"{place}: start", value.tag, text)
-        initial = {} if self.major == "1" else INITIAL.get(variability, {})
         is_enumeration = value.tag == "Enumeration"
+        dimensions = [self.dimension(place, e) for e in element.iterfind("Dimension")]
         return Variable(
             name,
             kind,
@@ -319,13 +308,13 @@ class _Reader:
             variability=variability,
             dependencies=now,
             initial_dependencies=initially,
-            shape=tuple(self.size(place, e) for e in element.iterfind("Dimension")),
-            sizes=tuple(self.holder(e) for e in element.iterfind("Dimension")),
+            shape=tuple(size for size, _ in dimensions),
+            sizes=tuple(holder for _, holder in dimensions),
             description=element.get("description"),
             magnitude=typed(value.tag, bounds.get("nominal")),
             relative=said.get("relativeQuantity") in ("true", "1"),
             enumeration=self.enumerations.get(type_name) if is_enumeration else None,
-            initial=element.get("initial") or initial.get(causality),
+            initial=element.get("initial"),
             display_unit=said.get("displayUnit"),
             starts=starts,
         )
@@ -349,34 +338,35 @@ class _Reader:
                 return "parameter", "fixed"
         if variability or self.major != "3":
             return causality, variability or "continuous"
-        if causality in PARAMETERS:
+        if causality in (*PARAMETERS, "calculatedParameter"):
             return causality, "fixed"
         return causality, "continuous" if kind == "Real" else "discrete"
-
-    def holder(self, dimension: Element) -> str | None:
-        """The name of the variable that holds the size in a dimension; None where it is fixed."""
-        reference = dimension.get("valueReference") if dimension.get("start") is None else None
-        return None if reference is None else _name(self.places[_whole("Dimension", reference)])
 
     def exchange(self, kinds: Mapping[str, Element]) -> ModelExchange | None:
         """The needs of model exchange; None where the FMU is not for that."""
         if "ModelExchange" not in kinds:
             return None
-        identifier, indicators = kinds["ModelExchange"].get("modelIdentifier", ""), 0
+        element, indicators = kinds["ModelExchange"], 0
+        identifier = element.get("modelIdentifier", "")
         with self.tolerated():
             _check_identifier(identifier)
             key = "numberOfEventIndicators"
             indicators = _whole(key, self.root.get(key, "0"), MOST_INDICATORS)
         states = len(self.root.findall("ModelStructure/Derivatives/Unknown"))
-        return ModelExchange(identifier, states, indicators)
+        if self.major == "3":
+            told = element.get("needsCompletedIntegratorStep") in ("true", "1")
+        else:
+            told = element.get("completedIntegratorStepNotNeeded") not in ("true", "1")
+        return ModelExchange(identifier, states, indicators, told)
 
-    def size(self, place: str, dimension: Element) -> int:
-        """The size of an array in a dimension, at the start where a variable holds it."""
-        text, reference = dimension.get("start"), dimension.get("valueReference")
+    def dimension(self, place: str, element: Element) -> tuple[int, str | None]:
+        """The size in a dimension of an array, and the variable that holds it; None if fixed."""
+        text, name, place = element.get("start"), None, f"{place}: Dimension"
         if text is None:
-            holds = self.places.get(_whole(f"{place}: Dimension: valueReference", reference))
-            text = None if holds is None else holds.get("start")
-        return _whole(f"{place}: Dimension", text, 2**64 - 1)
+            key = _whole(f"{place}: valueReference", element.get("valueReference"))
+            holder = self.places.get(key)
+            text, name = (None, None) if holder is None else (holder.get("start"), _name(holder))
+        return _whole(place, text, 2**64 - 1), name
 
 
 def _unit(name: str, base: Element) -> Unit:

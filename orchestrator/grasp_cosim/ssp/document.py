@@ -57,8 +57,6 @@ _TYPES = {
     **dict.fromkeys(("Float64", "Float32"), "Real"),
     **{f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)},
 }
-_LEFT_OUT = ("MetaData", "Signature")
-_REFUSED = {"Dimension": "arrays", "Clock": "clocks"}
 _KINDS = ("local", "constant", "unspecified")
 
 
@@ -156,65 +154,41 @@ def _place(element: Any) -> int:
 
 def as_version_1(place: str, root: Any, notes: Notes) -> None:
     """Change a document of SSP 2.0 into one of 1.0; InputError where it has no form there."""
-    connected = {
-        element.get(end)
-        for element in root.iter("{*}Connection")
-        for end in ("startConnector", "endConnector")
-    }
+    ends = ("startConnector", "endConnector")
+    connected = {e.get(end) for e in root.iter("{*}Connection") for end in ends}
     for element in list(root.iter()):
-        tag = etree.QName(element)
-        where = f"{place}:{element.sourceline}"
-        if tag.localname in _LEFT_OUT:
-            notes.add(where, f"{tag.localname} is not used")
-            element.getparent().remove(element)
-        elif tag.localname in _REFUSED and "SystemStructure" in (tag.namespace or ""):
+        tag, parent, refused = etree.QName(element), element.getparent(), ""
+        where, name, kind = at(place, element), element.get("name"), element.get("kind")
+        match tag.localname:
+            case "MetaData" | "Signature":
+                notes.add(where, f"{tag.localname} is not used")
+                parent.remove(element)
+            case "Dimension" | "Clock" if "SystemStructure" in (tag.namespace or ""):
+                refused = f"{parent.get('name')!r}: {tag.localname}"
+            case type_ if type_ in _TYPES:
+                element.tag = f"{{{tag.namespace}}}{_TYPES[type_]}"
+            case "Connector" if kind == "structuralParameter":
+                element.set("kind", "parameter")
+            case "Connector" if kind in _KINDS and name in connected:
+                refused = f"connector {name!r} on a connection: kind {kind!r}"
+            case "Connector" if kind in _KINDS:
+                notes.add(f"{where}: {name!r}", f"a connector of kind {kind!r} is not used")
+                parent.remove(element)
+            case "Connection" if not {"startIndices", "endIndices"}.isdisjoint(element.keys()):
+                refused = "startIndices or endIndices"
+            case "ConnectorGeometry":
+                for attribute in ("systemInnerX", "systemInnerY"):
+                    element.attrib.pop(attribute, None)
+            case "Value" if len(parent) > 1:
+                refused = "several Values"
+            case "Value":  # below a String or Enumeration
+                parent.set("value", element.get("value", ""))
+                parent.remove(element)
+        if refused:
             raise InputError(
-                f"{where}: {element.getparent().get('name')!r}: {tag.localname}: "
-                f"{_REFUSED[tag.localname]} of SSP 2.0 are not supported; must be scalar"
+                f"{where}: {refused} of SSP 2.0 not supported; must be scalar, and inputs, outputs "
+                "or parameters"
             )
-        elif tag.localname in _TYPES:
-            element.tag = f"{{{tag.namespace}}}{_TYPES[tag.localname]}"
-        elif tag.localname == "Connector":
-            _change_connector(where, element, connected, notes)
-        elif tag.localname == "Connection":
-            _check_connection(where, element)
-        elif tag.localname == "ConnectorGeometry":
-            for attribute in ("systemInnerX", "systemInnerY"):
-                element.attrib.pop(attribute, None)
-        elif tag.localname == "Value":
-            _change_value(where, element)
-
-
-def _change_connector(where: str, element: Any, connected: set[Any], notes: Notes) -> None:
-    name, kind = element.get("name"), element.get("kind")
-    if kind == "structuralParameter":
-        element.set("kind", "parameter")
-    elif kind in _KINDS and name in connected:
-        raise InputError(
-            f"{where}: connector {name!r}: kind {kind!r} of SSP 2.0 is not supported on a "
-            "connection; must be input, output or parameter"
-        )
-    elif kind in _KINDS:
-        notes.add(f"{where}: {name!r}", f"a connector of kind {kind!r} is not used")
-        element.getparent().remove(element)
-
-
-def _check_connection(where: str, element: Any) -> None:
-    for attribute in ("startIndices", "endIndices"):
-        if attribute in element.attrib:
-            raise InputError(
-                f"{where}: {attribute}: elements of arrays of SSP 2.0 are not supported; "
-                "must connect scalar variables"
-            )
-
-
-def _change_value(where: str, element: Any) -> None:
-    """One Value below a String or Enumeration is its value."""
-    parent = element.getparent()
-    if len(parent) > 1:
-        raise InputError(f"{where}: arrays of SSP 2.0 are not supported; must be one Value")
-    parent.set("value", element.get("value", ""))
-    parent.remove(element)
 
 
 def at(place: str, element: Any) -> str:
