@@ -20,7 +20,7 @@ from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 
@@ -122,7 +122,7 @@ def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ())
     ValueError, one line, for a name that is none, or where a compiler is missing;
     CompilerError where one fails.
     """
-    return _brought(out, _kept_native(plan or planned(), chosen_names(names)))
+    return _brought(out, _kept(chosen_names(names), plan or planned()))
 
 
 def build_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
@@ -146,16 +146,10 @@ def build_chosen(
     ValueError, one line, where there is no such block, or a compiler is missing; CompilerError
     where one fails.
     """
-    if fingers is not None:
-        names = of_fingers(fingers)
-        return (
-            build_native(out, plan, names) if plan else _brought(out, shipped_fmus(fingers), names)
-        )
-    if block is None:
-        return build_native(out, plan) if plan else build(out)
-    if plan and names_ours(block):
-        return build_native(out, plan, [str(block)])
-    return [build_block(block, out, plan)]
+    if block and not (plan and names_ours(block)):
+        return [build_block(block, out, plan)]
+    names = [str(block)] if block else of_fingers(fingers) if fingers is not None else []
+    return build_native(out, plan, names) if plan else _brought(out, shipped_fmus(fingers), names)
 
 
 def names_ours(block: Path) -> bool:
@@ -183,16 +177,23 @@ def write_c_only(block: Path | None, out: Path) -> list[Path]:
 
 def build_model(model: Model, out: Path, plan: Plan | None = None) -> Built:
     """Build the FMU of a model into the folder `out`, without cross-check files."""
-    from .native.sources import native_members
-    from .package import write_members, write_python
+    from .package import write_members
 
     name = model.description.name
-    if not plan:
-        return write_python(out / f"{name}.fmu", model)
-    if model.requires:
+    if plan and model.requires:
         raise ValueError(f"{name}: stays Python only, as it needs {', '.join(model.requires)}")
-    fmus = with_binaries([(name, native_members(model, plan.fmi))], plan)
-    return write_members(out / f"{name}.fmu", fmus[name])
+    return write_members(out / f"{name}.fmu", _members([model], plan)[name])
+
+
+def _members(models: Iterable[Model], plan: Plan | None) -> dict[str, Members]:
+    from .package import python_members
+
+    if not plan:
+        return {model.description.name: python_members(model)[1] for model in models}
+    from .native.sources import native_members
+
+    fmi = plan.fmi
+    return with_binaries(((m.description.name, native_members(m, fmi)) for m in models), plan)
 
 
 def chosen_names(names: Sequence[str] = ()) -> list[str]:
@@ -274,18 +275,33 @@ def _below(folder: Path) -> list[Path]:
     return found
 
 
-def _kept(make: Callable[[Path], None], *parts: str) -> Path:
-    """Return the folder that `make` fills, from the cache where it was made of the same parts.
+def _kept(names: Sequence[str], plan: Plan | None = None) -> Path:
+    """Return the folder with these FMUs, from the cache where they were built of the same parts.
 
     Where nothing can be kept it ends with this process, which a warning says.
     """
-    name = f"fmus/{cache.key((sources_key(), *parts))}"
+    parts = ("native", plan.key) if plan else ("python",)
+    name = f"fmus/{cache.key((sources_key(), *parts, *names))}"
     with _building:
         if kept := cache.kept(name):
             with suppress(OSError):  # of another user
                 os.utime(kept)
             return kept
-        return _until_the_end.get(name) or _made(make, name)
+        return _until_the_end.get(name) or _made(partial(_fill, names, plan), name)
+
+
+def _fill(names: Sequence[str], plan: Plan | None, folder: Path) -> None:
+    from .cross_check import cross_check_files
+    from .package import shipped_model, write_members
+
+    def models() -> Iterator[Model]:
+        for model in map(shipped_model, names):
+            yield model
+            for file, data in cross_check_files(model.description.name, model.block).items():
+                (folder / file).write_bytes(data)
+
+    for name, files in _members(models(), plan).items():
+        write_members(folder / f"{name}.fmu", files)
 
 
 def _made(make: Callable[[Path], None], name: str) -> Path:
@@ -323,40 +339,6 @@ def _brought(out: Path, made: Path, names: Sequence[str] = ()) -> list[Built]:
     return built
 
 
-def _build_python(names: Sequence[str], folder: Path) -> None:
-    from .package import shipped_model, write_python
-
-    for name in names:
-        model = shipped_model(name)
-        write_python(folder / f"{name}.fmu", model)
-        _write_checks(folder, name, model.block)
-
-
-def _kept_native(plan: Plan, names: Sequence[str]) -> Path:
-    return _kept(partial(_build_native, plan, names), "native", plan.key, *names)
-
-
-def _build_native(plan: Plan, names: Sequence[str], folder: Path) -> None:
-    from .native.sources import native_members
-    from .package import shipped_model, write_members
-
-    def fmus() -> Iterator[tuple[str, Members]]:
-        for name in names:
-            model = shipped_model(name)
-            yield name, native_members(model, plan.fmi)
-            _write_checks(folder, name, model.block)
-
-    for name, complete in with_binaries(fmus(), plan).items():
-        write_members(folder / f"{name}.fmu", complete)
-
-
-def _write_checks(folder: Path, name: str, block: Any) -> None:
-    from .cross_check import cross_check_files
-
-    for file, data in cross_check_files(name, block).items():
-        (folder / file).write_bytes(data)
-
-
 # ------------------------------------------------------------------ twins
 
 
@@ -367,7 +349,7 @@ def shipped_fmus(fingers: int | None = None) -> Path:
     at the same time. ValueError for a number of fingers that there is not.
     """
     names = [*SHIPPED, *(of_fingers(fingers) if fingers is not None else ())]
-    return _kept(partial(_build_python, names), "python", *names)
+    return _kept(names)
 
 
 @functools.cache
@@ -377,7 +359,7 @@ def shipped_twins(names: tuple[str, ...]) -> Path:
     NoTwinsError where they cannot be built.
     """
     try:
-        return _kept_native(planned(), names)
+        return _kept(names, planned())
     except (ValueError, CompilerError) as error:
         raise NoTwinsError(str(error)) from error
     except OSError as error:

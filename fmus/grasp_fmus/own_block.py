@@ -78,28 +78,31 @@ def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
     renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
     installed = {*sys.stdlib_module_names, *_required(file, tree)}
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Import | ast.ImportFrom):
+        if isinstance(node, ast.Import):
+            modules = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            modules = ["." * node.level + (node.module or "")]
+        else:
             continue
-        top_level_from = isinstance(node, ast.ImportFrom) and node.col_offset == 0
-        for module in _imported(node):
+        top_level = isinstance(node, ast.ImportFrom) and node.col_offset == 0
+        for module in modules:
             package = module.partition(".")[0]
+            said = f"{file}: line {node.lineno}:"
             if package in installed:
                 continue
             if package == "pythonfmu":
                 raise ValueError(
-                    f"{file}: line {node.lineno}: is a model of pythonfmu, which builds it itself: "
+                    f"{said} is a model of pythonfmu, which builds it itself: "
                     f"`pythonfmu build -f {file}`; then run it with --swap COMPONENT=FMU"
                 )
             if package not in PACKAGES:
                 raise ValueError(
-                    f"{file}: line {node.lineno}: imports {module}, which would not be in the FMU; "
+                    f"{said} imports {module}, which would not be in the FMU; "
                     f"must be of the standard library, of {', '.join(PACKAGES)}, or in REQUIRES"
                 )
-            if not (top_level_from and node.lineno in renamed):
-                raise ValueError(
-                    f"{file}: line {node.lineno}: {package} must be imported at the top level, "
-                    f"with single spaces, as: from {package} import ..."
-                )
+            if not (top_level and node.lineno in renamed):
+                must = "must be imported at the top level, with single spaces, as"
+                raise ValueError(f"{said} {package} {must}: from {package} import ...")
 
 
 def _required(file: Path, tree: ast.Module) -> tuple[str, ...]:
@@ -112,12 +115,6 @@ def _required(file: Path, tree: ast.Module) -> tuple[str, ...]:
                     return tuple(map(str, names))
             raise ValueError(f'{file}: line {node.lineno}: REQUIRES: must be as in ("numpy",)')
     return ()
-
-
-def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:
-    if isinstance(node, ast.Import):
-        return [alias.name for alias in node.names]
-    return ["." * node.level + (node.module or "")]
 
 
 @contextmanager
@@ -164,54 +161,46 @@ def _variables(file: Path, block: Any) -> list[Variable]:
     outputs = [v for v in found if v.causality == "output"]
     with _tried(file, "outputs()"):
         for x in (first, second):
-            _check_outputs(outputs, unpacker(fields)(block.outputs(p, x, u)))
+            values = unpacker(fields)(block.outputs(p, x, u))
+            for v, value in zip(outputs, values, strict=True):
+                _check_type(v, value, *([int] if v.kind is float else []))
+                if not isfinite(value):
+                    raise ValueError(f"{v.name} = {value!r}{v.in_unit}: must be finite")
     return found
 
 
+def _check_type(v: Variable, value: Any, *more: type[Any]) -> None:
+    if type(value) not in (v.kind, *more):
+        raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
+
+
 def _check_declaration(found: list[Variable]) -> None:
-    names = set()
+    names = [v.name for v in found]
     for v in found:
-        if v.name in names:
-            raise ValueError(
-                f"{v.name}: appears twice; inputs, outputs and parameters share their names"
-            )
-        names.add(v.name)
+        if names.count(v.name) > 1:
+            share = "inputs, outputs and parameters share their names"
+            raise ValueError(f"{v.name}: appears twice; {share}")
         if v.unit and (text := refusal(v.unit)):
             raise ValueError(f"{v.name}: {text}")
         if not v.name.isascii():
             raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
-        if v.causality != "output" and type(v.start) is not v.kind:
-            raise ValueError(f"{v.name} = {v.start!r}: must be of type {v.kind.__name__}")
         if v.causality != "output":
+            _check_type(v, v.start)
             v.check(v.start)
 
 
-def _check_outputs(outputs: list[Variable], values: list[Any]) -> None:
-    for v, value in zip(outputs, values, strict=True):
-        if type(value) not in ((float, int) if v.kind is float else (v.kind,)):
-            raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
-        if not isfinite(value):
-            raise ValueError(f"{v.name} = {value!r}{v.in_unit}: must be finite")
-
-
-def _kinds(state: Any) -> dict[str, type[Any]]:
+def _kinds(state: Any, name: str = "State") -> dict[str, type[Any]]:
     """The types of the scalars in a state, by name; ValueError where it could not be saved."""
-    kinds = {}
-    for name, value in _scalars("State", state):
-        if not isinstance(value, (float, int)):
-            raise ValueError(f"{name} = {value!r}: must be float, bool, int, or a tuple of those")
-        kinds[name] = type(value)
-    return kinds
-
-
-def _scalars(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, tuple):
-        fields = [f".{field}" for field in getattr(value, "_fields", ())]
-        labels = fields or [f"[{i + 1}]" for i in range(len(value))]
-        for label, item in zip(labels, value, strict=True):
-            yield from _scalars(f"{name}{label}", item)
-    else:
-        yield name, value
+    if isinstance(state, tuple):
+        labels = [f".{field}" for field in getattr(state, "_fields", ())]
+        labels = labels or [f"[{i + 1}]" for i in range(len(state))]
+        kinds: dict[str, type[Any]] = {}
+        for label, item in zip(labels, state, strict=True):
+            kinds |= _kinds(item, name + label)
+        return kinds
+    if not isinstance(state, (float, int)):
+        raise ValueError(f"{name} = {state!r}: must be float, bool, int, or a tuple of those")
+    return {name: type(state)}
 
 
 def _check_kinds(kinds: dict[str, type[Any]], before: dict[str, type[Any]]) -> None:

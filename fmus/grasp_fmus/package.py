@@ -86,11 +86,6 @@ def script(imports: str) -> bytes:
     return f"{imports}\nfrom {__package__} import slave\n\nslave.offer(block, globals())\n".encode()
 
 
-def write_python(target: Path, model: Model) -> Built:
-    """Write the FMU that Python runs, unless it is there already with the same content."""
-    return write_members(target, python_members(model)[1])
-
-
 def python_members(model: Model) -> tuple[str, dict[str, bytes]]:
     """Return the content hash of the FMU that Python runs, and the files in it."""
     from .description import model_description

@@ -186,12 +186,9 @@ def made_once(folder):
 
 def test_of_what_is_kept_the_newest_stay(own_cache, monkeypatch):
     monkeypatch.setattr(builds, "MOST_KEPT", 2)
-    for k, part in enumerate("abca"):
-        folder = builds._kept(made_once, part)
-        os.utime(folder, (k, k))
-    assert len(list((own_cache / "fmus").iterdir())) == 2
-    monkeypatch.setattr("test_build.made_once", None)
-    assert builds._kept(made_once, "a") == folder
+    for k, part in enumerate("abc"):
+        os.utime(builds._made(made_once, f"fmus/{part}"), (k, k))
+    assert sorted(folder.name for folder in (own_cache / "fmus").iterdir()) == ["b", "c"]
 
 
 @pytest.mark.usefixtures("own_cache")
