@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 
 from .native.targets import Target, Version, folders, here, universal
-from .package import Built, write_built
+from .package import Built, write_file
 from .shipped import (
     FEWEST,
     MOST,
@@ -334,7 +334,7 @@ def _brought(out: Path, made: Path, names: Sequence[str] = ()) -> list[Built]:
     for file in sorted(made.iterdir()):
         if names and not re.fullmatch(rf"({'|'.join(names)})[._].*", file.name):
             continue
-        brought = write_built(out / file.name, file.read_bytes())
+        brought = write_file(out / file.name, file.read_bytes())
         built += [brought] if file.suffix == ".fmu" else []
     return built
 

@@ -31,7 +31,6 @@ _WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
 _STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
 """Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
 
-
 DISPLAY = {"m": "mm", "m/s": "mm/s", "V": "mV"}
 """Units to show values in, a thousand times as many."""
 
@@ -70,20 +69,19 @@ def model_description(
     """
     structured = all(_STRUCTURED.fullmatch(v.name) for v in d.variables)
     tool = "grasp-cosim" if native else f"grasp-cosim with pythonfmu {version('pythonfmu')}"
-    root = Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": f"{fmi}.0",
-            "modelName": d.name,
-            "guid" if fmi == 2 else "instantiationToken": guid,
-            "description": d.summary,
-            "version": version(),
-            "license": "MIT",
-            "generationTool": tool,
-            "variableNamingConvention": "structured" if structured else "flat",
-            **({"numberOfEventIndicators": "0"} if fmi == 2 else {}),
-        },
-    )
+    about = {
+        "fmiVersion": f"{fmi}.0",
+        "modelName": d.name,
+        "guid" if fmi == 2 else "instantiationToken": guid,
+        "description": d.summary,
+        "version": version(),
+        "license": "MIT",
+        "generationTool": tool,
+        "variableNamingConvention": "structured" if structured else "flat",
+    }
+    root = Element("fmiModelDescription", about)
+    if fmi == 2:
+        root.set("numberOfEventIndicators", "0")
     _add_interface(root, d, fmi, native)
     _add_units(root, d, *(("s",) if fmi == 3 else ()))
     _add_enumerations(root, d, fmi)
@@ -98,7 +96,12 @@ def model_description(
     for reference, v in enumerate(d.variables):
         _add_variable(variables, v, reference, DISPLAY if d.units is None else {}, fmi)
     if fmi == 3:
-        SubElement(variables, "Float64", _time(d))
+        name = "time"
+        while name in {v.name for v in d.variables}:
+            name += "_"
+        time = {"name": name, "valueReference": str(len(d.variables)), "causality": "independent"}
+        time |= {"variability": "continuous", "description": "t", "unit": "s"}
+        SubElement(variables, "Float64", time)
     _add_structure(root, d.variables, fmi)
     return _document(root)
 
@@ -139,16 +142,15 @@ def _literal(value: Scalar) -> str:
 
 
 def _add_interface(root: Element, d: Description, fmi: Version, native: bool) -> None:
-    steps = {"canHandleVariableCommunicationStepSize": _literal(d.can_vary_step)}
-    state = "FMUstate" if fmi == 2 else "FMUState"
+    state, varies = "FMUstate" if fmi == 2 else "FMUState", _literal(d.can_vary_step)
+    steps = {"canHandleVariableCommunicationStepSize": varies}
     states = {f"{can}{state}": _literal(d.has_states) for can in ("canGetAndSet", "canSerialize")}
     if fmi == 3:
         SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **states, **steps})
         return
-    tool = {"needsExecutionTool": _literal(not native)}
+    tool = {"modelIdentifier": d.name, "needsExecutionTool": _literal(not native)}
     memory = {"canNotUseMemoryManagementFunctions": _literal(not native)}
-    attributes = {"modelIdentifier": d.name, **tool, **steps, **memory, **states}
-    interface = SubElement(root, "CoSimulation", attributes)
+    interface = SubElement(root, "CoSimulation", {**tool, **steps, **memory, **states})
     if native:
         SubElement(SubElement(interface, "SourceFiles"), "File", name=f"{d.name}.c")
 
@@ -219,28 +221,17 @@ def _initial(v: Variable) -> str:
     return "calculated" if v.start is None else "approx"
 
 
-def _time(d: Description) -> dict[str, str]:
-    name = "time"
-    while name in {v.name for v in d.variables}:
-        name += "_"
-    found = {"name": name, "valueReference": str(len(d.variables)), "causality": "independent"}
-    return {**found, "variability": "continuous", "description": "t", "unit": "s"}
-
-
 def _add_structure(root: Element, variables: Sequence[Variable], fmi: Version) -> None:
     """Add outputs and initial unknowns: FMI 2.0 counts variables from 1, FMI 3.0 refers to them."""
     structure = SubElement(root, "ModelStructure")
     number = {v.name: str(i) for i, v in enumerate(variables, 1 if fmi == 2 else 0)}
     outputs = [v for v in variables if v.causality == "output"]
-    initial = [v for v in outputs if _initial(v) != "exact"]
-    sections = {
-        "Output": [(v, v.dependencies) for v in outputs],
-        "InitialUnknown": [(v, v.initial_dependencies) for v in initial],
-    }
-    for section, unknowns in sections.items():
+    now = [(v.name, v.dependencies) for v in outputs]
+    initially = [(v.name, v.initial_dependencies) for v in outputs if _initial(v) != "exact"]
+    for section, unknowns in (("Output", now), ("InitialUnknown", initially)):
         parent, tag, key = structure, section, "valueReference"
         if fmi == 2 and unknowns:
             parent, tag, key = SubElement(structure, f"{section}s"), "Unknown", "index"
-        for v, names in unknowns:
-            known = " ".join(number[name] for name in names)
-            SubElement(parent, tag, {key: number[v.name], "dependencies": known})
+        for name, sources in unknowns:
+            known = " ".join(number[source] for source in sources)
+            SubElement(parent, tag, {key: number[name], "dependencies": known})

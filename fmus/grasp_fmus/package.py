@@ -133,27 +133,20 @@ def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)
-    return write_built(target, buffer.getvalue())
+    return write_file(target, buffer.getvalue())
 
 
-def write_built(target: Path, data: bytes) -> Built:
-    """Write a file as write_file() does, and say how it is beside what was there."""
-    before = target.read_bytes() if target.is_file() else None
-    if data == before:
-        return Built(target, "unchanged")
-    write_file(target, data)
-    return Built(target, "new" if before is None else "changed")
-
-
-def write_file(target: Path, data: bytes) -> None:
+def write_file(target: Path, data: bytes) -> Built:
     """Write a file in one piece, with its folder, unless it has that content already.
 
     OSError names the target.
     """
-    if target.is_file() and target.read_bytes() == data:
-        return
+    before = target.read_bytes() if target.is_file() else None
+    if data == before:
+        return Built(target, "unchanged")
     with in_one_piece(target) as part:
         part.write_bytes(data)
+    return Built(target, "new" if before is None else "changed")
 
 
 def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:

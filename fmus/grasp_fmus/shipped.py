@@ -117,9 +117,8 @@ def block_of(name: str) -> Any:
 def sized_source(name: str) -> dict[str, bytes]:
     """Return the module that differs where a number of fingers is asked for, by its path."""
     shipped, fingers = found(name)
-    if not fingers:
-        return {}
-    return {f"{shipped.size.replace('.', '/')}.py": _sized(shipped.size, fingers)}
+    path = f"{shipped.size.replace('.', '/')}.py"
+    return {path: _sized(shipped.size, fingers)} if fingers else {}
 
 
 def _sized(module: str, fingers: int) -> bytes:
