@@ -5,31 +5,136 @@ and never fatal; where a call was refused the log says why; a fresh life of the 
 computes what it always does. And the native FMU does in all what the one in Python does.
 """
 
-from ctypes import Array, c_char_p
-from typing import TypeVar
+from ctypes import Array, c_char_p, c_double, c_int, c_size_t, c_uint
 
 import pytest
 from grasp_fmus.shipped import SHIPPED
 from hypothesis import HealthCheck, given, reject
-from support.drawn_calls import SEQUENCES, Drawn
+from hypothesis import strategies as st
 from support.fmi2 import OK, Instance, State, drive
 from support.kinds import NAMES, all_kinds
 from support.marks import examples, slow
 
+SENSIBLE = st.sampled_from([0.0, 1e-3, 0.01, 0.05, 0.1, 0.5, 1.0, -0.1, -1.0])
+NUMBERS = st.one_of(SENSIBLE, st.floats(width=64))
+REFERENCES = st.lists(st.one_of(st.integers(0, 30), st.integers(0, 2**32 - 1)), max_size=6)
+TYPES = {"Real": c_double, "Boolean": c_int, "Integer": c_int, "String": c_char_p}
+CALLS = st.one_of(
+    st.tuples(st.just("setup"), NUMBERS),
+    st.tuples(st.sampled_from(["enter", "exit", "terminate", "reset"])),
+    st.tuples(st.sampled_from(["step", "step", "step"]), NUMBERS, NUMBERS),
+    st.tuples(st.just("next"), st.sampled_from([1e-4, 1e-3, 0.1])),
+    st.tuples(st.just("set"), REFERENCES, st.lists(NUMBERS, min_size=6, max_size=6)),
+    st.tuples(st.just("input"), NUMBERS),
+    st.tuples(st.just("assign"), st.integers(0, 60), NUMBERS),
+    st.tuples(st.just("read"), REFERENCES, st.sampled_from([*TYPES])),
+    st.tuples(st.just("set_boolean"), REFERENCES),
+    st.tuples(st.sampled_from(["save", "restore", "bytes"])),
+    st.tuples(st.just("damage"), st.binary(max_size=300)),
+)
+SEQUENCES = st.lists(st.tuples(st.integers(0, 1), CALLS), max_size=40)
+
+
+class Drawn:
+    """An instance, or two that are called as one, called as drawn."""
+
+    def __init__(self, instance):
+        self.instance, self.time, self.states = instance, 0.0, []
+
+    def call(self, action, *drawn):
+        """One drawn call; returns its status."""
+        own = getattr(self, f"_{action}", None)
+        return own(*drawn) if own else getattr(self.instance, action)(*drawn)
+
+    def live(self):
+        """A fresh life, in which all is as ever; the outputs in the end."""
+        for state in self.states:
+            state.free()
+        assert self.instance.call("Reset") == OK
+        return in_order(self.instance)
+
+    def _setup(self, start):
+        status = self.instance.setup(start)
+        self.time = start if status == OK else self.time
+        return status
+
+    def _terminate(self):
+        return self.instance.call("Terminate")
+
+    def _reset(self):
+        self.time = 0.0
+        return self.instance.call("Reset")
+
+    def _next(self, size):
+        status = self.instance.step(self.time, size)
+        self.time += size if status == OK else 0.0
+        return status
+
+    def _set(self, references, values):
+        known = self._known(references)
+        return self.instance.set_real(known, values[: len(known)])
+
+    def _input(self, value):
+        return self.instance.set({self.instance.fmu.names("input")[0]: value})
+
+    def _known(self, references):
+        """Without that of the time, which is a variable in FMI 3.0 alone."""
+        return [vr for vr in references if vr != len(self.instance.fmu.references)]
+
+    def _assign(self, which, value):
+        """Any variable, in its own type."""
+        names = list(self.instance.fmu.references)
+        name = names[which % len(names)]
+        if self.instance.fmu.kinds[name] != "Real":
+            value = min(max(value, -2e9), 2e9) if value == value else 0.0
+        return self.instance.assign({name: value})
+
+    def _set_boolean(self, references):
+        known = self._known(references)
+        return self.instance.set_boolean(known, [True] * len(known))
+
+    def _read(self, references, kind):
+        known = self._known(references)
+        n = len(known)
+        vector, values = (c_uint * n)(*known), (TYPES[kind] * n)()
+        return self.instance.call(f"Get{kind}", vector, c_size_t(n), values)
+
+    def _save(self):
+        self.states.append(self.instance.state())
+        return OK
+
+    def _restore(self):
+        return self.instance.restore(self.states[-1]) if self.states else OK
+
+    def _bytes(self):
+        if not self.states:
+            return OK
+        status, state = self.instance.from_bytes(self.states[-1].to_bytes())
+        self.states.append(state)
+        return status
+
+    def _damage(self, data):
+        status = self.instance.from_bytes(data)[0]
+        assert status == self.instance.fmu.refused
+        return status
+
+
 FIRST, *OTHERS = SHIPPED
 
 
-def in_order(fmu):
-    with Instance(fmu).initialise() as instance:
-        assert {instance.step(k * 1e-3, 1e-3) for k in range(5)} == {OK}
-        return instance.outputs()
+def in_order(instance):
+    """The outputs after five steps."""
+    assert (instance.setup(), instance.enter(), instance.exit()) == (OK, OK, OK)
+    assert {instance.step(k * 1e-3, 1e-3) for k in range(5)} == {OK}
+    return instance.outputs()
 
 
 @all_kinds
 @pytest.mark.hypothesis  # it finds those that are decorated, not what is inside of them
 @pytest.mark.parametrize("name", [FIRST, *map(slow, OTHERS)])
 def test_any_sequence_of_calls(load, name):
-    expected = in_order(load(name))
+    with Instance(load(name)) as instance:
+        expected = in_order(instance)
 
     @given(sequence=SEQUENCES)
     @examples(150, suppress_health_check=list(HealthCheck))
@@ -43,21 +148,13 @@ def test_any_sequence_of_calls(load, name):
                 assert status in (OK, one.fmu.discarded, one.fmu.refused)
                 assert bool(target.instance.log) == (status != OK)
             for target in drawn:
-                for state in target.states:
-                    state.free()
-                assert target.instance.call("Reset") == OK
-                target.instance.initialise()
-                assert {target.instance.step(k * 1e-3, 1e-3) for k in range(5)} == {OK}
-                assert target.instance.outputs() == expected
+                assert target.live() == expected
                 assert target.instance.call("Terminate") == OK
 
     run()
 
 
 # An FMU that Python runs and the native one, call by call: values, refusals, bytes of states
-
-
-R = TypeVar("R")
 
 
 class Twins(Instance):
@@ -157,13 +254,7 @@ def test_any_sequence_of_calls_in_both(load_as, kind, name):
             for _, call in sequence:
                 if call[0] != "setup" or kind != "native FMI 3":  # which has no such call
                     drawn.call(*call)
-            for state in drawn.states:
-                state.free()
-            assert twins.call("Reset") == OK
-            assert (twins.setup(), twins.enter(), twins.exit()) == (OK, OK, OK)
-            for k in range(5):
-                assert twins.step(k * 1e-3, 1e-3) == OK
-                twins.outputs()
+            drawn.live()
             assert twins.call("Terminate") == OK
 
     run()
