@@ -22,16 +22,10 @@ def exponents(**powers):
     ("name", "factor", "offset", "powers"),
     [
         ("mm", 1e-3, 0.0, {"m": 1}),
-        ("mm/s", 1e-3, 0.0, {"m": 1, "s": -1}),
-        ("m/s2", 1.0, 0.0, {"m": 1, "s": -2}),
         ("m.s-2", 1.0, 0.0, {"m": 1, "s": -2}),
-        ("m*s^-2", 1.0, 0.0, {"m": 1, "s": -2}),
         ("mN", 1e-3, 0.0, {"kg": 1, "m": 1, "s": -2}),
-        ("g", 1e-3, 0.0, {"kg": 1}),
         ("J/(kg.K)", 1.0, 0.0, {"m": 2, "s": -2, "K": -1}),
         ("km/h", 1e3 / 3600.0, 0.0, {"m": 1, "s": -1}),
-        ("l/min", 1e-3 / 60.0, 0.0, {"m": 3, "s": -1}),
-        ("cm3", 1e-6, 0.0, {"m": 3}),
         ("deg", math.pi / 180.0, 0.0, {"rad": 1}),
         ("rpm", 2.0 * math.pi / 60.0, 0.0, {"rad": 1, "s": -1}),
         ("degC", 1.0, 273.15, {"K": 1}),
@@ -39,18 +33,12 @@ def exponents(**powers):
         ("degF", 5.0 / 9.0, 459.67 * 5.0 / 9.0, {"K": 1}),
         ("mbar", 100.0, 0.0, {"kg": 1, "m": -1, "s": -2}),
         ("min", 60.0, 0.0, {"s": 1}),
-        ("mcd", 1e-3, 0.0, {"cd": 1}),
-        ("mmol", 1e-3, 0.0, {"mol": 1}),
         ("%", 1e-2, 0.0, {}),
-        ("-", 1.0, 0.0, {}),
         ("kOhm", 1e3, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
-        ("in", 0.0254, 0.0, {"m": 1}),
         ("m/s²", 1.0, 0.0, {"m": 1, "s": -2}),
         ("s⁻¹", 1.0, 0.0, {"s": -1}),
-        ("mm³", 1e-9, 0.0, {"m": 3}),
         ("°C", 1.0, 273.15, {"K": 1}),
         ("°/s", math.pi / 180.0, 0.0, {"rad": 1, "s": -1}),
-        ("\u03bcm", 1e-6, 0.0, {"m": 1}),
         ("k\u03a9", 1e3, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
         ("\u2126", 1.0, 0.0, {"kg": 1, "m": 2, "s": -3, "A": -2}),
     ],
@@ -71,13 +59,10 @@ def test_other_names_are_not(name):
     assert known_unit(name) is None
 
 
-@given(
-    st.sampled_from(list(TEN)),
-    st.sampled_from(list(SYMBOLS)),
-    st.sampled_from(list(TEN)),
-    st.sampled_from(list(SYMBOLS)),
-    st.integers(1, 3),
-)
+PREFIX, SYMBOL = st.sampled_from([*TEN]), st.sampled_from([*SYMBOLS])
+
+
+@given(PREFIX, SYMBOL, PREFIX, SYMBOL, st.integers(1, 3))
 def test_prefixes_are_powers_of_ten_to_the_bit(above, one, below, other, power):
     found = known_unit(f"{above}{one}/{below}{other}{power}")
     expected = [SYMBOLS[one].get(b, 0) - power * SYMBOLS[other].get(b, 0) for b in BASE]
@@ -92,22 +77,19 @@ def test_no_text_is_more_than_no_unit(name):
     assert found is None or (math.isfinite(found.factor) and found.factor > 0.0)
 
 
-@pytest.mark.parametrize("name", ["Pa", "rad/s", "N.m", "W", "kN", "V.m^n", "N/m^n", "1", "%"])
+@pytest.mark.parametrize("name", ["Pa", "V.m^n", "N/m^n", "1"])
 def test_a_unit_is_not_refused(name):
     assert refusal(name) == ""
 
 
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [("n", "N"), ("Nm", "N.m"), ("hz", "Hz"), ("KG", "kg")],
-)
-def test_what_is_meant_is_asked(name, meant):
-    assert refusal(name) == f"unit {name!r} is not known; did you mean {meant}?"
+FORM = "must be one like N, kg, m/s2, N.s/m"
+MEANT = {"n": "N", "Nm": "N.m", "hz": "Hz", "KG": "kg"}
 
 
-@pytest.mark.parametrize("name", ["zork", "m/s/s", "V.n^m", "m s^n"])
-def test_where_nothing_is_near_the_form_is_said(name):
-    assert refusal(name) == f"unit {name!r} is not known; must be one like N, kg, m/s2, N.s/m"
+@pytest.mark.parametrize("name", [*MEANT, "zork", "m/s/s", "V.n^m"])
+def test_what_is_meant_is_asked_or_the_form_said(name):
+    fix = f"did you mean {MEANT[name]}?" if name in MEANT else FORM
+    assert refusal(name) == f"unit {name!r} is not known; {fix}"
 
 
 @pytest.mark.parametrize(
