@@ -2,7 +2,7 @@
 
 import ctypes
 import sys
-from math import inf, nan
+from math import nan
 
 import pytest
 from fmpy.fmi1 import FMICallException
@@ -35,33 +35,24 @@ def other(call, type_):
 BEFORE = [
     (real("object_width", 99.0), "object_width = 99.0 m: must be from 0 to 10 m"),
     (real("finger_mass[2]", 0.0), "finger_mass[2] = 0.0 kg: must be from 0.001 to 1000 kg"),
-    (real("object_width", nan), "object_width = nan m: must be from 0 to 10 m"),
     (real("force[1]", nan), "force[1] = nan N: must be a finite number"),
-    (real("force[2]", -inf), "force[2] = -inf N: must be a finite number"),
     (real("gap[1]", 0.0), "gap[1]: output set: must be an input or a parameter"),
     (lambda i: i.exit(), "fmi2ExitInitializationMode before initialisation: must be in init"),
     (lambda i: i.step(0.0, 1e-3), "fmi2DoStep before initialisation: must be in step mode"),
     (lambda i: i.set_real([99], [0.0]), "value reference 99: must be"),
-    (lambda i: i.set_real([2**32 - 1], [0.0]), "value reference "),
     (lambda i: i.set_boolean([0], [True]), "force[1]: accessed as Boolean: must be as Real"),
     (lambda i: i.get_real([10])[0], "contact[1]: accessed as Real: must be as Boolean"),
-    (lambda i: i.get_boolean([2])[0], "position[1]: accessed as Boolean: must be as Real"),
     (other("GetInteger", ctypes.c_int), "Integer"),
-    (other("SetInteger", ctypes.c_int), "Integer"),
     (other("GetString", ctypes.c_char_p), "String"),
 ]
 STEPPING = [
     (lambda i: i.step(1e-3, 0.0), "step size = 0.0 s: must be a finite number above 0"),
-    (lambda i: i.step(1e-3, -1e-3), "step size = -0.001 s: must be a finite number above 0"),
     (lambda i: i.step(1e-3, nan), "step size = nan s: must be a finite number above 0"),
-    (lambda i: i.step(1e-3, inf), "step size = inf s: must be a finite number above 0"),
     (lambda i: i.step(0.0, 1e-3), "step from 0.0 s: must be from 0.001 s"),
     (lambda i: i.step(2e-3, 1e-3), "step from 0.002 s: must be from 0.001 s"),
-    (lambda i: i.step(nan, 1e-3), "step from nan s: must be from 0.001 s"),
     (real("force[1]", nan), "force[1] = nan N: must be a finite number"),
     (real("object_width", 0.05), "object_width: fixed parameter set in step mode: must be before"),
     (lambda i: i.enter(), "fmi2EnterInitializationMode in step mode: must be before init"),
-    (lambda i: i.exit(), "fmi2ExitInitializationMode in step mode: must be in init"),
 ]
 TERMINATED = [
     (real("force[1]", 1.0), "force[1]: set after fmi2Terminate: must be before"),
@@ -172,7 +163,6 @@ def faulty(altered, folder, statement):
         ("raise LookupError('the lamp is broken')", "LookupError: the lamp is broken"),
         ("raise LookupError('50 %n%s%n%s')", "50 %%n%%s%%n%%s"),  # pythonfmu would pass it on
         ("raise LookupError('\\ud800')", "LookupError: "),  # no UTF-8
-        ("raise type('Odd', (Exception,), {'__repr__': lambda self: 1 / 0})()", "Odd"),
         ("raise KeyboardInterrupt", "KeyboardInterrupt"),
     ],
 )

@@ -18,14 +18,6 @@ def write(path, text):
         part.write_text(text)
 
 
-def read_from(pipe):
-    os.mkfifo(pipe)
-    found = []
-    reader = Thread(target=lambda: found.append(pipe.read_bytes()), daemon=True)
-    reader.start()
-    return reader, found
-
-
 def test_a_full_disk_names_the_target(tmp_path):
     path = tmp_path / "wanted.txt"
     with full_disk(10), pytest.raises(OSError, match="too large") as caught:
@@ -34,18 +26,12 @@ def test_a_full_disk_names_the_target(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", [None, "part", "path"])
+@pytest.mark.parametrize("name", [lambda part: None, str, lambda part: part])
 def test_an_error_that_names_the_temporary_file(tmp_path, name):
     path = tmp_path / "wanted.txt"
     with pytest.raises(OSError, match="No space") as caught, in_one_piece(path) as part:
-        raise _no_space({None: None, "part": str(part), "path": part}[name])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), name(part))
     assert caught.value.filename == str(path)
-
-
-def _no_space(name):
-    error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    error.filename = name
-    return error
 
 
 def test_another_file_keeps_its_name(tmp_path):
@@ -74,7 +60,10 @@ def test_a_link_stays_and_what_it_names_is_replaced(tmp_path, there):
 
 
 def test_whoever_reads_a_pipe_gets_what_is_written(tmp_path):
-    reader, found = read_from(tmp_path / "pipe")
+    pipe, found = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = Thread(target=lambda: found.append(pipe.read_bytes()), daemon=True)
+    reader.start()
     (tmp_path / "link").symlink_to("pipe")
     write(tmp_path / "link", "text")
     reader.join(10.0)
