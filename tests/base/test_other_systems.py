@@ -9,7 +9,6 @@ import pytest
 from support.native_fmus import needs_gcc
 from support.native_systems import write_integrator
 
-ROOT = Path(__file__).parents[2]
 HIDDEN = Path(__file__).parents[1] / "support" / "no_posix"
 
 
@@ -54,22 +53,3 @@ def test_the_command_works(arguments, tmp_path):
     done = run("-m", "grasp_cosim", *arguments, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
-
-
-@pytest.mark.slow
-def test_the_quick_tests_of_the_core_pass(tmp_path):
-    rooms = ("interface", "system", "metrics", "exchange", "recording", "sweeps")
-    only = (
-        "-q",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "no:unraisableexception",
-        "-m",
-        "not slow",
-    )
-    kept = f"--basetemp={tmp_path}/t"
-    done = run("-m", "pytest", *only, kept, *(f"tests/{room}" for room in rooms), cwd=ROOT)
-    assert done.returncode == 0, done.stdout[-3000:]

@@ -1,15 +1,11 @@
 """The energy of a sampled exchange: the exact drift of a mass on a sampled spring."""
 
-from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from grasp_cosim.exchange.energy import Bond, ExchangeEnergy, bonds
-from grasp_cosim.interface.interface import MOST_ELEMENTS
-from grasp_cosim.interface.read import read_interface
-from grasp_cosim.system import parts
 from grasp_cosim.system.parts import Port
 from hypothesis import given
 from hypothesis import strategies as st
@@ -154,26 +150,3 @@ def test_the_source_keeps_its_own_step(grasp):
     components = tuple(slow if c.name == slow.name else c for c in grasp.components)
     system = replace(grasp, components=components)
     assert [b.period for b in bonds(system)] == [4, 4]
-
-
-def unread(system):
-    """The system as it was checked, but whose components read their FMUs anew."""
-    other = copy(system)
-    object.__setattr__(other, "components", tuple(replace(c) for c in system.components))
-    return other
-
-
-@pytest.mark.parametrize("name", ["force[1]", "position[1]"])
-def test_an_array_makes_no_bond(name, grasp, monkeypatch):
-    """As FMI 3.0 has them, and too large to be taken apart: it is not recorded."""
-
-    def declared(path):
-        found = read_interface(path)
-        large = (MOST_ELEMENTS + 1,)
-        variables = tuple(
-            replace(v, shape=large, sizes=(None,)) if v.name == name else v for v in found.variables
-        )
-        return replace(found, variables=variables)
-
-    monkeypatch.setattr(parts, "read_interface", declared)
-    assert [b.index for b in bonds(unread(grasp))] == [2]

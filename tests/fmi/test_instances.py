@@ -1,8 +1,11 @@
 """Instances of native FMUs of both versions, here and in processes of their own."""
 
+import ctypes
 import math
 import os
 import re
+import subprocess
+import sys
 import tempfile
 import zipfile
 from contextlib import contextmanager
@@ -14,9 +17,11 @@ from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi.fmi2 import SharedInstance
 from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
 from grasp_cosim.fmi.make_instance import load
+from grasp_cosim.fmi.variadic import CONVENTION, formatted, logger_type
 from grasp_cosim.interface.interface import Variable
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.system.parts import Component, Connection, Port
+from support.compiled import shared_library
 from support.marks import engines, slow
 from support.native_fmus import CAPABLE, TYPES, build, needs_gcc, starts
 from support.native_fmus import EARLY as MIGHT_RETURN_EARLY
@@ -300,14 +305,6 @@ def test_a_wish_to_end_in_a_part_of_a_step(tmp_path):
     assert "at t = 0.37 s" in result.log[-1]
 
 
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_a_step_that_must_not_vary_ends_the_run(tmp_path, version):
-    system = alone(tmp_path, version, "none", discard_at=0.35)
-    build(tmp_path, version=version, capabilities={})
-    with pytest.raises(SimulationError, match=DISCARDED):
-        simulate(system)
-
-
 @both
 def test_a_step_that_no_part_of_can_be_taken_ends_the_run(tmp_path, version, isolation):
     """A step is halved at most ten times; so close to its start none of them is short enough."""
@@ -361,3 +358,84 @@ def test_a_failing_step_names_what_came_over_its_connections(tmp_path, version, 
     head, _, inputs = str(caught.value).partition(" (inputs: ")
     assert head.startswith("second: native.fmu returned error at t = 1 s")
     assert inputs.startswith("width = 1500 mm, u_")
+
+
+# Messages of FMI 2.0: a format with its arguments, as C passes and prints them
+
+here = pytest.mark.skipif(CONVENTION is None, reason="NO va_list of this processor is known")
+
+C = """
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+typedef void (*logger)(void *, const char *, int, const char *, const char *, ...);
+char wanted[50][1000];
+int said;
+#define SAY(...) do { \\
+    snprintf(wanted[said++], 1000, __VA_ARGS__); log(0, "part", 3, "why", __VA_ARGS__); \\
+} while (0)
+void say(logger log) {
+    SAY("none");
+    SAY("100 %% of it");
+    SAY("the %s is broken", "lamp");
+    SAY("%d %i %u %x %#X %o %c %p", -1, 2, 3u, 0xabc, 0xABC, 8, 'c', (void *)wanted);
+    SAY("%ld %lld %zu %hd %hhd %jd %td %lu", -1L, -2LL, (size_t)3, (short)-4, (signed char)-5,
+        (intmax_t)6, (ptrdiff_t)7, ~0UL);
+    SAY("%f %e %g %G %a %g", 1.5, -2.5e300, 0.1, 1e-7, 3.0, 1.0 / 0.0);
+    SAY("%5d|%-8s|%08.3f|%+d|%.*f|%*d|%.3s", 42, "ab", 3.14159, 7, 2, 2.71828, 6, 9, "abcdef");
+    SAY("%2$s %1$d", 5, "second");
+    SAY("%d %d %d %d %d %d %d %d %d %d %d %d", 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12);
+    SAY("%g %g %g %g %g %g %g %g %g %g %g %g %s",
+        1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., "end");
+    SAY("%g %d %g %s %g %d %g %s %g %d %g %s %g %d %g %s %g %d %g %s %g %d",
+        1., 1, 2., "a", 3., 2, 4., "b", 5., 3, 6., "c", 7., 4, 8., "d", 9., 5, 10., "e", 11., 6);
+}
+"""
+
+
+def said(library):
+    """What the logger made of all that is said, and what C's own printf did."""
+    found = []
+
+    def log(environment, name, status, why, form, *passed):
+        assert (environment, name, status, why) == (None, b"part", 3, b"why")
+        found.append(formatted(form, passed))
+
+    logger = logger_type()(log)
+    library.say(logger)
+    wanted = (ctypes.c_char * 1000 * 50).in_dll(library, "wanted")
+    return found, [text.value for text in wanted[: len(found)]]
+
+
+@needs_gcc
+@here
+@pytest.mark.parametrize("level", ["-O0", "-O2"])
+def test_arguments_are_printed_as_by_c(tmp_path, level):
+    file = tmp_path / "say.so"
+    file.write_bytes(shared_library(code=C, options=(level,)))
+    found, wanted = said(ctypes.CDLL(str(file)))
+    assert found == wanted
+    assert found[2] == b"the lamp is broken"
+    assert len(found) == 11
+
+
+@needs_gcc
+@here
+@pytest.mark.parametrize("form", ["%Lf, %d", "%.3Lg", "%d " * 33])
+def test_what_cannot_be_told_stays_as_it_comes(tmp_path, form):
+    begin, end = C.split("    SAY", 1)[0], f'log(0, "part", 3, "why", "{form}", 1.0L, 5); }}'
+    file = tmp_path / "say.so"
+    file.write_bytes(shared_library(code=begin + end))
+    assert said(ctypes.CDLL(str(file)))[0] == [form.encode()]
+
+
+def test_fmpys_own_logger_is_not_used_and_what_it_prints_is_not_seen():
+    """Where FMPy has none for a processor, it says so on standard output."""
+    code = """
+import sys, types
+sys.modules["fmpy.logging"] = logging = types.ModuleType("fmpy.logging")
+logging.addLoggerProxy = lambda _: print("none such") or print("asked", file=sys.stderr)
+import grasp_cosim.fmi.fmi2
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    assert (done.stdout, done.stderr.split()) == (b"", [b"asked"] * 2)  # by FMPy: FMI 1.0 and 2.0

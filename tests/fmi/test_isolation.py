@@ -1,7 +1,6 @@
 """Components in a process of their own: what happens there stays there."""
 
 import gc
-import json
 import os
 import signal
 import subprocess
@@ -163,19 +162,6 @@ def test_without_posix_it_is_refused(tmp_path, monkeypatch):
         running(tmp_path, "3.0", "process"),
     ):
         pass
-
-
-@pytest.mark.slow
-def test_what_the_fmu_prints_does_not_get_into_json(tmp_path):
-    path = system_file(tmp_path, "3.0", "").read_text("utf-8")
-    alone = path.replace("[components.first]", '[components.first]\nisolation = "process"')
-    (tmp_path / "two.toml").write_text(alone, encoding="utf-8")
-    ran = subprocess.run(
-        [sys.executable, "-m", "grasp_cosim", "run", str(tmp_path / "two.toml"), "--json"],
-        capture_output=True, text=True, check=True, timeout=120,
-    )  # fmt: skip
-    assert "instantiated" not in ran.stdout + ran.stderr
-    assert json.loads(ran.stdout)["complete"] is True
 
 
 def test_the_process_ends_when_the_masters_is_killed(tmp_path):

@@ -8,12 +8,11 @@ import fmpy
 import numpy as np
 import numpy.typing as npt
 import pytest
-from fmpy.validation import validate_fmu
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.cli import main
 from grasp_cosim.system.parts import Component, Connection, Event, Port, Solver
 from support.marks import ENGINES
-from support.native_fmus import MODELS, build_model, needs_cvode, needs_gcc, state_space
+from support.native_fmus import build_model, needs_cvode, needs_gcc, state_space
 
 Floats = npt.NDArray[np.float64]
 
@@ -274,13 +273,6 @@ def test_new_nominal_values_are_kept_to():
 
 
 SOLVING = ("grasp_cosim.fmi.cvode", "grasp_cosim.fmi.model_exchange")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-@pytest.mark.parametrize("name", MODELS)
-def test_is_valid(name, version, tmp_path):
-    assert validate_fmu(str(build_model(name, tmp_path, version))) == []
 
 
 def test_without_cvode_it_is_refused_by_name(tmp_path, monkeypatch, capsys):

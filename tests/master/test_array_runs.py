@@ -4,21 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, System, simulate
+from grasp_cosim import System, simulate
 from grasp_cosim.cli.entry import main
 from grasp_cosim.recording.load import load_run
 from scipy.linalg import expm
 from support.marks import engines
 from support.native_fmus import ARRAY_TYPES as TYPES
-from support.native_fmus import needs_cvode, needs_gcc, state_space
-
-
-def isolated(system, isolation="process"):
-    """A copy with all components in processes of their own, or with "none" in this one."""
-    return system.with_settings(
-        {f"components.{c.name}.isolation": isolation for c in system.components}
-    )
-
+from support.native_fmus import needs_gcc, state_space
 
 pytestmark = needs_gcc
 STEP, STOP = 0.125, 2.0
@@ -82,25 +74,13 @@ def test_a_state_space_model_is_exact(tmp_path, engine, sizes):
     assert list(result.signals) == [f"ss.y[{i}]" for i in range(1, sizes[2] + 1)]
 
 
-@needs_cvode
-@pytest.mark.parametrize("sizes", [(3, 3, 3), (7, 2, 5)])
-@pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
-def test_it_is_as_exact_by_a_solver(tmp_path, isolation, sizes):
-    table = '[components.ss]\nfmu = "ss.fmu"\nsolver = { relative_tolerance = 1e-10 }\n'
-    given = values_of(*sizes)
-    values = dict(zip(("ss.n", "ss.m", "ss.r"), sizes, strict=True))
-    values |= {f"ss.{name}": value for name, value in given.items()}
-    system = load(tmp_path, table, types=False, kind="ModelExchange").with_values(values)
-    result = simulate(isolated(system, isolation))
-    np.testing.assert_allclose(signals(result, "ss.y", sizes[2]), exact(given), 1e-7, 1e-8)
-
-
 @engines
 @pytest.mark.parametrize("isolation", ["none", pytest.param("process", marks=pytest.mark.slow)])
 def test_stimuli_drive_elements(tmp_path, engine, isolation):
     (tmp_path / "drive.csv").write_text("time,ss.u[2]\n0,1\n1,3\n", "utf-8")
     table = '[components.ss]\nfmu = "ss.fmu"\nvalues = { C = 0 }\n[input]\nfile = "drive.csv"\n'
-    system = isolated(load(tmp_path, table, types=False), isolation)
+    system = load(tmp_path, table, types=False)
+    system = system.with_settings({"components.ss.isolation": isolation})
     found = signals(simulate(system, engine=engine), "ss.y", 3)
     times = np.arange(17) * STEP - STEP
     assert found[1:, 1].tolist() == np.interp(times[1:], [0.0, 1.0], [1.0, 3.0]).tolist()
@@ -184,8 +164,3 @@ def test_a_recorded_run_reads_back(tmp_path):
     assert list(read.signals) == list(result.signals)
     for name in result.signals:
         np.testing.assert_array_equal(read[name], result[name])
-
-
-def test_what_the_fmu_refuses_is_said(tmp_path):
-    with pytest.raises(InputError, match=r"^ss: ss\.fmu refused its initialisation: at most 24$"):
-        simulate(alone(tmp_path).with_values({"ss.r": 25}))

@@ -6,8 +6,6 @@ import signal
 import subprocess
 import sys
 import threading
-from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,26 +16,11 @@ from grasp_cosim.master import engine, loop
 from grasp_cosim.master.engine import make_loop
 from grasp_cosim.master.loop import CALL, COPY, LOAD, LOAD_LONG, SCALE, STEP, STORE
 from grasp_cosim.master.plan import Plan
-from grasp_cosim.recording.result import Rejection
-from grasp_cosim.system.parts import Connection, Port
 from support.grasps import CASES
 from support.marks import engines, needs_compiler
 from support.mocks import Mock, Run, make_system
 
 pytestmark = needs_compiler
-pytestmark = needs_compiler
-TYPES = [
-    "float32",
-    "int8",
-    "uint8",
-    "int16",
-    "uint16",
-    "int32",
-    "uint32",
-    "int64",
-    "uint64",
-    "bool",
-]
 
 
 def plan(values, operations, **parts):
@@ -127,79 +110,17 @@ def test_a_bad_status_says_where_and_the_run_can_go_on_behind_it(engine):
     assert run(made, engine, 2, operation=1)[0] == (2, 0, 0)
 
 
-ENGINES = ("python", "compiled")
-
-
-def both(system, **options):
-    one, two = (simulate(system, engine=engine, **options) for engine in ENGINES)
-    return one, two
-
-
-def assert_same_bits(one, two):
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+@pytest.mark.parametrize(("case", "step"), [(0, 2e-4), (1, 1e-3), (2, 1e-3)])
+def test_the_grasp(grasp, case, step, scheme):
+    system = grasp.with_values(CASES[case]).with_experiment(step, 0.4 if case == 0 else 2.5, scheme)
+    one, two = (simulate(system, engine=engine) for engine in ("python", "compiled"))
     assert list(one) == list(two)
     assert one.time.tobytes() == two.time.tobytes()
     assert [n for n in one if one[n].tobytes() != two[n].tobytes()] == []
 
 
-@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-@pytest.mark.parametrize(("case", "step"), [(0, 2e-4), (1, 1e-3), (2, 1e-3)])
-def test_the_grasp(grasp, case, step, scheme):
-    stop = 0.4 if case == 0 else 2.5
-    assert_same_bits(*both(grasp.with_values(CASES[case]), step=step, stop=stop, scheme=scheme))
-
-
-@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
-def test_slow_sensors_and_scaled_connections(grasp, scheme):
-    components = tuple(
-        replace(c, step_ns=3_000_000) if c.name == "sensor_1" else c for c in grasp.components
-    )
-    first, *others = grasp.connections
-    connections = (replace(first, factor=1.1, offset=-0.003), *others)
-    system = replace(
-        grasp,
-        components=components,
-        connections=connections,
-        step_ns=1_000_000,
-        stop_ns=2_400_000_000,
-    )
-    one, two = both(system, scheme=scheme)
-    assert_same_bits(one, two)
-    held = one["sensor_1.intensity"]
-    assert (held[3:6] == held[3]).all()
-    assert held[6] != held[5]
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_an_fmu_that_fails_is_the_same_error(grasp, altered, engine):
-    nan = "l = float('nan') if u.gap < 0.044 else u.gap"
-    fmu = altered(
-        "ProximitySensor", "proximity_sensor/optics.py", "l = 0.0 if u.gap < 0.0 else u.gap", nan
-    )
-    with pytest.raises(SimulationError, match=r"^sensor_1: .* at t = 0\.061 s: ") as caught:
-        simulate(grasp.swap("sensor_1", fmu), engine=engine)
-    assert len(caught.value.result.time) == 611
-    assert not caught.value.result.complete
-
-
-def chain(tmp_path, engine, *mocks):
-    connections = [Connection(Port(a.name, "y"), Port(b.name, "u")) for a, b in pairwise(mocks)]
-    return Run(make_system(mocks, connections), mocks, engine)
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_rejected_steps_are_resolved_in_both(tmp_path, engine):
-    clock = Mock(tmp_path, "clock", lambda u, t: t, direct=False)
-    slow = Mock(
-        tmp_path, "slow", lambda u, t: t, direct=False,
-        rejects=lambda begin, end: 0.13 if begin < 0.13 < end else end,
-    )  # fmt: skip
-    run = chain(tmp_path, engine, slow, clock)
-    signals = run.to_the_end()
-    assert signals["slow.y"] == pytest.approx(signals["clock.y"], abs=1e-15)
-    assert run.master.rejections == {"slow": Rejection(1, 0.1)}
-
-
-@pytest.mark.parametrize("engine", ENGINES)
+@engines
 def test_what_a_call_raises_ends_the_run(tmp_path, engine):
     """An exception must not get lost in compiled code."""
 
@@ -208,18 +129,18 @@ def test_what_a_call_raises_ends_the_run(tmp_path, engine):
             raise SimulationError("a: enough")
         return t
 
-    run = chain(tmp_path, engine, Mock(tmp_path, "a", output, direct=False))
+    mocks = [Mock(tmp_path, "a", output, direct=False)]
+    run = Run(make_system(mocks, []), mocks, engine)
     with pytest.raises(SimulationError, match="a: enough"):
         run.to_the_end()
     assert run.signals()["a.y"] == pytest.approx([0.0, 0.1, 0.2])
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_value_that_is_not_finite_at_t_0_is_kept_too(tmp_path, engine, monkeypatch):
+def test_a_value_that_is_not_finite_at_t_0_is_kept_too(tmp_path, monkeypatch):
     mock = Mock(tmp_path, "a", lambda u, t: math.nan)
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
     with pytest.raises(SimulationError, match=r"^a\.y = nan at step 0: must be finite") as caught:
-        simulate(make_system([mock], []), engine=engine)
+        simulate(make_system([mock], []))
     assert caught.value.result.time.tolist() == [0.0]
     assert not caught.value.result.complete
     assert mock.calls[-1] == "close"
@@ -286,24 +207,6 @@ def test_what_was_built_from_other_constants_is_not_taken(monkeypatch):
     before = engine._job().kept_as
     monkeypatch.setattr(engine, "EARLY", 7)
     assert engine._job().kept_as != before
-
-
-@pytest.mark.slow
-def test_processes_that_build_it_at_once_all_run(cache):
-    code = (
-        "from grasp_cosim.master import engine; import sys; sys.stdin.read(1)\n"
-        "print(engine.library(True).run.argtypes is not None, engine.is_there())"
-    )
-    started = [
-        subprocess.Popen([sys.executable, "-c", code], stdin=-1, stdout=-1, stderr=-1, text=True)
-        for _ in range(4)
-    ]
-    for process in started:
-        assert process.stdin
-        process.stdin.write("\n")
-        process.stdin.flush()
-    assert [p.communicate() for p in started] == [("True True\n", "")] * 4
-    assert [path.suffix for path in kept(cache)] == [".so"]
 
 
 @pytest.mark.usefixtures("cache")

@@ -50,6 +50,7 @@ WITHIN = SIGNAL[20:50]
         ("saturation", {"low": -0.5}, np.maximum(WITHIN, -0.5)),
         ("saturation", {"high": 0.5}, np.minimum(WITHIN, 0.5)),
         ("saturation", {"low": -0.2, "high": 0.3}, np.clip(WITHIN, -0.2, 0.3)),
+        ("quantisation", {"step": 0.25}, 0.25 * np.rint(WITHIN / 0.25)),
         ("delay", {"time": 0.007}, SIGNAL[13:43]),  # it knows what was passed before it began
         ("dropout", {"probability": 1.0}, SIGNAL[19]),
     ],
@@ -66,25 +67,12 @@ def test_a_boolean_is_stuck_as_a_number():
 @QUICK
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e3))
 def test_quantisation(value, width):
-    """The nearest level; NumPy rounds to even as well."""
     result = on_connection(fault("quantisation", step=width))(value, 0)
     assert result == np.rint(value / width) * width
     assert abs(result - value) <= 0.5 * width * (1 + 1e-9) + 1e-9 * abs(value)
 
 
-def test_quantisation_between_two_levels_takes_the_even_one():
-    values = np.array([-1.5, -0.5, 0.5, 1.5, 2.5]) * 0.25
-    expected = [-0.5, 0.0, 0.0, 0.5, 0.5]
-    assert passed(on_connection(fault("quantisation", step=0.25)), values).tolist() == expected
-
-
-@pytest.mark.parametrize("steps", [0, 1, 7, 40])
-def test_delay_is_exact(steps):
-    expected = SIGNAL[np.maximum(np.arange(100) - steps, 0)]
-    assert (passed(on_connection(fault("delay", time=steps / 1000)), SIGNAL) == expected).all()
-
-
-@pytest.mark.parametrize("delay", [1, 2, 5, 7])
+@pytest.mark.parametrize("delay", [0, 1, 5, 7])
 @pytest.mark.parametrize(("period", "phase"), [(1, 0), (3, 0), (3, 2)])
 def test_a_delay_counts_base_steps_on_a_slow_connection_too(delay, period, phase):
     """The value is the one that was the newest so many base steps ago."""

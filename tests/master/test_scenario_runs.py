@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.system.parts import Condition, Event, Fault, Port
+from grasp_cosim.system.parts import Event, Fault, Port
 from grasp_cosim.system.stimuli import read_stimuli
 from hypothesis import given
 from hypothesis import strategies as st
@@ -44,9 +44,6 @@ def test_a_change_of_reflectance_moves_the_target(grasp):
     alpha = np.where(np.arange(301) <= k, 1.0, 0.6)
     expected = intensity(changed["plant.gap[1]"], alpha)
     assert changed["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
-    xi_1, xi_2 = changed["sensor_1.intensity"], changed["sensor_2.intensity"]
-    force = 3.0 * np.tanh((xi_1 - xi_2) / (xi_1 + xi_2))
-    assert changed["controller.simultaneous_contact_force"] == pytest.approx(force, rel=1e-12)
     difference = changed["controller.target_position"] - plain["controller.target_position"]
     assert not difference[: k + 1].any()
     assert (np.diff(difference[k + 1 :]) < 0).all()
@@ -88,31 +85,6 @@ def test_a_fault_from_0_acts_at_t_0(grasp):
     result = run(grasp, stop=0.01, faults=(on_gap("bias", value=0.003),))
     expected = intensity(result["plant.gap[1]"] + 0.003)
     assert result["sensor_1.intensity"] == pytest.approx(expected, rel=1e-12)
-
-
-FULL = {
-    "events": (
-        Event({REFLECTANCE: 0.6}, at_ns=50_000_000),
-        Event({REFLECTANCE: 0.8}, when=Condition(Port("plant", "gap[1]"), "<", 0.04)),
-    ),
-    "faults": (
-        on_gap("noise", standard_deviation=1e-4),
-        on_gap("quantisation", 20, step=1e-5),
-        Fault(Port("sensor_2", "gap"), "dropout", {"probability": 0.3}, seed=5),
-        Fault(Port("controller", "position[1]"), "delay", {"time": 0.003}),
-        Fault(Port("controller", "velocity[2]"), "stuck", {}, 30_000_000, 60_000_000),
-        Fault(Port("controller", "intensity[1]"), "saturation", {"high": 0.4}, 10_000_000),
-        Fault(Port("plant", "force[1]"), "bias", {"value": -0.1}, 70_000_000),
-    ),
-}
-
-
-def bits(result):
-    return {name: np.ascontiguousarray(result[name]).tobytes() for name in result}
-
-
-def test_the_same_run_twice_gives_the_same_bits(grasp):
-    assert bits(run(grasp, **FULL)) == bits(run(grasp, **FULL))
 
 
 def test_what_did_not_happen_is_in_the_log(grasp):

@@ -1,21 +1,161 @@
-"""Runs of the built-in grasp through FMUs."""
+"""Runs and sessions: what can be done with one, when it is over, what is told and left."""
 
+import math
 import os
-import pty
-import re
-import select
-import signal
-import subprocess
 import sys
 import tempfile
-import termios
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fmi.test_instances import KINDS, alone
 from grasp_cosim import InputError, SimulationError, simulate
-from grasp_cosim.grasp.presets import SYSTEM
-from support.marks import needs_pythonfmu
+from grasp_cosim.fmi.instance import ERROR
+from grasp_cosim.master import master
+from grasp_cosim.system.parts import Connection, Event, Port
+from support.marks import engines, needs_pythonfmu
+from support.mocks import Mock, make_system
+from support.native_fmus import needs_gcc
+
+pytestmark = needs_gcc
+
+
+@engines
+def test_a_closed_session_calls_no_fmu(tmp_path, engine):
+    with simulate.session(alone(tmp_path, "3.0", "none"), engine=engine) as session:
+        session.step(3)
+    closed = "^alone: the session is closed; must be a new one$"
+    with pytest.raises(InputError, match=closed):
+        session.step()
+    with pytest.raises(InputError, match=closed):
+        session.set("part.gain", 2.0)
+    assert session["part.x"] == pytest.approx(0.6)
+    assert len(session.result().time) == 4
+
+
+@engines
+def test_after_a_failure_no_fmu_is_called(tmp_path, engine):
+    system = alone(tmp_path, "3.0", "none", error_at=0.35)
+    with simulate.session(system, engine=engine) as session:
+        with pytest.raises(SimulationError):
+            session.step(5)
+        for call in (session.step, lambda: session.set("part.gain", 2.0)):
+            with pytest.raises(InputError, match="the session is broken off by a failure or an"):
+                call()
+        assert len(session.result().time) == 4
+
+
+@pytest.mark.usefixtures("ctrl_c")
+@pytest.mark.parametrize(("version", "isolation"), KINDS)
+def test_an_interrupted_session_does_not_go_on(tmp_path, version, isolation):
+    """Its FMU is further than its rows."""
+    part = alone(tmp_path, version, isolation, interrupt_at=0.001_000_5, interrupted=os.getpid())
+    system = replace(part, step_ns=1000, stop_ns=100_000_000_000)
+    with simulate.session(system, engine="python") as session:
+        with pytest.raises(KeyboardInterrupt):
+            session.step(100_000_000)
+        with pytest.raises(InputError, match="the session is broken off by a failure or an"):
+            session.step()
+        result = session.result()
+        assert not result.complete
+        assert result["part.x"] == pytest.approx(2.0 * result.time, rel=1e-9)
+
+
+def test_a_session_that_has_not_stepped_has_metrics(tmp_path):
+    with simulate.session(alone(tmp_path, "3.0", "none")) as session:
+        metrics = session.result().metrics
+    assert (metrics["steps"], metrics["real_time_factor"]) == (0, 0.0)
+
+
+@pytest.mark.parametrize("steps", [0, -1, 1.5, True, 2**63])
+def test_steps_are_counted_in_whole_numbers(grasp, steps):
+    with simulate.session(grasp, stop=0.01) as session:
+        with pytest.raises(InputError, match=r"steps = .*: must be a whole number from 1 to"):
+            session.step(steps)
+        assert session.step(np.int64(3))
+        assert session.time == 3e-4
+
+
+def test_an_engine_that_does_not_exist_is_refused(grasp):
+    with pytest.raises(InputError, match="engine = 'complied': must be one of auto, python, comp"):
+        simulate(grasp, stop=1e-3, engine="complied")
+
+
+@engines
+def test_a_value_that_is_not_finite_is_found_in_its_step(tmp_path, monkeypatch, engine):
+    """Also where it has gone again at the end of the call."""
+    monkeypatch.setattr(master, "LONG", math.inf)
+    mock = Mock(tmp_path, "a", lambda u, t: math.inf if 0.45 < t < 0.65 else t)
+    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    with simulate.session(make_system([mock], [], 10), engine=engine) as session:
+        for _ in range(3):
+            session.step()
+        with pytest.raises(
+            SimulationError, match=r"^a\.y = inf at step 5: must be finite"
+        ) as error:
+            session.step(5)
+        assert len(error.value.result.time) == 6
+
+
+def test_a_setting_is_checked_each_time(grasp):
+    with simulate.session(grasp, stop=0.1) as session:
+        session.set("sensor_1.reflectance", 0.5)
+        session.set("sensor_1.reflectance", 0.25)
+        with pytest.raises(InputError, match=r"^set: sensor_1\.reflectance: reflectance = 'dark'"):
+            session.set("sensor_1.reflectance", "dark")
+        for _ in range(2):
+            with pytest.raises(
+                InputError, match=r"^set: sensor_1\.sampling\.rate: is a fixed param"
+            ):
+                session.set("sensor_1.sampling.rate", 1e3)
+        assert len(session.result().log) == 2
+
+
+LOOP = "algebraic loop at t = 0 through a.u: solved in "
+
+
+def ring(folder, monkeypatch, **more):
+    """y = 1 - 5 u, u = y; and its second mock."""
+    mocks = [Mock(folder, "a", lambda u, t: 1.0 - 5.0 * u), Mock(folder, "b", lambda u, t: u)]
+    by_name = {m.name: m for m in mocks}
+    monkeypatch.setattr(
+        "grasp_cosim.master.simulation.load", lambda component: by_name[component.name]
+    )
+    ends = [(Port("a", "y"), Port("b", "u")), (Port("b", "y"), Port("a", "u"))]
+    return make_system(mocks, [Connection(*e) for e in ends], 10, **more), mocks[1]
+
+
+def test_a_loop_is_told_before_the_first_step_and_what_is_known_is_not(tmp_path, monkeypatch):
+    system, b = ring(tmp_path, monkeypatch, notes=("read in a way",))
+    told = []
+
+    def note(line):
+        told.append((line, any(c.startswith("step") for c in b.calls)))
+
+    result = simulate(system, note=note)
+    ((line, stepped),) = told
+    assert line.startswith(LOOP)
+    assert not stepped
+    assert result.log == ("read in a way", line)
+
+
+def test_a_run_that_fails_has_told_it_and_what_came_later_once(tmp_path, monkeypatch):
+    event = Event({Port("a", "p"): 2.0}, 100_000_000)
+    system, b = ring(tmp_path, monkeypatch, events=(event,))
+    told = []
+    session = simulate.session(system, note=told.append)
+    assert len(told) == 1
+    session.step(2)
+    b.statuses["step"] = ERROR
+    with pytest.raises(SimulationError):
+        session.step()
+    session.close()
+    session.close()
+    assert told[0].startswith(LOOP)
+    assert len(told) == len(set(told)) == 2
+    assert "a.p" in told[1]
+
 
 SHORT = 0.05
 
@@ -42,14 +182,6 @@ def test_nothing_jumps_at_the_start(grasp):
     assert result["controller.target_position"][0] == pytest.approx(0.025, abs=1e-15)
     for j in (1, 2):
         assert np.abs(np.diff(result[f"controller.force[{j}]"])).max() < 0.02
-
-
-def test_a_refused_parameter_is_one_line_with_the_reason(grasp):
-    wide = grasp.with_values({"plant.object_width": 0.5})
-    with pytest.raises(
-        InputError, match=r"^plant: GripperPlant.fmu refused .*object_width = 0.5 m"
-    ):
-        simulate(wide, stop=SHORT)
 
 
 GAP = "l = 0.0 if u.gap < 0.0 else u.gap"
@@ -104,42 +236,3 @@ def test_a_temporary_folder_that_crashes_pythonfmu_is_refused(grasp, unpack_in):
 def test_a_temporary_folder_with_a_space_is_fine(grasp, unpack_in):
     unpack_in("a b")
     assert simulate(grasp, stop=1e-3).complete
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("ctrl_c")
-def test_ctrl_c_keeps_what_was_recorded(fmus, tmp_path):
-    """On a terminal there is a progress bar; Ctrl-C is sent once it has begun to move."""
-    terminal, side = pty.openpty()
-    termios.tcsetwinsize(side, (24, 100))
-    system = str(system_file(fmus, tmp_path))
-    options = ["--stop", "1000", "--out", str(tmp_path / "out"), "--json"]
-    with subprocess.Popen(
-        [sys.executable, "-m", "grasp_cosim", "run", system, *options],
-        stdout=subprocess.PIPE,
-        stderr=side,
-        text=True,
-    ) as process:
-        os.close(side)
-        seen = b""
-        while not re.search(rb"[1-9]\d* of 1000\.00 s", seen):
-            assert select.select([terminal], [], [], 30.0)[0], "no progress for 30 s"
-            seen += os.read(terminal, 4096)
-        process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=60)
-    os.close(terminal)
-    assert process.returncode == 130
-    assert '"complete": false' in out
-    lines = (tmp_path / "out" / "signals.csv").read_text().splitlines()
-    assert len(lines) > 1000
-    assert len(lines[-1].split(",")) == len(lines[0].split(","))
-
-
-def system_file(fmus, folder):
-    """The built-in system as a user's own file beside its FMUs."""
-    path = folder / "mine.toml"
-    text = SYSTEM.read_text("utf-8")
-    for name in ("GripperPlant", "ProximitySensor", "GraspController"):
-        text = text.replace(f'"{name}.fmu"', f'"{fmus / name}.fmu"')
-    path.write_text(text, encoding="utf-8")
-    return path

@@ -1,6 +1,5 @@
 """A start other than 0 s, and an end that an FMU asks for."""
 
-import json
 import re
 from dataclasses import replace
 from math import floor
@@ -8,7 +7,6 @@ from math import floor
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, load_run, simulate
-from grasp_cosim.cli.entry import main
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Component, Connection, Event, Fault, Port, Realtime
@@ -178,20 +176,6 @@ def test_the_end_at_the_very_beginning(tmp_path):
     assert result.complete
     assert result.time.tolist() == [0.0]
     assert "stair asked for the end of the simulation at t = 0 s" in result.log[-1]
-
-
-def test_the_command_is_done(tmp_path, capsys):
-    build_model("stair", tmp_path)
-    path, out = tmp_path / "stair.toml", tmp_path / "out"
-    path.write_text(
-        '[experiment]\nstep = 0.1\nstop = 60.0\n[components.stair]\nfmu = "stair.fmu"\n', "utf-8"
-    )
-    assert main(["run", str(path), "--out", str(out)]) == 0
-    assert "stair asked for the end of the simulation at t = 9 s" in capsys.readouterr().err
-    assert (out / "signals.csv").read_text("utf-8").splitlines()[-1] == "9.0,10"
-    written = json.loads((out / "run.json").read_text("utf-8"))
-    assert (written["complete"], written["steps"]) == (True, 90)
-    assert load_run(out).complete
 
 
 @pytest.mark.slow

@@ -137,13 +137,9 @@ def test_an_integer_that_gets_too_long_on_the_way_ends_the_run(tmp_path, source,
 REFUSED = [
     (connected("Int16", "Int8"), "is Int16 and b.u_Int8 is Int8, which does not hold all its val"),
     (connected("UInt8", "Int8"), "must be a type that holds 0 to 255"),
-    (connected("Int32", "UInt64"), "which does not hold all its values"),
     (connected("Int32", "Float32"), "which does not hold all its values; must be Float64"),
     (connected("Float64", "Int32"), "must be both Real, both Integer, both Boolean or both String"),
-    (connected("Boolean", "Int32"), "a.y_Boolean is Boolean and b.u_Int32 is Int32; must be both"),
-    (connected("String", "Float64"), "must be both Real"),
     ('"a.y_array -> b.u_Float64"', "a.y_array is of type array of String, which is not supp"),
-    ('"a.y_clock -> b.u_Boolean"', "a.y_clock is of type Clock, which is not supported; must be"),
     ('"a.y_Float64 -> b.u_Binary"', "b.u_Binary is of type Binary, which is not supported"),
     ('{ from = "a.y_Int8", to = "b.u_Int8", factor = 2 }', "must be Real to be scaled"),
     ('{ from = "a.x", to = "b.u_Float64", factor = 0 }', "factor = 0.0: must be a finite number"),
@@ -151,7 +147,6 @@ REFUSED = [
     ('{ from = "a.x", to = "b.u_Float64", factor = true }', "factor = True: must be a number"),
     ('{ from = "a.x", to = "b.u_Float64", gain = 2 }', "unknown entry 'gain'; valid: factor"),
     ('{ from = "a.x" }', "to = None: must be 'component.variable'"),
-    ('{ from = "x", to = "b.u_Float64" }', "from = 'x': must be 'component.variable'"),
 ]
 
 
@@ -199,9 +194,7 @@ UNKNOWN = r"which their FMUs do not define in SI units; \{ from = .*gives the fa
         (table('rename = { now = "x" }'), "'now' = 'x': a.fmu has a variable 'now' itself; must"),
         (table("rename = { gap = 1 }"), "'gap' = 1: must be a variable of the FMU, a string"),
         (table("rename = 'x'"), "rename: 'x'; must be a table"),
-        (table('isolation = "thread"'), "isolation = 'thread': must be one of none, process"),
         (table("step = 0.15"), r"a: step = 0.15 s is not a whole multiple of the base step 0.1 s"),
-        (table("step = true"), "step = True s: must be a number"),
     ],
 )
 def test_components_that_are_refused(tmp_path, more, message):
