@@ -7,7 +7,6 @@ those who want no motion.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -81,117 +80,98 @@ def three_svg(hands: Sequence[tuple[str, Result]]) -> str:
 
 
 def _plane(k: int, title: str, run: Result) -> Iterator[Part]:
-    """A hand with its title, the times of its contacts and its forces as bars."""
+    """A hand with its title, and its fingers with the times of their contacts."""
     middle, wrist = WIDTH * (0.25 + 0.5 * k), PLANE / 2 + 14
     signals, time = run.by_role, run.time
     x, y = (float(signals[f"plant.object_position[{i}]"][0]) for i in (1, 2))
     yield (
-        f'<text class="name middle" x="{middle:g}" y="22">{title}</text>\n'
-        f'<circle cx="{middle + AROUND * x:.1f}" cy="{wrist - AROUND * y:.1f}" '
+        _text(middle, 22, title, "name middle")
+        + f'<circle cx="{middle + AROUND * x:.1f}" cy="{wrist - AROUND * y:.1f}" '
         f'r="{AROUND * 0.035:.1f}" fill="var(--object)"/>',
         "",
     )
     for j, angle in enumerate(directions(signals), start=1):
         c, s = np.cos(angle), -np.sin(angle)
-        turn = f"rotate({np.degrees(np.arctan2(s, c)):.2f})"
-        way = AROUND * _face(run, j)
-        touch = run.metrics["time_to_contact"][j - 1]
+        way = AROUND * signals[f"plant.position[{j}]"]
         finger = (
-            f'<g transform="{turn}"><rect x="0" y="-10" width="40" height="20" rx="4" '
-            f'fill="var(--finger{j})"/></g><text class="on middle" x="{20 * c:.1f}" '
-            f'y="{20 * s + 5:.1f}">{j}</text>'
+            f'<g transform="rotate({np.degrees(np.arctan2(s, c)):.2f})">{_rect(0, -10, 40, 20, j)}'
+            f"</g>{_text(20 * c, 20 * s + 5, str(j), 'on middle')}"
         )
-        yield _moved(f"p{k}{j}", finger, time, middle + c * way, y=wrist + s * way)
+        yield _moved(f"p{k}{j}", finger, time, middle + c * way, wrist + s * way)
         out = way[-1] + 68.0
+        touch = run.metrics["time_to_contact"][j - 1]
         when = "never touches" if touch is None else f"{touch:.2f} s"
-        text = (
-            f'<text class="middle" x="{middle + c * out:.1f}" y="{wrist + s * out + 5:.1f}">'
-            f"{when}</text>"
-        )
+        text = _text(middle + c * out, wrist + s * out + 5, when, "middle")
         yield _shown(f"w{k}{j}", text, time, float(time[-1]) - 1e-2 if touch is None else touch)
 
 
 def _row(k: int, title: str, run: Result) -> Iterator[Part]:
     """A hand with its title and what comes of it."""
-    top, time = TOP + ROW * k, run.time
-    left, right = (_x(_face(run, j) - SIDE[j] * run.by_role[f"plant.gap[{j}]"])[0] for j in (2, 1))
+    top, time, signals = TOP + ROW * k, run.time, run.by_role
+    faces = {j: MIDDLE + SCALE * signals[f"plant.position[{j}]"] for j in FINGERS}
+    ends = {j: faces[j][0] - SIDE[j] * SCALE * signals[f"plant.gap[{j}]"][0] for j in FINGERS}
     yield (
-        f'<text class="name" x="14" y="{top + 18}">{title}</text>\n'
-        f'<line class="rule" x1="14" x2="{WIDTH - 14}" y1="{top + 122}" y2="{top + 122}"/>\n'
-        f'<rect x="{left:.1f}" y="{top + 42}" width="{right - left:.1f}" height="80" rx="4" '
-        'fill="var(--object)"/>',
+        _text(14, top + 18, title, "name")
+        + f'<line class="rule" x1="14" x2="{WIDTH - 14}" y1="{top + 122}" y2="{top + 122}"/>'
+        f'<rect x="{ends[2]:.1f}" y="{top + 42}" width="{ends[1] - ends[2]:.1f}" height="80" '
+        'rx="4" fill="var(--object)"/>',
         "",
     )
-    for j, at in zip(FINGERS, (right, left), strict=True):
-        yield from _finger(f"{k}{j}", top, run, at, j)
-    target = (
-        f'<line class="target" x1="0" x2="0" y1="{top + 38}" y2="{top + 122}"/>'
-        f'<text class="muted middle" x="0" y="{top + 34}">target</text>'
-    )
-    yield _moved(f"t{k}", target, time, _x(run.by_role["controller.target_position"]))
-    last = max(run.metrics["time_to_contact"])
-    text = f'<text class="name end" x="{WIDTH - 14}" y="{top + 18}">{_outcome(run)}</text>'
-    yield _shown(f"o{k}", text, time, last)
-
-
-def _finger(name: str, top: int, run: Result, at: float, j: int) -> Iterator[Part]:
-    """A finger, the light and the time of its contact at px `at`, and the force on it as a bar."""
-    side, time, touch = SIDE[j], run.time, run.metrics["time_to_contact"][j - 1]
-    lit = f'<rect x="{at - 3:.1f}" y="{top + 34}" width="6" height="88" fill="var(--lit)"/>'
-    when = (
-        f'<text class="{"" if j == 1 else "end"}" x="{at + 4 * side:.1f}" y="{top + 140}">'
-        f"touches at {touch:.2f} s</text>"
-    )
-    yield _shown(f"l{name}", lit + when, time, touch)
-    x = 0 if j == 1 else -THICK
-    finger = (
-        f'<rect x="{x}" y="{top + 34}" width="{THICK}" height="88" rx="4" '
-        f'fill="var(--finger{j})"/>'
-        f'<text class="on middle" x="{x + THICK / 2:g}" y="{top + 83}">{j}</text>'
-    )
-    yield _moved(f"f{name}", finger, time, _x(_face(run, j)))
-    force = abs(run.by_role[f"plant.contact_force[{j}]"])
-    away = at + side * THICK
-    bar = f'<rect x="0" y="{top + 73}" width="1" height="10" fill="var(--ink)"/>'
-    yield _moved(f"n{name}", bar, time, 0.0 * time + away, side * NEWTON * force)
+    for j, touch in zip(FINGERS, run.metrics["time_to_contact"], strict=True):
+        at, side, anchor = ends[j], SIDE[j], "" if j == 1 else "end"
+        lit = f'<rect x="{at - 3:.1f}" y="{top + 34}" width="6" height="88" fill="var(--lit)"/>'
+        when = _text(at + 4 * side, top + 140, f"touches at {touch:.2f} s", anchor)
+        yield _shown(f"l{k}{j}", lit + when, time, touch)
+        x = 0 if j == 1 else -THICK
+        finger = _rect(x, top + 34, THICK, 88, j) + _text(x + 10, top + 83, str(j), "on middle")
+        yield _moved(f"f{k}{j}", finger, time, faces[j])
+        force = abs(signals[f"plant.contact_force[{j}]"])
+        bar = f'<rect x="0" y="{top + 73}" width="1" height="10" fill="var(--ink)"/>'
+        yield _moved(f"n{k}{j}", bar, time, at + side * THICK, stretch=side * NEWTON * force)
+    target = f'<line class="target" x1="0" x2="0" y1="{top + 38}" y2="{top + 122}"/>'
+    target += _text(0, top + 34, "target", "muted middle")
+    yield _moved(f"t{k}", target, time, MIDDLE + SCALE * signals["controller.target_position"])
+    text = _text(WIDTH - 14, top + 18, _outcome(run), "name end")
+    yield _shown(f"o{k}", text, time, max(run.metrics["time_to_contact"]))
 
 
 def _clock(time: npt.NDArray[np.float64], height: int) -> Iterator[Part]:
     """The time of the runs as a line that a dot goes along."""
     end, y, left, right = float(time[-1]), height - 24, 90, WIDTH - 60
-    text = f'<text class="muted" x="14" y="{y + 5}">real time</text>'
-    text += f'<text class="muted" x="{right + 14}" y="{y + 5}">{end:g} s</text>'
+    text = _text(14, y + 5, "real time", "muted") + _text(right + 14, y + 5, f"{end:g} s", "muted")
     yield f'{text}<line class="rule" x1="{left}" x2="{right}" y1="{y}" y2="{y}"/>', ""
     dot = f'<circle cx="0" cy="{y}" r="6" fill="var(--ink)"/>'
     yield _moved("clock", dot, time, left + (right - left) * time / end)
+
+
+def _text(x: float, y: float, text: str, kind: str) -> str:
+    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}">{text}</text>'
+
+
+def _rect(x: float, y: float, width: float, height: float, finger: int) -> str:
+    size = f'x="{x}" y="{y}" width="{width}" height="{height}"'
+    return f'<rect {size} rx="4" fill="var(--finger{finger})"/>'
 
 
 def _moved(
     name: str,
     svg: str,
     time: npt.NDArray[np.float64],
-    x: npt.NDArray[np.float64],
-    stretch: npt.NDArray[Any] | None = None,
-    y: npt.NDArray[np.float64] | None = None,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike = 0.0,
+    stretch: npt.ArrayLike | None = None,
 ) -> Part:
-    """What is at x px over time in s, and is so many times as long; it stands still at the end.
-
-    With y it is at x, y.
-    """
+    """What is at x, y in px over time in s, and is so many times as long; it stops at the end."""
     frames = np.arange(round(float(time[-1]) * RATE) + 1) / RATE
-    places = [f"translateX({_number(at)}px)" for at in np.interp(frames, time, x)]
-    if y is not None:
-        along = zip(np.interp(frames, time, x), np.interp(frames, time, y), strict=True)
-        places = [f"translate({_number(a)}px,{_number(b)}px)" for a, b in along]
-    if stretch is not None:
-        long = np.interp(frames, time, stretch)
-        places = [f"{a} scaleX({_number(b)})" for a, b in zip(places, long, strict=True)]
-    changes = [  # one in the middle of equal ones says nothing
-        i
+    form = "translate({}px,{}px)" + ("" if stretch is None else " scaleX({})")
+    each = [np.broadcast_to(v, time.shape) for v in (x, y, stretch) if v is not None]
+    rows = zip(*(np.interp(frames, time, v) for v in each), strict=True)
+    places = [form.format(*map(_number, row)) for row in rows]
+    keys = [  # one in the middle of equal ones says nothing
+        (float(frames[i]), f"transform:{place}")
         for i, place in enumerate(places)
         if not (0 < i < len(places) - 1 and places[i - 1] == place == places[i + 1])
     ]
-    keys = [(float(frames[i]), f"transform:{places[i]}") for i in changes]
     drawn = f'<g id="{name}" style="transform:{places[-1]}">{svg}</g>'
     return drawn, _animated(name, keys, float(time[-1]))
 
@@ -210,15 +190,6 @@ def _animated(name: str, keys: Sequence[tuple[float, str]], end: float) -> str:
         f"#{name}{{animation:{name} {whole:g}s linear infinite}}\n"
         f"@keyframes {name}{{{frames}100%{{{keys[-1][1]}}}}}\n"
     )
-
-
-def _face(run: Result, j: int) -> npt.NDArray[np.float64]:
-    """Where the inner face of a finger is, m."""
-    return np.asarray(run.by_role[f"plant.position[{j}]"], dtype=np.float64)
-
-
-def _x(place: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    return MIDDLE + SCALE * place
 
 
 def _number(value: float, digits: int = 1) -> str:

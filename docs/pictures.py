@@ -12,31 +12,26 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import redirect_stdout
 from functools import partial
 from importlib.resources import files
-from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import tutorials
-from grasp_cosim import cli, hand_system, simulate
+from grasp_cosim import hand_system, simulate
 from grasp_cosim.base.files import write_text
+from grasp_cosim.grasp.presets import with_case
 from grasp_cosim.grasp.published.compared import compared
 from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.pictures import draw_hand as draw_three_fingers
 from grasp_cosim.recording.load import load_run
-from grasp_cosim.recording.result import Result
 from grasp_cosim.report.caption import Caption, about
 from grasp_cosim.report.diagram import Link, diagram_svg
 from grasp_cosim.report.plot import headed, save
 from hand import hand_svg, three_svg
 
 HERE = Path(__file__).parent
-
-GRASP = ("run", "--every", "10")
-"""The grasp of hand.svg and loop.svg."""
 
 THREE: dict[str, str | float] = {
     "plant.shape": "disc",
@@ -45,32 +40,14 @@ THREE: dict[str, str | float] = {
 }
 """The hand of three_fingers.svg and .png: black, white, and a little brighter."""
 
-ENDS = ("from", "to")
-"""Of a connection, in run.json."""
-
-
-def do(*words: str) -> None:
-    """Do a command and keep what it prints to itself; SystemExit where it fails."""
-    with redirect_stdout(StringIO()):
-        code = cli.main(list(words))
-    if code:
-        raise SystemExit(f"grasp-cosim {' '.join(words)}: exit code {code}")
-
-
-def recorded(folder: Path, *words: str) -> Result:
-    """What a command records in a folder."""
-    do(*words, "--out", str(folder))
-    return load_run(folder)
-
 
 def draw_hand(folder: Path) -> None:
     """hand.svg, the beginning of the README: the hand closes without and with layer 3."""
-    with TemporaryDirectory() as kept:
-        rows = [
-            (f"Case {case}: {title}", recorded(Path(kept, case), *GRASP, "--case", case))
-            for case, title in (("1", "without layer 3"), ("2", "with layer 3"))
-        ]
-        write_text(folder / "hand.svg", hand_svg(rows))
+    rows = [
+        (f"Case {case}: {title}", simulate(with_case(grasp_system(), case), every=10))
+        for case, title in ((1, "without layer 3"), (2, "with layer 3"))
+    ]
+    write_text(folder / "hand.svg", hand_svg(rows))
 
 
 def draw_three(folder: Path) -> None:
@@ -85,15 +62,13 @@ def draw_three(folder: Path) -> None:
 
 def draw_loop(folder: Path) -> None:
     """loop.svg: the FMUs of the built-in system and their connections, as `report` draws them."""
-    with TemporaryDirectory() as kept:
-        run = recorded(Path(kept), *GRASP, "--stop", "0.01")
-    ends = [
-        [(component, variable) for component, _, variable in (c[e].partition(".") for e in ENDS)]
-        for c in run.settings["connections"]
+    system = grasp_system(native=False)
+    links = [
+        Link((c.source.component, c.source.variable), (c.target.component, c.target.variable))
+        for c in system.connections
     ]
-    links = [Link(source, target) for source, target in ends]
-    boxes = {name: c["fmu"] for name, c in run.settings["components"].items()}
-    svg = diagram_svg(boxes, links, run.units)
+    boxes = {c.name: c.fmu.name for c in system.components}
+    svg = diagram_svg(boxes, links, simulate(system, stop=0.01).units)
     head, tag, rest = svg.partition("<defs>")
     backing = '<rect width="100%" height="100%" rx="8" fill="var(--paper)"/>'
     head = head.replace("<svg ", '<svg class="diagram" ', 1)
@@ -116,9 +91,10 @@ def draw_report(folder: Path) -> None:
     if browser is None:
         raise SystemExit("chromium is not installed; it takes the picture of the page, report.png")
     with TemporaryDirectory(ignore_cleanup_errors=True) as kept:
-        run = recorded(Path(kept, "grasp"), "run", "--native")
         page = Path(kept, "grasp/report.html")
-        do("report", str(page.parent))
+        tutorials.done("run", "--native", "--out", str(page.parent))
+        tutorials.done("report", str(page.parent))
+        run = load_run(page.parent)
         touches = run.time.searchsorted(max(run.metrics["time_to_contact"]))
         subprocess.run(  # noqa: S603 - the browser of this machine, our own page
             [
@@ -134,7 +110,7 @@ def draw_report(folder: Path) -> None:
 def draw_timing(folder: Path) -> None:
     """timing.png: how a run of this machine kept to the clock, never twice the same."""
     with TemporaryDirectory() as kept:
-        do("run", "--realtime", "--step", "1e-3", "--plot", "--out", kept)
+        tutorials.done("run", "--realtime", "--step", "1e-3", "--plot", "--out", kept)
         shutil.copy(Path(kept, "timing.png"), folder)
 
 
@@ -154,12 +130,6 @@ def draw_map(folder: Path) -> None:
     exec(example.replace('"map.png"', repr(str(folder / "reflectance_map.png"))), {})  # noqa: S102
 
 
-def draw_page(folder: Path, name: str) -> None:
-    """The pictures of a tutorial page, and the page's tables anew."""
-    tutorials.build_blocks()
-    tutorials.update(name, folder)
-
-
 PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "hand": (draw_hand, ["hand.svg"]),
     "three": (draw_three, ["three_fingers.svg", "three_fingers.png"]),
@@ -169,10 +139,10 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "timing": (draw_timing, ["timing.png"]),
     "maps": (draw_map, ["reflectance_map.png"]),
     "limits": (
-        partial(draw_page, name="limits"),
+        partial(tutorials.update, "limits"),
         ["layers.png", "objects.png", "limits.png", "colour.png"],
     ),
-    "your_plant": (partial(draw_page, name="your_plant"), ["your_plant.png"]),
+    "your_plant": (partial(tutorials.update, "your_plant"), ["your_plant.png"]),
 }
 """What draws into a folder, and the files there."""
 

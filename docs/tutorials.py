@@ -1,18 +1,16 @@
 """Does the runs that the tutorial pages list, fills in their tables and draws their pictures.
 
-    .venv/bin/python docs/tutorials.py     # in the folder of the checkout; a minute or two
+    .venv/bin/python docs/pictures.py limits your_plant     # in the folder of the checkout
 
 A table below a command has a row for each value of the word that is its first heading. The other
 headings say what is taken from the run: COLUMNS.
 """
 
 import math
-import os
 import re
 import shlex
-import sys
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
 from functools import cache
 from io import StringIO
 from pathlib import Path
@@ -32,13 +30,13 @@ from grasp_cosim.report.plot import (
     DASHES,
     GREY,
     RED,
+    STYLES,
     finish,
     headed,
     new_figure,
     one_legend,
     save,
 )
-from matplotlib.figure import Figure
 
 HERE = Path(__file__).parent
 
@@ -82,6 +80,14 @@ def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip().strip("|").split("|")]
 
 
+def done(*words: str) -> None:
+    """Do a command and keep what it prints to itself; SystemExit where it fails."""
+    with redirect_stdout(StringIO()):
+        code = cli.main(list(words))
+    if code:
+        raise SystemExit(f"grasp-cosim {shlex.join(words)}: exit code {code}")
+
+
 def recorder(folder: Path) -> Do:
     """Do each line "grasp-cosim run ..." once, in the current folder.
 
@@ -91,26 +97,18 @@ def recorder(folder: Path) -> Do:
     @cache
     def run(*words: str) -> Result:
         out = folder / str(run.cache_info().misses)
-        with redirect_stdout(StringIO()):
-            code = cli.main([*words[1:], "--out", str(out)])
-        if code:
-            raise SystemExit(f"{shlex.join(words)}: exit code {code}")
+        done(*words, "--out", str(out))
         return load_run(out)
 
-    return lambda line: run(*_once(shlex.split(line)))
+    return lambda line: run(*_once(shlex.split(line)[1:]))
 
 
 def _once(words: Sequence[str]) -> list[str]:
-    """The words of a line; a place or option that a row of a table sets goes before the line's."""
-    kept: dict[str, list[str]] = {}
-    for k, word in enumerate(words):
-        if word == "--set":
-            kept[words[k + 1].partition("=")[0]] = [word, words[k + 1]]
-        elif word == "--controller":
-            kept[word] = [word, words[k + 1]]
-        elif k == 0 or words[k - 1] not in ("--set", "--controller"):
-            kept[f"{k} {word}"] = [word]
-    return [word for pair in kept.values() for word in pair]
+    """The words of a line; a place that a row of a table sets goes before the line's."""
+    places = {k: w.partition("=")[0] for k, w in enumerate(words) if words[k - 1] == "--set"}
+    last = {place: k for k, place in places.items()}
+    gone = {k for k, place in places.items() if k != last[place]}
+    return [word for k, word in enumerate(words) if not {k, k + 1} & gone]
 
 
 # Columns
@@ -217,145 +215,27 @@ COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float] | None]
 
 _CASES = {"Case 0": ("-.", GREY), "Case 1": ("--", RED), "Case 2": ("-", BLUE)}
 _LAYERS = {"0": "force alone", "1": "+ impact reduction", "2": "+ simultaneous contact"}
-_STYLES = ("-", "--", "-.", ":")
 
 
-def draw_pictures(tables: Sequence[Runs], folder: Path) -> None:
-    """All pictures of limits.md."""
-    cases, box, tall, cup, reflectances, carried, laws, _, converter, _, friction, *_ = tables
-    draw_layers(cases, folder)
-    draw_objects(_plain(box), _plain(tall), _plain(cup), folder)
-    each = (reflectances, carried, converter, friction)
-    draw_limits([_plain(runs) for runs in each], folder)
-    draw_colour(_plain(laws), folder)
-
-
-def draw_layers(cases: Runs, folder: Path) -> None:
-    """layers.png, the cases at a fixed object."""
-    figure = new_figure(9.0, 7.0)
-    rows = figure.subplots(3, 3, sharex=True, sharey="row")
-    for case, column in zip("012", rows.T, strict=True):
-        run = cases[f"--case {case}"]
-        gaps, forces, target = column
-        for j in FINGERS:
-            gap = 1e3 * run.signals[f"plant.gap[{j}]"]
-            gaps.plot(run.time, gap, DASHES[j], color=COLOR[j], label=f"finger {j}")
-        finish(gaps, "gap in mm", legend=False)
-        draw_contact_forces(forces, run)
-        draw_targets(target, [(run, "-", "")])
-        gaps.set_title(f"Case {case}: {_LAYERS[case]}", fontsize=10)
-        target.set_xlabel("time in s")
-    for axes in rows[:, 1:].flat:
-        axes.set_ylabel("")
-    rows[1, 0].set_ylim(-0.2, 6.0)
-    rows[2, 0].set_ylim(-5.0, 45.0)
-    rows[2, 0].set_xlim(0.0, 3.0)
-    one_legend(figure)
-    _saved(figure, folder / "layers.png", "What each layer does, object fixed at 30 mm")
-
-
-def draw_objects(box: Runs, tall: Runs, cup: Runs, folder: Path) -> None:
-    """objects.png, the cases at two boxes and a cup."""
-    figure = new_figure(9.0, 3.4)
-    left, middle, right = figure.subplots(1, 3)
-    _over_time(left, box, "plant.object_position", 1e3, "Case {}")
-    _label(left, "time in s", "position of the box in mm", "light box", legend=False)
-    _over_time(middle, tall, "plant.tilt", math.degrees(1.0), "Case {}")
-    middle.axhline(-math.degrees(math.atan2(0.07, 0.1)), color="black", ls=":", label="balance")
-    _label(middle, "time in s", "tilt of the box in °", "tall box, rough floor", legend=False)
-    _over_time(right, cup, "plant.squeeze", 1e3, "Case {}")
-    right.axhline(8.0, color="black", ls=":", label="damaged above")
-    _label(right, "time in s", "squeeze of the cup in mm", "soft cup", legend=False)
-    one_legend(figure)
-    _saved(figure, folder / "objects.png", "What each layer does to objects that move or give")
-
-
-def _saved(figure: Figure, path: Path, title: str) -> None:
-    """Save a picture under its title, the date and the version."""
+@contextmanager
+def _picture(
+    path: Path, title: str, width: float, height: float, *grid: int, **shared: Any
+) -> Iterator[Any]:
+    """A grid of axes, saved as a picture under its title, the date and the version."""
+    figure = new_figure(width, height)
+    yield figure.subplots(*grid, squeeze=False, **shared)
     headed(figure, Caption(title, about(None)))
     save(figure, path)
 
 
-def _over_time(axes: Any, runs: Runs, name: str, factor: float, label: str) -> None:
-    """A signal of all runs; the label has {} in the place of the value in the first column."""
-    for plain, (value, run) in zip(_STYLES, runs.items(), strict=False):
-        named = label.format(value)
-        style, colour = _CASES.get(named, (plain, BLUE))
-        axes.plot(run.time, factor * run.signals[name], style, color=colour, label=named)
-
-
-def _label(axes: Any, x: str, y: str, title: str = "", *, legend: bool = True) -> None:
-    axes.set_xlabel(x)
-    axes.set_title(title, fontsize=10)
-    finish(axes, y, legend)
-
-
 def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
-    """limits.png: unequal reflectances, fixed and free; a converter too small; friction."""
-    reflectances, carried, converter, friction = tables
-    figure = new_figure(9.0, 7.0)
-    (top_left, top_right), (bottom_left, bottom_right) = figure.subplots(2, 2)
-    ratios = [float(ratio) for ratio in reflectances]
-    top_left.plot(ratios, [1e3 * gap_behind(r) for r in reflectances.values()], "o", color=BLUE)
-    curve = np.geomspace(0.5, 2.0, 101)
-    top_left.plot(curve, [1e3 * gap_at_equal_intensity(r) for r in curve], color=GREY)
-    top_left.legend(["simulated", "Eq. (9), equal intensities"], fontsize=8)
-    _label(
-        top_left,
-        "reflectance of the right face / left face",
-        "gap of the second finger\nat the first contact in mm",
-        "unequal reflectances, fixed object",
-        legend=False,
-    )
-    _over_time(top_right, carried, "plant.object_position", 1e3, "{} kg")
-    _label(
-        top_right, "time in s", "position of the object in mm", "reflectances 0.86 / 1, free object"
-    )
-    for style, (volts, run) in zip(_STYLES, converter.items(), strict=False):
-        speed = 1e3 * CLOSING[1] * run.signals["plant.velocity[1]"]
-        free = ~run.signals["plant.contact[1]"].astype(bool) & (speed > 0.0)
-        free &= np.cumsum(~free & (run.time > 1.0)) == 0
-        gap = 1e3 * run.signals["plant.gap[1]"][free]
-        bottom_left.plot(gap, speed[free], style, color=BLUE, label=f"converter up to {volts} V")
-    bottom_left.set_xlim(20.0, 0.0)
-    bottom_left.set_ylim(0.0, 80.0)
-    _label(
-        bottom_left,
-        "gap of finger 1 in mm",
-        "closing speed in mm/s",
-        "sensor saturated near the surface",
-    )
-    _over_time(bottom_right, friction, "plant.gap[1]", 1e3, "{} N")
-    bottom_right.set_ylim(-1.0, 30.0)
-    bottom_right.set_xlim(0.0, 8.0)
-    _label(bottom_right, "time in s", "gap of finger 1 in mm", "Coulomb friction of the fingers")
-    _saved(figure, folder / "limits.png", "Where the method fails")
-
-
-def draw_colour(laws: Runs, folder: Path) -> None:
-    """colour.png: black on the right and white on the left, under both laws."""
-    figure = new_figure(9.0, 4.8)
-    rows = figure.subplots(2, 2, sharex=True, sharey="row")
-    for (law, run), column in zip(laws.items(), rows.T, strict=True):
-        gaps, forces = column
-        for j, style in DASHES.items():
-            face = "black" if j == 1 else "white"
-            label = f"finger {j}, {face} face"
-            gap = 1e3 * run.signals[f"plant.gap[{j}]"]
-            force = abs(run.signals[f"plant.contact_force[{j}]"])
-            gaps.plot(run.time, gap, style, color=COLOR[j], label=label)
-            forces.plot(run.time, force, style, color=COLOR[j], label=label)
-        finish(gaps, "gap in mm", legend=False)
-        finish(forces, "contact force in N", legend=False)
-        apart = run.metrics["time_difference"]
-        gaps.set_title(f"black and white, {law} law: {apart:.2f} s apart", fontsize=10)
-        forces.set_xlabel("time in s")
-    for axes in rows[:, 1]:
-        axes.set_ylabel("")
-    rows[0, 0].set_ylim(-0.5, 20.0)
-    rows[1, 0].set_xlim(0.5, 4.0)
-    one_legend(figure)
-    _saved(figure, folder / "colour.png", "Black and white faces under both laws")
+    """All pictures of limits.md."""
+    cases, box, tall, cup, reflectances, carried, laws, _, converter, _, friction, *_ = tables
+    draw_layers(cases, folder / "layers.png")
+    draw_objects(_plain(box), _plain(tall), _plain(cup), folder / "objects.png")
+    each = (reflectances, carried, converter, friction)
+    draw_failures([_plain(runs) for runs in each], folder / "limits.png")
+    draw_colour(_plain(laws), folder / "colour.png")
 
 
 def _plain(runs: Runs) -> Runs:
@@ -363,21 +243,128 @@ def _plain(runs: Runs) -> Runs:
     return {value: run for value, run in runs.items() if " " not in value}
 
 
+def _in_columns(rows: Any) -> None:
+    """Label the values on the left and the time below, with one legend of all."""
+    for axes in rows[:, 1:].flat:
+        axes.set_ylabel("")
+    for axes in rows[-1]:
+        axes.set_xlabel("time in s")
+    one_legend(rows[0, 0].figure)
+
+
+def draw_layers(cases: Runs, path: Path) -> None:
+    """The cases at a fixed object."""
+    title, shared = "What each layer does, object fixed at 30 mm", {"sharex": True, "sharey": "row"}
+    with _picture(path, title, 9.0, 7.0, 3, 3, **shared) as rows:
+        for (case, layer), (gaps, forces, target) in zip(_LAYERS.items(), rows.T, strict=True):
+            run = cases[f"--case {case}"]
+            for j in FINGERS:
+                gap = 1e3 * run.signals[f"plant.gap[{j}]"]
+                gaps.plot(run.time, gap, DASHES[j], color=COLOR[j], label=f"finger {j}")
+            finish(gaps, "gap in mm", legend=False)
+            draw_contact_forces(forces, run)
+            draw_targets(target, [(run, "-", "")])
+            gaps.set_title(f"Case {case}: {layer}", fontsize=10)
+        _in_columns(rows)
+        rows[1, 0].set_ylim(-0.2, 6.0)
+        rows[2, 0].set_ylim(-5.0, 45.0)
+        rows[2, 0].set_xlim(0.0, 3.0)
+
+
+def draw_objects(box: Runs, tall: Runs, cup: Runs, path: Path) -> None:
+    """The cases at two boxes and a cup."""
+    title = "What each layer does to objects that move or give"
+    with _picture(path, title, 9.0, 3.4, 1, 3) as ((left, middle, right),):
+        left.set_title("light box", fontsize=10)
+        middle.set_title("tall box, rough floor", fontsize=10)
+        right.set_title("soft cup", fontsize=10)
+        y = "position of the box in mm"
+        _over_time(left, box, "plant.object_position", 1e3, "Case {}", y)
+        degrees = math.degrees(1.0)
+        _over_time(middle, tall, "plant.tilt", degrees, "Case {}", "tilt of the box in °")
+        middle.axhline(-degrees * math.atan2(0.07, 0.1), color="black", ls=":", label="balance")
+        _over_time(right, cup, "plant.squeeze", 1e3, "Case {}", "squeeze of the cup in mm")
+        right.axhline(8.0, color="black", ls=":", label="damaged above")
+        one_legend(left.figure)
+
+
+def _over_time(
+    axes: Any, runs: Runs, name: str, factor: float, label: str, y: str, *, legend: bool = False
+) -> None:
+    """A signal of all runs; the label has {} in the place of the value in the first column."""
+    for plain, (value, run) in zip(STYLES, runs.items(), strict=False):
+        named = label.format(value)
+        style, colour = _CASES.get(named, (plain, BLUE))
+        axes.plot(run.time, factor * run.signals[name], style, color=colour, label=named)
+    axes.set_xlabel("time in s")
+    finish(axes, y, legend)
+
+
+def draw_failures(tables: Sequence[Runs], path: Path) -> None:
+    """Unequal reflectances, fixed and free; a converter too small; friction."""
+    reflectances, carried, converter, friction = tables
+    with _picture(path, "Where the method fails", 9.0, 7.0, 2, 2) as ((fixed, free), (near, held)):
+        ratios = [float(ratio) for ratio in reflectances]
+        fixed.plot(ratios, [1e3 * gap_behind(r) for r in reflectances.values()], "o", color=BLUE)
+        curve = np.geomspace(0.5, 2.0, 101)
+        fixed.plot(curve, [1e3 * gap_at_equal_intensity(r) for r in curve], color=GREY)
+        fixed.set_title("unequal reflectances, fixed object", fontsize=10)
+        fixed.set_xlabel("reflectance of the right face / left face")
+        finish(fixed, "gap of the second finger\nat the first contact in mm", legend=False)
+        fixed.legend(["simulated", "Eq. (9), equal intensities"], fontsize=8)
+        free.set_title("reflectances 0.86 / 1, free object", fontsize=10)
+        y = "position of the object in mm"
+        _over_time(free, carried, "plant.object_position", 1e3, "{} kg", y, legend=True)
+        for style, (volts, run) in zip(STYLES, converter.items(), strict=False):
+            speed = 1e3 * CLOSING[1] * run.signals["plant.velocity[1]"]
+            before = ~run.signals["plant.contact[1]"].astype(bool) & (speed > 0.0)
+            before &= np.cumsum(~before & (run.time > 1.0)) == 0
+            gap = 1e3 * run.signals["plant.gap[1]"][before]
+            near.plot(gap, speed[before], style, color=BLUE, label=f"converter up to {volts} V")
+        near.set_title("sensor saturated near the surface", fontsize=10)
+        near.set_xlim(20.0, 0.0)
+        near.set_ylim(0.0, 80.0)
+        near.set_xlabel("gap of finger 1 in mm")
+        finish(near, "closing speed in mm/s")
+        held.set_title("Coulomb friction of the fingers", fontsize=10)
+        held.set_ylim(-1.0, 30.0)
+        held.set_xlim(0.0, 8.0)
+        _over_time(
+            held, friction, "plant.gap[1]", 1e3, "{} N", "gap of finger 1 in mm", legend=True
+        )
+
+
+def draw_colour(laws: Runs, path: Path) -> None:
+    """Black on the right and white on the left, under both laws."""
+    title, shared = "Black and white faces under both laws", {"sharex": True, "sharey": "row"}
+    with _picture(path, title, 9.0, 4.8, 2, 2, **shared) as rows:
+        for (law, run), (gaps, forces) in zip(laws.items(), rows.T, strict=True):
+            for j, face in zip(FINGERS, ("black", "white"), strict=True):
+                how = {"color": COLOR[j], "label": f"finger {j}, {face} face"}
+                gap = 1e3 * run.signals[f"plant.gap[{j}]"]
+                force = abs(run.signals[f"plant.contact_force[{j}]"])
+                gaps.plot(run.time, gap, DASHES[j], **how)
+                forces.plot(run.time, force, DASHES[j], **how)
+            finish(gaps, "gap in mm", legend=False)
+            finish(forces, "contact force in N", legend=False)
+            apart = run.metrics["time_difference"]
+            gaps.set_title(f"black and white, {law} law: {apart:.2f} s apart", fontsize=10)
+        _in_columns(rows)
+        rows[0, 0].set_ylim(-0.5, 20.0)
+        rows[1, 0].set_xlim(0.5, 4.0)
+
+
 def draw_your_plant(tables: Sequence[Runs], folder: Path) -> None:
     """your_plant.png: the object on a spring, Cases 1 and 2."""
-    cases = _plain(tables[0])
-    figure = new_figure(7.2, 3.2)
-    axes = figure.subplots()
-    _over_time(axes, cases, "plant.object_position", 1e3, "Case {}")
-    _label(axes, "time in s", "position of the object in mm")
-    _saved(figure, folder / "your_plant.png", "The object on a spring")
+    with _picture(folder / "your_plant.png", "The object on a spring", 7.2, 3.2) as ((axes,),):
+        place, y = "plant.object_position", "position of the object in mm"
+        _over_time(axes, _plain(tables[0]), place, 1e3, "Case {}", y, legend=True)
 
 
 PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
-    "limits": draw_pictures,
+    "limits": draw_limits,
     "your_plant": draw_your_plant,
 }
-
 
 BLOCKS = ("spring_plant.py", "moving_object.py")
 """What the pages build before they run it."""
@@ -385,27 +372,10 @@ BLOCKS = ("spring_plant.py", "moving_object.py")
 
 def update(name: str, pictures: Path) -> None:
     """Work out a page anew, and draw its pictures into a folder."""
+    for block in BLOCKS:
+        done("build", str(HERE / block))
     with TemporaryDirectory() as folder:
         page = HERE / f"{name}.md"
         text, tables = worked_out(page.read_text("utf-8"), recorder(Path(folder)))
         write_text(page, text)
         PAGES[name](tables, pictures)
-
-
-def main() -> None:
-    """Update the pages and their pictures."""
-    os.environ["SOURCE_DATE_EPOCH"] = DATE
-    build_blocks()
-    for name in PAGES:
-        update(name, HERE)
-
-
-def build_blocks() -> None:
-    """Build what the pages run; SystemExit where that fails."""
-    for block in BLOCKS:
-        if code := cli.main(["build", str(HERE / block)]):
-            sys.exit(code)
-
-
-if __name__ == "__main__":
-    main()

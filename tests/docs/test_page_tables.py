@@ -36,12 +36,12 @@ def checked(name, checkout):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", tutorials.DATE)
         found, tables = tutorials.worked_out(text, tutorials.recorder(checkout / "recorded"))
-        assert found == text, "run: docs/tutorials.py"
+        assert found == text, "run: docs/pictures.py"
         tutorials.PAGES[name](tables, drawn)
     pictures = sorted(p.name for p in drawn.iterdir())
     assert sorted(set(re.findall(r"!\[.*?\]\((.*?)\)", text))) == pictures
     for picture in pictures:
-        assert_same_picture(drawn / picture, DOCS / picture, "docs/tutorials.py")
+        assert_same_picture(drawn / picture, DOCS / picture, "docs/pictures.py")
     return tables
 
 

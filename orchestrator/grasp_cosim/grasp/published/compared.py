@@ -1,13 +1,13 @@
 """The published figures beside ours: the grasps of all their settings, and the deviations.
 
 One way for both sources, the simulation and the experiments on the bench preset; what differs is in
-SOURCES. What claims ask of the grasps is here as well.
+SOURCES.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.interruption import interrupts
 from ...base.parallel import run_all
+from ...interface.interface import Value
 from ...master.simulation import simulate
 from ...metrics.metric import resolved
 from ...recording.result import Result
@@ -49,6 +50,9 @@ def close(system: System, after: float | None = None) -> Result:
 
 SENSOR_CONTACT = 0.37e-3
 """m; the gap at which contact, were it declared there, would explain the published times best."""
+
+AT_SENSOR_CONTACT = "_at_0.37_mm"
+"""Behind the name of a figure that is of a contact declared there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,23 +113,6 @@ def _touch_force(result: Result, finger: int) -> float:
     return float(np.abs(result.by_role[f"plant.contact_force[{finger}]"][near]).max())
 
 
-def off_centre(runs: Runs) -> list[Setting]:
-    """The settings in which the object is not in the middle of the fingers."""
-    return sorted({setting for setting, _ in runs if setting.x_m})
-
-
-def balances(runs: Runs, setting: Setting) -> bool:
-    """True if Case 2 makes the nearer finger, the first, later and the farther one earlier."""
-    (near_1, far_1), (near_2, far_2) = (runs[setting, case].times for case in (1, 2))
-    return near_2 > near_1 and far_2 < far_1
-
-
-def settled_force(system: System) -> float:
-    """K_i·W/2 in N, with which a finger presses in the end where friction does not hold it."""
-    stiffness = start_in_si(system, "controller.contact_force.stiffness")
-    return 0.5 * stiffness * start_in_si(system, "plant.object_width")
-
-
 class Evidence(NamedTuple):
     """The grasps, the published figures, the rows of the report with both, and their deviations."""
 
@@ -139,8 +126,7 @@ class Evidence(NamedTuple):
 Job = tuple[System, Setting, int, Source]
 
 
-@dataclass(frozen=True, slots=True)
-class How:
+class How(NamedTuple):
     """How the figures of one source are run again.
 
     A grasp lasts `stop` s, or ends `after` s once both fingers touch; pictures end at `shown` s.
@@ -150,8 +136,14 @@ class How:
     stop: float
     after: float | None
     shown: float
-    deviations: Callable[[Sequence[Row], Sequence[Mapping[str, Any]]], dict[str, float]]
-    at_sensor_contact: bool
+
+
+SOURCES: Mapping[Source, How] = {
+    # The slowest contact is at 2.7 s, and the layers settle with a time constant of 0.2 s.
+    "simulation": How("Published simulation", 4.5, None, 3.0),
+    # Twice the slowest published contact; a grasp goes on for 1.5 s once both fingers touch.
+    "experiment": How("Published experiments", 10.0, 1.5, 5.0),
+}
 
 
 def compared(system: System, source: Source, workers: int, progress: bool) -> Evidence:
@@ -159,84 +151,59 @@ def compared(system: System, source: Source, workers: int, progress: bool) -> Ev
 
     InputError where a finger does not reach the object, KeyboardInterrupt at Ctrl-C.
     """
-    how, published = SOURCES[source], published_rows(source)
+    published = published_rows(source)
     settings = sorted({row.setting for row in published})
     jobs = [(system, setting, case, source) for setting in settings for case in CASES]
     found = run_all(_run, jobs, workers, progress, "evaluate")
     runs = {(run.setting, run.case): run for run in found}
-    rows = [_compared(row, runs, how.at_sensor_contact) for row in published]
-    return Evidence(runs, published, rows, how.deviations(published, rows), system)
+    rows = [_compared(row, runs[row.setting, row.case], source) for row in published]
+    return Evidence(runs, published, rows, deviations(published, rows), system)
 
 
 def _run(job: Job) -> Run:
     """One grasp; the reflectances of a setting are shares of those of the system."""
     system, setting, case, source = job
-    values = {
-        "plant.initial_object_position": setting.x_m,
-        "sensor_1.reflectance": setting.alpha_1 * start_in_si(system, "sensor_1.reflectance"),
-        "sensor_2.reflectance": setting.alpha_2 * start_in_si(system, "sensor_2.reflectance"),
-    }
+    x_m, *shares = setting
+    values: dict[str, Value] = {"plant.initial_object_position": x_m}
+    for j, share in zip(FINGERS, shares, strict=True):
+        name = f"sensor_{j}.reflectance"
+        values[name] = share * start_in_si(system, name)
     how = SOURCES[source]
     chosen = with_si_values(with_case(system, case), values, "evaluate:")
-    chosen = chosen.with_experiment(stop=how.stop)
-    return as_run(close(chosen, how.after), setting, case)
+    return as_run(close(chosen.with_experiment(stop=how.stop), how.after), setting, case)
 
 
-def _compared(row: Row, runs: Runs, at_sensor_contact: bool) -> dict[str, Any]:
+def _compared(row: Row, run: Run, source: Source) -> dict[str, Any]:
     """The published figure with ours beside it and the difference, simulated less published."""
-    run = runs[row.setting, row.case]
-    simulated = run.apart if row.finger is None else run.times[row.finger - 1]
-    found = {
-        **row._asdict(),
-        "simulated": simulated,
-        "difference": simulated - row.published,
-    }
-    del found["setting"]
-    if at_sensor_contact:
-        first, second = run.times_at_sensor_contact
-        ours = abs(second - first) if row.finger is None else (first, second)[row.finger - 1]
-        found["simulated_at_0.37_mm"] = ours
-        found["difference_at_0.37_mm"] = ours - row.published
+    found = {k: value for k, value in row._asdict().items() if k != "setting"}
+    for suffix, times in (("", run.times), (AT_SENSOR_CONTACT, run.times_at_sensor_contact)):
+        if not suffix or source == "simulation":
+            ours = abs(times[1] - times[0]) if row.finger is None else times[row.finger - 1]
+            found[f"simulated{suffix}"] = ours
+            found[f"difference{suffix}"] = ours - row.published
     return found
 
 
-def _rms(values: Sequence[float]) -> float:
-    return math.sqrt(math.fsum(v * v for v in values) / len(values))
-
-
-def simulation_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Root mean square of the differences in s, contact times and time differences apart."""
-    return {
-        f"{what}{suffix}": _rms([r[key] for r in chosen])
-        for what, chosen in (
-            ("contact_times", [r for r in rows if r["finger"]]),
-            ("time_differences", [r for r in rows if not r["finger"]]),
-        )
-        for suffix, key in (("", "difference"), ("_at_0.37_mm", "difference_at_0.37_mm"))
-    }
-
-
-def bench_rms(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Root mean square of the differences in s: contact times by table, then time differences.
+def deviations(published: Sequence[Row], rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Root mean square of the differences in s by name, contact times and time differences apart.
 
     "contact_times" are those of the position rows and of equal colours; white on both sides,
-    which is the position row of 0.03 m again, counts once.
+    which is the position row of 0.03 m again, counts once. Of a source with colours there are
+    those of each table, too.
     """
+    colours = any(row.table == "reflectance" for row in published)
     groups: dict[str, list[float]] = {}
     for row, ours in zip(published, rows, strict=True):
-        name = "time_differences"
-        if row.finger is not None:
-            alike = "positions" if row.table == "position" else "equal_colours"
-            name = alike if row.setting.equal_colours else "mixed_colours"
-        groups.setdefault(name, []).append(ours["difference"])
-        if name in ("positions", "equal_colours") and row.condition != "white/white":
-            groups.setdefault("contact_times", []).append(ours["difference"])
-    return {name: _rms(values) for name, values in sorted(groups.items())}
-
-
-SOURCES: Mapping[Source, How] = {
-    # The slowest contact is at 2.7 s, and the layers settle with a time constant of 0.2 s.
-    "simulation": How("Published simulation", 4.5, None, 3.0, simulation_rms, True),
-    # Twice the slowest published contact; a grasp goes on for 1.5 s once both fingers touch.
-    "experiment": How("Published experiments", 10.0, 1.5, 5.0, bench_rms, False),
-}
+        alike = "positions" if row.table == "position" else "equal_colours"
+        names = [alike if row.setting.equal_colours else "mixed_colours"] * colours
+        if row.setting.equal_colours and row.condition != "white/white":
+            names.append("contact_times")
+        for name in names if row.finger else ["time_differences"]:
+            for suffix in ("", AT_SENSOR_CONTACT):
+                if f"difference{suffix}" in ours:
+                    groups.setdefault(name + suffix, []).append(ours[f"difference{suffix}"])
+    # correctly rounded sums: sum() of Python 3.12 and later is not that of 3.11
+    return {
+        name: math.sqrt(math.fsum(v * v for v in values) / len(values))
+        for name, values in sorted(groups.items())
+    }

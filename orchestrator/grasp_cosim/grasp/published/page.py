@@ -12,13 +12,12 @@ from ...report.caption import about
 from ...report.page import page_style
 from ...report.plot import as_svg, new_figure, one_legend
 from ...report.tables import table
-from ...system.description import System
 from ...system.parts import NANOSECONDS
 from ...system.settings import changed
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES
 from ..system import controller_name
-from .compared import SOURCES, Evidence
+from .compared import AT_SENSOR_CONTACT, SOURCES, Evidence
 from .tables import REFLECTANCE_X_M, Source
 
 if TYPE_CHECKING:
@@ -85,39 +84,32 @@ METRICS = (
 
 def evaluation_html(evidence: Evidence, claims: Sequence[Mapping[str, Any]], source: Source) -> str:
     """Return the page as text."""
-    system, pictures = evidence.system, figures(evidence, source)
-    times, *others = (_picture(title.capitalize(), figure) for title, figure in pictures.values())
-    tables = dict.fromkeys(row["table"] for row in evidence.rows)
-    sections = [
-        _section("Claims of the paper", _claims(claims)),
-        _section("Deviations", _deviations(evidence.rms) + f'<p class="hint">{NOTES[source]}</p>'),
-        times,
-        *(_section(TABLES[name], _published(evidence.rows, name)) for name in tables),
-        *others,
-        _section("Every grasp", _grasps(evidence)),
-    ]
+    system, rows = evidence.system, evidence.rows
+    pictures = {
+        title.capitalize(): f'<div class="scroll"><div class="chart" role="img" '
+        f'aria-label="{title.capitalize()}">{as_svg(figure)}</div></div>'
+        for title, figure in figures(evidence, source).values()
+    }
+    times = next(iter(pictures))
+    sections = {
+        "Claims of the paper": _claims(claims),
+        "Deviations": _deviations(evidence.rms) + f'<p class="hint">{NOTES[source]}</p>',
+        times: pictures[times],
+        **{TABLES[name]: _published(rows, name) for name in (row["table"] for row in rows)},
+        **pictures,
+        "Every grasp": _grasps(evidence),
+    }
+    controller = system.component(controller_name(system), system.name).fmu.stem
     step = 1e3 * system.step_ns / NANOSECONDS
     return PAGE.substitute(
-        title=f"{SOURCES[source].title}, {escape(controller_fmu(system))}",
+        title=f"{SOURCES[source].title}, {escape(controller)}",
         style=page_style(),
         summary=f"{INTRODUCTION[source]} Steps of {step:g} ms, {system.scheme}.",
         about=escape(about(changed(system))),
-        sections="\n".join(sections),
+        sections="\n".join(
+            f"<section>\n<h2>{title}</h2>\n{html}\n</section>" for title, html in sections.items()
+        ),
     )
-
-
-def controller_fmu(system: System) -> str:
-    """Return the name of the controller's FMU."""
-    return system.component(controller_name(system), system.name).fmu.stem
-
-
-def _section(title: str, html: str) -> str:
-    return f"<section>\n<h2>{title}</h2>\n{html}\n</section>"
-
-
-def _picture(title: str, figure: Figure) -> str:
-    chart = f'<div class="chart" role="img" aria-label="{title}">{as_svg(figure)}</div>'
-    return _section(title, f'<div class="scroll">{chart}</div>')
 
 
 def _claims(claims: Sequence[Mapping[str, Any]]) -> str:
@@ -126,51 +118,46 @@ def _claims(claims: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _deviations(rms: Mapping[str, float]) -> str:
-    """The root mean squares; of a name with _at_0.37_mm in a column beside that without."""
-    near = "_at_0.37_mm"
-    more = any(name.endswith(near) for name in rms)
-    heads = ["root mean square of simulated less published, s", ""] + ["at 0.37 mm"] * more
-    names = [name for name in rms if not name.endswith(near)]
-    return table(
-        _heads(heads),
-        [
-            _cells([name.replace("_", " ")], [rms[name], *([rms[name + near]] if more else [])])
-            for name in names
-        ],
-    )
+    """The root mean squares; those of contacts declared at 0.37 mm in a column of their own."""
+    names = [name for name in rms if not name.endswith(AT_SENSOR_CONTACT)]
+    keys = ["", AT_SENSOR_CONTACT] if len(names) < len(rms) else [""]
+    heads = ["root mean square of simulated less published, s", "", "at 0.37 mm"]
+    cells = (_cells([n.replace("_", " ")], [_text(rms[n + key], 3) for key in keys]) for n in names)
+    return table(_heads(heads[: 1 + len(keys)]), cells)
 
 
 def _published(rows: Sequence[Mapping[str, Any]], name: str) -> str:
     """A row per grasp: published, simulated and their difference, of both fingers and between."""
-    grasps: dict[tuple[Any, int], list[Mapping[str, Any]]] = {}
-    for row in rows:
-        if row["table"] == name:
-            grasps.setdefault((row["condition"], row["case"]), []).append(row)
     names = ("finger 1", "finger 2", "apart")
     heads = [f"{n}<br>{what}" for n in names for what in ("published", "simulated", "difference")]
-    lines = []
-    for (condition, case), figures in grasps.items():
-        texts = (
-            (f"{f['published']:.2f}", _text(f["simulated"], 3), _text(f["difference"], 3, "+"))
-            for f in figures
-        )
-        where = f"{1e3 * condition:.0f} mm" if isinstance(condition, float) else condition
-        lines.append(_cells([where, f"Case {case}"], [text for three in texts for text in three]))
-    return table(_heads(["object", "times in s", *heads], texts=2), lines)
+    lines: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if row["table"] == name:
+            at = row["condition"]
+            where = f"{1e3 * at:.0f} mm" if isinstance(at, float) else at
+            lines.setdefault((where, f"Case {row['case']}"), []).extend(
+                (
+                    f"{row['published']:.2f}",
+                    _text(row["simulated"], 3),
+                    _text(row["difference"], 3, "+"),
+                )
+            )
+    rows_html = (_cells(*line) for line in lines.items())
+    return table(_heads(["object", "times in s", *heads], texts=2), rows_html)
 
 
 def _grasps(evidence: Evidence) -> str:
     heads = ["object", "", *(heading for heading, *_ in METRICS), "target at the end in mm"]
     lines = []
     for run in evidence.runs.values():
-        pairs = (
+        numbers = [
             " / ".join(_text(factor * value, decimals) for value in run.metrics[name])
             for _, name, factor, decimals in METRICS
-        )
+        ]
         target = _text(1e3 * run.metrics["target_position"], 1)
         x_m, alpha_1, alpha_2 = run.setting
         faces = "" if alpha_1 == alpha_2 == 1.0 else f", {alpha_1:.2f} / {alpha_2:.2f}"
-        lines.append(_cells([f"{1e3 * x_m:.0f} mm{faces}", f"Case {run.case}"], [*pairs, target]))
+        lines.append(_cells([f"{1e3 * x_m:.0f} mm{faces}", f"Case {run.case}"], [*numbers, target]))
     return table(_heads(heads, texts=2), lines)
 
 
@@ -179,11 +166,10 @@ def _heads(names: Sequence[str], texts: int = 1) -> str:
     return "".join(f"<th{kind}>{name}</th>" for kind, name in zip(kinds, names, strict=True))
 
 
-def _cells(texts: Iterable[str], numbers: Iterable[str | float]) -> str:
-    """The cells of a row: texts, then numbers, those that are no text yet with 3 decimals."""
-    shown = (n if isinstance(n, str) else _text(n, 3) for n in numbers)
+def _cells(texts: Iterable[str], numbers: Iterable[str]) -> str:
+    """The cells of a row."""
     return "".join(
-        [*(f"<td>{escape(t)}</td>" for t in texts), *(f'<td class="n">{n}</td>' for n in shown)]
+        [*(f"<td>{escape(t)}</td>" for t in texts), *(f'<td class="n">{n}</td>' for n in numbers)]
     )
 
 
