@@ -49,14 +49,7 @@ def boxes(draw):
     return q, Box(draw(st.floats(-0.1, 0.1)), tilt, draw(st.floats(-0.5, 0.5)), w)
 
 
-PUSHES = st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0))
 STEPS = st.floats(1e-5, 5e-4)
-
-
-def test_a_box_that_slides_stops_after_its_stopping_distance():
-    box = after(UPRIGHT, Box(0.02, 0.0, -0.4, 0.0), NOTHING, 1e-2, 20)
-    assert box.x == pytest.approx(0.02 - 0.4**2 / (2.0 * 0.3 * GRAVITY), rel=1e-12)
-    assert (box.v, box.tilt, box.w) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -176,17 +169,6 @@ def test_the_faces_at_the_height_of_the_fingertips():
         assert faces(q, Box(0.0, tilt, 0.0, 0.0)) == pytest.approx(tuple(found), rel=1e-12)
         middle = turned(0.0, q.a)
         assert centre(q, Box(0.0, tilt, 0.0, 0.0)) == pytest.approx(middle[0], abs=1e-15)
-
-
-@QUICK
-@given(boxes(), PUSHES, STEPS)
-def test_the_mirrored_box_does_exactly_the_mirrored_thing(start, push, d):
-    q, box = start
-    image = Box(*(-value for value in box))
-    for _ in range(20):
-        box = advance(q, box, Pushes(*push), d)
-        image = advance(q, image, Pushes(*push[::-1]), d)
-        assert image == Box(*(-value for value in box))
 
 
 @QUICK
