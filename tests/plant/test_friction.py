@@ -48,12 +48,6 @@ def test_a_block_that_is_pushed_back_stops_turns_and_goes():
 
 
 @QUICK
-@given(MASSES, st.floats(-0.7, 0.7), STEPS)
-def test_at_rest_below_breakaway_nothing_moves_at_all(m, f, d):
-    assert run(0.123, 0.0, m, f, STRIBECK, d, 10) == (0.123, 0.0)
-
-
-@QUICK
 @given(MASSES, SPEEDS, st.floats(-5.0, 5.0), STEPS)
 def test_friction_never_gives_energy(m, v, f, d):
     x, rate = move(0.0, v, m, f, STRIBECK, d)
