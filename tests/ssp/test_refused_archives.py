@@ -78,7 +78,9 @@ STRUCTURES = {
     "another root": ssd("<a/>"),
     "too long a name": ssd(structure(system("x" * 11_000_000, ELEMENT))),
     "too deep": ssd(SSD.replace("<ssd:Elements>", "<ssd:Elements>" + "<a>" * 20_000)),
-    "deeper than the stack": ssd(structure(TOP, annotations=OURS)),
+    "deeper than the stack": ssd(
+        structure(TOP, f'<ssd:DefaultExperiment stopTime="1">{OURS}</ssd:DefaultExperiment>')
+    ),
     "two lists": ssd(SSD.replace("<ssd:Elements>", f"{LISTS}<ssd:Elements>")),
     "a prefix for no namespace": ssd(SSD.replace("ssd:Elements", "ssx:Elements")),
     "no components": of('<ssd:System name="top"/>', a=A),

@@ -22,11 +22,9 @@ from grasp_cosim.system.parts import (
     Initialisation,
     Port,
 )
-from lxml import etree  # type: ignore[import-untyped]
 from ssp.hand_made import (
     archive,
     bind,
-    changed,
     component,
     connect,
     fmu,
@@ -176,24 +174,6 @@ def test_the_texts_of_an_archive(tmp_path, snapshot):
     before = (tmp_path / "again.ssp").read_bytes()
     write_ssp(original, tmp_path / "again.ssp")
     assert (tmp_path / "again.ssp").read_bytes() == before
-
-
-def test_our_annotation_is_read_where_earlier_archives_have_it(grasp, tmp_path):
-    path = tmp_path / "grasp.ssp"
-    write_ssp(grasp, path)
-
-    def older(ssd):
-        root = etree.fromstring(ssd)
-        annotations = root.find("{*}DefaultExperiment/{*}Annotations")
-        annotations.remove(annotations[0])
-        root.append(annotations)
-        return bytes(etree.tostring(root))
-
-    before = System.load(path)
-    changed(path, older)
-    after = System.load(path)
-    assert after == before
-    assert after.notes == ()
 
 
 @pytest.mark.parametrize("between", ["t = System.load(sys.argv[1]); assert s == t", FORK])

@@ -4,26 +4,51 @@ What the archive holds is run or refused by name; what the standard lets a tool 
 here, as docs/system_files.md describes, and said in the notes of the system.
 """
 
+import math
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from si_units import known_unit
 
 from ..base.errors import InputError, choices
 from ..interface.expansion import expanded
 from ..interface.interface import Value
 from ..system.description import System
-from ..system.parts import Component, Connection, Port, in_nanoseconds
+from ..system.parts import (
+    LONGEST,
+    NANOSECONDS,
+    Component,
+    Connection,
+    Port,
+    Solver,
+    in_nanoseconds,
+)
 from ..system.stimuli import Stimuli
-from .annotations import FOREIGN, TYPE, Extras, Steps, no_extras, read_extras, read_steps
+from .annotations import FOREIGN, TYPE, Beside, Extras, Steps, no_extras, read_extras, read_steps
 from .archive import STRUCTURE, Archive, Notes
 from .connectors import Carried, Connectors, Part
-from .decisions import Called, component_names, flow_order, renamed, step_time, times
-from .document import at, child, children, qualified
+from .document import at, child, children, qualified, same
 from .elements import Element, Hop, Path, read_system
-from .origin import Origin, open_structure
+from .origin import open_structure
 from .parameters import read_settings, read_sizes
+
+
+class Called(NamedTuple):
+    """A component under its name in the system.
+
+    names are its variables' names there by its FMU's own, units those that the archive names by the
+    former; the interface of the part has these, under the FMU's names.
+    """
+
+    name: str
+    names: Mapping[str, str]
+    units: Mapping[str, str]
+    beside: Beside
+    part: Part
 
 
 def read_ssp(
@@ -37,30 +62,38 @@ def read_ssp(
     archive = Archive(path, notes)
     origin, root = open_structure(archive, notes)
     file = origin.place
-    systems, parts = _elements(origin, root)
+    top = read_system(origin, child(root, "ssd:System"))
+    systems = {e.path: e for e in top.within() if e.interface is None}
+    parts = {e.path: Part(e, e.interface) for e in top.within() if e.interface is not None}
+    if not parts:
+        raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     names = component_names(file, parts)
     annotated = _annotated(file, root, names.values())
     given_ns = None if step is None else in_nanoseconds("step", step)
     steps = Steps() if annotated else read_steps(file, root, given_ns)
     extras = annotated or no_extras(names.values(), steps)
-    called = _called(file, _sized(systems, parts, notes), names, extras)
-    parts = {at: part.in_units() for at, part in called.items()}
-    network = Connectors(systems, parts)
+    called = {
+        at: _called(file, names[at], part, extras.components[names[at]])
+        for at, part in _sized(systems, parts, notes).items()
+    }
+    network = Connectors(systems, {at: component.part for at, component in called.items()})
     network.check()
-    connections = tuple(_connections(network, names, called))
+    connections = tuple(_connections(network, called))
     stimuli = stimuli or extras.input
     sourced = {*(c.target for c in connections), *(stimuli.columns if stimuli else ())}
     decided: list[str] = []
-    components = tuple(_components(file, network, names, called, sourced, decided))
+    components = tuple(_components(file, network, called, sourced, decided))
     if annotated is None:
         components = flow_order(components, connections)
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
     if steps.base_ns:
         decided.append(f"scheme = {extras.scheme}, as meant by {steps.said}")
-    start_ns, stop_ns = times(file, root, parts.values(), stop, decided)
-    span_ns = stop_ns - start_ns
-    step_ns = step_time(file, parts.values(), span_ns, given_ns, annotated, steps, decided)
+    start_ns, stop_ns = _times(file, root, parts.values(), stop, decided)
+    step_ns = given_ns or (annotated.step_ns if annotated else 0)
+    step_ns = step_ns or _step_time(file, parts.values(), stop_ns - start_ns, steps, decided)
     used = {TYPE, *FOREIGN} if annotated or steps.base_ns else {TYPE}
+    other_names = {".".join(path): name for path, name in names.items()}
+    said = [f"component {n} is called {name} here" for n, name in other_names.items() if n != name]
     return System(
         archive.place,
         components,
@@ -71,7 +104,7 @@ def read_ssp(
         extras.events,
         extras.faults,
         extras.initialisation,
-        (*_unused(archive, root, used), *renamed(names), *notes.lines(), *decided),
+        (*_unused(archive, root, used), *said, *notes.lines(), *decided),
         extras.roles,
         extras.presets,
         extras.diverging,
@@ -82,26 +115,28 @@ def read_ssp(
     )
 
 
-def _elements(origin: Origin, root: Any) -> tuple[dict[Path, Element], dict[Path, Part]]:
-    """The systems and the components of a structure; InputError where it has no component."""
-    top = read_system(origin, child(root, "ssd:System"))
-    parts = {e.path: Part(e, e.interface) for e in top.within() if e.interface is not None}
-    if not parts:
-        raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
-    return {e.path: e for e in top.within() if e.interface is None}, parts
+def component_names(file: str, parts: Iterable[Path]) -> dict[Path, str]:
+    """The components' names in the system, where a dot parts component and variable."""
+    names = {path: "_".join(path).replace(".", "_") for path in parts}
+    for name, count in Counter(names.values()).items():
+        if count > 1:
+            alike = choices(".".join(path) for path in names if names[path] == name)
+            raise InputError(f"{file}: components {alike} would all be {name!r} here; must differ")
+    return names
 
 
-def _called(
-    file: str,
-    parts: Mapping[Path, Part],
-    names: Mapping[Path, str],
-    extras: Extras,
-) -> dict[Path, Called]:
-    """The components under the names that they get, and under those of their variables."""
-    return {
-        at: Called(f"{file}: {names[at]}", part, extras.components[names[at]])
-        for at, part in parts.items()
-    }
+def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:
+    """The extras of our annotation, if there is one; `names` are those of the components."""
+    for annotation in children(root, "ssd:DefaultExperiment", "ssd:Annotations", "ssc:Annotation"):
+        if annotation.get("type") == TYPE:
+            extras = read_extras(at(file, annotation), annotation)
+            if set(extras.components) != set(names):
+                raise InputError(
+                    f"{file}: annotation {TYPE!r} is about other components, "
+                    f"{choices(extras.components)}; valid: {choices(names)}; remove it"
+                )
+            return extras
+    return None
 
 
 def _sized(
@@ -118,27 +153,30 @@ def _sized(
     }
 
 
-def _annotated(file: str, root: Any, names: Collection[str]) -> Extras | None:
-    """The extras of our annotation, if there is one; `names` are those of the components.
-
-    It is in the default experiment, in earlier archives below the root.
-    """
-    experiment = children(root, "ssd:DefaultExperiment", "ssd:Annotations", "ssc:Annotation")
-    for annotation in (*experiment, *children(root, "ssd:Annotations", "ssc:Annotation")):
-        if annotation.get("type") == TYPE:
-            extras = read_extras(at(file, annotation), annotation)
-            if set(extras.components) != set(names):
-                raise InputError(
-                    f"{file}: annotation {TYPE!r} is about other components, "
-                    f"{choices(extras.components)}; valid: {choices(names)}; remove it"
-                )
-            return extras
-    return None
+def _called(file: str, name: str, part: Part, beside: Beside) -> Called:
+    declared = part.interface
+    renamed = declared.renamed(beside.rename, f"{file}: {name}: rename")
+    pairs = zip(declared.variables, renamed.variables, strict=True)
+    names = {own.name: new.name for own, new in pairs}
+    units = {**{names[own]: unit for own, unit in _units(part).items()}, **beside.units}
+    seen = renamed.in_units(units, f"{file}: {name}")
+    own = tuple(replace(v, name=n) for n, v in zip(names, seen.variables, strict=True))
+    interface = replace(declared, variables=own, units=seen.units)
+    return Called(name, names, units, beside, replace(part, interface=interface))
 
 
-def _connections(
-    network: Connectors, names: Mapping[Path, str], called: Mapping[Path, Called]
-) -> Iterator[Connection]:
+def _units(part: Part) -> dict[str, str]:
+    """The units that connectors name for variables that have none in the FMU, if they are known."""
+    units = {}
+    for c in part.element.connectors.values():
+        v = part.interface.by_name.get(c.name)
+        meant = known_unit(c.unit.name) if c.unit else None
+        if c.unit and meant and v and v.kind == "Real" and v.unit is None and same(c.unit, meant):
+            units[c.name] = c.unit.name
+    return units
+
+
+def _connections(network: Connectors, called: Mapping[Path, Called]) -> Iterator[Connection]:
     """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
         if target.path not in network.parts or network.output(target) is None:
@@ -146,7 +184,7 @@ def _connections(
         hops = network.trace(target)
         carried = _carried(network, hops)
         source, sink = (
-            Port(names[node.path], called[node.path].new(node.name))
+            Port(called[node.path].name, called[node.path].names[node.name])
             for node in (hops[0].source, target)
         )
         if network.decided_by_units(hops, carried):
@@ -184,26 +222,109 @@ def _carried(network: Connectors, hops: list[Hop]) -> Carried:
 def _components(
     file: str,
     network: Connectors,
-    names: Mapping[Path, str],
     called: Mapping[Path, Called],
     sourced: Collection[Port],
     notes: list[str],
 ) -> Iterator[Component]:
     """The components with the archive's values, and start values of inputs not among sourced."""
     settings = read_settings(network)
-    for path, part in network.parts.items():
-        component = called[path].component(names[path], part, settings.get(path, {}))
+    for path, (name, names, units, beside, part) in called.items():
+        values = {names[own]: value for own, value in settings.get(path, {}).items()}
+        solver = beside.solver
+        if part.element.exchange and "CoSimulation" in part.interface.kinds:
+            solver = solver or Solver()
+        component = Component(
+            name,
+            part.interface.path,
+            values,
+            beside.rename,
+            beside.step_ns,
+            beside.isolation,
+            units,
+            solver=solver,
+        )
         starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):
-            port, start = Port(component.name, variable.name), variable.start
-            given = port in sourced or variable.name in component.values
+            port, start = Port(name, variable.name), variable.start
+            given = port in sourced or variable.name in values
             if variable.supported and not variable.element and not given and start is not None:
                 place = f"{file}: start value of {port}"
                 starts[variable.name] = component.interface.parse(
                     place, variable.name, start, text=True
                 )
                 notes.append(f"input {port} is not connected; keeps its start value {start}")
-        yield replace(component, values={**component.values, **starts})
+        yield replace(component, values={**values, **starts})
+
+
+def flow_order(
+    components: Sequence[Component], connections: Iterable[Connection]
+) -> tuple[Component, ...]:
+    """The components such that who gives goes before who takes; within a loop, and else, as given.
+
+    The elements of an SSD are in no order of execution, often sorted by name, and a sequential
+    scheme against the flow delays a value by a step. Inside a loop no order is better than that of
+    the file.
+    """
+    places = {component.name: i for i, component in enumerate(components)}
+    reach = np.zeros((len(places), len(places)), bool)
+    for c in connections:
+        reach[places[c.source.component], places[c.target.component]] = True
+    for between in range(len(places)):
+        reach |= np.outer(reach[:, between], reach[between])
+    before = reach & ~reach.T  # not in a loop
+    waits, order = before.sum(axis=0), []
+    for _ in components:
+        first = int(np.argmax(waits == 0))
+        order.append(components[first])
+        waits -= before[first]
+        waits[first] = -1
+    return tuple(order)
+
+
+def _times(
+    file: str, root: Any, parts: Iterable[Part], given: float | None, notes: list[str]
+) -> tuple[int, int]:
+    """The start time in ns, that of the archive or 0, and the stop time.
+
+    That is the one given, or of the archive, or the longest that its FMUs name.
+    """
+    experiment = child(root, "ssd:DefaultExperiment")
+    attributes = {} if experiment is None else experiment.attrib
+    start = float(attributes.get("startTime", "0"))
+    place = file if experiment is None else at(file, experiment)
+    start_ns = in_nanoseconds(f"{place}: startTime", start, zero=True, low=-LONGEST)
+    if given is not None:
+        return start_ns, in_nanoseconds("stop", given)
+    if "stopTime" in attributes:
+        return start_ns, in_nanoseconds(f"{place}: stopTime", float(attributes["stopTime"]))
+    declared = [part.interface.experiment.get("stop_time") for part in parts]
+    stop = max((float(time) for time in declared if time is not None), default=0.0)
+    if not 0.0 < stop < math.inf:
+        raise InputError(
+            f"{file}: no stopTime in a DefaultExperiment; give one: --set experiment.stop=..."
+        )
+    notes.append(f"stop = {stop:g} s, the longest that its FMUs name; the archive names none")
+    return start_ns, in_nanoseconds(f"{file}: stop time of its FMUs", stop)
+
+
+def _step_time(
+    file: str, parts: Iterable[Part], span_ns: int, steps: Steps, notes: list[str]
+) -> int:
+    """The step in ns: another tool's, or the FMUs' smallest that divides the span."""
+    if steps.base_ns:
+        notes.append(f"step = {steps.base_ns / NANOSECONDS:g} s, by {steps.said}")
+        return steps.base_ns
+    declared = sorted({part.interface.step for part in parts if part.interface.step})
+    for step in declared:
+        step_ns = round(step * NANOSECONDS) if 0.0 < step * NANOSECONDS <= span_ns else 0
+        if step_ns and span_ns % step_ns == 0 and math.isclose(step_ns / NANOSECONDS, step):
+            notes.append(f"step = {step:g} s, the smallest that its FMUs name; SSP has none")
+            return step_ns
+    listed = choices(f"{step:g} s" for step in declared)
+    raise InputError(
+        f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
+        f"divides the stop of {span_ns / NANOSECONDS:g} s; give one: --set experiment.step=..."
+    )
 
 
 def _unused(archive: Archive, root: Any, used: Collection[str]) -> Iterator[str]:
