@@ -9,7 +9,6 @@ import pytest
 from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Port
-from grasp_cosim.system.toml import read_toml
 from support.marks import slow
 
 AWAY = r"^controller\.force\[1\] ran away: -1e\+06 N at t = 0\.413\d s, ten times as much every "
@@ -76,7 +75,7 @@ def test_the_command_keeps_the_recording_and_is_3(command, fmus, tmp_path):
 
 
 def test_a_system_file_lets_it_go_on_and_so_does_its_archive(fmus, tmp_path):
-    system = read_toml(as_file(tmp_path, fmus, 'diverging = "continue"'))
+    system = System.load(as_file(tmp_path, fmus, 'diverging = "continue"'))
     assert simulate(system, stop=0.5, step=1e-3).settings["diverging"] == "continue"
     write_ssp(system, tmp_path / "turned.ssp")
     assert System.load(tmp_path / "turned.ssp").diverging == "continue"

@@ -135,10 +135,10 @@ def test_an_integer_that_gets_too_long_on_the_way_ends_the_run(tmp_path, source,
 
 
 REFUSED = [
-    (connected("Int16", "Int8"), "is Int16 and b.u_Int8 is Int8, which does not hold all its val"),
+    (connected("Int16", "Int8"), "is Int16 and b.u_Int8 is Int8; must be a type that holds"),
     (connected("UInt8", "Int8"), "must be a type that holds 0 to 255"),
-    (connected("Int32", "Float32"), "which does not hold all its values; must be Float64"),
-    (connected("Float64", "Int32"), "must be both Real, both Integer, both Boolean or both String"),
+    (connected("Int32", "Float32"), "must be Float64"),
+    (connected("Float64", "Int32"), "must be both Real, Integer, Boolean or String"),
     ('"a.y_array -> b.u_Float64"', "a.y_array is of type array of String, which is not supp"),
     ('"a.y_Float64 -> b.u_Binary"', "b.u_Binary is of type Binary, which is not supported"),
     ('{ from = "a.y_Int8", to = "b.u_Int8", factor = 2 }', "must be Real to be scaled"),
@@ -152,7 +152,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("connection", "message"), REFUSED)
 def test_connections_that_are_refused(tmp_path, connection, message):
-    with pytest.raises(InputError, match=rf"^pair.toml: connections\[0\].*{message}") as caught:
+    with pytest.raises(InputError, match=rf"^pair.toml: connection.*{message}") as caught:
         pair(tmp_path, connection)
     assert "\n" not in str(caught.value)
 
@@ -192,7 +192,7 @@ UNKNOWN = r"which their FMUs do not define in SI units; \{ from = .*gives the fa
         (table('rename = { gap = "Gap" }'), "'gap' = 'Gap': a.fmu has no variable 'Gap'; valid: u"),
         (table('rename = { gap = "x", hole = "x" }'), "'hole' = 'x': 'x' is renamed to 'gap' alre"),
         (table('rename = { now = "x" }'), "'now' = 'x': a.fmu has a variable 'now' itself; must"),
-        (table("rename = { gap = 1 }"), "'gap' = 1: must be a variable of the FMU, a string"),
+        (table("rename = { gap = 1 }"), "rename.gap = 1: must be a variable of the FMU, a string"),
         (table("rename = 'x'"), "rename: 'x'; must be a table"),
         (table("step = 0.15"), r"a: step = 0.15 s is not a whole multiple of the base step 0.1 s"),
     ],

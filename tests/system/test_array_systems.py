@@ -52,23 +52,23 @@ def test_names_and_units_of_whole_arrays(load):
 
 
 MISTAKES = [
-    ('"a.y -> b.u"', "values = { r = 2 }", r"connections\[0\] 'a.y -> b.u': a.y is \[2\] and b.u "),
+    ('"a.y -> b.u"', "values = { r = 2 }", r"connection 'a.y -> b.u': a.y is \[2\] and b.u "),
     ('"a.y -> b.u[1]"', "", r"a.y is \[3\] and b.u\[1\] is no array; must have equal shapes"),
-    ('"a.y -> b.v"', "", r"connections\[0\] 'a.y -> b.v': b has no input 'v'; valid: u\[1\], u"),
+    ('"a.y -> b.v"', "", r"connection 'a.y -> b.v': b has no input 'v'; valid: u\[1\], u"),
     ('"a.y -> b.u"', "values = { r = 1099511627776 }", "a.y is array of Float64 with more than 1"),
-    ('"a.y -> c.u"', "", r"connections\[0\] 'a.y -> c.u': no component 'c'; valid: a, b"),
+    ('"a.y -> c.u"', "", r"connection 'a.y -> c.u': no component 'c'; valid: a, b"),
     ('"a.y_Int8 -> b.u"', "", r"a.y_Int8 is \[2, 3\] and b.u is \[3\]"),
-    ('"a.y[1] -> b.u[1]", "a.y[4] -> b.u[2]"', "", r"connections\[1\] 'a.y\[4\] -> .* no output"),
-    ('"a.y -> b.u", "a.y[1] -> b.u[2]"', "", r"connections\[1\] .*: b.u\[2\] has two sources"),
+    ('"a.y[1] -> b.u[1]", "a.y[4] -> b.u[2]"', "", r"connection 'a.y\[4\] -> .* no output"),
+    ('"a.y -> b.u", "a.y[1] -> b.u[2]"', "", r"connection .*: b.u\[2\] has two sources"),
     ('"a.y_Boolean -> b.u_Int8"', "", r"a.y_Boolean\[1,1\] is Boolean and b.u_Int8\[1,1\] is Int8"),
-    ("", "values = { u = [1, 2] }", r"values: u = \[1, 2\]: is \[2\]; must be \[3\], or a list"),
+    ("", "values = { u = [1, 2] }", r"a.u: u = \[1, 2\]: is \[2\]; must be \[3\], or a list"),
     ("", "values = { m = 2, 'u[3]' = 1 }", r"no input or parameter 'u\[3\]'"),
     (
         "",
         "values = { n = 2, 'A[1,1]' = 1 }",
         r"a.A: no value for A\[1,2\], A\[2,1\], A\[2,2\], and",
     ),
-    ("", "values = { n = -1 }", "values: n = -1: must be a whole number of type UInt64"),
+    ("", "values = { n = -1 }", "a.n: n = -1: must be a whole number of type UInt64"),
     (
         "",
         "values = { n = 1099511627776, A = 1 }",

@@ -96,10 +96,10 @@ def test_an_fmu_comes_with_its_names_and_units(grasp, fmus, tmp_path):
         ("components.plant.values", 1, ": must be components.plant.values.NAME"),
         ("components.plant.step.x", 1, ": must be components.plant.step"),
         ("components.plant.fmu", 1, " = 1: must be the path of an FMU"),
-        ("components.plant.units.gap[1]", 1, " = 1: must be a string"),
+        ("components.plant.units.gap[1]", 1, " = 1: must be the name of a unit"),
         ("realtime.overrun", "x", "overrun = 'x': must be one of catch-up, continue, stop"),
         ("realtime.priority", "100", "priority = 100: must be a whole number from 1 to 99"),
-        ("input.interpolation", "held", ": there is no input file; must have input.file, too"),
+        ("input.interpolation", "held", "input.file = None: must be the path of a CSV"),
     ],
 )
 def test_a_mistake_is_one_line(grasp, key, value, said):
@@ -119,7 +119,7 @@ def test_a_place_is_given_once(grasp):
 
 def test_a_section_is_no_name_of_a_component(fmus, tmp_path):
     text = TEXT.replace("plant.", "input.").replace("[components.plant]", "[components.input]")
-    with pytest.raises(InputError, match=r"^grasp.toml: component 'input': is the name of a sec"):
+    with pytest.raises(InputError, match=r"^grasp.toml: input: is the name of a sec"):
         written(text, tmp_path, fmus)
 
 

@@ -18,8 +18,8 @@ from ..comparison.words import qualification_json, qualification_text
 from ..inspection import loading
 from ..inspection.inspection import as_text, inspect_fmu
 from ..interface.read import check_runs
-from ..system.changes import SECTIONS
 from ..system.description import FILES
+from ..system.toml import SECTIONS
 from .frame import (
     NEGATIVE,
     PATH,

@@ -12,9 +12,9 @@ import click
 
 from ..base.errors import InputError
 from ..base.progress import phase
-from ..system.changes import plain
 from ..system.description import System
 from ..system.stimuli import Stimuli, read_stimuli
+from ..system.toml import plain
 from .frame import pair, say, waiting
 
 Command = Callable[..., Any]

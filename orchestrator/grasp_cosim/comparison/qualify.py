@@ -21,7 +21,7 @@ from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
-from ..system.changes import Replacement, converted, replaced
+from ..system.changes import converted, replaced
 from ..system.description import System
 from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Isolation
 from ..system.structure import SCHEMES, between, output_units
@@ -282,7 +282,7 @@ def prepare_swap(
     ours = place.interface
     was = candidate if isinstance(candidate, Component) else replace(place, values={})
     fmu = was.fmu if isinstance(candidate, Component) else candidate
-    now = replaced(was, Replacement(fmu, rename, units or {}), "")
+    now = replaced(was, fmu, rename, units or {}, "")
     theirs = now.sized(describe(fmu)).renamed(now.rename, "rename")
     theirs = theirs.in_units(now.units, "units")
     _check_renamed(rename, ours, theirs)

@@ -14,10 +14,10 @@ from si_units import known_unit
 from ..base.errors import InputError, reason
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
-from ..system.changes import plain
 from ..system.description import System
 from ..system.parts import Port
 from ..system.structure import parameter_in_si
+from ..system.toml import plain
 
 Row = Mapping[str, Value]
 

@@ -5,24 +5,25 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ..base.checks import choice, known
+from ..base.checks import known
 from ..base.errors import InputError, nearest
 from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
-from .arrays import as_written, by_element, check_arrays
-from .changes import SECTIONS, as_file, changed, plain, with_entries
 from .native import natives
 from .parts import Component
 from .scenario import check_scenario
 from .settings import made_of
-from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
+from .stimuli import Stimuli, read_stimuli
 from .stimuli_checks import check_stimuli
 from .structure import Structure, experiment
+from .toml import SECTIONS, as_file, read_toml, sections, with_entries
 from .validity import (
+    as_written,
+    by_element,
+    check_arrays,
     check_components,
     check_connections,
-    check_solvers,
     check_steps,
 )
 
@@ -38,23 +39,21 @@ class System(Structure):
 
     def __post_init__(self) -> None:
         check_steps(self)
-        object.__setattr__(self, "connections", by_element(self))
+        connections = by_element(self.name, self.components, self.connections)
+        object.__setattr__(self, "connections", connections)
         for component in self.components:
-            interface = component.interface
+            place = f"{self.name}: {component.name}"
             for name, value in component.values.items():
-                interface.parse(f"{self.name}: {component.name}.{name}", name, value)
-        check_components(self)
-        check_solvers(self)
-        check_arrays(self)
-        check_stimuli(self)
-        check_connections(self)
-        check_scenario(self)
-        for component in self.components:
+                component.interface.parse(f"{place}.{name}", name, value)
             if component.name in SECTIONS:
                 raise InputError(
-                    f"{self.name}: component {component.name!r}: is the name of a section of a "
-                    "system file; must have another name"
+                    f"{place}: is the name of a section of a system file; must have another name"
                 )
+        check_components(self)
+        check_stimuli(self)
+        check_connections(self)
+        check_arrays(self)
+        check_scenario(self)
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
         for group in self.metrics:
@@ -80,14 +79,13 @@ class System(Structure):
         """
         path = Path(path)
         check_nature(path, "system")
-        system: System
+        stimuli = _stimuli(input)
         if path.suffix.lower() != ARCHIVE:
-            toml = higher("system.toml")  # as it makes systems
-            system = toml.read_toml(path, Path(fmus) if fmus else None, _stimuli(input))
-            return system.with_experiment(step, stop)
+            made = cls(**read_toml(path, Path(fmus) if fmus else None, stimuli))
+            return made.with_experiment(step, stop)
         if fmus is not None:
             raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
-        system = higher("ssp.from_archive").read_ssp(path, step, stop, _stimuli(input))
+        system: System = higher("ssp.from_archive").read_ssp(path, step, stop, stimuli)
         return system
 
     def start(self, key: str) -> float:
@@ -151,7 +149,7 @@ class System(Structure):
         tables = file.pop("components", {})
         components, notes = {c.name: c for c in self.components}, [*self.notes]
         for name, table in tables.items():
-            components[name], more = with_entries(self, components[name], table, place)
+            components[name], more = with_entries(components[name], table, place, self)
             notes += more
         if not file and all(_of_parameters(self, *named) for named in tables.items()):
             return self._with_parameters(tuple(components.values()))
@@ -160,14 +158,7 @@ class System(Structure):
             components=tuple(components.values()),
             connections=as_written(self),
             notes=tuple(notes),
-            initialisation=self._changed("initialisation", file, place),
-            realtime=self._changed("realtime", file, place),
-            roles={**self.roles, **file.get("roles", {})},
-            input=self._changed_input(file.get("input", {}), place),
-            **experiment(
-                lambda key: place(f"experiment.{key}"),
-                {key: plain(value) for key, value in file.get("experiment", {}).items()},
-            ),
+            **sections(self, file, place),
         )
 
     def with_presets(self, *names: str) -> "System":
@@ -221,26 +212,6 @@ class System(Structure):
         given = {"step": step, "stop": stop, "scheme": scheme, "diverging": diverging}
         changed = {key: value for key, value in given.items() if value is not None}
         return replace(self, **experiment(str, changed)) if changed else self
-
-    def _changed(self, section: str, file: Mapping[str, Any], place: Callable[[str], str]) -> Any:
-        """The options of a section with those of a file."""
-        table = file.get(section, {})
-        return changed(place(section), getattr(self, section), table, text=True)
-
-    def _changed_input(
-        self, table: Mapping[str, Any], place: Callable[[str], str]
-    ) -> Stimuli | None:
-        """The stimuli with a file, or a way between its rows, of their own."""
-        way = place("input.interpolation")
-        if "file" in table:
-            return read_stimuli(table["file"], table.get("interpolation", "linear"), way)
-        if not table:
-            return self.input
-        if self.input is None:
-            raise InputError(f"{way}: there is no input file; must have input.file, too")
-        return replace(
-            self.input, interpolation=choice(way, table["interpolation"], INTERPOLATIONS)
-        )
 
     def _with_parameters(self, components: tuple[Component, ...]) -> "System":
         """A copy with components that differ in values of parameters, which nothing else goes by.

@@ -19,7 +19,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.errors import InputError
 from .parts import LONGEST, NANOSECONDS, Fault, seconds
@@ -33,22 +33,14 @@ Act = Callable[[float, int, bool], float]
 Parameters = Mapping[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
-    """The range of a parameter of a fault; `needed` if it must be given."""
+class Range(NamedTuple):
+    """What a parameter of a fault must be; `above` if `low` is too low, `needed` if it must be."""
 
+    must: str
     low: float = -math.inf
     high: float = math.inf
     above: bool = False
-    """True if `low` itself is too low."""
     needed: bool = True
-
-    def __str__(self) -> str:
-        if math.isfinite(self.high):
-            return f"a number from {self.low:g} to {self.high:g}"
-        if math.isfinite(self.low):
-            return f"a finite number {'above' if self.above else 'of at least'} {self.low:g}"
-        return "a finite number"
 
 
 class Draws:
@@ -185,23 +177,35 @@ class FaultKind:
     """
 
 
+FINITE = Range("a finite number")
+
 FAULTS: Mapping[str, FaultKind] = MappingProxyType(
     {
         "stuck": FaultKind(_stuck, {"value": None}, discrete=True),
         "dropout": FaultKind(
-            _dropout, {"probability": Range(0.0, 1.0)}, discrete=True, random=True
+            _dropout,
+            {"probability": Range("a number from 0 to 1", 0.0, 1.0)},
+            discrete=True,
+            random=True,
         ),
-        "bias": FaultKind(_bias, {"value": Range()}),
-        "noise": FaultKind(_noise, {"standard_deviation": Range(0.0)}, random=True),
+        "bias": FaultKind(_bias, {"value": FINITE}),
+        "noise": FaultKind(
+            _noise, {"standard_deviation": Range("a finite number of at least 0", 0.0)}, random=True
+        ),
         "delay": FaultKind(
-            _delay, {"time": Range(0.0, LONGEST)}, discrete=True, check=_check_delay
+            _delay,
+            {"time": Range(f"a number from 0 to {LONGEST:g}", 0.0, LONGEST)},
+            discrete=True,
+            check=_check_delay,
         ),
         "saturation": FaultKind(
             _saturation,
-            {"low": Range(needed=False), "high": Range(needed=False)},
+            dict.fromkeys(("low", "high"), FINITE._replace(needed=False)),
             check=_check_saturation,
         ),
-        "quantisation": FaultKind(_quantisation, {"step": Range(0.0, above=True)}),
+        "quantisation": FaultKind(
+            _quantisation, {"step": Range("a finite number above 0", 0.0, above=True)}
+        ),
     }
 )
 """The kinds of faults by name."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import cached_property
@@ -12,8 +12,8 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from ..base.checks import choice, is_number, number, whole
-from ..base.errors import InputError
+from ..base.checks import choice, number, whole
+from ..base.errors import InputError, nearest
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value
 from ..interface.obstacles import of_binary
@@ -45,10 +45,8 @@ def in_nanoseconds(place: str, seconds: Any, zero: bool = False, low: float = 0.
 
     It is greater than low; with zero, it may be that.
     """
-    if not is_number(seconds):
-        raise InputError(f"{place} = {seconds!r} s: must be a number")
-    span = f"from {low:g} to {LONGEST:g}" if zero else f"greater than 0, at most {LONGEST:g}"
-    must = f"a number {span}"
+    span = f"from {low:g} to" if zero else "greater than 0, at most"
+    must = f"a number {span} {LONGEST:g}"
     time = number(place, seconds, low, LONGEST, above=not zero, must=must, unit="s")
     nanoseconds = round(time * NANOSECONDS)
     if abs(nanoseconds / NANOSECONDS - time) > 1e-12 * abs(time):
@@ -177,6 +175,16 @@ class Component:
         return expanded(interface, lengths)
 
 
+def component_of(components: Sequence[Component], name: str, place: object) -> Component:
+    """The component of that name; place says who asks, for the error message."""
+    for component in components:
+        if component.name == name:
+            return component
+    raise InputError(
+        f"{place}: no component {name!r}; {nearest(name, [c.name for c in components])}"
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Port:
     """A variable of a component."""
@@ -186,6 +194,14 @@ class Port:
 
     def __str__(self) -> str:
         return f"{self.component}.{self.variable}"
+
+
+def as_port(place: str, text: Any) -> Port:
+    """The port that a text names; InputError where it names none."""
+    component, _, variable = text.partition(".") if isinstance(text, str) else ("", "", "")
+    if not component or not variable:
+        raise InputError(f"{place} = {text!r}: must be 'component.variable'")
+    return Port(component, variable)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,23 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ..base.checks import as_table, check_keys, choice, exact, known, number, real, whole
+from ..base.checks import (
+    as_table,
+    check_keys,
+    check_values,
+    choice,
+    exact,
+    known,
+    number,
+    real,
+    whole,
+)
 from ..base.errors import InputError, choices, nearest
-from ..interface.interface import Interface, Value
+from ..interface.expansion import values_of
+from ..interface.interface import Value
 from .faults import FAULTS, RANDOM
 from .parts import (
     NANOSECONDS,
@@ -21,6 +32,7 @@ from .parts import (
     Event,
     Fault,
     Port,
+    as_port,
     first_step,
     in_nanoseconds,
     seconds,
@@ -28,149 +40,132 @@ from .parts import (
 from .stimuli_checks import driven
 from .structure import Structure
 
-_CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s]+)""")
+_CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s'"]+)""")
 
 
-def read_events(place: str, entries: Any) -> tuple[Event, ...]:
+def read_events(name: str, entries: Any) -> tuple[Event, ...]:
     """The events of a list of entries; a System checks them. InputError where one is malformed."""
-    return tuple(_event(at, entry) for at, entry in _entries(place, "events", entries))
+    found = []
+    for place, entry in _entries(name, "events", entries):
+        check_keys(place, entry, {"at", "when", "set"})
+        values = as_table(f"{place}: set", entry.get("set"))
+        check_values(f"{place}: set", values)
+        found.append(
+            Event(
+                {as_port(f"{place}: set", port): value for port, value in values.items()},
+                _time(place, entry, "at", zero=True),
+                _condition(place, entry),
+            )
+        )
+    return tuple(found)
 
 
-def read_faults(place: str, entries: Any, connections: Sequence[Connection]) -> tuple[Fault, ...]:
+def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> tuple[Fault, ...]:
     """The faults of a list of entries on connections; a System checks them.
 
     InputError where one is malformed.
     """
-    return tuple(_fault(at, entry, connections) for at, entry in _entries(place, "faults", entries))
+    found = []
+    for place, entry in _entries(name, "faults", entries):
+        kind: Any = entry.get("kind")
+        found.append(
+            Fault(
+                _target(place, entry.get("connection"), connections),
+                kind,
+                {key: value for key, value in entry.items() if key not in _entries_of(kind)},
+                _time(place, {"from": 0.0, **entry}, "from", zero=True) or 0,
+                _time(place, entry, "until"),
+                entry.get("seed", 0) if kind in RANDOM else 0,
+                _condition(place, entry),
+            )
+        )
+    return tuple(found)
 
 
 def event_entry(event: Event) -> dict[str, Any]:
     """The entry that reads as this event; it fits into JSON."""
-    moment: dict[str, Any] = {}
-    if event.at_ns is not None:
-        moment["at"] = event.at_ns / NANOSECONDS
-    if event.when is not None:
-        moment["when"] = str(event.when)
-    return {**moment, "set": {str(port): value for port, value in event.set.items()}}
+    at = {} if event.at_ns is None else {"at": event.at_ns / NANOSECONDS}
+    when = {"when": str(event.when)} if event.when else {}
+    return {**at, **when, "set": {str(port): value for port, value in event.set.items()}}
 
 
 def fault_entry(fault: Fault) -> dict[str, Any]:
     """The entry that reads as this fault; it fits into JSON."""
-    entry = {"connection": str(fault.target), "kind": fault.kind, **fault.parameters}
-    entry["from"] = fault.start_ns / NANOSECONDS
-    if fault.end_ns is not None:
-        entry["until"] = fault.end_ns / NANOSECONDS
-    if fault.when is not None:
-        entry["when"] = str(fault.when)
-    if fault.kind in RANDOM:
-        entry["seed"] = fault.seed
-    return entry
+    return {
+        "connection": str(fault.target),
+        "kind": fault.kind,
+        **fault.parameters,
+        "from": fault.start_ns / NANOSECONDS,
+        **({} if fault.end_ns is None else {"until": fault.end_ns / NANOSECONDS}),
+        **({"when": str(fault.when)} if fault.when else {}),
+        **({"seed": fault.seed} if fault.kind in RANDOM else {}),
+    }
 
 
-def _entries(place: str, key: str, entries: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+def _entries_of(kind: Any) -> list[str]:
+    """The entries of a fault of a kind, besides its parameters."""
+    return ["connection", "kind", "from", "until", "when", *["seed"] * (kind in RANDOM)]
+
+
+def _entries(name: str, key: str, entries: Any) -> Iterator[tuple[str, dict[str, Any]]]:
     """The tables of a list, each with its place."""
     if not isinstance(entries, list):
-        raise InputError(f"{place}: {key} = {entries!r}: must be a list of tables, [[{key}]]")
+        raise InputError(f"{name}: {key} = {entries!r}: must be a list of tables, [[{key}]]")
     for i, entry in enumerate(entries):
-        at = f"{place}: {key}[{i}]"
-        yield at, as_table(at, entry)
+        yield f"{name}: {key}[{i}]", as_table(f"{name}: {key}[{i}]", entry)
 
 
-def _event(place: str, entry: dict[str, Any]) -> Event:
-    check_keys(place, entry, {"at", "when", "set"})
-    values = as_table(f"{place}: set", entry.get("set"))
-    for name, value in values.items():
-        if not isinstance(value, float | int | bool | str):
-            raise InputError(
-                f"{place}: set.{name} = {value!r}: must be a number, boolean or string; "
-                'a name stands in quotes, like "sensor_1.reflectance" = 0.6'
-            )
-    at = entry.get("at")
-    return Event(
-        {_port(f"{place}: set", name): value for name, value in values.items()},
-        None if at is None else in_nanoseconds(f"{place}: at", at, zero=True),
-        _condition(place, entry.get("when")),
-    )
-
-
-def _fault(place: str, entry: dict[str, Any], connections: Sequence[Connection]) -> Fault:
-    kind: Any = entry.get("kind")
-    until = entry.get("until")
-    common = {"connection", "kind", "from", "until", "when", *(["seed"] if kind in RANDOM else [])}
-    return Fault(
-        _target(place, entry.get("connection"), connections),
-        kind,
-        {key: value for key, value in entry.items() if key not in common},
-        in_nanoseconds(f"{place}: from", entry.get("from", 0.0), zero=True),
-        None if until is None else in_nanoseconds(f"{place}: until", until),
-        entry.get("seed", 0) if kind in RANDOM else 0,
-        _condition(place, entry.get("when")),
-    )
+def _time(place: str, entry: Mapping[str, Any], key: str, zero: bool = False) -> int | None:
+    return in_nanoseconds(f"{place}: {key}", entry[key], zero) if key in entry else None
 
 
 def _target(place: str, text: Any, connections: Sequence[Connection]) -> Port:
     """The target of the connection that the text names, by both of its ends or the target alone."""
-    parts = [part.strip() for part in text.split("->")] if isinstance(text, str) else []
-    if len(parts) not in (1, 2) or not all("." in part for part in parts):
-        raise InputError(
-            f"{place}: connection = {text!r}: must be 'component.output -> component.input', or "
-            "'component.input' alone"
-        )
-    ends = [_port(place, part) for part in parts]
-    if len(ends) == 2 and ends not in [[c.source, c.target] for c in connections]:
-        found = nearest(text, connections)
-        raise InputError(f"{place}: connection = {text!r}: no such connection; {found}")
-    return ends[-1]
+    ends = [part.strip() for part in text.split("->")] if isinstance(text, str) else [text]
+    if len(ends) == 1:
+        return as_port(f"{place}: connection", ends[0])
+    for connection in connections:
+        if ends == [str(connection.source), str(connection.target)]:
+            return connection.target
+    near = nearest(text, connections)
+    raise InputError(f"{place}: connection = {text!r}: no such connection; {near}")
 
 
-def _condition(place: str, text: Any) -> Condition | None:
+def _condition(place: str, entry: Mapping[str, Any]) -> Condition | None:
+    text = entry.get("when")
     if text is None:
         return None
     found = _CONDITION.fullmatch(text.strip()) if isinstance(text, str) else None
-    value = _constant(found[3]) if found else None
-    if found is None or value is None:
+    try:
+        port, relation, said = found.groups() if found else ("", "", "none")
+        value = _constant(said)
+    except ValueError:
         raise InputError(
             f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01', "
             "'plant.contact[1] == true' or, for an Enumeration, \"plant.mode == 'fast'\""
-        )
-    return Condition(_port(f"{place}: when", found[1]), found[2], value)  # type: ignore[arg-type]
+        ) from None
+    return Condition(as_port(f"{place}: when", port), relation, value)  # type: ignore[arg-type]
 
 
-def _constant(text: str) -> float | str | None:
-    if text[0] in "'\"":
-        return text[1:-1] if len(text) > 1 and text[-1] == text[0] else None
+def _constant(text: str) -> float | bool | str:
     if text in ("true", "false"):
         return text == "true"
-    try:
-        return real(text)
-    except ValueError:
-        return None
-
-
-def _port(place: str, text: str) -> Port:
-    component, _, variable = text.partition(".")
-    if not component or not variable:
-        raise InputError(f"{place}: {text!r}: must be 'component.variable'")
-    return Port(component, variable)
+    return text[1:-1] if text[0] in "'\"" else real(text)
 
 
 def check_scenario(system: Structure) -> None:
     """InputError at the first event or fault that is not as it must be."""
     for i, event in enumerate(system.events):
-        _check_event(system, event, f"{system.name}: events[{i}]")
+        place = f"{system.name}: events[{i}]"
+        if (event.at_ns is None) == (event.when is None):
+            raise InputError(f"{place}: must have either at, a time in s, or when, a condition")
+        if not event.set:
+            raise InputError(f"{place}: set is empty; valid: {choices(_settable(system))}")
+        _check_condition(system, event.when, place)
+        for port, value in event.set.items():
+            check_setting(system, port, value, f"{place}: set.{port}")
     for i, fault in enumerate(system.faults):
         _check_fault(system, fault, f"{system.name}: faults[{i}]")
-
-
-def _check_event(system: Structure, event: Event, place: str) -> None:
-    if (event.at_ns is None) == (event.when is None):
-        raise InputError(f"{place}: must have either at, a time in s, or when, a condition")
-    if not event.set:
-        raise InputError(f"{place}: set is empty; valid: {choices(_settable(system))}")
-    if event.when is not None:
-        _check_condition(system, event.when, f"{place}: when = '{event.when}'")
-    for port, value in event.set.items():
-        check_setting(system, port, value, f"{place}: set.{port}")
 
 
 def _settable(system: Structure) -> list[Port]:
@@ -209,31 +204,30 @@ def check_setting(system: Structure, port: Port, value: Value, place: str) -> No
             f"{place}: {found}; must be a tunable parameter or an input without a connection; "
             f"{nearest(port, own or settable, interface.listing)}"
         )
-    interface.parse(place, port.variable, value)
+    values_of(interface, place, port.variable, value)
 
 
-def _check_condition(system: Structure, condition: Condition, place: str) -> None:
-    interface = system.component(condition.port.component, place).interface
-    valid = [v.name for v in interface.of("output") if v.is_number]
-    component, variable = condition.port.component, condition.port.variable
-    said = f"{place}: {component} has no numeric output"
-    known(said, variable, valid, see=interface.listing)
-    kind, items = interface.by_name[variable].kind, interface.by_name[variable].items
-    relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)
-    if condition.relation not in relations:
-        raise InputError(
-            f"{place}: {condition.port} is {kind}; must be compared with {choices(relations)}"
-        )
-    if isinstance(condition.value, str):
-        said = f"{place}: {condition.port} is {kind} and has no item"
-        known(said, condition.value, items)
+def _check_condition(system: Structure, condition: Condition | None, place: str) -> None:
+    if condition is None:
         return
-    if kind == "Integer" and float(condition.value).is_integer():
-        exact(place, int(condition.value))
-    boolean = isinstance(condition.value, bool)
-    if boolean != (kind == "Boolean") or not math.isfinite(condition.value):
-        expected = "true or false" if kind == "Boolean" else "a finite number"
-        raise InputError(f"{place}: {condition.port} is {kind}; must be compared with {expected}")
+    place, port, value = f"{place}: when = '{condition}'", condition.port, condition.value
+    interface = system.component(port.component, place).interface
+    valid = [v.name for v in interface.of("output") if v.is_number]
+    said = f"{place}: {port.component} has no numeric output"
+    known(said, port.variable, valid, see=interface.listing)
+    kind, items = interface.by_name[port.variable].kind, interface.by_name[port.variable].items
+    relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)
+    if isinstance(value, str):
+        known(f"{place}: {port} is {kind} and has no item", value, items)
+    elif kind == "Integer" and float(value).is_integer():
+        exact(place, int(value))
+    boolean = kind == "Boolean"
+    fits = isinstance(value, str) or (isinstance(value, bool) == boolean and math.isfinite(value))
+    if condition.relation not in relations or not fits:
+        what = "true or false" if boolean else "a finite number"
+        raise InputError(
+            f"{place}: {port} is {kind}; must be compared with {what}, by {choices(relations)}"
+        )
 
 
 def _check_fault(system: Structure, fault: Fault, place: str) -> None:
@@ -245,15 +239,23 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
         )
     choice(f"{place}: kind", fault.kind, FAULTS)
     interface = system.component(fault.target.component, place).interface
-    kind = interface.by_name[fault.target.variable].kind
-    discrete = kind in ("Integer", "Boolean")
-    possible = [name for name, f in FAULTS.items() if kind == "Real" or (discrete and f.discrete)]
-    if fault.kind not in possible:
+    kind, of = interface.by_name[fault.target.variable].kind, FAULTS[fault.kind]
+    possible = [name for name, f in FAULTS.items() if kind == "Real" or f.discrete]
+    if kind == "String" or fault.kind not in possible:
         raise InputError(
-            f"{place}: kind = {fault.kind!r}: {fault.target} is {kind}; "
-            f"must be one of {choices(possible)}"
+            f"{place}: kind = {fault.kind!r}: {fault.target} is {kind}; must be one of "
+            f"{choices(possible if kind != 'String' else ())}"
         )
-    _check_parameters(fault, interface, place)
+    entries = [*of.parameters, *_entries_of(fault.kind)]
+    for name in fault.parameters:
+        known(f"{place}: unknown entry", name, entries, f" of {fault.kind}")
+    for name, valid in of.parameters.items():
+        at, given = f"{place}: {name}", fault.parameters.get(name)
+        if valid and (valid.needed or name in fault.parameters):
+            number(at, given, valid.low, valid.high, above=valid.above, must=valid.must)
+        elif not valid and name in fault.parameters:
+            exact(at, interface.parse(at, fault.target.variable, fault.parameters[name]))
+    of.check(place, fault.parameters, system.step_ns)
     step, start, end = system.step_ns, fault.start_ns, fault.end_ns
     since = system.start_ns
     if end is not None and first_step(start, step, since) >= first_step(end, step, since):
@@ -261,25 +263,5 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
             f"{place}: from {seconds(start)} until {seconds(end)}: must hold a communication "
             f"point, a multiple of {seconds(step)}"
         )
-    FAULTS[fault.kind].check(place, fault.parameters, system.step_ns)
-    if fault.when is not None:
-        _check_condition(system, fault.when, f"{place}: when = '{fault.when}'")
+    _check_condition(system, fault.when, place)
     whole(f"{place}: seed", fault.seed, 0, must="a whole number, at least 0")
-
-
-def _check_parameters(fault: Fault, interface: Interface, place: str) -> None:
-    kind = FAULTS[fault.kind]
-    for name in fault.parameters:
-        if name not in kind.parameters:
-            others = ["connection", "kind", "from", "until", "when", *["seed"] * kind.random]
-            raise InputError(
-                f"{place}: unknown entry {name!r} of {fault.kind}; "
-                f"{nearest(name, [*kind.parameters, *others])}"
-            )
-    for name, valid in kind.parameters.items():
-        if valid is not None and (valid.needed or name in fault.parameters):
-            at, given = f"{place}: {name}", fault.parameters.get(name)
-            number(at, given, valid.low, valid.high, above=valid.above, must=str(valid))
-        elif valid is None and name in fault.parameters:
-            at, given = f"{place}: {name}", fault.parameters[name]
-            exact(at, interface.parse(at, fault.target.variable, given))

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, get_args
 from si_units import Unit
 
 from ..base.checks import choice
-from ..base.errors import InputError, nearest
+from ..base.errors import InputError
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion, conversion
 from .parts import (
@@ -23,6 +23,7 @@ from .parts import (
     Initialisation,
     Port,
     Realtime,
+    component_of,
     in_nanoseconds,
 )
 from .stimuli import Stimuli
@@ -114,11 +115,7 @@ class Structure:
 
     def component(self, name: str, place: object) -> Component:
         """The component of that name; place says who asks, for the error message."""
-        for component in self.components:
-            if component.name == name:
-                return component
-        names = [c.name for c in self.components]
-        raise InputError(f"{place}: no component {name!r}; {nearest(name, names)}")
+        return component_of(self.components, name, place)
 
 
 def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[str, Any]:

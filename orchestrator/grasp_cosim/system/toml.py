@@ -1,94 +1,219 @@
-"""The system file: a system in TOML. Its entries are in docs/system_files.md."""
+"""The entries of a system file, docs/system_files.md: read as a whole, or changed by their places.
+
+A place is like experiment.step, components.plant.fmu, or plant.object_width for a value. Messages
+begin with what a function `place` makes of one.
+"""
+
+from __future__ import annotations
 
 import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from ..base.checks import as_table, check_keys, check_values, choice, is_number, text, toml_table
-from ..base.errors import InputError
-from ..interface.interface import Given
+from ..base.checks import (
+    as_table,
+    check_keys,
+    check_values,
+    choice,
+    integer,
+    is_number,
+    known,
+    real,
+    text,
+    toml_table,
+)
+from ..base.errors import InputError, nearest
+from ..interface.interface import SETTABLE
 from ..interface.read import read_interface
-from .arrays import with_given
-from .changes import ENTRIES, PLACES, SECTIONS, changed
-from .description import System
+from .changes import replaced, with_given, with_old_values
 from .parts import (
     ISOLATIONS,
     Component,
     Connection,
     Initialisation,
-    Port,
     Realtime,
     Solver,
+    as_port,
     in_nanoseconds,
 )
 from .scenario import read_events, read_faults
-from .stimuli import Stimuli, read_stimuli
-from .structure import experiment
+from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
+from .structure import Structure, experiment
+from .validity import by_element
+
+Options = TypeVar("Options")
+Place = Callable[[str], str]
+
+SECTIONS = (
+    "experiment", "components", "connections", "initialisation", "events", "faults", "roles",
+    "presets", "input", "realtime", "metrics",
+)  # fmt: skip
+"""The entries of a system file, which are no names of components."""
+
+PLACES: Mapping[str, Sequence[str]] = {
+    "experiment": ("step", "stop", "scheme", "diverging", "start"),
+    "components": (),
+    "initialisation": Initialisation.__slots__,
+    "roles": (),
+    "realtime": Realtime.__slots__,
+    "input": ("file", "interpolation"),
+}
+"""The sections that have single values, each with its entries, where these are always the same."""
+
+NAMES = {"rename": "a variable of the FMU, a string", "units": "the name of a unit, like 'mm'"}
+"""The tables of names that a component has, and what these must be."""
+
+TABLES = ("values", *NAMES, "solver")
+ENTRIES = ("fmu", "step", "isolation", *TABLES)
+"""The entries of a component, of which some are tables."""
 
 TODO = re.compile(r"""(?:[^#"']|"(?!TODO\b)(?:[^"\\]|\\.)*"|'(?!TODO\b)[^']*')*["']TODO\b""")
 """A line with a value that is left to do; a # in quotes begins no comment."""
 
 
-def read_toml(path: Path, fmus: Path | None = None, stimuli: Stimuli | None = None) -> System:
-    """The system of a TOML file; fmus is where its FMUs are, by default beside the file.
+def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[str, Any]:
+    """The attributes of the system of a TOML file; fmus is where its FMUs are, by default beside.
 
     stimuli go before those that it names.
     """
-    place, folder = path.name, fmus or path.parent
-    table = toml_table(path, "system file")
+    file, place = toml_table(path, "system file"), f"{path.name}: ".__add__
     check_filled_in(path)
-    check_keys(place, table, SECTIONS)
-
-    def part(name: str, default: Any = None) -> dict[str, Any]:
-        return as_table(f"{place}: [{name}]", table.get(name, default))
-
-    chosen = part("experiment")
-    check_keys(f"{place}: [experiment]", chosen, PLACES["experiment"])
-    components = part("components")
-    connections = _connections(f"{place}: connections", table.get("connections", []))
-    system = System(
-        place,
-        tuple(_component(place, name, entry, folder) for name, entry in components.items()),
-        connections,
-        **experiment(
-            lambda key: f"{place}: experiment.{key}",
-            {"step": None, "stop": None, "scheme": "sequential", **chosen},
-        ),
-        events=read_events(place, table.get("events", [])),
-        initialisation=changed(
-            f"{place}: [initialisation]", Initialisation(), part("initialisation", {})
-        ),
-        realtime=changed(f"{place}: [realtime]", Realtime(), part("realtime", {})),
-        roles={
-            role: text(f"{place}: [roles]: {role}", name, "the name of a component")
-            for role, name in part("roles", {}).items()
-        },
-        presets={
-            name: _values(f"{place}: [presets.{name}]", values)
-            for name, values in part("presets", {}).items()
-        },
-        metrics=_groups(f"{place}: metrics", table.get("metrics", [])),
-        input=stimuli or _input(f"{place}: [input]", table.get("input"), path.parent),
+    check_keys(path.name, file, SECTIONS)
+    for section in (*PLACES, "presets"):
+        table = file.get(section, None if section in ("experiment", "components") else {})
+        file[section] = as_table(place(f"[{section}]"), table)
+        if PLACES.get(section):
+            check_keys(place(f"[{section}]"), file[section], PLACES[section])
+    components = []
+    for name, entry in file["components"].items():
+        own = place(f"components.{name}")
+        check_keys(own, as_table(own, entry), ENTRIES)
+        fmu = text(f"{own}.fmu", entry.get("fmu"), "the path of an FMU, as a string")
+        new = Component(name, (fmus or path.parent) / fmu, {})
+        components.append(with_entries(new, entry, place)[0])
+    for name, values in file["presets"].items():
+        own = place(f"presets.{name}")
+        check_values(own, as_table(own, values))
+    for name in _list(place, file, "metrics", '["grasp"]'):
+        text(place("metrics"), name, "the name of a group of metrics")
+    links = _list(place, file, "connections", "['component.output -> component.input']")
+    connections = by_element(
+        path.name,
+        components,
+        [_connection(place(f"connections[{i}]"), link) for i, link in enumerate(links)],
     )
-    faults = read_faults(place, table.get("faults", []), system.connections)
-    return replace(system, faults=faults) if faults else system
+    if stimuli:
+        file["input"] = {}
+    file["experiment"] = {"step": None, "stop": None, "scheme": "sequential"} | file["experiment"]
+    found = sections(None, file, place, path.parent)
+    return {
+        **found,
+        "name": path.name,
+        "components": tuple(components),
+        "connections": connections,
+        "events": read_events(path.name, file.get("events", [])),
+        "faults": read_faults(path.name, file.get("faults", []), connections),
+        "presets": file["presets"],
+        "metrics": tuple(file.get("metrics", ())),
+        "input": stimuli or found["input"],
+    }
 
 
-def _groups(place: str, names: Any) -> tuple[str, ...]:
-    """The names of groups of metrics, of which ours are checked by the system."""
-    if not isinstance(names, list):
-        raise InputError(f'{place} = {names!r}: must be a list of groups, like ["grasp"]')
-    return tuple(text(place, name, "the name of a group of metrics") for name in names)
+def _list(place: Place, file: Mapping[str, Any], key: str, form: str) -> list[Any]:
+    found = file.get(key, [])
+    if not isinstance(found, list):
+        raise InputError(f"{place(key)} = {found!r}: must be a list, like {form}")
+    return found
 
 
-def _input(place: str, entry: Any, folder: Path) -> Stimuli | None:
-    if entry is None:
-        return None
-    check_keys(place, as_table(place, entry), PLACES["input"])
-    file = text(f"{place}: file", entry.get("file"), "the path of a CSV file, as a string")
-    way = entry.get("interpolation", "linear")
-    return read_stimuli(folder / file, way, f"{place}: interpolation")
+def sections(
+    was: Structure | None, file: Mapping[str, Any], place: Place, folder: Path = Path()
+) -> dict[str, Any]:
+    """The attributes of a system that stand in sections of single values, with those of a file.
+
+    folder is that of the file.
+    """
+    tables = {section: file.get(section, {}) for section in PLACES}
+    for role, name in tables["roles"].items():
+        text(place(f"roles.{role}"), name, "the name of a component")
+    loops, pace = (was.initialisation, was.realtime) if was else (Initialisation(), Realtime())
+    return {
+        **experiment(lambda key: place(f"experiment.{key}"), tables["experiment"]),
+        "initialisation": _changed(place("initialisation"), loops, tables["initialisation"]),
+        "realtime": _changed(place("realtime"), pace, tables["realtime"]),
+        "roles": {**(was.roles if was else {}), **tables["roles"]},
+        "input": _input(was.input if was else None, tables["input"], place, folder),
+    }
+
+
+def _input(
+    was: Stimuli | None, table: Mapping[str, Any], place: Place, folder: Path
+) -> Stimuli | None:
+    """The stimuli with another file, or another way between its rows."""
+    way, file = table.get("interpolation", "linear"), table.get("file")
+    if not table:
+        return was
+    if file is None and was:
+        chosen = choice(place("input.interpolation"), way, INTERPOLATIONS)
+        return replace(was, interpolation=chosen)
+    if not isinstance(file, str | Path):
+        raise InputError(f"{place('input.file')} = {file!r}: must be the path of a CSV file")
+    return read_stimuli(folder / file, way, place("input.interpolation"))
+
+
+def _changed(place: str, options: Options, table: Any) -> Options:
+    """Options such as Initialisation with those of a table; errors begin with the place."""
+    check_keys(place, as_table(place, table), options.__slots__)  # type: ignore[attr-defined]
+    try:
+        return replace(options, **table)  # type: ignore[type-var]
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error
+
+
+def with_entries(
+    was: Component, table: Mapping[str, Any], place: Place, system: Structure | None = None
+) -> tuple[Component, list[str]]:
+    """The component with entries of a file; and notes.
+
+    Those for a component of a system are changes: texts may stand for numbers, and with an FMU,
+    names and units are those of its variables, and so are values, in its units.
+    """
+    own, now, notes = f"components.{was.name}", was, list[str]()
+    values, rename, units = (
+        as_table(place(f"{own}.{entry}"), table.get(entry, {})) for entry in ("values", *NAMES)
+    )
+    if system is None:
+        check_values(place(f"{own}.values"), values)
+    for entry, must in NAMES.items():
+        for key, name in table.get(entry, {}).items():
+            text(place(f"{own}.{entry}.{key}"), name, must)
+    if system and "fmu" in table:
+        where, fmu = place(f"{own}.fmu"), table["fmu"]
+        if not isinstance(fmu, str | Path):
+            raise InputError(f"{where} = {fmu!r}: must be the path of an FMU")
+        now = replaced(was, Path(fmu), rename, units, f"{where}: ")
+        now, notes = with_old_values(system, was, now, values, where)
+    if rename or units:
+        now = replace(now, rename={**now.rename, **rename}, units={**now.units, **units})
+        read_interface(now.fmu)  # what is wrong in it has a place of its own
+        try:
+            now.interface  # noqa: B018 - it is made
+        except InputError as error:
+            raise InputError(place(f"components.{error}")) from error
+    if "step" in table:
+        now = replace(now, step_ns=in_nanoseconds(place(f"{own}.step"), table["step"]))
+    if "isolation" in table:
+        chosen = choice(place(f"{own}.isolation"), table["isolation"], ISOLATIONS)
+        now = replace(now, isolation=chosen)
+    if "solver" in table:
+        solver = _changed(place(f"{own}.solver"), now.solver or Solver(), table["solver"])
+        now = replace(now, solver=solver)
+    if values:
+        now = with_given(now, lambda n: place(f"{was.name}.{n}"), values, text=system is not None)
+    return now, notes
 
 
 def check_filled_in(path: Path) -> None:
@@ -106,69 +231,71 @@ def to_do(text: str) -> dict[int, str]:
     return {number: line.strip(" \t\r,") for number, line in lines if TODO.match(line)}
 
 
-def _values(place: str, table: Any) -> dict[str, Given]:
-    """A table of values; if they fit their variables is checked where it is used."""
-    values = as_table(place, table)
-    check_values(place, values)
-    return values
-
-
-def _component(place: str, name: str, entry: Any, folder: Path) -> Component:
-    place = f"{place}: [components.{name}]"
-    entry = as_table(place, entry)
-    check_keys(place, entry, ENTRIES)
-    fmu = folder / text(f"{place}: fmu", entry.get("fmu"), "the path of an FMU, as a string")
-    values = _values(f"{place}: values", entry.get("values", {}))
-    own = entry.get("step")
-    rename = _names(f"{place}: rename", entry.get("rename", {}), "a variable of the FMU, a string")
-    units = _names(f"{place}: units", entry.get("units", {}), "the name of a unit, like 'mm'")
-    component = Component(
-        name,
-        fmu,
-        {},
-        rename,
-        None if own is None else in_nanoseconds(f"{place}: step", own),
-        choice(f"{place}: isolation", entry.get("isolation", "none"), ISOLATIONS),
-        units,
-        solver=changed(f"{place}: solver", Solver(), entry["solver"])
-        if "solver" in entry
-        else None,
-    )
-    sized = component.sized(read_interface(fmu)).renamed(rename, f"{place}: rename")
-    sized.in_units(units, f"{place}: units")
-    return with_given(component, lambda _: f"{place}: values", values)
-
-
-def _names(place: str, table: Any, must: str) -> dict[str, str]:
-    """A table of strings."""
-    names = as_table(place, table)
-    for key, name in names.items():
-        text(f"{place}: {key!r}", name, must)
-    return names
-
-
-def _connections(place: str, entries: Any) -> tuple[Connection, ...]:
-    if not isinstance(entries, list):
-        raise InputError(f"{place} = {entries!r}: must be a list of 'output -> input'")
-    return tuple(_connection(f"{place}[{i}]", entry) for i, entry in enumerate(entries))
-
-
 def _connection(place: str, entry: Any) -> Connection:
     if not isinstance(entry, dict):
         parts = [part.strip() for part in entry.split("->")] if isinstance(entry, str) else []
-        ports = [Port(*part.split(".", 1)) for part in parts if "." in part]
-        if len(parts) != 2 or len(ports) != 2:
+        if len(parts) != 2:
             raise InputError(f"{place}: {entry!r}: must be 'component.output -> component.input'")
-        return Connection(ports[0], ports[1])
+        return Connection(as_port(place, parts[0]), as_port(place, parts[1]))
     check_keys(place, entry, {"from", "to", "factor", "offset"})
     for key in ("factor", "offset"):
         if not is_number(entry.get(key, 0.0)):
             raise InputError(f"{place}: {key} = {entry[key]!r}: must be a number")
-    source, target = (_port(f"{place}: {key}", entry.get(key)) for key in ("from", "to"))
+    source, target = (as_port(f"{place}: {key}", entry.get(key)) for key in ("from", "to"))
     return Connection(source, target, entry.get("factor"), entry.get("offset"))
 
 
-def _port(place: str, name: Any) -> Port:
-    if not isinstance(name, str) or "." not in name:
-        raise InputError(f"{place} = {name!r}: must be 'component.variable'")
-    return Port(*name.split(".", 1))
+def as_file(system: Structure, settings: Mapping[str, Any], place: Place) -> dict[str, Any]:
+    """The tables that a file of the system with these settings would have.
+
+    InputError, with what `place` makes of a key, where there is no such place, or one is given
+    twice.
+    """
+    root: dict[str, Any] = {}
+    names = [component.name for component in system.components]
+    for key, value in settings.items():
+        if "." not in key:
+            entries = [f"{section}.{e}" for section, found in PLACES.items() for e in found]
+            of = [(c.name, v) for c in system.components for v in c.interface.of(*SETTABLE)]
+            near = nearest(key, entries + [f"{name}.{v.name}" for name, v in of])
+            raise InputError(f"{place(key)}: no place in a system file; {near}")
+        *tables, name = _place(names, key, place(key))
+        table = root
+        for entry in tables:
+            table = table.setdefault(entry, {})
+        if name in table:
+            raise InputError(f"{place(key)}: this place is given twice; must be given once")
+        as_it_is = {"roles", "input", "values", *NAMES} & {tables[0], *tables[2:]}
+        table[name] = value if as_it_is or name == "fmu" else plain(value)
+    return root
+
+
+def _place(names: Collection[str], key: str, said: str) -> tuple[str, ...]:
+    """The entries of the tables that lead to a place; COMPONENT.VARIABLE is short for a value."""
+    section, _, rest = key.partition(".")
+    if section in names:
+        section, rest = "components", f"{section}.values.{rest}"
+    known(f"{said}: no component", section, [*names, *PLACES])
+    if section != "components":
+        known(f"{said}: no entry", rest, PLACES[section] or [rest], f" of [{section}]")
+        return section, rest
+    name, _, rest = rest.partition(".")
+    entry, _, last = rest.partition(".")
+    known(f"{said}: no component", name, names)
+    known(f"{said}: no entry", entry, ENTRIES, " of a component")
+    if bool(last) != (entry in TABLES):
+        form = f"components.{name}.{entry}"
+        raise InputError(f"{said}: must be {form}{'.NAME' if entry in TABLES else ''}")
+    return (section, name, entry, last) if last else (section, name, entry)
+
+
+def plain(value: Any) -> Any:
+    """A text from a command line as the number or boolean that it spells; all else as it is."""
+    if not isinstance(value, str):
+        return value
+    if value in ("true", "false"):
+        return value == "true"
+    for kind in (integer, real):
+        with suppress(ValueError):
+            return kind(value)
+    return value

@@ -1,20 +1,23 @@
-"""Checks of a system before it is run: every input has one source, every port exists."""
+"""Checks of a system before it is run: every input has one source, every port exists.
+
+A connection between whole arrays becomes one for each element.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 from ..base.checks import known, number
 from ..base.errors import InputError, choices
 from ..base.text import counted
-from ..interface.interface import SUPPORTED, Interface, Variable, limits
+from ..interface.expansion import shape_text
+from ..interface.interface import SUPPORTED, Variable, limits
 from ..interface.obstacles import KINDS
 from ..interface.units import conversion
-from .arrays import as_written, unsourced
-from .parts import NANOSECONDS, Connection, Port, seconds
+from .parts import NANOSECONDS, Component, Connection, Port, component_of, seconds
 from .stimuli_checks import check_stimuli, driven, stimuli_remarks
 from .structure import Structure
 
@@ -22,35 +25,72 @@ FEW = 10
 """Steps; a run of fewer is remarked on."""
 
 
-class _End(NamedTuple):
-    port: Port
-    interface: Interface
-    variable: Variable
+def as_written(system: Structure) -> tuple[Connection, ...]:
+    """The connections as they were given: of whole arrays one."""
+    return tuple(dict.fromkeys(c.whole or c for c in system.connections))
+
+
+def by_element(
+    name: str, components: Sequence[Component], connections: Sequence[Connection]
+) -> tuple[Connection, ...]:
+    """The connections of a system of that name, between whole arrays one for each element.
+
+    InputError where the shapes differ.
+    """
+    arrays = {c.name: c.interface.arrays for c in components}
+    made: list[Connection] = []
+    for connection in connections:
+        ends = (connection.source, connection.target)
+        source, target = found = [arrays.get(p.component, {}).get(p.variable) for p in ends]
+        if source is None and target is None:
+            made.append(connection)
+            continue
+        place = f"{name}: connection '{connection}'"
+        if source is None or target is None or source.shape != target.shape:
+            has = []
+            for port, array, causality in zip(ends, found, ("output", "input"), strict=True):
+                v = None if array else _end(components, port, causality, place)
+                what = shape_text(array.shape) if array else v and v.shape and v.nature
+                has.append(f"{port} is {what or 'no array'}")
+            raise InputError(
+                f"{place}: {' and '.join(has)}; must have equal shapes, or be of elements, like "
+                "u[1]"
+            )
+        for start, end in zip(source.names, target.names, strict=True):
+            first, last = Port(ends[0].component, start), Port(ends[1].component, end)
+            made.append(replace(connection, source=first, target=last, whole=connection))
+    return tuple(made)
+
+
+def _end(components: Sequence[Component], port: Port, causality: str, place: str) -> Variable:
+    """The variable at an end of a connection; InputError where there is none."""
+    interface = component_of(components, port.component, place).interface
+    found = interface.by_name.get(port.variable)
+    if found is None or found.causality != causality:
+        valid = [v.name for v in interface.of(causality)]
+        known(f"{place}: {port.component} has no {causality}", port.variable, valid,
+              see=interface.listing)  # fmt: skip
+    assert found is not None  # noqa: S101 - it is known
+    return found
 
 
 def check_components(system: Structure) -> None:
-    """InputError where an FMU that a process can have once is in it twice."""
+    """InputError where a process cannot have an FMU twice, or a solver has no use."""
     first: dict[Path, str] = {}
     for component in system.components:
-        interface = component.interface
+        interface, fmu, name = component.interface, component.loaded, component.name
         once = interface.capability("canBeInstantiatedOnlyOncePerProcess") is True
         if once and component.isolation == "none":
-            other = first.setdefault(interface.path, component.name)
-            if other != component.name:
+            other = first.setdefault(interface.path, name)
+            if other != name:
                 raise InputError(
-                    f"{system.name}: {component.name} and {other} are both {interface.path.name}, "
+                    f"{system.name}: {name} and {other} are both {interface.path.name}, "
                     'of which a process can have one only; must have isolation = "process" but '
                     "for one"
                 )
-
-
-def check_solvers(system: Structure) -> None:
-    """InputError where a component cannot be integrated as it says."""
-    for component in system.components:
-        fmu = component.loaded
         if component.solver and fmu.exchange is None:
             raise InputError(
-                f"{system.name}: {component.name}: solver: {fmu.path.name} is for "
+                f"{system.name}: {name}: solver: {fmu.path.name} is for "
                 f"{choices(KINDS[k] for k in fmu.kinds)} alone; must be left out"
             )
 
@@ -59,20 +99,21 @@ def check_connections(system: Structure) -> None:
     """InputError at the first connection or input that is not as it must be."""
     sources: dict[Port, Port] = {}
     for connection in system.connections:
-        place, source, target = _Place(system, connection), connection.source, connection.target
+        source, target = connection.source, connection.target
         connection_transform(system, connection)
         valued = target.variable in system.component(target.component, "").values
         if valued or target in sources:
             two = "the connection and a value" if valued else f"{sources[target]} and {source}"
-            raise InputError(f"{place}: {target} has two sources, {two}; must have one")
+            raise InputError(
+                f"{_place(system, connection)}: {target} has two sources, {two}; must have one"
+            )
         sources[target] = source
-    others = driven(system)
+    fed = _fed(system)
     missing = [
-        port
-        for component in system.components
-        for v in component.interface.of("input")
-        if v.supported and not v.element and v.name not in component.values
-        if (port := Port(component.name, v.name)) not in sources and port not in others
+        Port(c.name, v.name)
+        for c in system.components
+        for v in c.interface.of("input")
+        if v.supported and not v.element and v.name not in c.values and v.name not in fed[c.name]
     ]
     if missing:
         check_stimuli(system, whole=True)
@@ -88,169 +129,108 @@ def check_connections(system: Structure) -> None:
         )
 
 
+def check_arrays(system: Structure) -> None:
+    """InputError where only a part of an array is given, and nothing is known of the rest.
+
+    The rest of what is given keeps its start value, which must be declared for the size it has.
+    """
+    fed, stimuli = _fed(system), driven(system)
+    for c in system.components:
+        given = {*c.values, *(p.variable for p in stimuli if p.component == c.name)}
+        for name, array in c.interface.arrays.items():
+            silent = [n for n in array.names if c.interface.by_name[n].start is None]
+            missing = [n for n in silent if n not in given and n not in fed[c.name]]
+            if missing and not given.isdisjoint(array.names):
+                raise InputError(
+                    f"{system.name}: {c.name}.{name}: no value for {choices(missing, 6)}, "
+                    "and no start value for this size; must be given, too"
+                )
+
+
+def _fed(system: Structure) -> Mapping[str, set[str]]:
+    """The inputs that have a connection, or that stimuli drive, by component."""
+    found: dict[str, set[str]] = {c.name: set() for c in system.components}
+    for port in (*(connection.target for connection in system.connections), *driven(system)):
+        found[port.component].add(port.variable)
+    return found
+
+
 def connection_transform(system: Structure, connection: Connection) -> tuple[float, float]:
     """Factor and offset of a connection, (1.0, 0.0) for the identity.
 
     What the connection declares, or else the conversion between the units of its ends. InputError
     where an end does not exist, and where values cannot be passed from one end to the other.
     """
-    place = _Place(system, connection)
-    source, target = _ends(system, connection)
-    _check_types(place, source, target)
+    place = _place(system, connection)
+    source, target = (
+        _end(system.components, port, causality, place)
+        for port, causality in ((connection.source, "output"), (connection.target, "input"))
+    )
+    _check_types(system, place, (connection.source, source), (connection.target, target))
     if connection.factor is not None or connection.offset is not None:
-        return _declared(place, connection, target.variable)
-    given, taken = source.variable.unit, target.variable.unit
+        return _declared(place, connection, target)
+    given, taken = source.unit, target.unit
     if given is None or taken is None or given == taken:
         return 1.0, 0.0
-    units = source.interface.unit(source.variable), target.interface.unit(target.variable)
+    units = [
+        system.component(port.component, place).interface.unit(variable)
+        for port, variable in ((connection.source, source), (connection.target, target))
+    ]
     found = conversion(units[0], units[1]) if units[0] and units[1] else None
     if None in units:
         why = "which their FMUs do not define in SI units;"
     elif found is None:
         why = "which cannot be converted; must be the same quantity, or"
-    elif found.offset and source.variable.relative != target.variable.relative:
+    elif found.offset and source.relative != target.relative:
         why = "and only one of them is a difference (relativeQuantity); must be both, or"
     else:
-        return found.factor, 0.0 if target.variable.relative else found.offset
+        return found.factor, 0.0 if target.relative else found.offset
     raise InputError(
-        f"{place}: {source.port} is in {given} and {target.port} in {taken}, {why} "
-        f'{{ from = "{source.port}", to = "{target.port}", factor = ... }} '
+        f"{place}: {connection.source} is in {given} and {connection.target} in {taken}, {why} "
+        f'{{ from = "{connection.source}", to = "{connection.target}", factor = ... }} '
         f"gives the factor from {given} to {taken}, and a component's units correct a wrong one"
     )
 
 
 def transforms(system: Structure) -> dict[Port, tuple[float, float]]:
     """Factor and offset of every connection, by its target: see connection_transform()."""
-    return {
-        connection.target: connection_transform(system, connection)
-        for connection in system.connections
-    }
+    return {c.target: connection_transform(system, c) for c in system.connections}
 
 
-def remarks(system: Structure) -> tuple[str, ...]:
-    """Return remarks on a system that is valid, a line each.
-
-    Units other than the declared ones, values that lose digits, units that cannot be compared,
-    variables that are left alone.
-    """
-    lines = [
-        f"{component.name}: {component.fmu.name} runs by model exchange, integrated by CVode with "
-        f"a relative tolerance of {chosen.relative_tolerance:g}"
-        for component in system.components
-        if (chosen := component.integrated)
-    ]
-    lines += [
-        f"{component.name}: several variables of {component.fmu.name} are called {choices(names)}: "
-        "they are left alone"
-        for component in system.components
-        if (names := component.interface.ambiguous)
-    ]
-    for component in system.components:
-        declared = component.declared
-        lines += [
-            f"{Port(component.name, name)} is declared in {v.unit}, but named in {unit}: taken to "
-            "be in that"
-            for name, unit in component.units.items()
-            if (v := declared.sample(name)) and v.unit not in (None, unit)
-        ]
-    lines += _of_connections(system)
-    for component in system.components:
-        for variable in component.interface.of("input", "output"):
-            if not variable.supported:
-                port = Port(component.name, variable.name)
-                left = "keeps its start value" if variable.causality == "input" else "not recorded"
-                lines.append(f"{port} is of type {variable.nature}: {left}")
-        lines += unsourced(system, component)
-    lines += stimuli_remarks(system)
-    steps = system.total_steps
-    if system.connections and steps < FEW:
-        lines.append(
-            f"{system.name}: the whole run is {counted(steps, 'step')} of "
-            f"{system.step_ns / NANOSECONDS:g} s, and values are passed on only between steps; "
-            "take a shorter --step"
-        )
-    if not system.recorded:
-        lines.append(
-            f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
-            "Boolean or String"
-        )
-    return tuple(lines)
+def _place(system: Structure, connection: Connection) -> str:
+    return f"{system.name}: connection '{connection}'"
 
 
-def _of_connections(system: Structure) -> Iterator[str]:
-    """Remarks on connections that round values, or that lack a unit at one end."""
-    for named, connection in {c.whole or c: c for c in system.connections}.items():
-        source, target = (end.variable for end in _ends(system, connection))
-        if target.type == "Float32" and source.type in ("Real", "Float64"):
-            yield f"{named}: from {source.type} to Float32, rounded to 7 digits"
-        if target.kind == "Real" and connection.factor is None and connection.offset is None:
-            ends = ((named.source, source), (named.target, target))
-            missing = [port for port, variable in ends if variable.unit is None]
-            if len(missing) == 1:
-                unit = source.unit or target.unit
-                yield f"{named}: {missing[0]} has no unit, taken to be in {unit}"
-
-
-class _Place:
-    """Where a connection is, as text once it is needed: a system may have thousands."""
-
-    def __init__(self, system: Structure, connection: Connection) -> None:
-        self._system, self._connection = system, connection
-
-    def __str__(self) -> str:
-        written = as_written(self._system)
-        number = written.index(self._connection.whole or self._connection)
-        return f"{self._system.name}: connections[{number}] '{self._connection}'"
-
-
-def _ends(system: Structure, connection: Connection) -> tuple[_End, _End]:
-    """Source and target of a connection; InputError where one does not exist."""
-
-    def end(port: Port, causality: str) -> _End:
-        interface = system.component(port.component, _Place(system, connection)).interface
-        found = interface.by_name.get(port.variable)
-        if found is None or found.causality != causality:
-            valid = [v.name for v in interface.of(causality)]
-            said = f"{_Place(system, connection)}: {port.component} has no {causality}"
-            known(said, port.variable, valid, see=interface.listing)
-            raise AssertionError(port)  # pragma: no cover
-        return _End(port, interface, found)
-
-    return end(connection.source, "output"), end(connection.target, "input")
-
-
-def _check_types(place: _Place, source: _End, target: _End) -> None:
+def _check_types(
+    system: Structure, place: str, source: tuple[Port, Variable], target: tuple[Port, Variable]
+) -> None:
     """InputError where the target's type does not hold what the source puts out."""
-    for port, _, variable in (source, target):
+    ranges = []
+    for port, variable in (source, target):
         if not variable.supported:
             raise InputError(
                 f"{place}: {port} is of type {variable.nature}, which is not supported; "
                 f"must be {choices(SUPPORTED)}"
             )
-    given, taken = source.variable, target.variable
-
-    def types() -> str:
-        return f"{place}: {source.port} is {given.type} and {target.port} is {taken.type}"
-
-    (least, most), (low, high) = (
-        limits(end.variable.type, end.interface.version) for end in (source, target)
-    )
+        version = system.component(port.component, place).interface.version
+        ranges.append(limits(variable.type, version))
+    given, taken = source[1], target[1]
+    (least, most), (low, high) = ranges
+    fits, must = True, ""
     if (given.kind, taken.kind) == ("Integer", "Real"):
-        if taken.type == "Float32" and not -(2**24) <= least <= most <= 2**24:
-            raise InputError(f"{types()}, which does not hold all its values; must be Float64")
+        fits = taken.type != "Float32" or -(2**24) <= least <= most <= 2**24
+        must = "Float64, which holds all its values"
     elif given.kind != taken.kind:
+        fits, must = False, "both Real, Integer, Boolean or String, or from Integer to Real"
+    elif given.kind == "Integer":
+        fits, must = low <= least <= most <= high, f"a type that holds {least} to {most}"
+    if not fits:
         raise InputError(
-            f"{types()}; must be both Real, both Integer, both Boolean or both String, "
-            "or from Integer to Real"
-        )
-    elif given.kind == "Integer" and not low <= least <= most <= high:
-        raise InputError(
-            f"{types()}, which does not hold all its values; must be a type that holds "
-            f"{least} to {most}"
+            f"{place}: {source[0]} is {given.type} and {target[0]} is {taken.type}; must be {must}"
         )
 
 
-def _declared(place: _Place, connection: Connection, target: Variable) -> tuple[float, float]:
+def _declared(place: str, connection: Connection, target: Variable) -> tuple[float, float]:
     factor = 1.0 if connection.factor is None else float(connection.factor)
     offset = 0.0 if connection.offset is None else float(connection.offset)
     if not factor or not math.isfinite(factor):
@@ -270,14 +250,10 @@ def check_steps(system: Structure) -> None:
     until = f"stop = {seconds(stop)}{f' from start = {seconds(start)}' if start else ''}"
     if stop <= start:
         raise InputError(f"start = {seconds(start)}: must be before stop = {seconds(stop)}")
-
-    def nearest(time: int) -> int:
-        return max(1, round(time / step)) * step
-
     if (stop - start) % step:
+        near = max(1, round((stop - start) / step)) * step
         raise InputError(
-            f"step = {seconds(step)} does not divide {until}; "
-            f"stop could be {seconds(start + nearest(stop - start))}"
+            f"step = {seconds(step)} does not divide {until}; stop could be {seconds(start + near)}"
         )
     for component in system.components:
         own = step if component.step_ns is None else component.step_ns
@@ -285,7 +261,78 @@ def check_steps(system: Structure) -> None:
         if own % step:
             raise InputError(
                 f"{place} is not a whole multiple of the base step {seconds(step)}; "
-                f"could be {seconds(nearest(own))}"
+                f"could be {seconds(max(1, round(own / step)) * step)}"
             )
         if (stop - start) % own:
             raise InputError(f"{place} does not divide {until}; must end with a whole step")
+
+
+def remarks(system: Structure) -> tuple[str, ...]:
+    """Remarks on a system that is valid, a line each.
+
+    Units other than the declared ones, values that lose digits, units that cannot be compared,
+    variables that are left alone.
+    """
+    return (*_of_components(system), *_of_connections(system), *_of_the_rest(system))
+
+
+def _of_components(system: Structure) -> Iterator[str]:
+    for c in system.components:
+        if solver := c.integrated:
+            yield (
+                f"{c.name}: {c.fmu.name} runs by model exchange, integrated by CVode with a "
+                f"relative tolerance of {solver.relative_tolerance:g}"
+            )
+        if names := c.interface.ambiguous:
+            yield (
+                f"{c.name}: several variables of {c.fmu.name} are called {choices(names)}: they "
+                "are left alone"
+            )
+        for name, unit in c.units.items():
+            if (v := c.declared.sample(name)) and v.unit not in (None, unit):
+                port = Port(c.name, name)
+                yield f"{port} is declared in {v.unit}, but named in {unit}: taken to be in that"
+
+
+def _of_connections(system: Structure) -> Iterator[str]:
+    """Remarks on connections that round values, or that lack a unit at one end."""
+    for named, connection in {c.whole or c: c for c in system.connections}.items():
+        ends = ((connection.source, "output"), (connection.target, "input"))
+        source, target = (_end(system.components, port, what, "") for port, what in ends)
+        if target.type == "Float32" and source.type in ("Real", "Float64"):
+            yield f"{named}: from {source.type} to Float32, rounded to 7 digits"
+        if target.kind == "Real" and connection.factor is None and connection.offset is None:
+            missing = [
+                p for p, v in ((named.source, source), (named.target, target)) if v.unit is None
+            ]
+            if len(missing) == 1:
+                unit = source.unit or target.unit
+                yield f"{named}: {missing[0]} has no unit, taken to be in {unit}"
+
+
+def _of_the_rest(system: Structure) -> Iterator[str]:
+    fed = _fed(system)
+    for c in system.components:
+        for v in c.interface.of("input", "output"):
+            if not v.supported:
+                left = "keeps its start value" if v.causality == "input" else "not recorded"
+                yield f"{Port(c.name, v.name)} is of type {v.nature}: {left}"
+        free: list[str] = []
+        for name, array in c.interface.arrays.items():
+            without = [n for n in array.names if n not in fed[c.name] and n not in c.values]
+            if without and c.interface.by_name[without[0]].causality == "input":
+                free += [name] if len(without) == len(array.names) else without
+        if free:
+            yield f"{c.name}: no source for {choices(free, 6)}: kept as the FMU starts with"
+    yield from stimuli_remarks(system)
+    if system.connections and system.total_steps < FEW:
+        yield (
+            f"{system.name}: the whole run is {counted(system.total_steps, 'step')} of "
+            f"{system.step_ns / NANOSECONDS:g} s, and values are passed on only between steps; "
+            "take a shorter --step"
+        )
+    if not system.recorded:
+        yield (
+            f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
+            "Boolean or String"
+        )
