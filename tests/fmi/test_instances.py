@@ -14,10 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.fmi.fmi2 import SharedInstance
+from grasp_cosim.fmi.fmi2 import CONVENTION, SharedInstance, formatted, logger_type
 from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
-from grasp_cosim.fmi.make_instance import load
-from grasp_cosim.fmi.variadic import CONVENTION, formatted, logger_type
+from grasp_cosim.fmi.process import load
 from grasp_cosim.interface.interface import Variable
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.system.parts import Component, Connection, Port

@@ -1,9 +1,19 @@
-"""An instance whose FMU lives in a process of its own: it may crash there, or hang.
+"""An instance of a component: in this process, or in one of its own, where it may crash or hang.
 
-What the FMU prints does not get out of it, but for the last lines, as notes of the error when the
-process is lost.
+Both ends of such a process are here: python -m grasp_cosim.fmi.process serves, with the descriptors
+of the connection for commands, of the shared memory and of a pipe that is closed when the master's
+process ends, whereupon this one ends, too. A macro step is one round trip. The master puts inputs
+and the time into the shared memory, sends STEP and waits for the status; the component's process
+passes the inputs on that are pending, steps, fetches all outputs into the shared memory and
+answers. All else is a method with its arguments, and answered by its value or error with warnings.
+
+What the FMU prints does not get out, but for the last lines, as notes of the error when the process
+is lost.
 """
 
+import faulthandler
+import logging
+import mmap
 import os
 import pickle
 import socket
@@ -14,21 +24,24 @@ import threading
 import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ..base import interruption
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError, ended
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import end_group, listener
 from ..interface.interface import Interface, Value, Variable
-from ..system.parts import Solver
-from .instance import EARLY, WARNING, Inputs
-from .shared_memory import ANSWER, CALL, FETCH, LOGGED, SIZE, STEP, SharedMemory
+from ..system.parts import Component, Solver
+from .fmi2 import FmuInstance, SharedInstance
+from .fmi3 import Fmi3Instance
+from .instance import EARLY, OK, WARNING, Inputs, Instance, dtype
+from .loaded import LoadedInstance
 
 POSIX = os.name == "posix"
 """Elsewhere a process is not handed open files."""
@@ -48,12 +61,72 @@ OUTPUT_TIMEOUT = 1.0
 LINES = 80
 """The last lines of what an FMU printed that are kept for the error: of a crash both stacks."""
 
+STEP, FETCH = b"S", b"F"
+"""Pass pending inputs on and step; pass them on and fetch outputs. Pickles are longer."""
+
+LOGGED = "FMU: "
+"""So begins what an FMU logged, among the lines that its process prints."""
+
+SIZE = 1 << 26
+"""Bytes of shared memory; only what is used of it takes memory."""
+
+
+def load(component: Component) -> Instance:
+    """The instance of a component, in a process of its own where it wants one.
+
+    InputError where the FMU does not load. The caller closes it.
+    """
+    if component.isolation == "process":
+        return ProcessInstance(component.name, component.loaded, component.solver)
+    if component.native and component.loaded.version == "2.0":
+        return SharedInstance(component.name, component.loaded)
+    return load_here(component.name, component.loaded, component.solver)
+
+
+def load_here(name: str, interface: Interface, solver: Solver | None = None) -> LoadedInstance:
+    """The instance of an FMU in this process; by model exchange with a solver, or if it has to."""
+    three = interface.version.startswith("3")
+    if not solver and "CoSimulation" in interface.kinds:
+        return (Fmi3Instance if three else FmuInstance)(name, interface)
+    try:
+        from .model_exchange import Fmi2Model, Fmi3Model  # loads the solver's libraries
+    except OSError as error:
+        raise InputError(
+            f"{name}: {interface.path.name} is for model exchange, and FMPy has no CVode for "
+            f"this machine: {error}; must be a co-simulation FMU"
+        ) from error
+    return (Fmi3Model if three else Fmi2Model)(name, interface, solver or Solver())
+
+
+class _SharedMemory:
+    """The memory behind the file with the given descriptor, which both processes see."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._memory = mmap.mmap(descriptor, SIZE)
+        self.clock: npt.NDArray[np.float64] = self._view(np.float64, 1, 0)
+        """Time in s at the beginning of the step."""
+        self.step: npt.NDArray[np.float64] = self._view(np.float64, 1, 8)
+        """Its length in s."""
+        self._used = 16
+
+    def add(
+        self, interface: Interface, variables: Sequence[Variable]
+    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:
+        """A mark that values of the variables are pending, and room for them.
+
+        Both processes add the same variables in the same order and get the same room.
+        """
+        begin, count = self._used, len(variables)
+        self._used += 8 + 8 * count
+        element = dtype(interface.version, variables[0].type)
+        return self._view(np.bool_, 1, begin), self._view(element, count, begin + 8)
+
+    def _view(self, element: npt.DTypeLike, count: int, offset: int) -> npt.NDArray[Any]:
+        return np.frombuffer(self._memory, element, count, offset)
+
 
 class ProcessInstance:
-    """One instance of an FMU in a process of its own, which runs worker.py.
-
-    The process ends with this one, however this one ends.
-    """
+    """One instance of an FMU in a process of its own, which ends with this one, however it ends."""
 
     def __init__(self, name: str, interface: Interface, solver: Solver | None = None) -> None:
         """Start the process and instantiate; InputError where the FMU does not load."""
@@ -71,7 +144,7 @@ class ProcessInstance:
         folder = self._stack.enter_context(ScratchFolder()).name
         memory = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
         memory.truncate(SIZE)
-        self._exchange = SharedMemory(memory.fileno())
+        self._shared = _SharedMemory(memory.fileno())
         ours, theirs = socket.socketpair()
         self._connection = Connection(ours.detach())
         reading, writing = os.pipe()
@@ -79,7 +152,7 @@ class ProcessInstance:
         ends = (theirs.fileno(), memory.fileno(), reading)
         path = os.pathsep.join(filter(None, sys.path))
         self._process = subprocess.Popen(  # noqa: S603
-            [sys.executable, "-P", "-m", "grasp_cosim.fmi.worker", *map(str, ends)],
+            [sys.executable, "-P", "-m", "grasp_cosim.fmi.process", *map(str, ends)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -138,7 +211,7 @@ class ProcessInstance:
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """As Instance.transfer: inputs arrive with the next step, and outputs come with it."""
-        pending, shared = self._exchange.add(self.interface, variables)
+        pending, shared = self._shared.add(self.interface, variables)
         self._ask("transfer", action, list(variables))
         if action == "set":
             self._inputs.bind(variables, data)
@@ -158,11 +231,11 @@ class ProcessInstance:
         return Call(put if action == "set" else fetch)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        exchange = self._exchange
+        shared = self._shared
 
         def advance() -> int:
-            exchange.clock[0] = clock[0]
-            exchange.step[0] = step
+            shared.clock[0] = clock[0]
+            shared.step[0] = step
             return self._pass_values(STEP)
 
         return Call(advance)
@@ -182,15 +255,15 @@ class ProcessInstance:
             return error
 
     def _pass_values(self, command: bytes) -> int:
-        """STEP or FETCH, one round trip; the FMI status."""
+        """STEP or FETCH; the FMI status."""
         self._fresh = False
-        status: int = self._request(command, None, TIMEOUT)
+        status: int = self._request(command, TIMEOUT)
         self._fresh = status <= WARNING or status == EARLY
         return status
 
     def _ask(self, method: str, *arguments: Any, timeout: float = TIMEOUT) -> Any:
-        """Return the value of a worker's method; InputError or SimulationError if it raises one."""
-        return self._request(CALL, (method, arguments), timeout)
+        """The value of a method in the other process; what it raises there is raised here."""
+        return self._request(pickle.dumps((method, arguments)), timeout)
 
     def _prepare(self, method: str, *arguments: Any) -> None:
         """Ask while the FMU is loaded or initialised: InputError also where its process is lost."""
@@ -205,30 +278,29 @@ class ProcessInstance:
         self._wait_for_the_end()
         self._stack.close()
 
-    def _request(self, command: bytes, call: Any, timeout: float) -> Any:
-        """Send a command and wait for the answer: a status, or what a method returns."""
+    def _request(self, command: bytes, timeout: float) -> Any:
         if self._lost is not None:
             raise self._lost
         try:
             self._connection.send_bytes(command)
-            if call is not None:
-                # not send(), whose buffer would be in the traceback of an error, and be complained
-                # of when that is cleared away
-                self._connection.send_bytes(pickle.dumps(call))
             if not self._answers(timeout):
                 self._process.kill()
                 raise self._lose(f"did not answer within {timeout:g} s and was ended")
-            status = self._connection.recv_bytes()[0]
-            if status < ANSWER:
-                return status
-            kind, value, notes = self._connection.recv()
+            answer = self._connection.recv_bytes()
         except (EOFError, OSError) as error:
             raise self._lose() from error
         except KeyboardInterrupt:  # an answer on the way would be taken for the next one
             self._process.kill()
             self._lose("was interrupted and ended")
             raise
-        return self._value(kind, value, notes)
+        if len(answer) == 1:
+            return answer[0]
+        value, notes = pickle.loads(answer)  # noqa: S301
+        if isinstance(value, Exception):
+            raise value
+        for text in notes:
+            warnings.warn(text, stacklevel=3)
+        return value
 
     def _lose(self, what: str = "") -> SimulationError:
         """The error for a process that has ended, or is about to."""
@@ -238,7 +310,7 @@ class ProcessInstance:
         self._lost = SimulationError(
             f"{self.name}: the process of {self.interface.path.name} "
             f"{what or ended(self._process.returncode)} "
-            f"at t = {self._exchange.clock[0]:.9g} s{said}{self._inputs}"
+            f"at t = {self._shared.clock[0]:.9g} s{said}{self._inputs}"
         )
         for line in self._printed:
             self._lost.add_note(line.rstrip())
@@ -253,13 +325,90 @@ class ProcessInstance:
         end_group(self._process.pid)  # forks of it
         self._reader.join(OUTPUT_TIMEOUT)
 
-    def _value(self, kind: str, value: Any, notes: list[str]) -> Any:
-        """The value of an answer, or the error that it is."""
-        if kind == "value":
-            for text in notes:
-                warnings.warn(text, stacklevel=3)
-            return value
-        error = (InputError if kind == "InputError" else SimulationError)(value)
-        for text in notes:
-            error.add_note(text)
-        raise error
+
+class _Worker:
+    """The other end: serves commands on one instance."""
+
+    def __init__(self, connection: Connection, shared: _SharedMemory) -> None:
+        self._connection = connection
+        self._shared = shared
+        self._instance: Instance
+        self._inputs: list[tuple[Any, Call]] = []
+        self._outputs: list[Call] = []
+        self._step: float | None = None
+        self._advance: Call
+
+    def serve(self) -> None:
+        """Answer commands until one is to close."""
+        method, answer = "", b""
+        while method != "close":
+            command = self._connection.recv_bytes()
+            try:
+                if len(command) == 1:
+                    answer = bytes([self._exchange(command)])
+                else:
+                    method, arguments = pickle.loads(command)  # noqa: S301
+                    with warnings.catch_warnings(record=True) as caught:
+                        warnings.simplefilter("always")
+                        value = self._call(method, arguments)
+                    answer = pickle.dumps((value, [str(w.message) for w in caught]))
+            except (InputError, SimulationError) as error:
+                answer = pickle.dumps((error, []))
+            self._connection.send_bytes(answer)
+
+    def _exchange(self, command: bytes) -> int:
+        self._pass_on()
+        status = OK
+        if command == STEP:
+            step = float(self._shared.step[0])
+            if step != self._step:
+                self._step, self._advance = step, self._instance.stepper(self._shared.clock, step)
+            status = self._advance.python()
+        if status <= WARNING or status == EARLY:
+            for call in self._outputs:
+                self._check(call.python())
+        return status
+
+    def _pass_on(self) -> None:
+        for pending, call in self._inputs:
+            if pending[0]:
+                pending[0] = False
+                self._check(call.python())
+
+    def _check(self, status: int) -> None:
+        if status > WARNING:
+            raise self._instance.failure(status, float(self._shared.clock[0]))
+
+    def _call(self, method: str, arguments: tuple[Any, ...]) -> Any:
+        if method == "load":
+            self._instance = load_here(*arguments)
+            return None
+        if method == "transfer":
+            return self._transfer(*arguments)
+        if method in ("get", "set"):
+            self._pass_on()
+        return getattr(self._instance, method)(*arguments)
+
+    def _transfer(self, action: str, variables: Sequence[Variable]) -> None:
+        pending, data = self._shared.add(self._instance.interface, variables)
+        call = self._instance.transfer(action, variables, data)
+        if action == "set":
+            self._inputs.append((pending, call))
+        else:
+            self._outputs.append(call)
+
+
+def main(connection: int, memory: int, lifeline: int) -> None:
+    """Serve until the instance is closed."""
+    faulthandler.enable()
+    logging.basicConfig(format=f"{LOGGED}%(message)s", level=logging.INFO)
+    interruption.worker(lifeline)
+    with suppress(EOFError):  # where the master wants no more of it
+        _Worker(Connection(connection), _SharedMemory(memory)).serve()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)  # without what the FMU's library might do at exit
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

@@ -9,7 +9,7 @@ from grasp_fmus.link import LinkVariable, Signature
 
 from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
-from ..fmi.make_instance import load_here
+from ..fmi.process import load_here
 from ..interface.interface import Interface, Value, Variable
 from ..master.master import finish_step
 

@@ -40,7 +40,7 @@ _PACKAGES = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"
 _TRIAL = """
 import os, sys
 from pathlib import Path
-from grasp_cosim.fmi.make_instance import load_here
+from grasp_cosim.fmi.process import load_here
 from grasp_cosim.interface.read import read_interface
 try:
     load_here("trial", read_interface(Path(sys.argv[1]))).close()

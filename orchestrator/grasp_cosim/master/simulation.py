@@ -16,7 +16,7 @@ from ..base.progress import DELAY, Progress, phase
 from ..base.text import counted
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener
-from ..fmi.make_instance import load
+from ..fmi.process import load
 from ..interface.interface import Value
 from ..metrics.in_si import in_si
 from ..metrics.metric import (
