@@ -27,7 +27,7 @@ def fault(kind, start=0, end=None, *, target=WIRE, seed=0, **parameters):
 
 def on_connection(*faults):
     """What a connection with these faults makes of a value."""
-    windows = [Window(f"faults[{i}]", f, STEP) for i, f in enumerate(faults)]
+    windows = [Window(f, STEP) for f in faults]
     return fault_functions(windows, STEP)[faults[0].target]
 
 
@@ -195,7 +195,7 @@ def test_faults_of_a_connection_act_in_the_order_of_the_file():
 
 def test_each_connection_has_its_own_faults():
     faults = (fault("bias", value=1.0), fault("bias", value=2.0, target=OTHER))
-    functions = fault_functions([Window("", f, STEP) for f in faults], STEP)
+    functions = fault_functions([Window(f, STEP) for f in faults], STEP)
     assert {port: f(0.0, 0) for port, f in functions.items()} == {WIRE: 1.0, OTHER: 2.0}
 
 

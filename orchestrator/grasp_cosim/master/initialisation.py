@@ -20,6 +20,7 @@ from ..system.description import System
 from ..system.faults import INITIAL
 from ..system.parts import Connection, Initialisation, Port
 from ..system.validity import transforms
+from .scenario import of_kind
 
 Floats = npt.NDArray[np.float64]
 
@@ -201,8 +202,7 @@ class Propagation:
             number = factor * number + offset
         if connection.target in self._faults:
             number = self._faults[connection.target](number, INITIAL)
-        kind = self._kind(connection.target)
-        return number if kind == "Real" else int(number) if kind == "Integer" else number != 0.0
+        return of_kind(self._kind(connection.target), number)
 
     def _check_dependencies(self) -> list[str]:
         """Pass on again while outputs change: a line for each that hides a dependency.

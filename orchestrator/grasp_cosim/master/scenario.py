@@ -39,6 +39,26 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 }
 
 
+@dataclass(slots=True, eq=False)
+class _Once:
+    """What happens once: at a step from first on, before end, of its period, where `when` holds.
+
+    What it does gives lines for the log; `otherwise` is the one where it has not happened.
+    """
+
+    first: int
+    end: float
+    period: int
+    when: Condition | None
+    happen: Callable[[int], Sequence[str]]
+    otherwise: str = ""
+
+    def due(self, step: int) -> float:
+        """The first step from this one on at which it can happen."""
+        found = -(-max(step, self.first) // self.period) * self.period
+        return found if found < self.end else math.inf
+
+
 class Scenario:
     """The events and faults of one run.
 
@@ -55,38 +75,47 @@ class Scenario:
     ) -> None:
         """Values holds the outputs of now whenever a method is called, at the places in slots."""
         self.log: list[str] = []
-        self._system, self._instances = system, instances
-        self._slots, self._values = slots, values
-        self._events = [
-            self._pending(f"events[{i}]", event) for i, event in enumerate(system.events)
-        ]
-        self._windows = [
-            Window(f"faults[{i}]", self._in_numbers(fault), system.step_ns, system.start_ns)
-            for i, fault in enumerate(system.faults)
-        ]
-        self.fault_functions = fault_functions(self._windows, system.step_ns)
-        self._due = self.next_step(0)
+        self._system, self._slots, self._values = system, slots, values
+        self._instances = {instance.name: instance for instance in instances}
+        self._pending: list[_Once] = []
+        for i, event in enumerate(system.events):
+            self._add_event(f"events[{i}]", event)
+        windows = []
+        for i, fault in enumerate(system.faults):
+            given = {n: self._number(fault.target, v) for n, v in fault.parameters.items()}
+            numbers = replace(fault, parameters=given)
+            windows.append(Window(numbers, system.step_ns, system.start_ns))
+            self._pending += windows[-1].ends(f"faults[{i}]")
+        self.fault_functions = fault_functions(windows, system.step_ns)
+        self._due = self._next_step(0)
         self._settable: set[Port] = set()
+
+    def _add_event(self, place: str, event: Event) -> None:
+        system, otherwise = self._system, f"{event.when} never held"
+        if event.at_ns is not None:
+            otherwise = f"no step began at or after t = {seconds(event.at_ns)}"
+        at_ns = system.start_ns if event.at_ns is None else event.at_ns
+        first = first_step(at_ns, system.step_ns, system.start_ns)
+        period = math.lcm(*(system.period(port.component) for port in event.set))
+        happen, said = self._setter(place, event), f"{place} did not happen: {otherwise}"
+        self._pending.append(_Once(first, math.inf, period, event.when, happen, said))
 
     def before_step(self, step: int) -> None:
         """Do what is due at communication point `step`, before the step that begins there.
 
         Steps come in order. SimulationError where a component refuses a value.
         """
-        if self._due is None or step < self._due:
+        if step < self._due:
             return
-        for event in self._events[:]:
-            if event.next_step(step) == step and self._holds(event.event.when):
-                self._events.remove(event)
-                self._note(step, event.happen())
-        for window in self._windows:
-            if window.may_begin(step) and self._holds(window.fault.when):
-                window.begin(step)
-                self._note(step, [f"{window} begins"])
-            elif window.must_end(step):
-                window.ended = True
-                self._note(step, [f"{window} ends"])
-        self._due = self.next_step(step + 1)
+        for once in self._pending[:]:
+            if once.due(step) == step and self._holds(once.when):
+                self._pending.remove(once)
+                self._note(step, once.happen(step))
+        self._due = self._next_step(step + 1)
+
+    def _next_step(self, step: int) -> float:
+        """The first step from this one on at which something may be due."""
+        return min((once.due(step) for once in self._pending), default=math.inf)
 
     def set(self, name: str, value: Value, step: int) -> None:
         """Set what an event could set, now, at communication point step.
@@ -99,25 +128,11 @@ class Scenario:
         if port not in self._settable:
             check_setting(self._system, port, value, place)
             self._settable.add(port)
-        self._note(step, self._pending(place, Event({port: value})).happen())
-
-    def _pending(self, name: str, event: Event) -> _PendingEvent:
-        return _PendingEvent(name, event, self._system, self._instances, self._slots, self._values)
-
-    def next_step(self, step: int) -> int | None:
-        """The first step from this one on that needs before_step, as things are; None: none does.
-
-        That is the step itself while a condition is pending there.
-        """
-        steps = [event.next_step(step) for event in self._events]
-        steps += [k for w in self._windows if (k := w.next_step(step)) is not None]
-        return min(steps, default=None)
+        self._note(step, self._setter(place, Event({port: value}))(step))
 
     def pending(self) -> list[str]:
         """A line for each event that has not happened and each fault that has not begun."""
-        events = [f"{event.name} did not happen: {event.reason()}" for event in self._events]
-        faults = [f"{w.name} did not begin: {w}" for w in self._windows if not w.begun]
-        return events + faults
+        return [once.otherwise for once in self._pending if once.otherwise]
 
     def _note(self, step: int, lines: Sequence[str]) -> None:
         self.log += [f"t = {seconds(self._system.time_ns(step))}: {line}" for line in lines]
@@ -132,110 +147,69 @@ class Scenario:
         """The number of a constant for a port, which may be the name of an item."""
         if not isinstance(value, str):
             return value
-        interface = next(i.interface for i in self._instances if i.name == port.component)
-        return interface.by_name[port.variable].items[value]
+        return self._instances[port.component].interface.by_name[port.variable].items[value]
 
-    def _in_numbers(self, fault: Fault) -> Fault:
-        """The fault with numbers in the place of names of items."""
-        given = {n: self._number(fault.target, v) for n, v in fault.parameters.items()}
-        return replace(fault, parameters=given)
+    def _setter(self, place: str, event: Event) -> Callable[[int], Sequence[str]]:
+        """What an event does.
 
-
-class _PendingEvent:
-    """An event that has not happened yet, with the calls that it makes."""
-
-    def __init__(
-        self,
-        name: str,
-        event: Event,
-        system: System,
-        instances: Sequence[Instance],
-        slots: Mapping[Port, int],
-        values: npt.NDArray[np.float64],
-    ) -> None:
-        """An element of an array that is connected in part has a slot, and is passed on from it."""
-        self.name = name
-        self.event = event
-        self._period = math.lcm(*(system.period(port.component) for port in event.set))
-        at_ns = system.start_ns if event.at_ns is None else event.at_ns
-        self._first = first_step(at_ns, system.step_ns, system.start_ns)
-        self._calls: dict[str, tuple[Instance, list[Variable], list[Value]]] = {}
-        self._placed: dict[int, float] = {}
-        self._values = values
-        by_name = {instance.name: instance for instance in instances}
+        An element of an array that is connected in part has a slot, and is passed on from it.
+        """
+        calls: dict[str, tuple[list[Variable], list[Value]]] = {}
+        placed: dict[int, float] = {}
         for port, value in event.set.items():
-            instance = by_name[port.component]
-            if port in slots:
-                number = instance.interface.parse(name, port.variable, value)
-                exact(f"{name}: {port}", number)
-                self._placed[slots[port]] = float(number)
-                continue
-            _, variables, given = self._calls.setdefault(port.component, (instance, [], []))
-            variables.append(instance.interface.by_name[port.variable])
-            given.append(instance.interface.parse(name, port.variable, value))
+            interface = self._instances[port.component].interface
+            parsed = interface.parse(place, port.variable, value)
+            if port in self._slots:
+                exact(f"{place}: {port}", parsed)
+                placed[self._slots[port]] = float(parsed)
+            else:
+                variables, given = calls.setdefault(port.component, ([], []))
+                variables.append(interface.by_name[port.variable])
+                given.append(parsed)
+        reason = f" ({event.when})" if event.when else ""
+        lines = [f"{port} = {literal(value)}{reason}" for port, value in event.set.items()]
 
-    def next_step(self, step: int) -> int:
-        """The first step from this one on at which it can happen."""
-        return -(-max(step, self._first) // self._period) * self._period
+        def happen(_: int) -> Sequence[str]:
+            for component, (variables, given) in calls.items():
+                self._instances[component].set(variables, given)
+            for slot, number in placed.items():
+                self._values[slot] = number
+            return lines
 
-    def happen(self) -> list[str]:
-        """Set what it sets; lines for the log that say so."""
-        for instance, variables, values in self._calls.values():
-            instance.set(variables, values)
-        for slot, number in self._placed.items():
-            self._values[slot] = number
-        reason = f" ({self.event.when})" if self.event.when else ""
-        return [f"{port} = {literal(value)}{reason}" for port, value in self.event.set.items()]
-
-    def reason(self) -> str:
-        """Return why it has not happened."""
-        if self.event.when is not None:
-            return f"{self.event.when} never held"
-        return f"no step began at or after t = {seconds(self.event.at_ns or 0)}"
+        return happen
 
 
 class Window:
     """The steps in which a fault acts. With a condition they are only known when it begins."""
 
-    def __init__(self, name: str, fault: Fault, step_ns: int, start_ns: int = 0) -> None:
-        self.name = name
+    def __init__(self, fault: Fault, step_ns: int, start_ns: int = 0) -> None:
         self.fault = fault
-        self.begun = False
-        self.ended = False
         self._earliest = first_step(fault.start_ns, step_ns, start_ns)
+        self._first: float = (self._earliest or INITIAL) if fault.when is None else math.inf
         self._end: float = math.inf
         if fault.end_ns is not None:
             self._end = first_step(fault.end_ns, step_ns, start_ns)
-        self._first: float = self._earliest or INITIAL
-        if fault.when is not None:
-            self._first = math.inf
-
-    def __str__(self) -> str:
-        return f"{self.fault.target}: {self.fault.kind}"
+        self._begun = False
 
     def acts(self, step: int) -> bool:
         """Return True if the fault acts on the values passed in this step."""
         return self._first <= step < self._end
 
-    def may_begin(self, step: int) -> bool:
-        """Return True if it begins at this step, provided that its condition holds."""
-        return not self.begun and self._earliest <= step < self._end
+    def ends(self, place: str) -> list[_Once]:
+        """Its beginning, and its end where it has one."""
+        name = f"{self.fault.target}: {self.fault.kind}"
 
-    def begin(self, step: int) -> None:
-        """Act from this step on, at the latest."""
-        self.begun = True
-        self._first = min(self._first, step)
+        def begin(step: int) -> Sequence[str]:
+            self._begun, self._first = True, min(self._first, step)
+            return [f"{name} begins"]
 
-    def must_end(self, step: int) -> bool:
-        """Return True if it has begun, and this step is behind its last one."""
-        return self.begun and not self.ended and step >= self._end
-
-    def next_step(self, step: int) -> int | None:
-        """Return the first step from this one on at which it may begin or must end, or None."""
-        if not self.begun:
-            earliest = max(step, self._earliest)
-            return earliest if earliest < self._end else None
-        return None if self.ended or self._end == math.inf else max(step, int(self._end))
+        otherwise = f"{place} did not begin: {name}"
+        found = [_Once(self._earliest, self._end, 1, self.fault.when, begin, otherwise)]
+        if self._end < math.inf:
+            said = f"{name} ends"
+            end = _Once(int(self._end), math.inf, 1, None, lambda _: [said] * self._begun)
+            found.append(end)
+        return found
 
 
 def fault_functions(windows: Sequence[Window], step_ns: int) -> Mapping[Port, FaultFunction]:
@@ -295,12 +269,14 @@ def drives_of(system: System, slots: dict[Port, int]) -> dict[Port, Drive]:
 
 def at_start(system: System, drives: dict[Port, Drive], name: str) -> dict[str, Value]:
     """The values at the start of the inputs of a component that are driven."""
-    found: dict[str, Value] = {}
-    for port, drive in drives.items():
-        if port.component == name:
-            kind = system.component(name, name).interface.by_name[port.variable].kind
-            value = drive.at(system.start_ns)
-            found[port.variable] = (
-                value if kind == "Real" else int(value) if kind == "Integer" else value != 0.0
-            )
-    return found
+    by_name = system.component(name, name).interface.by_name
+    return {
+        port.variable: of_kind(by_name[port.variable].kind, drive.at(system.start_ns))
+        for port, drive in drives.items()
+        if port.component == name
+    }
+
+
+def of_kind(kind: str, number: float) -> Value:
+    """The value of a variable that is no String for a number on its connection."""
+    return number if kind == "Real" else int(number) if kind == "Integer" else number != 0.0
