@@ -36,7 +36,7 @@ from .plan import Plan
 
 Engine = Literal["auto", "python", "compiled"]
 LOGGER = logging.getLogger(__name__)
-"""Gets which engine runs, and why, at the level INFO."""
+"""Gets which engine runs at the level INFO."""
 
 ENGINES: tuple[str, ...] = get_args(Engine)
 
@@ -62,23 +62,7 @@ _OVER = 0
 """Through the sockets of Aside comes the number of a signal, or this."""
 
 
-class _Call(ctypes.Structure):
-    """As Native."""
-
-    _fields_ = [
-        (name, ctypes.c_double if name == "step" else ctypes.c_int64) for name in Native._fields
-    ]
-
-
-class _Plan(ctypes.Structure):
-    _fields_ = [
-        ("operations", ctypes.c_void_p),
-        ("size", ctypes.c_int64),
-        *((n, ctypes.c_void_p) for n in ("connections", "casts", "buffers", "drives", "calls")),
-        ("values", ctypes.c_void_p),
-        ("width", ctypes.c_int64),
-        ("clock", ctypes.c_void_p),
-    ]
+_CALL = [(name, "f8" if name == "step" else "i8") for name in Native._fields]
 
 
 class _Shared(ctypes.Structure):
@@ -112,17 +96,17 @@ class CompiledLoop:
             np.array(plan.operations, np.int64),
             np.array(plan.connections, "i8, i8, f8, f8"),
             *(np.array(table, np.int64) for table in (plan.casts, buffers, drives)),
+            np.array(calls, _CALL),
         ]
-        operations, *others = (table.ctypes.data for table in tables)
-        bound = (_Call * len(calls))(*(_Call(*call) for call in calls))
-        self._kept = plan, callbacks, tables, bound
-        self._tables = _Plan(
-            operations, len(plan.operations), *others, ctypes.addressof(bound),
-            plan.values.ctypes.data, len(plan.values), plan.clock.ctypes.data,
-        )  # fmt: skip
+        operations, *others, values, clock = (
+            table.ctypes.data for table in (*tables, plan.values, plan.clock)
+        )
+        whole = operations, len(plan.operations), *others, values, len(plan.values), clock
+        words = np.array(whole, np.int64)
+        self._kept = plan, callbacks, tables, words
         self.shared = _Shared()
         self.alone = all(call.native and not call.keeps_lock for call in plan.calls)
-        self._places = ctypes.addressof(self._tables), ctypes.addressof(self.shared)
+        self._places = words.ctypes.data, ctypes.addressof(self.shared)
         self._run = library(any(call.keeps_lock for call in plan.calls)).run
 
     def __call__(
@@ -157,22 +141,18 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     InputError where it is to be compiled and cannot be.
     """
     choice("engine", engine, ENGINES)
-    there, why = engine == "auto" and is_there(), "as asked"
-    if engine == "auto":
-        why = "as the run is short, or there is no compiler"
-    long = there or ((steps is None or steps >= LONG) and has_compiler())
-    if engine == "compiled" or (engine == "auto" and long):
+    long, auto = steps is None or steps >= LONG, engine == "auto"
+    if engine == "compiled" or (auto and (is_there() or (long and has_compiler()))):
         try:
             made = CompiledLoop(plan)
         except InputError as error:  # of a compiler that does not work
-            if engine == "compiled":
+            if not auto:
                 raise
-            why = str(error)
+            LOGGER.info("%s", error)
         else:
-            reason = "built before" if there else "as the run is long enough"
-            LOGGER.info("engine: the loop in C, %s", reason if engine == "auto" else why)
+            LOGGER.info("engine: the loop in C")
             return made
-    LOGGER.info("engine: the loop in Python, %s", why)
+    LOGGER.info("engine: the loop in Python")
     return _interpreted(plan)
 
 

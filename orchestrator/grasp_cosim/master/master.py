@@ -16,7 +16,7 @@ from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
 from ..base.system_calls import cpus
 from ..exchange.listener import Texts
-from ..fmi.instance import DISCARD, EARLY, OK, WARNING, Instance
+from ..fmi.instance import DISCARD, EARLY, WARNING, Instance
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.result import Rejection
@@ -315,50 +315,28 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
     """Bring an instance to end, in s, that rejected the step from begin to there.
 
     Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
-    1/1024 of the step. The time in s where the FMU asked for the end of the simulation, else None.
-    SimulationError where that does not help.
+    1/1024 of the step; a rest below half of that is none. The time in s where the FMU asked for the
+    end of the simulation, else None. SimulationError where that does not help.
     """
-    if (ended := instance.the_end()) is not None:
-        return ended
-    if not instance.interface.can_vary_step:
-        raise instance.failure(status, begin)
-    clock = np.array([begin])
-    smallest = (end - begin) / SMALLEST
-    length = end - begin
-    for _ in range(2 * SMALLEST):
-        reached = instance.last_successful_time()
-        if reached is None:
-            raise instance.failure(status, float(clock[0]))
-        if reached > clock[0]:
-            clock[0] = reached
-            length = end - float(clock[0])
-        elif (length := length / 2) < smallest or clock[0] + length == clock[0]:
-            raise instance.failure(status, float(clock[0]))
-        status, length = _go_on(instance, clock, end, length, smallest)
-        if status <= WARNING:
+    clock, length = np.array([begin]), end - begin
+    smallest = length / SMALLEST
+    for _ in range(4 * SMALLEST):
+        if status in (DISCARD, EARLY):
+            if (ended := instance.the_end()) is not None:
+                return ended
+            varies = instance.interface.can_vary_step
+            if not varies or (reached := instance.last_successful_time()) is None:
+                break
+            if reached > clock[0]:
+                clock[0], length = reached, end - reached
+            elif (length := length / 2) < smallest or clock[0] + length == clock[0]:
+                break
+        elif status > WARNING:
+            break
+        if clock[0] >= end:
             return None
-        if status not in (DISCARD, EARLY):
-            raise instance.failure(status, float(clock[0]))
-        if (ended := instance.the_end()) is not None:
-            return ended
-    raise instance.failure(status, float(clock[0]))
-
-
-def _go_on(
-    instance: Instance,
-    clock: npt.NDArray[np.float64],
-    end: float,
-    length: float,
-    smallest: float,
-) -> tuple[int, float]:
-    """Steps of a length in s from the time in clock[0] to end, or to one that is rejected.
-
-    The last status, and the length of that step. A rest below half of the smallest is none.
-    """
-    status = OK
-    while clock[0] < end and status <= WARNING:
         length = min(length, end - float(clock[0]))
         status = instance.stepper(clock, length).python()
         if status <= WARNING:
             clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
-    return status, length
+    raise instance.failure(status, float(clock[0]))

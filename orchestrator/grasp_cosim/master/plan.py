@@ -103,6 +103,7 @@ class Planner:
         self.stamps = 0
         self.transforms = system.once(transforms)
         self.made = Plan(values, np.zeros(2))
+        self.view: Any = memoryview(values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
     def plan(self) -> Plan:
         """The program of a macro step in the scheme of the system, and what it works on."""
@@ -163,8 +164,7 @@ class Planner:
             self.stamps += 1
 
     def _fault(self, target: Port, period: int, phase: int) -> None:
-        fault, slot = self.scenario.fault_functions[target], self.slots[target]
-        view: Any = memoryview(self.made.values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
+        fault, slot, view = self.scenario.fault_functions[target], self.slots[target], self.view
 
         def act(step: int) -> None:
             view[slot] = fault(view[slot], step)
@@ -175,7 +175,7 @@ class Planner:
         target = self.instances[connection.target.component]
         taken_in = target.interface.by_name[connection.target.variable]
         texts, slot = self.texts[connection.source], self.slots[connection.source]
-        view: Any = memoryview(self.made.values)  # type: ignore[arg-type]
+        view = self.view
 
         def pass_on(_: int) -> None:
             target.set([taken_in], [texts.listed[int(view[slot])]])
@@ -184,7 +184,7 @@ class Planner:
 
     def _fetch_texts(self, name: str, phase: int) -> None:
         """Fetch the String outputs of a component, if it has any."""
-        instance, view = self.instances[name], memoryview(self.made.values)  # type: ignore[arg-type]
+        instance, view = self.instances[name], self.view
         ports = [port for port in self.texts if port.component == name]
         variables = [instance.interface.by_name[port.variable] for port in ports]
 
