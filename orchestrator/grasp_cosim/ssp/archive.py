@@ -9,8 +9,7 @@ an archive read twice is extracted once.
 import hashlib
 import posixpath
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -32,28 +31,19 @@ class Notes:
     """What was decided or passed over, and where; the same text of several places is one line."""
 
     def __init__(self) -> None:
-        self._places: dict[str, list[str]] = {}
+        self.places: dict[str, list[str]] = {}
 
     def add(self, place: str, text: str) -> None:
         """Note `text` of a place, once."""
-        places = self._places.setdefault(text, [])
+        places = self.places.setdefault(text, [])
         if place not in places:
             places.append(place)
-
-    @contextmanager
-    def off(self) -> Iterator[None]:
-        """Note nothing meanwhile."""
-        kept = {text: list(places) for text, places in self._places.items()}
-        try:
-            yield
-        finally:
-            self._places = kept
 
     def lines(self) -> list[str]:
         """The notes in the order of their first places."""
         return [
             f"{places[0]}: {text}" + (f" ({len(places)} such)" if len(places) > 1 else "")
-            for text, places in self._places.items()
+            for text, places in self.places.items()
         ]
 
 

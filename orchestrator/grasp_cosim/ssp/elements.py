@@ -16,8 +16,7 @@ from ..base.errors import InputError, choices
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface
 from .archive import STRUCTURE, Archive
-from .document import at, child, children, is_true, qualified, same, short
-from .origin import Origin, open_structure
+from .document import Origin, at, child, children, is_true, open_structure, qualified, same, short
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"

@@ -7,6 +7,7 @@ here, as docs/system_files.md describes, and said in the notes of the system.
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
@@ -31,10 +32,9 @@ from ..system.stimuli import Stimuli
 from .annotations import FOREIGN, TYPE, Beside, Extras, Steps, no_extras, read_extras, read_steps
 from .archive import STRUCTURE, Archive, Notes
 from .connectors import Carried, Connectors, Part
-from .document import at, child, children, qualified, same
+from .document import at, child, children, open_structure, qualified, same
 from .elements import Element, Hop, Path, read_system
-from .origin import open_structure
-from .parameters import read_settings, read_sizes
+from .parameters import read_settings
 
 
 class Called(NamedTuple):
@@ -145,8 +145,9 @@ def _sized(
     """The parts with their arrays taken apart, of as many elements as the archive's values say."""
     if not any(v.shape for part in parts.values() for v in part.interface.variables):
         return dict(parts)
-    with notes.off():  # of the values of elements that are not there yet
-        sizes = read_sizes(Connectors(systems, parts))
+    before = deepcopy(notes.places)
+    sizes = read_settings(Connectors(systems, parts), "structuralParameter")
+    notes.places = before  # without those on values of elements that are not there yet
     return {
         at: replace(part, interface=expanded(part.interface, sizes.get(at, {})))
         for at, part in parts.items()

@@ -24,9 +24,8 @@ from ..base.checks import known
 from ..base.errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
 from .connectors import OTHERWISE, Carried, Connectors
-from .document import at, change, child, children, is_true, same, short
+from .document import Origin, at, change, child, children, is_true, same, short
 from .elements import Element, Hop, Node, Path, linear, transformation
-from .origin import Origin
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
     "Real": float,
@@ -68,13 +67,16 @@ class Given:
     transformation: Any = None
 
 
-def read_settings(network: Connectors) -> dict[Path, dict[str, Value]]:
-    """The value that holds for each variable that is given one.
+def read_settings(network: Connectors, causality: str = "") -> dict[Path, dict[str, Value]]:
+    """The value that holds for each variable that is given one; of one causality, if that is named.
 
     By the path of the component and the FMU's name of the variable.
     """
     values: dict[Path, dict[str, Value]] = {}
     for end, parameter in _settled(network):
+        variable = network.parts[end.path].interface.by_name.get(end.name)
+        if causality and (variable is None or variable.causality != causality):
+            continue
         value, source = _value(network, end, parameter), network.output(end)
         if source:
             text = f"{end} is connected to {source}; not used"
@@ -82,16 +84,6 @@ def read_settings(network: Connectors) -> dict[Path, dict[str, Value]]:
         else:
             values.setdefault(end.path, {})[end.name] = value
     return values
-
-
-def read_sizes(network: Connectors) -> dict[Path, dict[str, Value]]:
-    """The same of structural parameters alone, on which depends how many elements arrays have."""
-    sizes: dict[Path, dict[str, Value]] = {}
-    for end, parameter in _settled(network):
-        variable = network.parts[end.path].interface.by_name.get(end.name)
-        if variable and variable.causality == "structuralParameter":
-            sizes.setdefault(end.path, {})[end.name] = _value(network, end, parameter)
-    return sizes
 
 
 def _settled(network: Connectors) -> Iterator[tuple[Node, Parameter]]:
