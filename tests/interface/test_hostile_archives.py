@@ -1,5 +1,6 @@
-"""Archives and descriptions made to do harm, or to deceive, are refused in one line."""
+"""Archives and descriptions that are damaged, or made to do harm, are refused in one line."""
 
+import io
 import re
 import struct
 import zipfile
@@ -7,10 +8,16 @@ from contextlib import suppress
 
 import pytest
 from grasp_cosim.base.errors import InputError
+from grasp_cosim.cli import main
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.inspection.inspection import inspect_fmu
 from grasp_cosim.inspection.loading import examine, unpack
 from grasp_cosim.interface import document, read
 from grasp_cosim.interface.read import describe, read_interface
+from grasp_cosim.ssp.to_archive import write_ssp
+from hypothesis import HealthCheck, given
+from hypothesis import strategies as st
+from support.marks import examples
 
 HEAD = '<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">'
 TAIL = '<CoSimulation modelIdentifier="m"/></fmiModelDescription>'
@@ -90,25 +97,15 @@ def nested(depth):
 
 
 LAUGHS = "".join(f'<!ENTITY a{i + 1} "{f"&a{i};" * 10}">' for i in range(9))
-DOCTYPES = (
-    f'<!DOCTYPE d [<!ENTITY a0 "ha">{LAUGHS}]>',
-    '<!DOCTYPE d SYSTEM "file:///etc/passwd">',
-    '<!DOCTYPE d [<!ENTITY a9 SYSTEM "file:///etc/hostname">]>',
-    "<!DOCTYPE d []>",
-)
-
-
-def of_type(doctype, encoding):
-    text = PLAIN.replace('Name="M"', 'Name="&a9;"')
-    return f'<?xml version="1.0" encoding="{encoding}"?>{doctype}{text}'.encode(encoding)
-
-
-REFERENCES = (str(2**32), "-1", "x", "", "1.0", "1_0", "\u0663", "9" * 5000)
+LAUGHS = f'<!DOCTYPE d [<!ENTITY a0 "ha">{LAUGHS}]>' + PLAIN.replace('"M"', '"&a9;"')
+UTF_16 = f'<?xml version="1.0" encoding="utf-16"?><!DOCTYPE d SYSTEM "file:///a">{PLAIN}'
+REFERENCES = (str(2**32), "-1", "1.0", "1_0", "\u0663", "9" * 5000)
 ENTITY = "has a document type 'd', which may define entities"
 SAME = (f'<Float64 name="{n}" valueReference="7"/>' for n in "ab")
 REFUSED = [
     *((nested(n), f"more than {document.DEEPEST} elements deep") for n in (257, 200_000)),
-    *((of_type(d, e), ENTITY) for d in DOCTYPES for e in ("utf-8", "utf-16")),
+    (LAUGHS, ENTITY),
+    (UTF_16.encode("utf-16"), ENTITY),
     *(
         (
             described(variable(f'name="a" valueReference="{r}"')),
@@ -119,7 +116,7 @@ REFUSED = [
     (described(variable('name="a"')), "variable 'a': valueReference = missing"),
     *(
         (described(variable(f'name="a{c}b" valueReference="1"')), "must have no control characters")
-        for c in ("&#10;", "&#9;", "&#13;", "\x7f", "\x9b", "\u2028")
+        for c in ("&#10;", "\x7f", "\x9b", "\u2028")
     ),
     (
         described(variable(f'name="{"x" * 2001}" valueReference="1"')),
@@ -147,22 +144,6 @@ def test_a_description_that_is_taken(write, description, names):
     assert list(read_interface(write(description)).by_name) == names
 
 
-def test_an_encrypted_archive(write):
-    path = write(PLAIN)
-    data = bytearray(path.read_bytes())
-    for signature, offset in ((b"PK\x01\x02", 8), (b"PK\x03\x04", 6)):
-        data[data.index(signature) + offset] |= 1
-    path.write_bytes(bytes(data))
-    refused(path, "encrypted")
-
-
-def test_two_variables_of_one_name(write):
-    twice = [variable(f'name="a" valueReference="{i}"') for i in range(2)]
-    found = read_interface(write(described(*twice, variable('name="b" valueReference="2"'))))
-    assert found.ambiguous == ("a",)
-    assert [v.name for v in found.variables] == ["b"]
-
-
 @pytest.mark.parametrize("alias", ["x", "y"])
 def test_an_alias_of_a_name_that_is_taken(write, alias):
     """A dependency on it would be on one of them, unsaid on which."""
@@ -178,11 +159,6 @@ def test_more_elements_than_an_fmu_has(write, monkeypatch):
     refused(write(f"{HEAD}{'<a/>' * 98}<ModelVariables/>{TAIL}"), "more than 100 elements")
 
 
-@pytest.mark.slow
-def test_millions_of_elements(write):
-    refused(write(f"{HEAD}{'<a/>' * 3_000_000}<ModelVariables/>{TAIL}"), "1000000 elements")
-
-
 def two(one, other, type_="Real"):
     return described(
         variable(f'name="a" valueReference="7" causality="{one}"'),
@@ -195,15 +171,13 @@ def start(type_, text):
 
 
 BOTH = "the valueReference 7 both; one of them at most may be set"
-BINARIES = ("", "../../tmp/evil", "/tmp/evil", "a\\b", "C:evil", "..", "a&#10;b")
+BINARIES = ("", "../../tmp/evil", "a\\b", "C:evil", "..", "a&#10;b")
 NOT_RUN = [
     *((PLAIN.replace('"m"', f'"{name}"'), "must be the name of its binary") for name in BINARIES),
     (two("input", "input"), BOTH),  # setting one would set the other
     (two("input", "parameter"), BOTH),
-    (two("parameter", "input"), BOTH),
     (two("parameter", "parameter"), ""),
     (two("input", "output"), ""),  # two names of one
-    (two("output", "output"), ""),
     (two("input", "input", "Integer"), ""),  # the references of a type are its own
     (start("Float64", "abc"), "variable 'a': start = 'abc': must be a number"),
     (start("Int8", "127"), ""),
@@ -223,7 +197,7 @@ def test_what_no_master_takes(write, description, message):
             read_interface(path)
 
 
-@pytest.mark.parametrize("name", ["../x", "binaries/../../x", "/tmp/x"])
+@pytest.mark.parametrize("name", ["binaries/../../x", "/tmp/x"])
 def test_an_entry_that_leads_out_of_the_folder_is_refused(name, write):
     path = write(PLAIN)
     with zipfile.ZipFile(path, "a") as archive:
@@ -231,10 +205,7 @@ def test_an_entry_that_leads_out_of_the_folder_is_refused(name, write):
     refused(path, f"{name} leads out of the archive; must be the path of a file in it")
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["../x", "../../x", "/tmp/x", "C:\\x", "a\\..\\..\\x", "binaries/../../x", "x\0y", "~/x"],
-)
+@pytest.mark.parametrize("name", ["../../x", "C:\\x", "a\\..\\..\\x", "x\0y", "~/x"])
 def test_no_entry_leads_out_of_the_folder(tmp_path, name, write):
     path, inside = write(PLAIN), tmp_path / "out" / "side" / "folder"
     with zipfile.ZipFile(path, "a") as archive:
@@ -248,3 +219,113 @@ def test_no_entry_leads_out_of_the_folder(tmp_path, name, write):
     left = {p for p in tmp_path.rglob("*") if inside not in p.parents} - before
     assert left == {inside, *inside.parents} - {tmp_path, *tmp_path.parents}
     assert not any(p.is_symlink() for p in inside.rglob("*"))
+
+
+WORDS = st.sampled_from(
+    [
+        *("", "x", "../x", "plant.gap[1]", "a -> b", "\x1b[2J", "\u202e", "x" * 5000, "%s%n"),
+        *(
+            "nan",
+            "1e999",
+            "-1",
+            "4294967296",
+            "9" * 5000,
+            "1e-320",
+            "true",
+            "none",
+            "process",
+            "Real",
+        ),
+    ]
+)
+NAMES = st.sampled_from(
+    [
+        *("../outside", "/tmp/outside", "C:\\outside", "a\\b", "x" * 300, "a/" * 200 + "b", "\x01"),
+        *("modelDescription.xml", "./modelDescription.xml", "SystemStructure.ssd", ""),
+    ]
+)
+
+
+@st.composite
+def texts(draw, text):
+    """A text some of whose words, numbers and values are others."""
+    places = [m.span() for m in re.finditer(r'(?<=")[^"\n]*(?=")|[\w.+-]+', text)]
+    for _ in range(draw(st.integers(1, 3))):
+        start, end = draw(st.sampled_from(places))
+        text = text[:start] + draw(WORDS) + text[end:]
+    return text
+
+
+@st.composite
+def damaged(draw, data):
+    """A file with bytes that were changed, lost, doubled or put in, or without its end."""
+    for _ in range(draw(st.integers(1, 3))):
+        at = draw(st.integers(0, len(data)))
+        length = draw(st.sampled_from([1, 2, 8, 100]))
+        put = draw(st.sampled_from([b"", b"\0", b"\xff" * 8, data[at : at + length] * 2]))
+        data = data[:at] + put + data[at + length :]
+    return data[: draw(st.integers(0, len(data)))] if draw(st.integers(0, 9)) == 0 else data
+
+
+@st.composite
+def archives(draw, data):
+    """An archive with its bytes, its entries, their names or their texts changed."""
+    if draw(st.booleans()):
+        return draw(damaged(data))
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        entries = [(info.filename, archive.read(info)) for info in archive.infolist()]
+    place = draw(st.integers(0, len(entries) - 1))
+    texts_of = [i for i, (name, _) in enumerate(entries) if name.endswith((".xml", ".ssd", ".ssv"))]
+    name, content = entries[place]
+    match draw(st.integers(0, 3)):
+        case 0:
+            del entries[place]
+        case 1:
+            entries.append((draw(NAMES), content))
+        case 2:
+            entries[place] = (name, draw(damaged(content)))
+        case 3:
+            place = draw(st.sampled_from(texts_of))
+            name, content = entries[place]
+            entries[place] = (name, draw(texts(content.decode())).encode())
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, content in entries:
+            archive.writestr(name or ".", content)
+    return out.getvalue()
+
+
+@pytest.fixture(scope="module")
+def sound(grasp, fmus, tmp_path_factory):
+    """The contents of a system file, an FMU and an archive."""
+    archive = tmp_path_factory.mktemp("sound") / "grasp.ssp"
+    write_ssp(grasp, archive)
+    text = SYSTEM.read_text("utf-8").replace('fmu = "', f'fmu = "{fmus}/')
+    fmu = (fmus / "ProximitySensor.fmu").read_bytes()
+    return {"toml": text, "fmu": fmu, "ssp": archive.read_bytes()}
+
+
+COMMANDS = {
+    "toml": ["run", "--step", "1e-3", "--stop", "1e-3"],
+    "fmu": ["inspect"],
+    "ssp": ["run", "--step", "1e-3", "--stop", "1e-3", "--set", "components.plant.isolation=none"],
+}
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+@pytest.mark.parametrize("kind", ["toml", "fmu", "ssp"])
+@examples(60, suppress_health_check=list(HealthCheck), deadline=None)
+@given(data=st.data())
+def test_a_damaged_file_ends_in_a_verdict(kind, data, sound, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    content = sound[kind]
+    strategy = texts(content) if kind == "toml" else archives(content)
+    file = tmp_path / f"damaged.{kind}"
+    made = data.draw(strategy)
+    file.write_bytes(made.encode("utf-8", "replace") if kind == "toml" else made)
+    code = main([COMMANDS[kind][0], file.name, *COMMANDS[kind][1:]])
+    said = [s for s in capsys.readouterr().err.splitlines() if s.startswith("grasp-cosim: ")]
+    assert code in (0, 1, 2, 3)
+    assert len(said) == (code >= 2), said
+    assert not any("--debug shows where" in line or "Traceback" in line for line in said)
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]

@@ -13,6 +13,7 @@ A connector of a system without a unit passes on that of the value.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 from si_units import Unit
 
@@ -32,8 +33,7 @@ class Part:
     interface: Interface
 
 
-@dataclass(frozen=True, slots=True)
-class Carried:
+class Carried(NamedTuple):
     """A number x after some hops: factor * x + offset, in unit.
 
     unit is None where it is not known. settled is False where a transformation has led to a

@@ -24,7 +24,7 @@ from ..base.checks import known
 from ..base.errors import InputError, choices
 from ..interface.interface import SETTABLE, Value
 from .connectors import OTHERWISE, Carried, Connectors
-from .document import Origin, at, change, child, children, is_true, same, short
+from .document import Origin, at, child, children, is_true, same, short
 from .elements import Element, Hop, Node, Path, linear, transformation
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
@@ -198,24 +198,25 @@ def _passed(network: Connectors, hop: Hop, given: Parameter) -> Parameter:
     """The parameter after one more hop."""
     if given.type in ("Real", "Integer"):
         carried = network.carry(hop, Carried(given.unit, settled=given.settled))
-        number = _linear(given.value, carried.factor, carried.offset)
-        given = replace(given, value=number, unit=carried.unit, settled=carried.settled)
+        value, (unit, factor, offset, settled) = given.value, carried
+        if (factor, offset) != (1.0, 0.0):
+            value = factor * float(value) + offset
+        given = replace(given, value=value, unit=unit, settled=settled)
     elif hop.transformation:
         raise InputError(f"{hop.place}: transforms a {given.type}; must be Real")
     return given
 
 
 def _adapted(network: Connectors, node: Node, given: Given) -> Parameter:
-    """The parameter in the unit of the node, transformed."""
-    unit, parameter = network.unit(node), given.parameter
-    own = None if given.suppress else _own_unit(network, node, parameter)
-    if own and unit:
-        factor, offset = change(parameter.place, own, unit)
-        parameter = replace(parameter, value=_linear(parameter.value, factor, offset))
-    if given.transformation is not None:
-        parameter = _transformed(parameter, given.transformation)
-    settled = unit is not None or given.transformation is None
-    return replace(parameter, unit=unit or own, settled=settled)
+    """The parameter in the unit of the node, transformed as on a connection, or by a table."""
+    own = None if given.suppress else _own_unit(network, node, given.parameter)
+    parameter, change, factors = replace(given.parameter, unit=own), given.transformation, None
+    if change is not None and short(change.tag) != "ssc:LinearTransformation":
+        parameter = _mapped(parameter, change)
+    elif change is not None:
+        factors = linear(change)
+        parameter = replace(parameter, type=parameter.type.replace("Integer", "Real"))
+    return _passed(network, Hop(parameter.place, node, node, factors, given.suppress), parameter)
 
 
 def _own_unit(network: Connectors, node: Node, parameter: Parameter) -> Unit | None:
@@ -238,32 +239,17 @@ def _own_unit(network: Connectors, node: Node, parameter: Parameter) -> Unit | N
     return origin.unit(place, name, wanted)
 
 
-def _transformed(given: Parameter, element: Any) -> Parameter:
-    kind = short(element.tag).removeprefix("ssc:").removesuffix("Transformation")
-    if kind == "Linear":
-        if given.type not in ("Real", "Integer"):
-            said = f"{given.place}: {given.type} has a linear transformation; must be Real"
-            raise InputError(said)
-        return replace(given, type="Real", value=_linear(given.value, *linear(element)))
-    mapped = kind.removesuffix("Mapping")
-    if given.type != mapped:
-        raise InputError(f"{given.place}: {given.type} has {short(element.tag)}; must be {mapped}")
-    read = _READERS[mapped]
-    table = {
-        read(entry.get("source")): read(entry.get("target"))
-        for entry in children(element, "ssc:MapEntry")
-    }
-    if given.value not in table:
-        raise InputError(
-            f"{given.place}: {given.value!r} is not in its {short(element.tag)}; "
-            f"valid: {choices(map(repr, table))}"
-        )
-    return replace(given, value=table[given.value])
-
-
-def _linear(value: Value, factor: float, offset: float) -> Value:
-    """The value times factor plus offset; the value itself where they do nothing."""
-    return value if (factor, offset) == (1.0, 0.0) else factor * float(value) + offset
+def _mapped(given: Parameter, element: Any) -> Parameter:
+    table = short(element.tag)
+    kind = table.removeprefix("ssc:").removesuffix("MappingTransformation")
+    if given.type != kind:
+        raise InputError(f"{given.place}: {given.type} has {table}; must be {kind}")
+    read, entries = _READERS[kind], children(element, "ssc:MapEntry")
+    targets = {read(entry.get("source")): read(entry.get("target")) for entry in entries}
+    if given.value not in targets:
+        valid = choices(map(repr, targets))
+        raise InputError(f"{given.place}: {given.value!r} is not in its {table}; valid: {valid}")
+    return replace(given, value=targets[given.value])
 
 
 def _value(network: Connectors, node: Node, given: Parameter) -> Value:
