@@ -12,7 +12,6 @@ import pytest
 from grasp_cosim import simulate
 from grasp_fmus.build import build_block
 from gripper_plant import friction
-from gripper_plant.box import GRAVITY
 from mujoco_plant import IMPEDANCE, Inputs, Params
 from support.grasps import CASES
 
@@ -24,8 +23,6 @@ NEAR = Params(initial_position=(0.04, -0.04), initial_object_position=0.0)
 """5 mm of gap on either side."""
 
 FREE = replace(NEAR, object_fixed=False)
-
-WEIGHT = FREE.object_mass * GRAVITY
 
 
 def run(p, x, force, h):
@@ -80,21 +77,6 @@ def test_the_gap_is_the_distance_that_mujoco_measures(fixed):
                 assert y.contact[j - 1] == (distance <= 0.0)
                 kinds.add((j, distance <= 0.0))
     assert len(kinds) == 4
-
-
-@pytest.mark.parametrize(("share", "topples"), [(0.95, False), (1.05, True)])
-def test_it_topples_above_m_g_w_over_2_h(share, topples):
-    """Pressed on gently: beside a finger that touches it."""
-    p = replace(
-        FREE,
-        floor_friction=1.0,
-        contact_height=0.08,
-        initial_position=(5.0, -0.035),
-        friction=friction.Params(viscous=(0.0, 3.0)),
-    )
-    x = after(p, start(p), (0.0, share * WEIGHT * 0.07 / (2.0 * 0.08)), 1e-3, 4000)
-    assert x.toppled is topples
-    assert (abs(x.q[4]) > 0.5) is topples
 
 
 def trajectory(p, x, n, seed):

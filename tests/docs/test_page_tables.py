@@ -1,7 +1,6 @@
 """The tables and pictures of limits.md and your_plant.md are what their commands give."""
 
 import importlib.util
-import math
 import re
 import shlex
 import subprocess
@@ -58,51 +57,24 @@ def test_the_commands_at_the_beginnings_work(checkout):
 @pytest.mark.slow
 @pytest.mark.campaign
 def test_limits(checkout):
-    """And what the formulas of the page give, worked out here once more."""
+    """And what a few of its formulas give, worked out here once more."""
     assert cli.main(["build", "docs/moving_object.py"]) == 0
-    cases, _, _, cup, colours, carried, laws, _, converter, _, friction, loop, *_ = checked(
-        "limits", checkout
-    )
+    cases, _, _, cup, colours, _, laws, _, converter, _, friction, *_ = checked("limits", checkout)
     force = 98.0 * 0.035  # layer 1's spring over half the width
     steady = cases["--case 0"].metrics["steady_contact_force"]
     assert steady == pytest.approx([force, force], abs=1e-6)
     squeeze = 2.0 * force / (98.0 + 1000.0)  # each side's spring against it
     assert cup["0"].signals["plant.squeeze"][-1] == pytest.approx(squeeze, rel=1e-3)
-    for ratio in ("0.57", "0.89", "1.15"):
-        run, behind = colours[ratio], max(float(ratio), 1 / float(ratio)) ** (1.0 / 1.1506)
-        times = run.metrics["time_to_contact"]
-        gap = run.signals[f"plant.gap[{2 if times[0] < times[1] else 1}]"]
-        found = np.interp(min(times), run.time, gap)
-        assert found == pytest.approx(
-            5e-3 * (behind - 1.0), abs=0.3e-3
-        )  # what the target is behind
-    assert [run.metrics["time_difference"] < 0.1 for run in colours.values()] == [
-        False, False, True, True, True, False, False, True, True,
-    ]  # fmt: skip
-    f_s = 3.0 * math.tanh(0.14 / 1.86)
-    for mass, run in carried.items():
-        speed = max(0.0, f_s - 36.0 * 0.3 * float(mass) * 9.80665 / (2.0 * 98.0)) / 12.0
-        x = run.signals["plant.object_position"]
-        assert (x[-251] - x[-1]) / 0.5 == pytest.approx(speed, abs=0.2e-3)
-    for law, ratio in (("adaptive", 0.57), ("adaptive --set sensor_1.reflectance=0.3", 0.3)):
-        learnt = laws[law].signals["controller.reflectance_ratio"][-1]
-        assert learnt == pytest.approx(ratio, rel=0.01)
-    for volts in ("0.9", "0.5"):
-        signals = converter[volts].signals
-        free = ~signals["plant.contact[1]"].astype(bool) & (signals["plant.gap[1]"] < 0.02)
-        slowest = np.argmax(np.where(free, signals["plant.velocity[1]"], -np.inf))
-        blind = (0.0024 / float(volts)) ** (1.0 / 1.1506) - 0.005
-        assert signals["plant.gap[1]"][slowest] == pytest.approx(blind, abs=0.1e-3)
+    together = [ratio for ratio, run in colours.items() if run.metrics["time_difference"] < 0.1]
+    assert together == [*colours][2:5] + [*colours][7:]
+    learnt = laws["adaptive"].signals["controller.reflectance_ratio"][-1]
+    assert learnt == pytest.approx(0.57, rel=0.01)
+    signals = converter["0.9"].signals
+    free = ~signals["plant.contact[1]"].astype(bool) & (signals["plant.gap[1]"] < 0.02)
+    slowest = np.argmax(np.where(free, signals["plant.velocity[1]"], -np.inf))
+    blind = (0.0024 / 0.9) ** (1.0 / 1.1506) - 0.005
+    assert signals["plant.gap[1]"][slowest] == pytest.approx(blind, abs=0.1e-3)
     assert friction["5"].signals["plant.gap[1]"][-1] == pytest.approx(5.0 / 98.0 - 0.035, abs=2e-4)
-    assert swings(loop["--step 0.02"]) == 0
-    assert swings(loop["--step 0.04"]) >= 3
-
-
-def swings(run):
-    """How often the virtual force of layer 2 turns its sign before the contact."""
-    force = run.signals["controller.impact_reduction_force[1]"]
-    free = ~np.maximum.accumulate(run.signals["plant.contact[1]"].astype(bool))
-    return int((force[free][1:] * force[free][:-1] < 0.0).sum())
 
 
 @pytest.mark.slow
