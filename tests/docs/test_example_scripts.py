@@ -63,21 +63,6 @@ def test_the_spring_plant_obeys_its_equations():
     assert 1.5 < errors[0] / errors[1] < 2.5  # first order
 
 
-def test_the_spring_plant_at_rest():
-    """A finger that pushes alone moves the object until the spring answers: x - x_0 = F/k."""
-    plant = runpy.run_path(str(DOCS / "spring_plant.py"))
-    p = plant["Params"](initial_position=(0.066, -0.11), spring_damping=20.0)
-    u = plant["Inputs"](force=(-0.5, 0.0))
-    s = plant["initial_state"](p, u)
-    for _ in range(3000):
-        s = plant["step"](p, s, u, 1e-3)
-    y = plant["outputs"](p, s, u)
-    assert y.object_position == pytest.approx(0.03 - 0.5 / 100.0, abs=1e-9)
-    assert y.contact_force == pytest.approx((0.5, 0.0), abs=1e-6)
-    assert y.spring_force == pytest.approx(0.5, abs=1e-6)
-    assert y.contact == (True, False)
-
-
 # The search of docs/tune.py, with two gains, in coarse steps
 
 POSITION = "plant.initial_object_position"
