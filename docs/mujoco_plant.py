@@ -19,10 +19,10 @@ Limits: no breakaway force above Coulomb friction; free flight is of first order
 impact above e·(W/2 + R)/T goes through the box; near its top, where H - h < W/2, slower ones do.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, cos, hypot, sin
+from threading import get_ident
 from typing import Annotated, Any, NamedTuple
 
 from block_variables import Parameter
@@ -103,25 +103,9 @@ class State(NamedTuple):
     toppled: bool
 
 
-class Simulator(NamedTuple):
-    """A model of MuJoCo, its data, and the arrays in there that a step goes through."""
-
-    step: Callable[..., None]
-    model: Any
-    data: Any
-    q: Any
-    v: Any
-    acceleration: Any
-    force: Any
-    constraint_force: Any
-    warnings: Any
-
-
 def initial_state(p: Params, u: Inputs) -> State:
     """All at rest, the fingers free of the object. ImportError without MuJoCo."""
-    idle = _idle(p)
-    if not idle:
-        idle.append(_simulator(p))
+    _simulator(p, get_ident())
     x_1, x_2 = p.initial_position
     q = (x_1, x_2, p.initial_object_position, 0.5 * p.object_height, 0.0)
     none = (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -135,30 +119,25 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """
     forces = fingers.forces(p.actuator, u)
     n = _timesteps(p, x, forces, h)
-    idle = _idle(p)
-    try:
-        s = idle.pop()
-    except IndexError:  # another thread has it
-        s = _simulator(p)
-    size = len(s.q)
-    s.model.opt.timestep = h / n
-    s.q[:] = x.q[:size]
-    s.v[:] = x.v[:size]
-    s.acceleration[:] = x.acceleration[:size]
-    s.force[:2] = forces
-    s.step(s.model, s.data, n)
-    if any(s.warnings.tolist()):
-        raise ArithmeticError(_said(s))
-    q = (*s.q.tolist(), *x.q[size:])
-    after = State(
+    mujoco, model, data = _simulator(p, get_ident())
+    size = len(data.qpos)
+    model.opt.timestep = h / n
+    data.qpos[:], data.qvel[:] = x.q[:size], x.v[:size]
+    data.qacc_warmstart[:] = x.acceleration[:size]
+    data.qfrc_applied[:2] = forces
+    mujoco.mj_step(model, data, n)
+    if any(data.warning.number):
+        kinds = [mujoco.mjtWarning(k).name for k, n in enumerate(data.warning.number) if n]
+        _simulator.cache_clear()  # it goes on all the same
+        raise ArithmeticError(f"MuJoCo warns of {', '.join(kinds)}: its simulation is unstable")
+    q = (*data.qpos.tolist(), *x.q[size:])
+    return State(
         q,
-        (*s.v.tolist(), *x.v[size:]),
-        (*s.acceleration.tolist(), *x.acceleration[size:]),
-        _contact_forces(p, s),
+        (*data.qvel.tolist(), *x.v[size:]),
+        (*data.qacc_warmstart.tolist(), *x.acceleration[size:]),
+        _contact_forces(p, data),
         x.toppled or (not p.object_fixed and abs(q[4]) >= standing.balance(_shape(p))),
     )
-    idle.append(s)
-    return after
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -246,14 +225,13 @@ def _timesteps(p: Params, x: State, forces: Pair, h: float) -> int:
     return n
 
 
-def _contact_forces(p: Params, s: Simulator) -> Pair:
+def _contact_forces(p: Params, data: Any) -> Pair:
     """Forces of the box on the fingers in N: all constraints' forces but that of friction."""
-    f_1, f_2 = s.constraint_force[:2].tolist()
+    f_1, f_2 = data.qfrc_constraint[:2].tolist()
     c_1, c_2 = p.friction.coulomb
-    if c_1 > 0.0 or c_2 > 0.0:
-        rubs = s.data.efc_force  # begins with a row per joint that rubs
-        f_1 -= float(rubs[0]) if c_1 > 0.0 else 0.0
-        f_2 -= float(rubs[int(c_1 > 0.0)]) if c_2 > 0.0 else 0.0
+    rubs = data.efc_force  # begins with a row per joint that rubs
+    f_1 -= float(rubs[0]) if c_1 > 0.0 else 0.0
+    f_2 -= float(rubs[int(c_1 > 0.0)]) if c_2 > 0.0 else 0.0
     return max(0.0, f_1), min(0.0, f_2)
 
 
@@ -275,16 +253,12 @@ def _shape(p: Params) -> Shape:
 
 
 @lru_cache(maxsize=32)
-def _idle(p: Params) -> list[Simulator]:
-    """The simulators of these parameters that no step is using.
+def _simulator(p: Params, thread: int) -> tuple[Any, Any, Any]:
+    """MuJoCo, the model of these parameters and its data, of a thread alone.
 
-    What an instance is stands in its State alone: a step may take any of them. MuJoCo lets other
-    threads run while it computes, so none serves two steps at once.
+    What an instance is stands in its State alone, so all of a thread go through the same data; but
+    MuJoCo lets other threads run while it computes.
     """
-    return []
-
-
-def _simulator(p: Params) -> Simulator:
     try:
         import mujoco
     except ImportError as error:
@@ -292,20 +266,6 @@ def _simulator(p: Params) -> Simulator:
         reason = MISSING if absent else f"mujoco does not load: {' '.join(str(error).split())}"
         raise ImportError(reason) from error
     model = mujoco.MjModel.from_xml_string(mjcf(p))
-    data = mujoco.MjData(model)
-    arrays = data.qpos, data.qvel, data.qacc_warmstart, data.qfrc_applied, data.qfrc_constraint
     if mujoco.get_mju_user_warning() is None:  # it prints them, and logs them where the host stands
-        mujoco.set_mju_user_warning(_ignore)
-    return Simulator(mujoco.mj_step, model, data, *arrays, data.warning.number)
-
-
-def _ignore(warning: str) -> None:
-    """Say nothing: step() does."""
-
-
-def _said(s: Simulator) -> str:
-    """What MuJoCo has warned of, by its names for that: it goes on all the same."""
-    from mujoco import mjtWarning
-
-    kinds = [mjtWarning(k).name for k, count in enumerate(s.warnings.tolist()) if count]
-    return f"MuJoCo warns of {', '.join(kinds)}: its simulation is unstable"
+        mujoco.set_mju_user_warning(lambda _: None)  # step() says them
+    return mujoco, model, mujoco.MjData(model)

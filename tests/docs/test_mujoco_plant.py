@@ -105,7 +105,7 @@ def test_the_same_state_goes_on_with_the_same_bits(p):
             rng.uniform(0.0, 1.0)
         for fresh in (False, True):
             if fresh:
-                mujoco_plant._idle.cache_clear()
+                mujoco_plant._simulator.cache_clear()
             x = expected[k]
             random = Random()
             random.setstate(rng.getstate())
