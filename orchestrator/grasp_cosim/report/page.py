@@ -37,8 +37,7 @@ from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter
 from .tables import metrics_table, number, settings_html, summary, svg_button
-from .timing import TIMING, draw_result
-from .timing_html import timing_html
+from .timing import TIMING, draw_result, timing_html
 
 LOGGER = logging.getLogger(__name__)
 

@@ -1,23 +1,26 @@
-"""The timing of a paced run as a chart and in words: the parts of a step, and its overruns.
+"""The timing of a paced run: a chart, a sentence and a section of the page. Times are in s.
 
 A curve is the share of the steps that took longer than a time, over that time, both logarithmic:
 the tail, which decides whether a loop keeps its period, takes as much room as the bulk. A histogram
-would show one step in a million as nothing. Times are in s.
+would show one step in a million as nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import accumulate
+from collections.abc import Iterable, Iterator
+from html import escape
+from itertools import accumulate, zip_longest
 from math import ceil, floor, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
+from ..base.errors import InputError, choices
 from ..base.text import grouped
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
 from .caption import Caption, caption
-from .plot import GREY, RED, as_svg, finish, headed, new_figure, save
+from .plot import GREY, RED, as_svg, beside, finish, headed, new_figure, save
+from .tables import bullets, number, svg_button, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,65 +32,25 @@ QUANTILES = {"median": 0.5, "p99": 0.01, "p99.9": 0.001}
 NAMES = {"step": "whole step", "start": "late start", "between": "between steps"}
 """Labels of the parts of a step whose name does not say enough."""
 
-BACKLOG = "backlog"
-"""The culprit of a step that began late because of those before."""
-
-BLAMED = 3
-"""So many other culprits are named in a sentence."""
-
 COLORS = (
     "#1b7f79", "#b26b00", "#7a4fa3", "#4c7a1f", "#a83279", "#5b6470", "#2f6fb3", "#8c4a2f",
 )  # fmt: skip
 """Those of components; each next one is dashed in another way, so that grey tells them too."""
 
-INK, MUTED = "#1d2023", "#8a9098"
+OTHERS = ("step", "start", "between", "exchange", "recording", "backlog")
+"""All that is no component: three in black, three in grey; a backlog is because of steps before."""
 
 DASHES, MARKERS = ("-", "--", ":"), ("o", "D", "s")
-"""By Look.dash."""
+"""By the number of a look."""
 
 SHORTEST = 1e-7
 """s; an axis begins here at the earliest, where the clock itself is no longer exact."""
 
-MOST_STEMS = 100
-"""With more overruns there are no lines down to the axis: they would be a wall."""
-
 TIMING = "timing"
 """The stem of the file of the chart."""
 
-HANDLE = 5
-"""Letters that the line before a text in the legend takes, with the gap after it."""
-
-LETTER = 0.602
-"""The width of a letter of DejaVu Sans Mono, as a share of its size."""
-
-Point = tuple[float, float]
-"""A time, and the share of the steps that took longer."""
-
-
-class Look(NamedTuple):
-    """How a part is drawn: its colour, and the place of its line and marker in DASHES, MARKERS."""
-
-    color: str
-    dash: int
-
-
-class Curve(NamedTuple):
-    """A part of a step as points from left to right; marks are quantiles and worst."""
-
-    part: str
-    points: tuple[Point, ...]
-    marks: dict[str, Point]
-
-
-OTHERS = {
-    "step": Look(INK, 0),
-    "start": Look(INK, 1),
-    "between": Look(INK, 2),
-    "exchange": Look(MUTED, 0),
-    "recording": Look(MUTED, 1),
-    BACKLOG: Look(MUTED, 2),
-}
-"""The looks of all that is no component."""
+BLAMED, MOST_ROWS = 4, 50
+"""So many culprits are in the sentence, and so many overruns in the table."""
 
 
 def draw_result(result: Result, folder: Path, suffix: str = "png") -> Iterator[Path]:
@@ -114,9 +77,69 @@ def draw_timing(timing: Timing, end: float, path: Path, said: Caption) -> None:
     save(figure, path)
 
 
-def timing_svg(timing: Timing, end: float) -> str:
-    """Return the chart as an SVG element, without a caption: see draw_timing."""
-    return as_svg(_figure(timing, end))
+def kept(timing: Timing) -> str:
+    """A sentence: the period was kept, or how often it was not, by how much, and through what."""
+    steps, period = grouped(timing.steps), duration(timing.period)
+    if not timing.overruns:
+        return f"All {steps} steps ended within their period of {period}."
+    blamed = [f"{label(name)} ({grouped(n)})" for name, n in timing.culprits.items()]
+    listed = len(timing.listed)
+    some = f" of the first {grouped(listed)}" if listed < timing.overruns else ""
+    return (
+        f"{grouped(timing.overruns)} of {steps} steps ({_percent(timing.overruns / timing.steps)}) "
+        f"ended after their period of {period}. The worst{some} was "
+        f"{duration(max(overrun.late for overrun in timing.listed))} late; "
+        f"to blame: {choices(blamed, BLAMED)}."
+    )
+
+
+def label(part: str) -> str:
+    """The label of a part of a step: a component is called by its name."""
+    return NAMES.get(part, part)
+
+
+def duration(seconds: float) -> str:
+    """A time for the eye, with three figures: like 41.2 µs or 1.1 ms."""
+    for factor, unit in ((1e9, "ns"), (1e6, "µs"), (1e3, "ms")):
+        if factor * abs(seconds) < 999.5 and seconds:
+            return f"{factor * seconds:.3g} {unit}"
+    return f"{seconds:.3g} s" if abs(seconds) < 999.5 else f"{seconds:.0f} s"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
+
+
+def looks(timing: Timing) -> dict[str, tuple[str, int]]:
+    """The colour of every part and culprit, components in colours, all else black and grey; and the
+    place of its line and marker in DASHES, MARKERS.
+    """
+    components = dict.fromkeys(n for n in (*timing.parts, *timing.culprits) if n not in OTHERS)
+    found = {n: (COLORS[k % len(COLORS)], k % 3) for k, n in enumerate(components)}
+    return found | {n: ("#8a9098" if k > 2 else "#1d2023", k % 3) for k, n in enumerate(OTHERS)}
+
+
+def tail(spread: Spread, histogram: Histogram) -> list[tuple[float, float]]:
+    """Times and the share of the steps that took longer, to that of the worst."""
+    edges, counts = histogram
+    left = list(accumulate(reversed(counts)))[::-1]
+    # Where nothing fell between two edges the line is level: its ends are enough.
+    bins = [
+        (edge, n / left[0])
+        for edge, n, here, before in zip(edges, left, counts, (0, *counts), strict=False)
+        if n and (here or before)
+    ]
+    one = 1.0 / left[0]
+    shares = {**QUANTILES, "worst": one}.values()
+    marks = [(time, share) for time, share in zip(spread, shares, strict=False) if share >= one]
+    return sorted({*bins, *marks}, key=lambda p: (p[0], -p[1]))
+
+
+def decades(times: Iterable[float]) -> tuple[float, float]:
+    """Powers of ten that hold the times in s, with some room above; 0 s is SHORTEST."""
+    logs = [log10(max(t, SHORTEST)) for t in times if t]
+    low = floor(min(logs, default=log10(SHORTEST)))
+    return 10.0**low, 10.0 ** max(ceil(max(logs, default=low) + 0.05), low + 1)
 
 
 def _figure(timing: Timing, end: float) -> Figure:
@@ -128,202 +151,142 @@ def _figure(timing: Timing, end: float) -> Figure:
     return figure
 
 
-def label(part: str) -> str:
-    """Return the label of a part of a step: a component is called by its name."""
-    return NAMES.get(part, part)
-
-
-def quantiles(spread: Spread) -> dict[str, float]:
-    """Return the figures of a part by name: the quantiles, then the worst."""
-    return {**dict(zip(QUANTILES, spread, strict=False)), "worst": spread.worst}
-
-
-def culprits(timing: Timing) -> list[tuple[str, int]]:
-    """Return what made steps late, and how many of them; the most frequent first."""
-    return sorted(timing.culprits.items(), key=lambda entry: -entry[1])
-
-
-def kept(timing: Timing) -> str:
-    """A sentence: the period was kept, or how often it was not, by how much, and through what."""
-    steps, period = grouped(timing.steps), duration(timing.period)
-    if not timing.overruns:
-        return f"All {steps} steps ended within their period of {period}."
-    blamed = [
-        f"{label(name)} ({grouped(times)})" for name, times in culprits(timing) if name != BACKLOG
-    ]
-    rest = len(blamed) - BLAMED
-    names = blamed[:BLAMED] + ([f"{rest} other{'s' if rest > 1 else ''}"] if rest > 0 else [])
-    if BACKLOG in timing.culprits:  # it follows from what the others did
-        names.append(f"{label(BACKLOG)} ({grouped(timing.culprits[BACKLOG])})")
-    listed = len(timing.listed)
-    some = f" of the first {grouped(listed)}" if listed < timing.overruns else ""
-    return (
-        f"{grouped(timing.overruns)} of {steps} steps ({percent(timing.overruns / timing.steps)}) "
-        f"ended after their period of {period}. The worst{some} was "
-        f"{duration(max(overrun.late for overrun in timing.listed))} late; "
-        f"to blame: {', '.join(names)}."
-    )
-
-
-def duration(seconds: float) -> str:
-    """A time for the eye, with three figures: like 41.2 µs or 1.1 ms."""
-    for factor, unit in ((1e9, "ns"), (1e6, "µs"), (1e3, "ms")):
-        if factor * abs(seconds) < 999.5 and seconds:
-            return f"{factor * seconds:.3g} {unit}"
-    return f"{seconds:.3g} s" if abs(seconds) < 999.5 else f"{seconds:.0f} s"
-
-
-def percent(share: float) -> str:
-    """A share for the eye, with three figures: like 100 % or 0.0123 %."""
-    return f"{100.0 * share:.3g} %"
-
-
-def looks(timing: Timing) -> dict[str, Look]:
-    """Return the look of every part and culprit: components in colours, all else black and grey."""
-    components = [name for name in (*timing.parts, *timing.culprits) if name not in OTHERS]
-    return OTHERS | {
-        name: Look(COLORS[k % len(COLORS)], k % len(DASHES))
-        for k, name in enumerate(dict.fromkeys(components))
-    }
-
-
-def curves(timing: Timing) -> list[Curve]:
-    """Return the curve of each part, the whole step last and so on top."""
-    drawn = [
-        _curve(part, timing.parts[part], histogram) for part, histogram in timing.histograms.items()
-    ]
-    return sorted(drawn, key=lambda curve: curve.part == "step")
-
-
-def _curve(part: str, spread: Spread, histogram: Histogram) -> Curve:
-    edges, counts = histogram
-    tails = list(accumulate(reversed(counts)))[::-1]
-    total = tails[0]
-    # Where nothing fell between two edges the line is level: its ends are enough.
-    bins = [
-        (edges[k], tails[k] / total)
-        for k in range(len(counts))
-        if tails[k] and (counts[k] or (k and counts[k - 1]))
-    ]
-    one = 1.0 / total
-    figures, shares = quantiles(spread), {**QUANTILES, "worst": one}
-    marks = {name: (figures[name], share) for name, share in shares.items() if share >= one}
-    points = sorted({*bins, *marks.values()}, key=lambda p: (p[0], -p[1]))
-    return Curve(part, tuple(points), marks)
-
-
-def decades(times: Iterable[float]) -> tuple[float, float]:
-    """Return powers of ten that hold the times in s, with some room above; 0 s is SHORTEST."""
-    logs = [log10(max(t, SHORTEST)) for t in times if t]
-    low = floor(min(logs, default=log10(SHORTEST)))
-    return 10.0**low, 10.0 ** max(ceil(max(logs, default=low) + 0.05), low + 1)
-
-
 def _draw_distributions(axes: Axes, timing: Timing) -> None:
-    """The share of the steps that took longer over the time, of each part."""
-    drawn, look, period = curves(timing), looks(timing), timing.period
-    for curve in drawn:
-        _draw_curve(axes, curve, look[curve.part])
-    points = [point for curve in drawn for point in curve.points]
-    left, right = decades([period, *(t for t, _ in points)])
-    bottom = 10.0 ** floor(log10(min([share for _, share in points], default=0.1)) - 1e-9)
+    """The share of the steps that took longer over the time, of each part; a ring on the worst."""
+    look, period, ends = looks(timing), timing.period, [timing.period]
+    for part, histogram in timing.histograms.items():  # an underscore in front hides a label
+        spread, (color, dash), whole = timing.parts[part], look[part], part == "step"
+        times, shares = zip(*tail(spread, histogram), strict=True)
+        ends += [times[0], times[-1]]
+        axes.plot(
+            [max(t, SHORTEST) for t in times], shares, DASHES[dash], color=color,
+            linewidth=2.2 if whole else 1.3, zorder=3 if whole else 2, marker="o", mfc="white",
+            markevery=[-1], markersize=5,
+            label=f" {label(part)}: {duration(spread.median)}, at worst {duration(spread.worst)}",
+        )  # fmt: skip
+    left, right = decades(ends)
     axes.axvline(period, color=RED, linewidth=1.6)
     axes.axvspan(period, right, color=RED, alpha=0.07, linewidth=0.0)
-    axes.annotate(
-        f"period {duration(period)}", (period, 1.0), (0, 3), xycoords=("data", "axes fraction"),
-        textcoords="offset points", ha="center", va="bottom", fontsize=9, color=RED,
-    )  # fmt: skip
+    axes.set_title(f"red: from the period of {duration(period)} on", fontsize=9, color=RED)
+    axes.set(xscale="log", yscale="log", xlim=(left, right), xlabel="time")
+    bottom = 10.0 ** floor(-log10(max(timing.steps, 10)) - 1e-9)
+    axes.set_ylim(bottom, 1.5)
     for name, share in QUANTILES.items():
-        if share <= bottom:
-            continue
-        axes.axhline(share, color=GREY, linestyle=":", linewidth=0.9)
-        axes.annotate(
-            name, (0.0, share), (5, 2), xycoords=("axes fraction", "data"),
-            textcoords="offset points", fontsize=9, color=GREY,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
-        )  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlim=(left, right), ylim=(bottom, 1.5), xlabel="time")
+        if share > bottom:
+            axes.axhline(share, color=GREY, linestyle=":", linewidth=0.9)
+            axes.text(left, share, f" {name}", va="bottom", fontsize=9, color=GREY)
+    _logarithmic(axes, "share that took longer")
     axes.xaxis.set_major_formatter(lambda seconds, _: duration(seconds))
-    axes.yaxis.set_major_formatter(lambda share, _: percent(share))
-    axes.minorticks_off()
-    finish(axes, "share that took longer", legend=False)
-    _key(axes, timing)
-
-
-def _draw_curve(axes: Axes, curve: Curve, look: Look) -> None:
-    """The line with a dot on each quantile and a ring on the worst."""
-    line, *marks = (
-        [(max(t, SHORTEST), share) for t, share in points]
-        for points in (curve.points, [*curve.marks.values()][:-1], [curve.marks["worst"]])
-    )
-    axes.plot(
-        *zip(*line, strict=True), DASHES[look.dash], color=look.color, label=curve.part,
-        linewidth=2.2 if curve.part == "step" else 1.3,
-    )  # fmt: skip
-    axes.plot(*(zip(*marks[0], strict=True) if marks[0] else ([], [])), ".", color=look.color)
-    axes.plot(*marks[1][0], "o", color=look.color, mfc="white", markersize=5, clip_on=False)
-
-
-def _key(axes: Axes, timing: Timing) -> None:
-    """The parts in the order of the step, with their figures: a table beside the curves."""
-    lines = {line.get_label(): line for line in axes.lines}
-    wide = max((len(label(part)) for part in timing.parts), default=0)
-    heads = (*QUANTILES, "worst")
-    title = " " * (HANDLE + wide + 1) + "".join(f"{head:>9s}" for head in heads)
-    rows = [
-        f"{label(part):{wide}s} "
-        + "".join(f"{duration(t):>9s}" for t in quantiles(spread).values())
-        for part, spread in timing.parts.items()
-    ]
-    font = {"family": "DejaVu Sans Mono", "size": 8}
-    _legend(
-        axes, [lines[part] for part in timing.parts], rows, title=title, prop=font,
-        title_fontproperties=font, handlelength=HANDLE * LETTER - 0.8, handletextpad=0.8,
-    )  # fmt: skip
+    axes.yaxis.set_major_formatter(lambda share, _: _percent(share))
 
 
 def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
     """How late each listed step ended, over the time of the run, in the colour of its culprit."""
-    listed = timing.listed
-    axes.set_xlim(0.0, max([end, SHORTEST, *(o.time for o in listed)]))
+    listed, look = timing.listed, looks(timing)
+    low, high = decades(o.late for o in listed)
+    axes.set(xlim=(0.0, max([end, SHORTEST, *(o.time for o in listed)])))
     axes.set_xlabel("time in the run in s")
-    finish(axes, "late by", legend=False)
     if not listed:
         axes.set_yticks([])
         axes.text(0.5, 0.5, "no overruns", transform=axes.transAxes, ha="center", color=GREY)
+        finish(axes, "late by", legend=False)
         return
-    look = looks(timing)
-    few = len(listed) <= MOST_STEMS
-    low, high = decades(o.late for o in listed)
-    for part, times in culprits(timing):  # the rarest on top
-        points = [(o.time, max(o.late, low)) for o in listed if o.culprit == part]
-        if not points:
-            continue
+    for part, times in timing.culprits.items():  # the rarest on top
         color, dash = look[part]
-        times_in_run, lates = zip(*points, strict=True)
-        if few:
-            axes.vlines(times_in_run, low, lates, color=color, linewidth=0.8, alpha=0.4)
+        of_it = [o for o in listed if o.culprit == part]
         axes.plot(
-            times_in_run, lates, MARKERS[dash], color=color, mfc="white" if dash else color,
-            markersize=5.0 if few else 3.0, clip_on=False,
+            [o.time for o in of_it], [max(o.late, low) for o in of_it], MARKERS[dash], color=color,
+            mfc="white" if dash else color, markersize=4.0, clip_on=False,
             label=f"{grouped(times)} × {label(part)}",
         )  # fmt: skip
     axes.set(yscale="log", ylim=(low, high))
-    axes.yaxis.set_major_formatter(lambda seconds, _: duration(seconds))
-    axes.minorticks_off()
-    if rest := timing.overruns - len(
-        listed
-    ):  # shade the part of the run whose overruns were counted only
+    if rest := timing.overruns - len(listed):
         axes.axvspan(listed[-1].time, end, color=GREY, alpha=0.15, linewidth=0.0)
         text = f"grey: {grouped(rest)} more, counted only"
         axes.set_title(text, fontsize=9, loc="right", color=GREY)
-    _legend(axes, title="what took too long", fontsize=9, title_fontsize=9)
+    _logarithmic(axes, "late by")
+    axes.yaxis.set_major_formatter(lambda seconds, _: duration(seconds))
 
 
-def _legend(axes: Axes, *entries: Sequence[Any], **options: Any) -> None:
-    legend = axes.legend(
-        *entries, loc="upper left", bbox_to_anchor=(1.01, 1.0), alignment="left", frameon=False,
-        **options,
-    )  # fmt: skip
-    for text in legend.get_texts():
-        text.set_parse_math(False)  # a name with dollars is no formula
+def _logarithmic(axes: Axes, what: str) -> None:
+    """Finish axes with what is up, and a legend beside them."""
+    axes.minorticks_off()
+    finish(axes, what, legend=False)
+    if axes.get_legend_handles_labels()[0]:
+        beside(axes)
+
+
+def timing_html(timing: Timing, end: float) -> str:
+    """The content of the section; `end` is the simulated time in s at the end of the run.
+
+    Without matplotlib a line says that the chart needs it.
+    """
+    kind = "warn" if timing.overruns else "sum"
+    return (
+        f'<p class="{kind}">{escape(kept(timing))}</p>{_chart(timing, end)}'
+        f'<div class="paced"><div><h3>Parts of a step</h3>{_parts(timing)}</div>'
+        f"<div><h3>Pace</h3>{_pace(timing)}"
+        f"{bullets('Granted by the machine', timing.granted, 'Nothing.')}"
+        f"{bullets('Refused by the machine', timing.refused, 'Nothing.')}</div></div>"
+        f"{_listed(timing)}"
+    )
+
+
+def _chart(timing: Timing, end: float) -> str:
+    try:
+        svg = as_svg(_figure(timing, end))
+    except InputError as error:
+        return f'<p class="hint">No chart: {escape(str(error))}</p>'
+    text = "how often a part of a step took longer than a time, and how late steps ended"
+    return (
+        f'<div class="scroll"><div class="chart" role="img" aria-label="{text}">{svg}</div></div>'
+        f"{svg_button('.chart svg', 'timing')}"
+    )
+
+
+def _pace(timing: Timing) -> str:
+    rows = {
+        "period": duration(timing.period),
+        "factor asked for": number(timing.factor),
+        "times as fast as real time": number(timing.real_time_factor),
+        "after an overrun": timing.overrun,
+        "steps": grouped(timing.steps),
+        "overruns": grouped(timing.overruns),
+    }
+    return table("", (f"<td>{name}</td><td>{escape(text)}</td>" for name, text in rows.items()))
+
+
+def _parts(timing: Timing) -> str:
+    """The times that each part took and how often it was to blame; empty for a mere culprit."""
+    rows = []
+    for part in dict.fromkeys((*timing.parts, *timing.culprits)):
+        cells, late = [""] * (len(QUANTILES) + 2), list[bool]()
+        if spread := timing.parts.get(part):
+            cells = [grouped(1e6 * t, 1) for t in spread[:-1]] + [number(spread.worst_at)]
+            late = [t > timing.period for t in spread[:-1]]
+        cells.append(grouped(timing.culprits[part]) if part in timing.culprits else "")
+        both = zip_longest(cells, late, fillvalue=False)
+        texts = (f'<td class="n{" warn" * is_late}">{text}</td>' for text, is_late in both)
+        rows.append(f"<td>{escape(label(part))}</td>{''.join(texts)}")
+    heads = (
+        f'<th class="n">{head}</th>' for head in (*QUANTILES, "worst", "at t in s", "overruns")
+    )
+    return table(f"<th>part of a step, in µs</th>{''.join(heads)}", rows)
+
+
+def _listed(timing: Timing) -> str:
+    listed = timing.listed[:MOST_ROWS]
+    if not listed:
+        return ""
+    title = f"The first {len(listed)} of {grouped(timing.overruns)} overruns"
+    rows = (
+        f'<td class="n">{number(o.time, 9)}</td><td class="n">{grouped(o.step)}</td>'
+        f'<td class="n">{grouped(1e6 * o.late, 1)}</td><td>{escape(label(o.culprit))}</td>'
+        f'<td class="n">{grouped(1e6 * o.took, 1)}</td>'
+        for o in listed
+    )
+    heads = (
+        '<th class="n">t in s</th><th class="n">step</th><th class="n">late by, µs</th>'
+        '<th>culprit</th><th class="n">which took, µs</th>'
+    )
+    return f"<details><summary>{title}</summary>{table(heads, rows)}</details>"
