@@ -50,9 +50,13 @@ class Diagram:
 
 
 def corners(path):
-    """The points of a path of M, L, C and Q, control points left out."""
-    numbers = [[float(n) for n in text.split()] for text in re.findall(r"[MLCQ]([^MLCQ]*)", path)]
-    return [(n[-2], n[-1]) for n in numbers]
+    """The points of a path of M, C, H and V, control points left out."""
+    points = []
+    for kind, text in re.findall(r"([MCHV])([^MCHV]*)", path):
+        *_, last = numbers = [float(n) for n in text.split()]
+        x, y = (last, points[-1][1]) if kind == "H" else (points[-1][0], last) if points else (0, 0)
+        points.append((x, y) if kind in "HV" else (numbers[-2], last))
+    return points
 
 
 def link(text):
