@@ -10,13 +10,14 @@ from grasp_cosim.comparison.bands import (
     SHARE,
     SMALL,
     Band,
+    Bands,
     Given,
-    check_patterns,
     entry_for,
     metric_band,
     read_bands,
     signal_band,
 )
+from grasp_cosim.comparison.side import Side
 from grasp_cosim.comparison.tube import Curve, deviation, tube
 from hypothesis import given
 from hypothesis import strategies as st
@@ -123,9 +124,14 @@ def test_a_wrong_file_is_one_line(tmp_path, text, message):
 
 
 def test_a_pattern_for_nothing_is_an_error():
-    check_patterns("b.toml", {"plant.*": Given(0.1)}, ["plant.gap[1]"])
-    with pytest.raises(InputError, match=r"^b.toml: nothing is called 'plnt.\*'; valid: plant.gap"):
-        check_patterns("b.toml", {"plnt.*": Given(0.1)}, ["plant.gap[1]"])
+    bands = Bands("b.toml", {"plant.*": Given(0.1)}, {"time_*": Given(0.1)})
+    bands.check(["plant.gap[1]"], ["time_to_contact[1]"])
+    with pytest.raises(
+        InputError, match=r"^b.toml: \[signals\]: nothing is called 'plant.\*'; val"
+    ):
+        bands.check(["plnt.gap[1]"], ["time_to_contact[1]"])
+    with pytest.raises(InputError, match=r"^b.toml: \[metrics\]: nothing is called 'time_\*'"):
+        bands.check(["plant.gap[1]"], ["tome_to_contact[1]"])
 
 
 # The tube: whether curves are the same but for a shift in time, and how far apart else.
@@ -227,5 +233,6 @@ def test_a_peak_between_samples_is_in_the_band_of_one_that_is_thinned():
             for start in (0.1, 0.1 + part * STEP)
         ]
         one, other = (Curve(time, values) for values in impacts)
-        hidden = max(deviation(one, one.thinned(i), 3 * STEP).values.max() for i in (0, 1))
+        thinned = Side("", time, {"": one.values}, {}, {}).every_second()
+        hidden = max(deviation(one, t.curves()[""], 3 * STEP).values.max() for t in thinned)
         assert 0.0 < deviation(one, other, 3 * STEP).values.max() <= 2.0 * hidden

@@ -57,10 +57,10 @@ def test_a_copy_is_qualified_without_any_deviation(copied):
     found = copied
     assert found.qualified
     assert found.swap.differences == ()
-    assert found.numerics == NUMERICS
+    assert found.comparison.numerics == NUMERICS
     assert found.failure is None
     assert len(found.signals) >= 21
-    assert len(found.metrics) + len(found.absent) == 19
+    assert len(found.metrics) + len(found.comparison.absent) == 19
     assert {c.deviation for c in (*found.signals, *found.metrics)} == {0.0}
     assert all(c.band.source == "derived" for c in (*found.signals, *found.metrics))
     assert by_name(found.signals)["plant.gap[1]"].band.time == 0.002  # two steps
@@ -68,8 +68,7 @@ def test_a_copy_is_qualified_without_any_deviation(copied):
 
 
 def test_without_anything_to_compare_there_is_no_qualification(copied):
-    assert replace(copied, signals=()).qualified
-    found = replace(copied, signals=(), metrics=())
+    found = replace(copied, comparison=replace(copied.comparison, signals=(), metrics=()))
     assert not found.qualified
     assert as_json(found)["reason"].startswith("nothing was compared: no output")
 
@@ -93,7 +92,7 @@ def test_text_and_json_of_a_heavier_finger(heavier, snapshot):
 def test_a_blocked_candidate_is_not_run(short, fmus):
     found = qualify(short, "plant", fmus / "ProximitySensor.fmu")
     assert not found.qualified
-    assert (found.signals, found.metrics, found.numerics) == ((), (), ())
+    assert found.comparison is None
     assert "force[1], " in as_json(found)["reason"]
     lines = as_text(found).splitlines()
     assert lines[1].startswith("not run, the interface does not fit: force[1], ")
@@ -106,7 +105,7 @@ def test_bands_of_a_file_decide(short, heavy):
     wide = Bands("b.toml", {"*": Given(relative=1.0)}, {"*": Given(absolute=math.inf)})
     found = qualify(short, "plant", heavy, bands=wide, isolation="none")
     assert found.qualified
-    assert found.numerics == ()  # nothing is derived, so the original is run once
+    assert found.comparison.numerics == ()  # nothing is derived, so the original is run once
     assert {c.band.source for c in (*found.signals, *found.metrics)} == {"given"}
 
 
@@ -123,7 +122,7 @@ def test_a_written_band_file_gives_the_same_verdict(short, heavy, heavier, tmp_p
     bands = read_bands(tmp_path / "first.json")
     second = qualify(short, "plant", heavy, bands=bands, isolation="none")
     assert [(c.name, c.ratio) for c in second.signals] == [(c.name, c.ratio) for c in first.signals]
-    assert second.numerics == ()
+    assert second.comparison.numerics == ()
 
 
 CONTACT = "s_1, v_1, f_1 = contact.advance("
@@ -197,7 +196,7 @@ def test_millimetres_are_converted_on_the_connection_in_values_and_in_signals(lo
         ("warns", "unit", "x", "unit mm instead of m: converted"),
     ]
     assert found.qualified
-    x, other = (run["plant.x"].values for run in found.runs)
+    x, other = (run["plant.x"].values for run in found.comparison.curves)
     assert x.tolist() == pytest.approx([1.0 - 0.97**k for k in range(101)], rel=1e-9)
     assert other.tolist() == pytest.approx(x.tolist(), rel=1e-12)
     assert {c.unit for c in found.signals if c.name == "plant.x"} == {"m"}
@@ -238,8 +237,8 @@ def test_a_candidate_that_ends_on_the_way(loop, tmp_path, what, text):
     assert not found.qualified
     assert found.failure is not None
     assert text in found.failure
-    assert found.runs[1]["plant.x"].time[-1] == pytest.approx(0.5)
-    assert found.runs[0]["plant.x"].time[-1] == pytest.approx(1.0)
+    assert found.comparison.curves[1]["plant.x"].time[-1] == pytest.approx(0.5)
+    assert found.comparison.curves[0]["plant.x"].time[-1] == pytest.approx(1.0)
     assert found.metrics == ()
     assert all(c.time is not None and c.time <= 0.5 for c in found.signals)
     assert as_text(found).splitlines()[1].startswith("the candidate failed: plant: ")
@@ -249,4 +248,19 @@ def test_a_candidate_that_ends_on_the_way(loop, tmp_path, what, text):
 def test_a_step_that_the_candidate_rejects_is_told(loop, tmp_path):
     found = going_wrong(loop, tmp_path, "discard_at", "none")
     assert not found.qualified
-    assert any("discard" in line or "reject" in line for line in (*found.log, found.failure or ""))
+    assert any(
+        "discard" in line or "reject" in line
+        for line in (*found.comparison.notes, found.failure or "")
+    )
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("loops", "said"), [("refuse", "algebraic loop"), ("iterate", "out of band")]
+)
+def test_a_new_direct_dependence_is_judged_by_the_candidates_own_run(loops, said, loop, tmp_path):
+    """What it calls x is u_Real at once."""
+    system = replace(loop, initialisation=replace(loop.initialisation, loops=loops))
+    found = qualify(system, "plant", tmp_path / "plant.fmu", rename={"x": "y_Real", "y_Real": "x"})
+    assert not found.qualified
+    assert said in as_json(found)["reason"]

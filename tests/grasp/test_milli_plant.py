@@ -122,7 +122,7 @@ def test_the_plant_may_take_the_place_of_the_original(grasp, plants, original):
     check(simulate(fast.swap("plant", plant), metrics=[closest]).metrics, original.metrics)
     found = qualify(fast, "plant", plant, isolation="none")
     assert found.qualified
-    assert not found.uncompared
+    assert not found.comparison.only[0]
     for compared in found.metrics:
         assert compared.candidate == pytest.approx(compared.original, rel=1e-9)
     named = dict(entry.split(" = ") for entry in ENTRY.replace('"', "").split(", "))

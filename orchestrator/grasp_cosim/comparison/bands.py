@@ -14,9 +14,8 @@ the unit of the original:
 
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Any, Literal
@@ -25,8 +24,6 @@ import numpy as np
 
 from ..base.checks import known, number, toml_table
 from ..base.errors import InputError, choices, nearest
-from ..metrics.metric import Metric, Signals, measure
-from .side import Side
 from .tube import Curve, deviation
 
 SHARE = 1e-3
@@ -37,12 +34,6 @@ SMALL = 1e-6
 
 BOTH = 2.0
 """The numerical errors of two runs, of that of one."""
-
-FEWEST_STEPS = 2
-"""The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
-
-Curves = Mapping[str, Curve]
-Values = Mapping[str, float | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +73,24 @@ class Bands:
     signals: Mapping[str, Given] = field(default_factory=dict)
     metrics: Mapping[str, Given] = field(default_factory=dict)
 
+    def of_signal(self, name: str) -> Given | None:
+        """The entry for a signal."""
+        return entry_for(self.signals, name)
+
+    def of_metric(self, name: str) -> Given | None:
+        """The entry for a metric, by its name or that of all its values."""
+        return entry_for(self.metrics, name, plain(name))
+
+    def check(self, signals: Collection[str], metrics: Iterable[str]) -> None:
+        """InputError for a pattern that no name fits: most likely it is misspelt."""
+        both = [n for name in metrics for n in dict.fromkeys((plain(name), name))]
+        kinds = (("signals", self.signals, signals), ("metrics", self.metrics, both))
+        for kind, entries, names in kinds:
+            for pattern in entries:
+                if not any(_fits(pattern, name) for name in names):
+                    said = f"{self.place}: [{kind}]: nothing is called {pattern!r}"
+                    raise InputError(f"{said}; {nearest(pattern, names)}")
+
 
 def read_bands(path: Path) -> Bands:
     """The bands of a TOML file, or those that a qualification used, of what its --json printed.
@@ -116,11 +125,9 @@ def entry_for(entries: Mapping[str, Given], *names: str) -> Given | None:
     return exact[0] if exact else next(fitting, None)
 
 
-def check_patterns(place: str, entries: Mapping[str, Given], names: Sequence[str]) -> None:
-    """InputError for a pattern that no name fits: most likely it is misspelt."""
-    for pattern in entries:
-        if not any(_fits(pattern, name) for name in names):
-            raise InputError(f"{place}: nothing is called {pattern!r}; {nearest(pattern, names)}")
+def plain(name: str) -> str:
+    """The name of a metric that has a value of this name, like time_to_contact[1]."""
+    return name.partition("[")[0]
 
 
 def signal_band(
@@ -171,18 +178,18 @@ def _fits(pattern: str, name: str) -> bool:
 def _entries(place: str, table: Any, valid: Sequence[str]) -> dict[str, Given]:
     if not isinstance(table, dict):
         raise InputError(f"{place}: {table!r}: must be a table")
-    return {pattern: _given(f"{place}: {pattern!r}", e, valid) for pattern, e in table.items()}
-
-
-def _given(place: str, entry: Any, valid: Sequence[str]) -> Given:
-    if not isinstance(entry, dict) or not entry:
-        raise InputError(f"{place} = {entry!r}: must be a table with one of {choices(valid)}")
-    for key, value in entry.items():
-        known(f"{place}: unknown entry", key, valid)
-        more = ", inf where it is not judged" if key == "absolute" else ""
-        if not (more and value == inf):
-            number(f"{place}: {key}", value, 0.0, must=f"a number of at least 0{more}")
-    return Given(**{key: float(value) for key, value in entry.items()})
+    found = {}
+    for pattern, entry in table.items():
+        at = f"{place}: {pattern!r}"
+        if not isinstance(entry, dict) or not entry:
+            raise InputError(f"{at} = {entry!r}: must be a table with one of {choices(valid)}")
+        for key, value in entry.items():
+            known(f"{at}: unknown entry", key, valid)
+            more = ", inf where it is not judged" if key == "absolute" else ""
+            if not (more and value == inf):
+                number(f"{at}: {key}", value, 0.0, must=f"a number of at least 0{more}")
+        found[pattern] = Given(**{key: float(value) for key, value in entry.items()})
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,116 +221,3 @@ class Compared:
     def inside(self) -> bool:
         """True if the deviation is in its band."""
         return self.ratio <= 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """A run with which another is compared: all that both have, the worst first.
-
-    `asked` are the metrics that are compared, `shift` is that in time in s which a derived band
-    allows, `nominals` are the nominal values that its signals declare.
-    """
-
-    side: Side
-    asked: tuple[Metric, ...]
-    shift: float
-    bands: Bands
-    nominals: Mapping[str, float | None] = field(default_factory=dict)
-
-    @cached_property
-    def curves(self) -> Curves:
-        """Its signals."""
-        return self.side.curves()
-
-    @cached_property
-    def own(self) -> Values:
-        """Its metrics, see values()."""
-        return self.values(self.curves)
-
-    def values(self, curves: Curves) -> Values:
-        """The single metrics by name, like time_to_contact[1], of curves in our units."""
-        if not curves:
-            return {}
-        columns = {name: c.values for name, c in curves.items()}
-        side = replace(self.side, time=next(iter(curves.values())).time, signals=columns)
-        return single_values(side.by_role(), self.asked)
-
-    def check_bands(self, signals: Iterable[str] = (), metrics: Iterable[str] = ()) -> None:
-        """InputError where an entry of the bands is for nothing, neither for what the other run
-        may have beside: `signals` and `metrics`.
-        """
-        of, place = self.bands, self.bands.place
-        check_patterns(f"{place}: [signals]", of.signals, (*self.curves, *signals))
-        both = [n for name in self.own for n in dict.fromkeys((_plain(name), name))]
-        check_patterns(f"{place}: [metrics]", of.metrics, (*both, *metrics))
-
-    @property
-    def derives(self) -> bool:
-        """True if the width of some band is not given."""
-        there = [name for name, value in self.own.items() if value is not None]
-        given = [*map(self._of_signal, self.curves), *map(self._of_metric, there)]
-        return not all(entry and entry.wide for entry in given)
-
-    def _of_signal(self, name: str) -> Given | None:
-        return entry_for(self.bands.signals, name)
-
-    def _of_metric(self, name: str) -> Given | None:
-        return entry_for(self.bands.metrics, name, _plain(name))
-
-    def signals(self, candidate: Curves, again: Sequence[Curves]) -> tuple[Compared, ...]:
-        """All signals that both have, up to the end of the run that ends first.
-
-        The candidate's are in our units; again are our own run with other numerics.
-        """
-        found = []
-        for name, reference in self.curves.items():
-            if name not in candidate:
-                continue
-            theirs = candidate[name].until(float(reference.time[-1]))
-            nominal, others = self.nominals.get(name), [run[name] for run in again]
-            band = signal_band(reference, others, nominal, self.shift, self._of_signal(name))
-            apart = deviation(reference.until(float(theirs.time[-1])), theirs, band.time)
-            worst = apart.values.argmax()
-            time, distance, ours, other = (float(column[worst]) for column in apart)
-            span, unit = float(np.ptp(reference.values)), self.side.units[name]
-            found.append(Compared(name, unit, band, distance, ours, other, time, span))
-        return tuple(sorted(found, key=lambda c: -c.ratio))
-
-    def metrics(self, theirs: Values, again: Sequence[Curves]) -> tuple[Compared, ...]:
-        """The metrics that one of both has a value of.
-
-        One that is not among theirs has no value there; but for optional ones, which the
-        candidate's signals may not permit.
-        """
-        others = [self.values(run) for run in again]
-        asked, found = {m.name: m for m in self.asked}, []
-        for name, value in self.own.items():
-            metric, other = asked[_plain(name)], theirs.get(name)
-            if value is other is None or (metric.optional and name not in theirs):
-                continue
-            least = self.shift if metric.unit == "s" else SHARE if metric.unit == "1" else 0.0
-            band = metric_band(
-                value, (run.get(name) for run in others), least, self._of_metric(name)
-            )
-            apart = inf if value is None or other is None else abs(other - value)
-            found.append(Compared(name, metric.unit, band, apart, value, other))
-        return tuple(sorted(found, key=lambda c: -c.ratio))
-
-    def absent(self, theirs: Values) -> tuple[str, ...]:
-        """The metrics that neither run has a value of: nothing is judged by these."""
-        return tuple(name for name, v in self.own.items() if v is theirs.get(name) is None)
-
-
-def single_values(signals: Signals, asked: Iterable[Metric]) -> dict[str, float | None]:
-    """The metrics of signals as single values by name; true is 1 and false 0."""
-    found = measure(signals, asked).flat()
-    return {name: None if v is None else float(v) for name, v in found.items()}
-
-
-def every_second(curves: Curves) -> list[Curves]:
-    """The same curves with the samples of even numbers, and with those of odd ones."""
-    return [{n: c.thinned(first) for n, c in curves.items()} for first in (0, 1)]
-
-
-def _plain(name: str) -> str:
-    return name.partition("[")[0]

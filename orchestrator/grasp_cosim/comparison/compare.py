@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
+
+import numpy as np
 
 from ..base.errors import InputError, choices
 from ..interface.units import Conversion
@@ -14,20 +16,15 @@ from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
 from ..system.description import FILES, System
 from ..system.parts import NANOSECONDS
-from .bands import (
-    FEWEST_STEPS,
-    SHARE,
-    Band,
-    Bands,
-    Compared,
-    Curves,
-    Reference,
-    Values,
-    every_second,
-    single_values,
-)
+from .bands import SHARE, Bands, Compared, metric_band, plain, signal_band
 from .side import Difference, Side, differences, read_side, side_of
-from .tube import ROUNDING, Curve
+from .tube import ROUNDING, Curve, deviation
+
+FEWEST_STEPS = 2
+"""The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
+
+Curves = Mapping[str, Curve]
+Values = Mapping[str, float | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +34,8 @@ class Comparison:
     Both are in the units of a. `curves` are the signals of a and of b that were compared, `asked`
     the metrics that were, `absent` those that neither has a value of, `only` the signals that only
     a has, then those that only b has, and `only_metrics` the metrics. `differences` are those of
-    their settings, where both are runs. `names` are what the two are called.
+    their settings, where both are runs. `names` are what the two are called, `numerics` is what
+    derived bands are from.
     """
 
     a: Side
@@ -48,11 +46,12 @@ class Comparison:
     metrics: tuple[Compared, ...]
     curves: tuple[Curves, Curves]
     asked: tuple[Metric, ...]
-    differences: tuple[Difference, ...]
-    notes: tuple[str, ...]
     absent: tuple[str, ...]
-    only: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-    only_metrics: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    only: tuple[tuple[str, ...], tuple[str, ...]]
+    only_metrics: tuple[tuple[str, ...], tuple[str, ...]]
+    differences: tuple[Difference, ...] = ()
+    notes: tuple[str, ...] = ()
+    numerics: tuple[str, ...] = ("its range", "every second sample")
     names: tuple[str, str] = ("A", "B")
 
     @property
@@ -86,30 +85,83 @@ def compare(
     first, second = first.like(second), second.like(first)
     begin, end = _overlap(first, second)
     ours, theirs = first.part(begin, end), second.part(begin, end)
-    changes = _changes(ours, theirs)
+    changes, given = _changes(ours, theirs), bands or Bands()
     asked, other = (_asked(side, part, metrics) for side, part in ((first, ours), (second, theirs)))
+    values = ours.measured(asked), theirs.measured(other)
+    given.check({**ours.signals, **theirs.signals}, values[0])
     shift = max(SHARE * (end - begin), FEWEST_STEPS * max(ours.interval, theirs.interval))
-    reference = Reference(ours, asked, shift, bands or Bands())
-    reference.check_bands(theirs.signals)
-    again = every_second(reference.curves)
-    curves = _converted(theirs.curves(), changes, reference.curves)
-    values = single_values(theirs.by_role(), other)
+    again = ours.every_second()
     runs = (first.result, second.result) if first.result and second.result else None
-    of_both = {m.name for m in asked if runs and m in other and not m.optional}
+    required = [m.name for m in other] if runs else []
+    changed = theirs.converted(changes)
+    found = judge(ours, changed, values, asked, again, given, shift, required=required)
+    return replace(
+        found,
+        a=first,
+        b=second,
+        begin=begin,
+        end=end,
+        only=_only(ours.signals, theirs.signals),
+        differences=differences(*runs) if runs else (),
+        notes=tuple(_notes(first, second, begin, end, changes)),
+    )
+
+
+def judge(
+    a: Side,
+    b: Side,
+    values: tuple[Values, Values],
+    asked: tuple[Metric, ...],
+    again: Sequence[Side],
+    bands: Bands,
+    shift: float,
+    nominals: Mapping[str, float | None] | None = None,
+    required: Collection[str] = (),
+) -> Comparison:
+    """Compare two runs, both in the units of a, up to the end of the one that ends first.
+
+    `values` are the metrics `asked` of each, `again` is the run of a with other numerics, `shift`
+    the one in time in s which a derived band allows, `nominals` are the declared nominal values.
+    A metric that is `required` and not optional is out where only one has it.
+    """
+    ours, theirs, runs = a.curves(), b.curves(), [run.curves() for run in again]
+    ours = {name: curve for name, curve in ours.items() if name in theirs}
+    theirs = {n: c._replace(held=c.held or ours[n].held) for n, c in theirs.items() if n in ours}
+    signals = []
+    for name, reference in ours.items():
+        other, nominal = theirs[name].until(float(reference.time[-1])), (nominals or {}).get(name)
+        numerics = [run[name] for run in runs]
+        band = signal_band(reference, numerics, nominal, shift, bands.of_signal(name))
+        apart = deviation(reference.until(float(other.time[-1])), other, band.time)
+        worst = apart.values.argmax()
+        time, distance, was, now = (float(column[worst]) for column in apart)
+        span, unit = float(np.ptp(reference.values)), a.units[name]
+        signals.append(Compared(name, unit, band, distance, was, now, time, span))
+    metrics, own, measured = [], values[0], [run.measured(asked) for run in again]
+    by_name = {m.name: m for m in asked}
+    for name in dict.fromkeys((*own, *values[1])):
+        metric, value, found = by_name.get(plain(name)), own.get(name), values[1].get(name)
+        if metric is None or value is found is None:
+            continue
+        judged = metric.name in required and not metric.optional
+        if not judged and (name not in own or name not in values[1]):
+            continue
+        least = shift if metric.unit == "s" else SHARE if metric.unit == "1" else 0.0
+        band = metric_band(value, (m.get(name) for m in measured), least, bands.of_metric(name))
+        distance = inf if value is None or found is None else abs(found - value)
+        metrics.append(Compared(name, metric.unit, band, distance, value, found))
     return Comparison(
-        first,
-        second,
-        begin,
-        end,
-        reference.signals(curves, again),
-        _metrics(reference, values, again, of_both),
-        ({name: reference.curves[name] for name in curves}, curves),
+        a,
+        b,
+        float(max(a.time[0], b.time[0])),
+        float(min(a.time[-1], b.time[-1])),
+        tuple(sorted(signals, key=lambda c: -c.ratio)),
+        tuple(sorted(metrics, key=lambda c: -c.ratio)),
+        (ours, theirs),
         asked,
-        differences(*runs) if runs else (),
-        tuple(_notes(first, second, begin, end, changes)),
-        reference.absent(values),
-        _only(ours.signals, theirs.signals),
-        _only(reference.own, values),
+        tuple(name for name, v in own.items() if v is values[1].get(name) is None),
+        _only(a.signals, b.signals),
+        _only(own, values[1]),
     )
 
 
@@ -163,33 +215,6 @@ def _asked(side: Side, part: Side, more: Sequence[Metric]) -> tuple[Metric, ...]
     recorded = side.result.more_metrics if side.result and whole else ()
     own = [m for m in recorded if m.name not in taken]
     return tuple(m for m in metrics_of(side.groups, [*more, *own]) if not m.reason)
-
-
-def _converted(
-    curves: Curves, changes: Mapping[str, Conversion | None], like: Curves
-) -> dict[str, Curve]:
-    """The signals in the units of the other, held where one of both is."""
-    return {
-        name: Curve(c.time, change(c.values), c.held or like[name].held)
-        for name, change in changes.items()
-        if change is not None and (c := curves[name])
-    }
-
-
-def _metrics(
-    reference: Reference, values: Values, again: Sequence[Curves], both: set[str]
-) -> tuple[Compared, ...]:
-    """The metrics that both runs were asked for; one that only one has a value of is out."""
-    units = {m.name: m.unit for m in reference.asked if m.name in both}
-    theirs = [
-        Compared(name, units[plain], Band(0.0, 0.0, "derived"), inf, None, value)
-        for name, value in values.items()
-        if name not in reference.own
-        and value is not None
-        and (plain := name.partition("[")[0]) in both
-    ]
-    found = reference.metrics(values, again)
-    return (*theirs, *(c for c in found if c.name in values or c.name.partition("[")[0] in both))
 
 
 def _only(

@@ -24,10 +24,9 @@ from .qualify import Qualification
 from .side import Side
 from .tube import deviation, tube
 from .words import (
-    basis,
+    absent_lines,
     difference_lines,
     notes,
-    qualification_basis,
     qualification_verdict,
     reason,
     verdict,
@@ -53,10 +52,10 @@ def write_qualification(q: Qualification, path: Path, limit: int = LIMIT) -> boo
     A page that was there before is gone then.
     """
     c = q.comparison
-    if c is None:
+    if c is None or not c.signals:
         path.unlink(missing_ok=True)
         return False
-    said = [*difference_lines(q.swap.differences), *qualification_basis(q)]
+    said = [*difference_lines(q.swap.differences), *notes(c)]
     text = f"{qualification_verdict(q)}: {reason(q)}"
     write_text(path, _html(c, limit, text, q.qualified, said))
     return True
@@ -64,7 +63,7 @@ def write_qualification(q: Qualification, path: Path, limit: int = LIMIT) -> boo
 
 def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
     """Return the page of a comparison as text, see write_comparison."""
-    return _html(c, limit, verdict(c), c.alike, [*notes(c), *basis(c)])
+    return _html(c, limit, verdict(c), c.alike, [*absent_lines(c), *notes(c)])
 
 
 def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[str]) -> str:
@@ -75,9 +74,15 @@ def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[st
     scene = c.a.result.view.scene(c.a.result) if c.a.result else None
     units = {s.name: s.unit for s in sorted(c.signals, key=lambda s: [*c.curves[0]].index(s.name))}
     texts = c.a.result.descriptions if c.a.result else {}
+    exact = (
+        f"{c.names[0]} solid and pale, {c.names[1]} dashed over it; the tube is the band around "
+        f"{c.names[0]}. {grouped(len(time))} rows of {counted(len(c.signals), 'signal')}."
+    )
+    if thinned := shown.rows_per_pair:
+        exact += f" Of each {thinned} rows this page keeps the lowest and the highest value."
     sections = {
         "runs": (" and ".join(c.names), _runs(c, remarks)),
-        "traces": ("Traces", traces_html(_exactness(c, shown, len(time)), units, texts, ())),
+        "traces": ("Traces", traces_html(exact, units, texts, ())),
         "metrics": ("Metrics", f'<div class="pairs">{_metrics(c)}</div>'),
         "signals-table": ("Signals, the worst first", f'<div class="pairs">{_signals(c)}</div>'),
     }
@@ -138,16 +143,6 @@ def _state(
         "marks": [{"t": t, "color": "--fault"} for log in logs for t in moments(log)],
         "scene": None,
     }
-
-
-def _exactness(c: Comparison, shown: Shown, rows: int) -> str:
-    said = (
-        f"{c.names[0]} solid and pale, {c.names[1]} dashed over it; the tube is the band around "
-        f"{c.names[0]}. {grouped(rows)} rows of {counted(len(c.signals), 'signal')}."
-    )
-    if thinned := shown.rows_per_pair:
-        said += f" Of each {thinned} rows this page keeps the lowest and the highest value."
-    return said
 
 
 def _runs(c: Comparison, remarks: Sequence[str]) -> str:

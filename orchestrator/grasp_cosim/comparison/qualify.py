@@ -16,7 +16,7 @@ from ..base.errors import InputError, SimulationError
 from ..interface.expansion import values_of
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
-from ..interface.units import IDENTITY, Conversion, conversion
+from ..interface.units import Conversion, conversion
 from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Metric, metrics_of
@@ -26,8 +26,8 @@ from ..system.description import System
 from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Isolation
 from ..system.structure import SCHEMES, between, output_units
 from ..system.validity import transforms
-from .bands import FEWEST_STEPS, SHARE, Bands, Compared, Curves, Reference, every_second
-from .compare import Comparison
+from .bands import SHARE, Bands, Compared, plain
+from .compare import FEWEST_STEPS, Comparison, judge
 from .interface_difference import (
     SEVERITIES,
     Difference,
@@ -35,8 +35,7 @@ from .interface_difference import (
     interface_differences,
     use_of,
 )
-from .side import differences, side_of
-from .tube import Curve
+from .side import Side, differences, side_of
 
 END = Metric(
     "end_of_run", lambda run: float(run.time[-1]), "s", "where an FMU asked for the end, else stop"
@@ -68,25 +67,26 @@ class Swap:
 
 @dataclass(frozen=True, slots=True)
 class Qualification:
-    """The verdict and all that led to it; signals and metrics the worst first.
+    """The verdict and all that led to it.
 
-    failure is why the candidate did not run to the end, None where it did or was not run. numerics
-    are the other runs of the original that derived bands are from. runs are the signals of the
-    original and of the candidate, by name and in the original's units. log is what the candidate's
-    run tells and the original's does not. `asked` are the metrics, `absent` those that neither run
-    has a value of, `results` the runs.
+    failure is why the candidate did not run to the end, None where it did or was not run.
+    comparison is that of the two runs, in which notes are what the candidate's run tells and the
+    original's does not; None where the candidate did not run.
     """
 
     swap: Swap
-    signals: tuple[Compared, ...] = ()
-    metrics: tuple[Compared, ...] = ()
+    comparison: Comparison | None = None
     failure: str | None = None
-    numerics: tuple[str, ...] = ()
-    runs: tuple[Curves, Curves] = ({}, {})
-    log: tuple[str, ...] = ()
-    asked: tuple[Metric, ...] = ()
-    absent: tuple[str, ...] = ()
-    results: tuple[Result, Result] | None = None
+
+    @property
+    def signals(self) -> tuple[Compared, ...]:
+        """The signals that were compared, the worst first."""
+        return self.comparison.signals if self.comparison else ()
+
+    @property
+    def metrics(self) -> tuple[Compared, ...]:
+        """The metrics that were compared, the worst first."""
+        return self.comparison.metrics if self.comparison else ()
 
     @property
     def blocks(self) -> tuple[Difference, ...]:
@@ -94,44 +94,10 @@ class Qualification:
         return tuple(d for d in self.swap.differences if d.severity == "blocks")
 
     @property
-    def outside(self) -> tuple[Compared, ...]:
-        """The signals and metrics that are out of their bands."""
-        return tuple(c for c in (*self.signals, *self.metrics) if not c.inside)
-
-    @property
-    def uncompared(self) -> tuple[str, ...]:
-        """The signals of the original that the candidate's run lacks, or has in no such unit."""
-        return tuple(name for name in self.runs[0] if name not in self.runs[1])
-
-    @property
-    def comparison(self) -> Comparison | None:
-        """Both runs as those of a comparison; None where the candidate did not run."""
-        if self.results is None or not self.signals:
-            return None
-        names = (self.swap.original.name, self.swap.candidate.name)
-        a, b = (side_of(*of) for of in zip(self.results, names, strict=True))
-        curves, other = ({c.name: run[c.name] for c in self.signals} for run in self.runs)
-        return Comparison(
-            a,
-            b,
-            0.0,
-            float(min(a.time[-1], b.time[-1])),
-            self.signals,
-            self.metrics,
-            (curves, other),
-            self.asked,
-            differences(*self.results),
-            self.log,
-            self.absent,
-            only=(self.uncompared, ()),
-            names=("original", "candidate"),
-        )
-
-    @property
     def qualified(self) -> bool:
         """True if the candidate may take the original's place: all that there was to compare."""
-        compared = self.signals or self.metrics
-        return bool(compared) and not (self.blocks or self.failure or self.outside)
+        c = self.comparison
+        return c is not None and not self.failure and c.alike and bool(c.signals or c.metrics)
 
 
 def qualify(
@@ -171,34 +137,36 @@ def qualify(
         how = "of the candidate: --set components.NAME.units.VARIABLE=UNIT"
         raise InputError(f"{error}; {how}") from error
     run = _run(swap.system, progress and "original")
-    asked += (END,) if _ended_early(run) else ()
-    side = side_of(run, swap.original.name)
-    side = replace(side, to_si={n: c for n, c in more.items() if n not in run} | dict(run.to_si))
+    ours = side_of(run, swap.original.name)
+    ours = replace(ours, to_si={n: c for n, c in more.items() if n not in run} | dict(run.to_si))
+    given = bands or Bands()
+    given.check(ours.signals, (*ours.measured(asked), END.name))
+    result, failure = _tried(swap.swapped, progress)
+    if result is None:
+        return Qualification(swap, failure=failure)
+    early = any(r.complete and bool(r.time[-1] < r.settings["stop"]) for r in (run, result))
+    asked = () if failure else (*asked, END) if early else asked
+    own = ours.measured(asked)
+    again: list[Side] = []
+    numerics: list[str] = []
+    there = [given.of_metric(name) for name, value in own.items() if value is not None]
+    if not all(entry and entry.wide for entry in (*map(given.of_signal, ours.signals), *there)):
+        again, numerics = _other_numerics(swap.system, ours, progress)
+    theirs = side_of(result, swap.candidate.name).converted(swap.back)
+    both = own, replace(ours, time=theirs.time, signals=theirs.signals).measured(asked)
     span_ns, step_ns = swap.system.stop_ns - swap.system.start_ns, swap.system.step_ns
     shift = max(SHARE * span_ns, FEWEST_STEPS * step_ns) / NANOSECONDS
-    original = Reference(side, asked, shift, bands or Bands(), swap.nominals)
-    original.check_bands(metrics=(END.name,))
-    result, failure = _tried(swap.swapped, progress)
-    again: list[Curves] = []
-    numerics: list[str] = []
-    if original.derives:
-        again, numerics = _other_numerics(swap.system, original.curves, progress)
-    theirs = _converted(side_of(result, "").curves(), swap) if result else {}
-    if result and _ended_early(result) and END not in asked:
-        original = replace(original, asked=(*asked, END))
-    singly = original.values(theirs)
-    return Qualification(
-        swap,
-        original.signals(theirs, again),
-        () if failure else original.metrics(singly, again),
-        failure,
-        tuple(numerics),
-        (original.curves, theirs),
-        _remarks(run, result) if result else (),
-        original.asked,
-        () if failure else original.absent(singly),
-        (run, result) if result else None,
+    required = {*map(plain, own)}
+    found = judge(ours, theirs, both, asked, again, given, shift, swap.nominals, required)
+    texts = [f"{name} is a String: not compared" for name in ours.texts]
+    found = replace(
+        found,
+        differences=differences(run, result),
+        notes=(*(line for line in result.log if line not in run.log), *texts),
+        numerics=tuple(numerics),
+        names=("original", "candidate"),
     )
+    return Qualification(swap, found, failure)
 
 
 def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
@@ -218,24 +186,17 @@ def _run(system: System, progress: str | bool) -> Result:
     return result
 
 
-def _ended_early(result: Result) -> bool:
-    """True if an FMU asked for the end before the stop time."""
-    return result.complete and bool(result.time[-1] < result.settings["stop"])
-
-
-def _other_numerics(
-    system: System, original: Curves, progress: bool
-) -> tuple[list[Curves], list[str]]:
+def _other_numerics(system: System, original: Side, progress: bool) -> tuple[list[Side], list[str]]:
     """The original thinned, with twice the step and in the other scheme, as far as it runs so.
 
     And what they are, in words.
     """
-    runs = every_second(original)
+    runs = original.every_second()
     said = ["every second sample"]
     for name, other in _variants(system):
         try:
             run = _run(other, progress and f"original, {name}")
-            runs.append(side_of(run, name).curves())
+            runs.append(side_of(run, name))
             said.append(name)
         except (InputError, SimulationError) as error:
             said.append(f"not {name}: {error}")
@@ -250,22 +211,6 @@ def _variants(system: System) -> Iterator[tuple[str, System]]:
     for scheme in SCHEMES:
         if scheme != system.scheme:
             yield f"scheme {scheme}", system.with_experiment(scheme=scheme)
-
-
-def _remarks(reference: Result, result: Result) -> tuple[str, ...]:
-    """Lines that only the candidate's run said, and on what is not compared."""
-    texts = [name for name in reference if name not in reference.numbers]
-    said = [line for line in result.log if line not in reference.log]
-    return (*said, *(f"{name} is a String: not compared" for name in texts))
-
-
-def _converted(curves: Curves, swap: Swap) -> dict[str, Curve]:
-    """The signals in the original's units, but for those that cannot be."""
-    return {
-        name: Curve(c.time, change(c.values), c.held)
-        for name, c in curves.items()
-        if (change := swap.back.get(name, IDENTITY)) is not None
-    }
 
 
 def prepare_swap(

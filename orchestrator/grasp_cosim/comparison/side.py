@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from si_units import known_unit
 from ..base.errors import InputError
 from ..base.files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion
-from ..metrics.metric import Signals
+from ..metrics.metric import Metric, Signals, measure
 from ..recording.load import ARROW, SETTINGS, SIGNALS, load_run
 from ..recording.mdf import read_mdf
 from ..recording.result import Result
@@ -58,9 +58,27 @@ class Side:
     def part(self, begin: float, end: float) -> Side:
         """The rows from begin to end in s."""
         first = int(np.searchsorted(self.time, begin - ROUNDING, side="left"))
-        rows = slice(first, int(np.searchsorted(self.time, end + ROUNDING, side="right")))
-        signals = {name: column[rows] for name, column in self.signals.items()}
-        return replace(self, time=self.time[rows], signals=signals)
+        return self._rows(slice(first, int(np.searchsorted(self.time, end + ROUNDING, "right"))))
+
+    def every_second(self) -> list[Side]:
+        """The rows of even numbers, and those of odd ones; each with the ends."""
+        kept = np.zeros((2, len(self.time)), bool)
+        kept[0, ::2] = kept[1, 1::2] = kept[:, 0] = kept[:, -1] = True
+        return [self._rows(rows) for rows in kept]
+
+    def _rows(self, kept: Any) -> Side:
+        signals = {name: column[kept] for name, column in self.signals.items()}
+        return replace(self, time=self.time[kept], signals=signals)
+
+    def converted(self, changes: Mapping[str, Conversion | None]) -> Side:
+        """With other values of signals, without those whose conversion is None."""
+        found = {n: changes.get(n, IDENTITY) for n in self.signals}
+        signals = {
+            n: self.signals[n] if c == IDENTITY else c(self.signals[n])
+            for n, c in found.items()
+            if c
+        }
+        return replace(self, signals=signals)
 
     def curves(self) -> dict[str, Curve]:
         """The signals as curves; Booleans and integers are held between samples."""
@@ -69,9 +87,11 @@ class Side:
             for name, column in self.signals.items()
         }
 
-    def by_role(self) -> Signals:
-        """The signals as metrics take them."""
-        return Signals(self.time, self.signals, self.roles, self.to_si, self.values)
+    def measured(self, asked: Iterable[Metric]) -> dict[str, float | None]:
+        """The metrics as single values by names like time_to_contact[1]; true is 1 and false 0."""
+        signals = Signals(self.time, self.signals, self.roles, self.to_si, self.values)
+        found = measure(signals, asked).flat()
+        return {name: None if v is None else float(v) for name, v in found.items()}
 
     def like(self, other: Side) -> Side:
         """A log from elsewhere as one of the other's system: with its roles, its types where they

@@ -33,12 +33,6 @@ class Curve(NamedTuple):
         count = int(np.searchsorted(self.time, end + ROUNDING, side="right"))
         return Curve(self.time[:count], self.values[:count], self.held)
 
-    def thinned(self, first: int) -> "Curve":
-        """Every second sample from the given one on, 0 or 1, and the ends."""
-        kept = np.zeros(len(self.time), bool)
-        kept[first::2] = kept[0] = kept[-1] = True
-        return Curve(self.time[kept], self.values[kept], self.held)
-
     def continued(self, shift: float) -> "Curve":
         """The curve and how it goes on for a shift in s; a held one stays."""
         end, last = self.time[-1], self.values[-1]

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
 
 from ..base.errors import choices
 from ..base.text import columns, significant
-from ..metrics.metric import Metric
 from ..system.parts import NANOSECONDS
-from .bands import Compared
+from .bands import Compared, plain
 from .compare import Comparison
 from .interface_difference import SEVERITIES, Difference
 from .qualify import Qualification
@@ -23,7 +22,7 @@ FEW = 3
 """How many it lists where all of them are inside, or just notes."""
 
 MOST = 12
-"""So many differences of the settings at most are in the text."""
+"""So many differences of the settings, or notes, at most are in the text."""
 
 WIDE = 0.1
 """A band wider than this share of the range of its signal proves little."""
@@ -33,8 +32,7 @@ def verdict(c: Comparison) -> str:
     """The outcome in a line."""
     word = "ALIKE" if c.alike else "DIFFERENT"
     ended = [f"{name} did not come to its end" for name in c.unfinished]
-    said = "; ".join([*ended, counts(c.signals, c.metrics)])
-    return f"{word}: {said}, from {c.begin:.6g} to {c.end:.6g} s"
+    return f"{word}: {'; '.join([*ended, counts(c)])}, from {c.begin:.6g} to {c.end:.6g} s"
 
 
 def as_text(c: Comparison) -> str:
@@ -42,31 +40,28 @@ def as_text(c: Comparison) -> str:
     sides = zip(c.names, (c.a, c.b), strict=True)
     parts = [[verdict(c), *(f"{name}: {side.name}" for name, side in sides)]]
     if c.differences:
-        rows = [f"  {d.what}: {d.a} | {d.b}" for d in c.differences[:MOST]]
-        if left := len(c.differences) - len(rows):
-            rows.append(f"  {left} more; --json and the page have all")
+        rows = _cut([f"  {d.what}: {d.a} | {d.b}" for d in c.differences], MOST, "  ")
         parts.append([f"the runs differ in ({' | '.join(c.names)}):", *rows])
     elif c.a.result and c.b.result:
         parts.append(["the settings of the runs are the same"])
-    parts += _tables(c.signals, c.metrics, c.names)
-    parts.append([*notes(c), *basis(c)])
-    return "\n\n".join(map("\n".join, parts))
+    return _joined([*parts, *_tables(c), [*absent_lines(c), *notes(c)]])
 
 
 def notes(c: Comparison) -> list[str]:
-    """What is not judged, and why."""
+    """Where the bands are from, what only one has, which is not judged, and what the runs tell."""
     only = [
         f"{kind} only in {run}: {choices(names, 6)}"
         for kind, both in (("signals", c.only), ("metrics", c.only_metrics))
         for run, names in zip(c.names, both, strict=True)
         if names
     ]
-    return [*c.notes, *absent_lines(c.absent, c.asked, c.end), *only]
-
-
-def basis(c: Comparison) -> list[str]:
-    """Where the bands are from."""
-    return bands_lines(c.signals, c.metrics, f"{c.names[0]} (its range; every second sample)")
+    compared = (*c.signals, *c.metrics)
+    given = sum(m.band.source == "given" for m in compared)
+    derived = f"{len(compared) - given} derived from {c.names[0]} ({'; '.join(c.numerics)})"
+    bands = f"{given} given, {derived}" if given < len(compared) else f"all {given} given"
+    wide = [s.name for s in c.signals if s.span and WIDE * s.span < s.band.width < inf]
+    said = [f"bands that are wide for the range of their signals: {', '.join(wide)}"]
+    return [f"bands: {bands}", *(said if wide else []), *only, *c.notes]
 
 
 def as_json(c: Comparison) -> dict[str, Any]:
@@ -84,23 +79,17 @@ def as_json(c: Comparison) -> dict[str, Any]:
         "no_value": list(c.absent),
         "only_a": {"signals": list(c.only[0]), "metrics": list(c.only_metrics[0])},
         "only_b": {"signals": list(c.only[1]), "metrics": list(c.only_metrics[1])},
-        "notes": notes(c),
+        "notes": [*absent_lines(c), *notes(c)],
         "units": {"begin": "s", "end": "s", "band_time": "s", "time": "s"},
     }
 
 
 def qualification_text(q: Qualification) -> str:
     """The verdict, then what is out of band, the worst first, then the interface."""
-    parts = [[qualification_verdict(q), reason(q)]]
-    parts += _tables(q.signals, q.metrics, ("original", "candidate"))
-    parts.append(difference_lines(q.swap.differences))
-    if q.signals:
-        parts.append(qualification_basis(q))
-    elif q.failure:
-        parts.append(
-            [f"whether this machine loads it: grasp-cosim inspect --load {q.swap.candidate}"]
-        )
-    return "\n\n".join(map("\n".join, parts))
+    c, parts = q.comparison, [[qualification_verdict(q), reason(q)]]
+    last = [f"whether this machine loads it: grasp-cosim inspect --load {q.swap.candidate}"]
+    parts += [*(_tables(c) if c else []), difference_lines(q.swap.differences)]
+    return _joined([*parts, _cut(notes(c), MOST) if c else last if q.failure else []])
 
 
 def qualification_verdict(q: Qualification) -> str:
@@ -119,7 +108,7 @@ def qualification_json(q: Qualification) -> dict[str, Any]:
 
     `bands` are those that were used: `qualify --bands` takes the file.
     """
-    system = q.swap.system
+    system, c = q.swap.system, q.comparison
     return {
         "qualified": q.qualified,
         "reason": reason(q),
@@ -132,15 +121,15 @@ def qualification_json(q: Qualification) -> dict[str, Any]:
         "scheme": system.scheme,
         "failure": q.failure,
         "differences": [asdict(d) for d in q.swap.differences],
-        "signals": [_json(c, "original", "candidate") for c in q.signals],
-        "metrics": [_json(c, "original", "candidate") for c in q.metrics],
-        "no_value": list(q.absent),
-        "uncompared": list(q.uncompared),
-        "numerics": list(q.numerics),
-        "log": list(q.log),
+        "signals": [_json(s, "original", "candidate") for s in q.signals],
+        "metrics": [_json(m, "original", "candidate") for m in q.metrics],
+        "no_value": list(c.absent) if c else [],
+        "uncompared": list(c.only[0]) if c else [],
+        "numerics": list(c.numerics) if c else [],
+        "log": list(c.notes) if c else [],
         "bands": {
-            "signals": {c.name: _band(c) | {"time": c.band.time} for c in q.signals},
-            "metrics": {c.name: _band(c) for c in q.metrics},
+            "signals": {s.name: _band(s) | {"time": s.band.time} for s in q.signals},
+            "metrics": {m.name: _band(m) for m in q.metrics},
         },
         "units": {"step": "s", "stop": "s", "band_time": "s", "time": "s"},
     }
@@ -153,82 +142,57 @@ def reason(q: Qualification) -> str:
         return f"not run, the interface does not fit: {names}"
     if q.failure:
         return f"the candidate failed: {q.failure}"
-    if not (q.signals or q.metrics):
+    if q.comparison is None or not (q.signals or q.metrics):
         return "nothing was compared: no output that both record is a number"
-    end = q.swap.system.stop_ns / NANOSECONDS
-    return "; ".join([counts(q.signals, q.metrics), *absent_lines(q.absent, q.asked, end)])
+    return "; ".join([counts(q.comparison), *absent_lines(q.comparison)])
 
 
 def difference_lines(differences: Sequence[Difference]) -> list[str]:
     """What the candidate declares otherwise, the worst first."""
     if not differences:
         return ["interface: no difference"]
-    found = {s: sum(d.severity == s for d in differences) for s in SEVERITIES}
-    lines = ["interface: " + ", ".join(f"{n} {s}" for s, n in found.items() if n)]
-    for severity in SEVERITIES:
-        of_it = [d for d in differences if d.severity == severity]
-        most = FEW if severity == "notes" else ROWS
-        lines += [f"  {severity:6}  {d.kind:11}  {d.variable}: {d.text}" for d in of_it[:most]]
-        if len(of_it) > most:
-            lines.append(f"  {severity:6}  {len(of_it) - most} more; --json has all")
+    found = {s: [d for d in differences if d.severity == s] for s in SEVERITIES}
+    lines = ["interface: " + ", ".join(f"{len(of)} {s}" for s, of in found.items() if of)]
+    for severity, of in found.items():
+        rows = [f"  {severity:6}  {d.kind:11}  {d.variable}: {d.text}" for d in of]
+        lines += _cut(rows, FEW if severity == "notes" else ROWS, f"  {severity:6}  ")
     return lines
 
 
-def qualification_basis(q: Qualification) -> list[str]:
-    """Where the bands are from, what is not judged, and what the candidate's run told."""
-    runs = "; ".join(q.numerics) or "its own range alone"
-    lines = bands_lines(q.signals, q.metrics, f"the original ({runs})")
-    if q.uncompared:
-        names = ", ".join(q.uncompared)
-        lines.append(f"not compared, as the candidate has no such output: {names}")
-        if any(c.original is not None and c.candidate is None for c in q.metrics):
-            lines.append(
-                "metrics that want such an output have no value there; to judge it without them: "
-                "--bands with '*' = { absolute = inf } under [metrics]"
-            )
-    lines += [f"the candidate's run: {line}" for line in q.log[:ROWS]]
-    if len(q.log) > ROWS:
-        lines.append(f"the candidate's run: {len(q.log) - ROWS} more lines; --json has all")
-    return lines
-
-
-def counts(signals: Sequence[Compared], metrics: Sequence[Compared]) -> str:
+def counts(c: Comparison) -> str:
     """How many are out of band: "2 of 30 signals and 1 of 12 metrics out of band"."""
     found = [
-        f"{sum(not c.inside for c in compared)} of {len(compared)} {name}"
-        for name, compared in (("signals", signals), ("metrics", metrics))
+        f"{sum(not one.inside for one in compared)} of {len(compared)} {name}"
+        for name, compared in (("signals", c.signals), ("metrics", c.metrics))
         if compared
     ]
     return f"{' and '.join(found)} out of band"
 
 
-def absent_lines(absent: Sequence[str], asked: Sequence[Metric], end: float) -> list[str]:
+def absent_lines(c: Comparison) -> list[str]:
     """A line on metrics that have no value in either run, and on what that means."""
-    if not absent:
+    if not c.absent:
         return []
-    names = {name.partition("[")[0] for name in absent}
-    means = [m.none for m in asked if m.none and m.name in names]
-    said = f"{', '.join(dict.fromkeys(means))} until t = {end:g} s: " if means else ""
-    until = "" if means else f" until t = {end:g} s"
-    return [f"{said}{len(absent)} metrics have no value in either run{until}: {choices(absent, 6)}"]
+    names = {plain(name) for name in c.absent}
+    means = [m.none for m in c.asked if m.none and m.name in names]
+    said = f"{', '.join(dict.fromkeys(means))} until t = {c.end:g} s: " if means else ""
+    until = "" if means else f" until t = {c.end:g} s"
+    line = f"{len(c.absent)} metrics have no value in either run{until}: {choices(c.absent, 6)}"
+    return [said + line]
 
 
-def bands_lines(signals: Sequence[Compared], metrics: Sequence[Compared], basis: str) -> list[str]:
-    """Where the bands are from: given, or derived from `basis`; and which prove little."""
-    given = sum(c.band.source == "given" for c in (*signals, *metrics))
-    derived = len(signals) + len(metrics) - given
-    from_ = f"{given} given, {derived} derived from {basis}" if derived else f"all {given} given"
-    lines = [f"bands: {from_}"]
-    if wide := [c.name for c in signals if c.span and WIDE * c.span < c.band.width < inf]:
-        lines.append(f"bands that are wide for the range of their signals: {', '.join(wide)}")
-    return lines
+def _joined(parts: Iterable[Sequence[str]]) -> str:
+    return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
-def _tables(
-    signals: Sequence[Compared], metrics: Sequence[Compared], runs: tuple[str, str]
-) -> list[list[str]]:
-    both = (("signal", signals), ("metric", metrics))
-    return [_table(name, compared, runs) for name, compared in both if compared]
+def _cut(lines: Sequence[str], most: int, indent: str = "") -> list[str]:
+    left = len(lines) - most
+    return [*lines[:most], *([f"{indent}{left} more; --json has all"] if left > 0 else [])]
+
+
+def _tables(c: Comparison) -> list[list[str]]:
+    both = (("signal", c.signals), ("metric", c.metrics))
+    return [_table(name, compared, c.names) for name, compared in both if compared]
 
 
 def _table(name: str, compared: Sequence[Compared], runs: tuple[str, str]) -> list[str]:
