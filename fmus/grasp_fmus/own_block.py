@@ -154,10 +154,14 @@ def _variables(file: Path, block: Any) -> list[Variable]:
         longest_step(block)
     with _tried(file, "initial_state()"):
         first = block.initial_state(p, u)
-        kinds = _kinds(first)
+        before = _kinds(first)
     with _tried(file, "step()"):
         second = block.step(p, first, u, 1e-3)
-        _check_kinds(_kinds(second), kinds)
+        kinds = _kinds(second)
+        for name in {**before, **kinds}:  # or a saved state would come back as another: 0.5 as 0
+            kind, like = (k[name].__name__ if name in k else "not there" for k in (kinds, before))
+            if kind != like:
+                raise ValueError(f"{name} is {kind}: must be as initial_state() makes it, {like}")
     outputs = [v for v in found if v.causality == "output"]
     with _tried(file, "outputs()"):
         for x in (first, second):
@@ -201,14 +205,6 @@ def _kinds(state: Any, name: str = "State") -> dict[str, type[Any]]:
     if not isinstance(state, (float, int)):
         raise ValueError(f"{name} = {state!r}: must be float, bool, int, or a tuple of those")
     return {name: type(state)}
-
-
-def _check_kinds(kinds: dict[str, type[Any]], before: dict[str, type[Any]]) -> None:
-    """ValueError where a saved state would not come back as it was: 0.5 as 0, by an int."""
-    for name in {**before, **kinds}:
-        kind, like = (k[name].__name__ if name in k else "not there" for k in (kinds, before))
-        if kind != like:
-            raise ValueError(f"{name} is {kind}: must be as initial_state() makes it, {like}")
 
 
 @contextmanager

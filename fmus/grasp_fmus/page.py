@@ -4,7 +4,7 @@ A page is Markdown, the card and then the sections that follow here; its frame i
 tables of variables in the cards are made here as well: `make cards` brings them up to date.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from itertools import cycle
@@ -212,39 +212,36 @@ def updated(card: str, blocks: Mapping[str, Block]) -> str:
 def variable_tables(blocks: Mapping[str, Block]) -> str:
     """The variables of a block as a Markdown table; of several, what all have, then what each adds.
 
-    The blocks are given by name. Those of a hand follow by themselves.
+    The blocks are given by name. Those of a hand follow by themselves. A row that stood before is
+    named, and not shown again.
     """
     rows = {name: [_row(f) for f in declared(block)] for name, block in blocks.items()}
     if len(rows) == 1:
         return _table(*rows.values())
     hands = {name: own for name, own in rows.items() if name.startswith("hand")}
     others = {name: own for name, own in rows.items() if name not in hands}
-    parts = _parts("all have", others)
-    if hands:
-        parts |= _parts("all of a hand of three fingers have", hands)
-    return "\n".join(_tables(parts))
-
-
-def _parts(title: str, rows: Mapping[str, list[str]]) -> dict[str, list[str]]:
-    """What all have, and what each adds, by a title."""
-    first, *others = rows.values()
-    common = [row for row in first if all(row in other for other in others)]
-    added = {f"`{name}` adds": [r for r in own if r not in common] for name, own in rows.items()}
-    return {title: common, **{name: own for name, own in added.items() if own}}
-
-
-def _tables(parts: Mapping[str, list[str]]) -> Iterator[str]:
-    """Each part under its title; a row that stood before is named there, and not shown again."""
+    parts: dict[str, list[str]] = {}
+    for who, group in (("all have", others), ("all of a hand of three fingers have", hands)):
+        common = [row for row in rows.get(next(iter(group), ""), ()) if _in_all(row, group)]
+        added = {f"`{n}` adds": [r for r in own if r not in common] for n, own in group.items()}
+        parts |= {title: own for title, own in {who: common, **added}.items() if own}
     seen: set[str] = set()
-    for title, rows in parts.items():
-        fresh = [row for row in rows if row not in seen]
-        names = (row.split("`")[1].partition("[")[0] for row in rows if row in seen)
-        groups = dict.fromkeys(
-            f"`{name.partition('.')[0]}{'.*' if '.' in name else ''}`" for name in names
+    text = []
+    for title, own in parts.items():
+        names = (row.split("`")[1].partition("[")[0] for row in own if row in seen)
+        groups = (f"`{name.partition('.')[0]}{'.*' if '.' in name else ''}`" for name in names)
+        named = ", ".join(dict.fromkeys(groups))
+        again = f", besides {named} as above" if named else ""
+        fresh = [row for row in own if row not in seen]
+        text.append(
+            f"What {title}{again}:\n\n{_table(fresh)}" if fresh else f"What {title}{again}.\n"
         )
-        again = f", besides {', '.join(groups)} as above" if groups else ""
-        yield f"What {title}{again}:\n\n{_table(fresh)}" if fresh else f"What {title}{again}.\n"
-        seen |= {*rows}
+        seen |= {*own}
+    return "\n".join(text)
+
+
+def _in_all(row: str, rows: Mapping[str, list[str]]) -> bool:
+    return all(row in own for own in rows.values())
 
 
 def _table(rows: list[str]) -> str:

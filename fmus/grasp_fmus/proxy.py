@@ -24,37 +24,32 @@ LONGEST_TEXT = 1023
 _MOST = 2**31 - 1
 
 
+_TEXT = (0, LONGEST_TEXT)
+
+
 class Settings(NamedTuple):
     """The parameters proxy.*, but for those of the outputs: type, unit, limits, description."""
 
-    host: Annotated[str, "", (0, LONGEST_TEXT), "name or IPv4 address of the peer"] = "127.0.0.1"
+    host: Annotated[str, "", _TEXT, "name or IPv4 address of the peer"] = "127.0.0.1"
     port: Annotated[int, "", (1, 65535), "its UDP port"] = PORT
     timeout: Annotated[
         float, "s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"
     ] = 0.01  # the step of the original is no measure: 0.1 ms is less than many a network needs
     connect_timeout: Annotated[
-        float,
-        "s",
-        (1e-3, 3600.0),
+        float, "s", (1e-3, 3600.0),
         "longest wait for an answer in initialisation mode, by the clock",
-    ] = 5.0
+    ] = 5.0  # fmt: skip
     misses_tolerated: Annotated[
         int, "", (0, _MOST), "misses in a row before the peer is lost with one more"
     ] = 3
     on_loss: Annotated[
-        str,
-        "",
-        (0, LONGEST_TEXT),
-        "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error",
+        str, "", _TEXT, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"
     ] = "stop"
     resume: Annotated[bool, "", None, "go on asking a lost peer, and come back when it answers"] = (
         False
     )
     key_file: Annotated[
-        str,
-        "",
-        (0, LONGEST_TEXT),
-        "file with a key shared with the peer, 16 bytes or more; empty: none",
+        str, "", _TEXT, "file with a key shared with the peer, 16 bytes or more; empty: none"
     ] = ""
 
 
@@ -211,7 +206,6 @@ _LICENCE = "/* What a proxy and its peer say to each other, in bytes: README.md 
 _INCLUDED = "".join(
     f"#include <{header}.h>\n" for header in ("stdbool", "stddef", "stdint", "string")
 )
-_KINDS = {float: "KIND_REAL", bool: "KIND_BOOLEAN", int: "KIND_INTEGER", str: "KIND_STRING"}
 _WHOLE = (-(2.0**31), 2.0**31 - 1.0)
 """What an Integer of the link holds."""
 
@@ -224,36 +218,30 @@ def _table(signature: Signature, variables: Sequence[Variable]) -> str:
     from .native.text import number, string
 
     texts: list[str] = []
-    rows = []
+    rows = ""
     for i, v in enumerate(variables):
         limits = v.limits if i >= len(signature.variables) else None
-        start: float = 0.0
         low, high = limits or (_WHOLE if v.kind is int else (0.0, 0.0))
-        if v.kind is str:
-            start = len(texts)
-            texts.append(string(str(v.start or "")))
-        elif v.start is not None:
-            start = float(v.start)
-        fixed = int(v.variability == "fixed")
+        start = len(texts) if v.kind is str else v.start or 0.0
+        texts += [string(str(v.start))] if v.kind is str else []
+        kind = f"KIND_{TYPES[v.kind].upper()}"
+        cells = string(v.name), string(v.in_unit), kind, v.causality.upper()
+        flags = v.variability == "fixed", limits is not None or v.kind is int
         numbers = ", ".join(number(float(x)) for x in (low, high, start))
-        rows.append(
-            f"    {{{string(v.name)}, {string(v.in_unit)}, {_KINDS[v.kind]}, "
-            f"{v.causality.upper()}, {fixed},\n"
-            f"     {int(limits is not None or v.kind is int)}, {numbers}}},\n"
-        )
+        rows += f"    {{{', '.join(cells)}, {flags[0]:d},\n     {flags[1]:d}, {numbers}}},\n"
     defined = {
         "N_REQUEST": len(signature.request),
         "N_ANSWER": len(signature.answer),
         "REQUEST_SIZE": 8 * len(signature.request),
         "ANSWER_SIZE": 8 * len(signature.answer),
-        "N_VARIABLES": len(rows),
+        "N_VARIABLES": len(variables),
         "N_TEXTS": len(texts),
     }
     return (
         "/* The variables of a proxy, in the order of their value references. */\n"
         + "".join(f"#define {name} {value}\n" for name, value in defined.items())
         + '#include "variable.h"\n\n'
-        + f"static const Variable variables[N_VARIABLES] = {{\n{''.join(rows)}}};\n\n"
+        + f"static const Variable variables[N_VARIABLES] = {{\n{rows}}};\n\n"
         + "static const char *const texts[N_TEXTS + 1] = {\n"
         + "".join(f"    {text},\n" for text in texts)
         + '    ""};\n'
