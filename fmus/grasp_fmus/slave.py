@@ -59,7 +59,7 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def reported(call: _F) -> _F:
-    """The call, with what it raises reported. In the calls of every step this is written out."""
+    """The call, with what it raises reported."""
 
     def reporting(self: "Slave", *arguments: Any) -> Any:
         try:
@@ -71,37 +71,33 @@ def reported(call: _F) -> _F:
 
 
 def _getter(kind: type[Scalar]) -> Callable[["Slave", list[int]], list[Any]]:
+    @reported
     def get(self: "Slave", vrs: list[int]) -> list[Any]:
         """Values of the given references."""
-        try:
-            if vrs != self._last_read.get(kind):
-                self._check_kind(vrs, kind)
-                self._last_read[kind] = [*vrs]
-            if self._inputs is None and not self._output_vrs.isdisjoint(vrs):
-                self._refresh()
-        except BaseException as error:
-            self._report(error)
+        if vrs != self._last_read.get(kind):
+            self._check_kind(vrs, kind)
+            self._last_read[kind] = [*vrs]
+        if self._inputs is None and not self._output_vrs.isdisjoint(vrs):
+            self._refresh()
         return [self._values[vr] for vr in vrs]
 
     return get
 
 
 def _setter(kind: type[Scalar]) -> Callable[["Slave", list[int], list[Any]], None]:
+    @reported
     def set_(self: "Slave", vrs: list[int], values: list[Any]) -> None:
         """Set inputs or parameters, all or none; outputs follow when they are next asked for."""
-        try:
-            only_inputs = vrs == self._last_set.get(kind)
-            if not only_inputs:
-                self._check_kind(vrs, kind)
-                self._check_settable(vrs)
-                only_inputs = max(vrs, default=0) < self._first_parameter
-                if only_inputs:
-                    self._last_set[kind] = [*vrs]
-            if not only_inputs or (kind is float and not isfinite(sum(values))):
-                for vr, value in zip(vrs, values, strict=True):
-                    self._variables[vr].check(value)
-        except BaseException as error:
-            self._report(error)
+        only_inputs = vrs == self._last_set.get(kind)
+        if not only_inputs:
+            self._check_kind(vrs, kind)
+            self._check_settable(vrs)
+            only_inputs = max(vrs, default=0) < self._first_parameter
+            if only_inputs:
+                self._last_set[kind] = [*vrs]
+        if not only_inputs or (kind is float and not isfinite(sum(values))):
+            for vr, value in zip(vrs, values, strict=True):
+                self._variables[vr].check(value)
         for vr, value in zip(vrs, values, strict=True):
             self._values[vr] = value
         if not only_inputs:
@@ -166,36 +162,32 @@ class Slave:
         """The end; values can still be read."""
         self._enter(TERMINATED)
 
+    @reported
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance the block by step_size seconds with the inputs as they are.
 
         Where it cannot, it raises: to discard a step is for pythonfmu to end the simulation.
         """
+        self._require("fmi2DoStep", STEPPING)
+        if not 0.0 < step_size < inf:
+            raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
+        late = abs(current_time - self._time)
+        if not (late <= TIME_TOLERANCE or isclose(current_time, self._time, rel_tol=1e-12)):
+            raise ValueError(f"step from {current_time} s: must be from {self._time} s")
+        if step_size > self._longest_step:
+            raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
+        step, outputs, pack, unpack = self._functions
+        params = self._read_params() if self._params is None else self._params
+        inputs = self._inputs
+        if inputs is None:
+            self._inputs = inputs = pack(self._values)
         try:
-            if self._phase != STEPPING:
-                self._require("fmi2DoStep", STEPPING)
-            if not 0.0 < step_size < inf:
-                raise ValueError(f"step size = {step_size} s: must be a finite number above 0")
-            late = abs(current_time - self._time)
-            if not (late <= TIME_TOLERANCE or isclose(current_time, self._time, rel_tol=1e-12)):
-                raise ValueError(f"step from {current_time} s: must be from {self._time} s")
-            if step_size > self._longest_step:
-                raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
-            step, outputs, pack, unpack = self._functions
-            params, inputs = self._params, self._inputs
-            if inputs is None:
-                if params is None:
-                    params = self._read_params()
-                self._inputs = inputs = pack(self._values)
-            try:
-                state = step(params, self._state, inputs, step_size)
-                values = unpack(outputs(params, state, inputs))
-                if not isfinite(sum(values)):
-                    self._check_finite(values)
-            except REASONS as error:
-                raise ArithmeticError(f"step of {step_size} s: {error}") from error
-        except BaseException as error:
-            self._report(error)
+            state = step(params, self._state, inputs, step_size)
+            values = unpack(outputs(params, state, inputs))
+            if not isfinite(sum(values)):
+                self._check_finite(values)
+        except REASONS as error:
+            raise ArithmeticError(f"step of {step_size} s: {error}") from error
         self._state = state
         self._values[self._outputs] = values
         self._time = current_time + step_size
