@@ -102,21 +102,6 @@ def test_values_there_and_back(a, b, c):
     assert repr(codec.unpack(body)) == repr([a, b, c])
 
 
-@pytest.mark.parametrize(
-    ("place", "bad"),
-    [
-        (0, struct.pack("<d", math.nan)), (0, struct.pack("<d", -math.inf)),
-        (8, struct.pack("<q", 2**31)), (8, struct.pack("<q", -(2**31) - 1)),
-        (16, struct.pack("<Q", 2)), (24, b"\0"), (17, b""), (8, b""), (0, b""),
-    ],
-)  # fmt: skip
-def test_what_is_no_value(place, bad):
-    """A body that holds one, or has another size."""
-    body = bytearray(Codec(ALL).pack(1.0, 1, True))
-    body[place : place + len(bad) if bad else None] = bad
-    assert Codec(ALL).unpack(bytes(body)) is None
-
-
 def test_the_largest_reals_are_values_though_their_sum_is_not():
     codec = Codec([U, U])
     assert codec.unpack(codec.pack(1.7e308, 1.7e308)) == [1.7e308, 1.7e308]
@@ -191,7 +176,7 @@ def test_what_the_text_cannot_hold(variables, reason):
         Signature(variables)
 
 
-# Sessions
+# Sessions; whatever is sent in them, again or damaged: test_bench_header.py
 
 
 class Bench:
@@ -287,15 +272,6 @@ def test_a_live_session_keeps_others_away_until_it_is_silent():
     second.step(0.0, 0.1, VALUES)
 
 
-def test_of_two_that_were_greeted_the_later_one_is_greeted_anew():
-    bench = Bench()
-    late = bench.proxy()
-    late.take(bench(late.hello(2)))
-    bench.begun(session=1).end()
-    assert refused(late.initialise, 0.0, VALUES) == (link.UNKNOWN, "")
-    late.begin(2, VALUES)
-
-
 def test_a_recorded_session_cannot_be_played_again():
     bench = Bench(KEY)
     proxy = bench.proxy(key=KEY)
@@ -352,30 +328,6 @@ def test_a_failure_ends_the_session_and_says_why_until_it_was_heard():
     assert refused(proxy.take, again) == (link.FAILED, "no power, no pow")
     assert bench.counts() == {"initialisations": 1, "repeated": 1}
     assert refused(proxy.initialise, 0.0, VALUES) == (link.UNKNOWN, "")
-
-
-BAD = {
-    "malformed": (
-        *({"kind": kind} for kind in (INITIALISE, link.OUTPUTS, link.HELLO)),
-        *({"step": step} for step in (0.0, -1.0)),
-        *({"body": body} for body in (b"", b"\xff" * 16)),
-    ),
-    "other_version": ({"version": 1},),
-    "foreign": (
-        {"session": 1}, {"cookie": 7}, {"interface": bytes(16)}, {"kind": END, "session": 1},
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("counter", "spoil"), [(c, s) for c, bad in BAD.items() for s in bad])
-def test_a_bad_step_is_dropped_and_the_next_one_served(counter, spoil):
-    bench = Bench()
-    proxy = bench.begun()
-    proxy.step(0.0, 0.1, VALUES)
-    bench(proxy.request(STEP, 0.1, VALUES, 0.1, **spoil))
-    assert len(bench.done) == 2
-    assert bench.counts()[counter] == 1
-    proxy.step(0.2, 0.1, VALUES)
 
 
 @pytest.mark.parametrize("step", [link.LONGEST_STEP * 1.001, 1e300])
