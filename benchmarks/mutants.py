@@ -10,28 +10,22 @@ import argparse
 import compileall
 import os
 import random
+import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from py_compile import PycInvalidationMode
 
-from cosmic_ray.work_db import WorkDB, use_db
-from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkResult
+from cosmic_ray.commands.init import _all_work_items
+from cosmic_ray.mutating import mutate_and_test
+from cosmic_ray.work_item import TestOutcome
 
 ROOT = Path(__file__).parents[1]
 ROOTS = ("plant", "sensor", "controller", "fmus", "orchestrator", "tests", "docs", ".")
 QUICK = "not slow and not platforms and not interop"
-CONFIG = """[cosmic-ray]
-module-path = "{room}"
-timeout = {timeout}
-test-command = "{command}"
-[cosmic-ray.distributor]
-name = "local"
-"""
 
 
 def tests_of(room: str) -> str:
@@ -44,26 +38,8 @@ def tests_of(room: str) -> str:
     return folder.as_posix()
 
 
-def sample(db: WorkDB, number: int, seed: int) -> int:
-    """Leave no more than number mutants to try, those of the seed. Returns how many there were."""
-    items = sorted(db.pending_work_items, key=lambda item: str(item.mutations))
-    drawn = random.Random(seed).sample(items, min(number, len(items)))  # noqa: S311
-    left = {item.job_id for item in drawn}
-    for item in items:
-        if item.job_id not in left:
-            db.set_result(item.job_id, WorkResult(WorkerOutcome.SKIPPED))
-    return len(items)
-
-
-def outcome(db: WorkDB) -> tuple[int, list[str]]:
-    """How many mutants were tried, and the changes that no test noticed."""
-    results = [result for _, result in db.results if result.worker_outcome != WorkerOutcome.SKIPPED]
-    survived = [r.diff or "" for r in results if r.test_outcome == TestOutcome.SURVIVED]
-    return len(results), survived
-
-
-def copied(folder: Path) -> dict[str, str]:
-    """Put a copy of the checkout in folder, compiled; returns the environment to test it in.
+def enter_copy(folder: Path) -> None:
+    """Go into a copy of the checkout, compiled.
 
     Compiled modules are told from stale ones by what they say, as a mutant may be as long and as
     old as what it replaces.
@@ -73,15 +49,9 @@ def copied(folder: Path) -> dict[str, str]:
     compileall.compile_dir(
         folder, quiet=2, workers=0, invalidation_mode=PycInvalidationMode.CHECKED_HASH
     )
+    os.chdir(folder)
     paths = os.pathsep.join(str(folder / root) for root in ROOTS)
-    return {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", "CI": ""}
-
-
-def run(command: str, folder: Path, env: Mapping[str, str]) -> None:
-    """Run a command in the copy. SystemExit with what it printed if it fails."""
-    done = subprocess.run(command.split(), cwd=folder, env=env, capture_output=True, text=True)
-    if done.returncode:
-        raise SystemExit(f"{command}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    os.environ |= {"PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", "CI": ""}
 
 
 def main() -> None:
@@ -93,28 +63,24 @@ def main() -> None:
     given = parser.parse_args()
     if not (ROOT / given.room).exists():
         parser.error(f"{given.room}: must be a module or a package, like plant/gripper_plant")
-    tests = given.tests or tests_of(given.room)
+    room, tests = Path(given.room), given.tests or tests_of(given.room)
+    command = f"{sys.executable} -m pytest -x -q -p no:xdist -m '{QUICK}' {tests}"
     with tempfile.TemporaryDirectory(prefix="grasp_mutants_") as name:
-        folder, session = Path(name, "tree"), Path(name, "session.sqlite")
-        env = copied(folder)
-        command = f"{sys.executable} -m pytest -x -q -p no:xdist -m '{QUICK}' {tests}"
+        enter_copy(Path(name, "tree"))
         start = time.monotonic()
-        plain = f"{sys.executable} -m cosmic_ray.cli"
-        config = Path(name, "config.toml")
-        config.write_text(CONFIG.format(room=given.room, timeout=600, command=command))
-        run(f"{plain} baseline {config}", folder, env)
+        subprocess.run(shlex.split(command), check=True)
         allowed = 10 + 5 * (time.monotonic() - start)
-        config.write_text(CONFIG.format(room=given.room, timeout=allowed, command=command))
-        run(f"{plain} init {config} {session}", folder, env)
-        with use_db(session, WorkDB.Mode.open) as db:
-            number = sample(db, given.sample, given.seed)
-        run(f"{plain} exec {config} {session}", folder, env)
-        with use_db(session, WorkDB.Mode.open) as db:
-            tried, survived = outcome(db)
+        modules = [room] if room.is_file() else sorted(room.rglob("*.py"))
+        every = [item.mutations for item in _all_work_items(modules, {})]
+        draw = random.Random(given.seed)  # noqa: S311 - no secret
+        chosen = draw.sample(every, min(given.sample, len(every)))
+        found = [mutate_and_test(mutations, command, allowed) for mutations in chosen]
+        os.chdir(ROOT)
+    survived = [result.diff for result in found if result.test_outcome == TestOutcome.SURVIVED]
     print(*survived, sep="\n")
-    score = 100 * (1 - len(survived) / tried)
-    print(f"{given.room}: {tried - len(survived)} of {tried} mutants killed by {tests}, ", end="")
-    print(f"{score:.1f} % (of {number} that could be made; seed {given.seed})")
+    killed = len(found) - len(survived)
+    score = f"{killed} of {len(found)} mutants killed by {tests}, {100 * killed / len(found):.1f} %"
+    print(f"{given.room}: {score} (of {len(every)} that could be made; seed {given.seed})")
 
 
 if __name__ == "__main__":

@@ -3,23 +3,17 @@
     python -m benchmarks.realtime [--seconds 60] [--rates 1000 10000] [--priority P] [--cpu N]
         [--python]
 
-Three measurements for each rate, under the same priority and on the same CPU. The gaps of a loop
-that only looks at the clock are times in which this machine ran nothing of ours: nobody can do
-better. Waiting alone, without any FMU, is what sleeping costs on top. Then comes the run. What
-the run shows beyond the other two is our share.
+Two measurements for each rate, under the same priority and on the same CPU. The gaps of a loop that
+only looks at the clock are times in which this machine ran nothing of ours: nobody can do better.
+Then comes the run. What it shows beyond is our share.
 """
 
 import argparse
 import time
-from itertools import pairwise
-from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-from grasp_cosim import Realtime, System, simulate
+from grasp_cosim import Realtime, simulate
 from grasp_cosim.grasp.system import grasp_system
-from grasp_cosim.realtime.pacer import Pacer, privileges
-from grasp_cosim.realtime.timing import BEGIN, DUE
+from grasp_cosim.realtime.pacer import privileges
 from grasp_cosim.report.terminal import timing_lines
 
 GAPS = (100_000, 1_000_000, 10_000_000)
@@ -52,36 +46,13 @@ def spin(seconds: float) -> tuple[list[int], int]:
     return gaps, ran
 
 
-def wait(system: System, realtime: Realtime) -> npt.NDArray[np.float64]:
-    """The lateness of each start in ns where there is nothing to do but to wait."""
-    pacer = Pacer(system, realtime)
-    values = np.zeros(pacer.width)
-    pacer.bind(values, lambda _: None)
-    late = np.empty(system.total_steps)
-    for step in range(len(late)):
-        pacer(step)
-        late[step] = values[BEGIN] - values[DUE]
-    return late
-
-
-def stolen() -> float:
-    """s that the hypervisor has taken from the CPUs since the machine started; 0 elsewhere."""
-    stat = Path("/proc/stat")
-    return float(stat.read_text().split()[8]) / 100.0 if stat.exists() else 0.0
-
-
 def measure(seconds: float, rate: int, realtime: Realtime, native: bool) -> None:
-    """All three at a rate in Hz."""
+    """Both at a rate in Hz."""
     system = grasp_system(native=native).with_experiment(1.0 / rate, seconds, None)
     simulate(system, stop=10 / rate)  # compiles the loop
-    marks = [stolen()]
     with privileges(realtime):
         gaps, ran = spin(seconds)
-        marks.append(stolen())
-        late = wait(system, realtime)
-        marks.append(stolen())
     timing = simulate(system, progress=True, realtime=realtime).timing
-    marks.append(stolen())
     assert timing is not None  # noqa: S101 - it is paced
     print(f"\n== {rate} Hz for {seconds:g} s; granted: {', '.join(timing.granted) or 'nothing'}")
     for line in timing.refused:
@@ -90,19 +61,13 @@ def measure(seconds: float, rate: int, realtime: Realtime, native: bool) -> None
         f"{sum(gap > limit for gap in gaps)} over {limit / 1e6:g} ms" for limit in GAPS
     )
     worst, lost = max(gaps, default=0) / 1e6, sum(gaps) / ran
-    print(f"machine, spin loop:  gaps {counts}; worst {worst:.3f} ms; {lost:.2%} of the time lost")
-    quantiles = np.quantile(late, (0.5, 0.99, 0.999, 1.0)) / 1e3
-    print("machine, waiting:    start late by", _row(quantiles))
-    for name, (before, after) in zip(("spin loop", "waiting", "run"), pairwise(marks), strict=True):
-        print(f"steal during {name}: {after - before:.2f} s of CPU")
+    print(f"machine: gaps {counts}; worst {worst:.3f} ms; {lost:.2%} of the time lost")
+    quantiles = "p50 {:9.1f}  p99 {:9.1f}  p99.9 {:9.1f}  worst {:9.1f} us".format
     for name, part in timing.parts.items():
-        print(f"run, {name:14s}", _row(1e6 * np.array(part[:4])), f"at t = {part.worst_at:.4f} s")
+        us = quantiles(*(1e6 * second for second in part[:4]))
+        print(f"run, {name:14s} {us} at t = {part.worst_at:.4f} s")
     for line in timing_lines(timing):
         print(f"run: {line}")
-
-
-def _row(quantiles: npt.NDArray[np.float64]) -> str:
-    return "p50 {:9.1f}  p99 {:9.1f}  p99.9 {:9.1f}  worst {:9.1f} us".format(*quantiles)
 
 
 if __name__ == "__main__":

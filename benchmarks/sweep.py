@@ -1,13 +1,9 @@
-"""How long sweeps of whole grasps take on one worker and on two, native, and whether they agree.
-
-Beside it stands how much faster two processes are at plain arithmetic: what the machine gives.
-"""
+"""How long sweeps of whole grasps take on one worker and on two, native, and whether they agree."""
 
 import argparse
 import os
 import statistics
 import time
-from multiprocessing import get_context
 
 from grasp_cosim import grasp_system, sweep
 from grasp_cosim.sweeps.table import Table
@@ -22,21 +18,6 @@ def timed(rows: dict[str, list[float]], step: float, workers: int) -> tuple[floa
     return time.perf_counter() - start, table
 
 
-def arithmetic(additions: int) -> float:
-    """The time in s of so many additions."""
-    start, total = time.perf_counter(), 0.0
-    for i in range(additions):
-        total += i * 0.5
-    return time.perf_counter() - start
-
-
-def machine(additions: int = 20_000_000) -> float:
-    """How many times as much plain arithmetic two processes do as one."""
-    with get_context("spawn").Pool(2) as pool:
-        one = pool.apply(arithmetic, (additions,))
-        return 2.0 * one / max(pool.map(arithmetic, [additions] * 2, chunksize=1))
-
-
 def main() -> None:
     """Measure in rounds, one and two workers by turns."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -47,7 +28,7 @@ def main() -> None:
     positions = [0.05 * k / given.runs for k in range(given.runs)]
     rows, ratios = {"plant.initial_object_position": positions}, []
     print(f"{given.runs} grasps of 3 s, step {given.step:g} s, {os.cpu_count()} processors")
-    head("round", "1 worker, s", "2 workers, s", "times as fast", "plain arithmetic", "load")
+    head("round", "1 worker, s", "2 workers, s", "times as fast", "load")
     for k in range(given.rounds):
         load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
         found = {n: timed(rows, given.step, n) for n in ((1, 2) if k % 2 else (2, 1))}
@@ -55,8 +36,7 @@ def main() -> None:
         if first != second or first.errors:
             raise RuntimeError("one and two workers differ")
         ratios.append(one / two)
-        times = f"{one:.2f}", f"{two:.2f}", f"{one / two:.2f}", f"{machine():.2f}"
-        row(k + 1, *times, f"{load:.2f}")
+        row(k + 1, f"{one:.2f}", f"{two:.2f}", f"{one / two:.2f}", f"{load:.2f}")
     print(f"\nmedian: {statistics.median(ratios):.2f} times")
 
 

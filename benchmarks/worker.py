@@ -56,13 +56,9 @@ def ours(folder: Path, engine: str) -> Master:
     """grasp-cosim; every output in memory."""
     grasp_cosim = importlib.import_module("grasp_cosim")
     presets = importlib.import_module("grasp_cosim.grasp.presets")
-    session = grasp_cosim.simulate.session(
-        grasp_cosim.System.load(presets.SYSTEM, folder),
-        step=STEP,
-        stop=LONG,
-        scheme="jacobi",
-        engine=engine,
-    )
+    system = grasp_cosim.System.load(presets.SYSTEM, folder)
+    how = {"step": STEP, "stop": LONG, "scheme": "jacobi", "engine": engine}
+    session = grasp_cosim.simulate.session(system, **how)
     return Master(session.step, lambda: session["plant.position[1]"])
 
 
@@ -76,12 +72,9 @@ def ecospy(folder: Path) -> Master:
         structure.make_real_connection(f"{source}::{output}", f"{target}::{given}")
     simulation = ecos.EcosSimulation(structure=structure, step_size=STEP)
     table = os.path.join(tempfile.mkdtemp(dir=os.environ["TMPDIR"]), "ecospy.csv")  # noqa: PTH118
-    names = [
-        f"{name}::{v.name}"
-        for name, variables in descriptions(folder).items()
-        for v in variables
-        if v.causality == "output"
-    ]
+    described = descriptions(folder).items()
+    outputs = [(name, v) for name, of in described for v in of if v.causality == "output"]
+    names = [f"{name}::{v.name}" for name, v in outputs]
     simulation.add_csv_writer(table, identifiers=names)
     if not simulation.init():
         raise RuntimeError(ecos.EcosLib.get_last_error())
@@ -138,41 +131,24 @@ def cofmupy(folder: Path) -> Master:
     read = wrappers.read_model_description
 
     def without_boolean_outputs(path: str) -> Any:
-        description = read(path)
-        description.modelVariables = [
-            v
-            for v in description.modelVariables
-            if not (v.causality == "output" and v.type == "Boolean")
-        ]
+        description, unread = read(path), ("output", "Boolean")
+        variables = description.modelVariables
+        description.modelVariables = [v for v in variables if (v.causality, v.type) != unread]
         return description
 
     wrappers.read_model_description = without_boolean_outputs
     coordinator = importlib.import_module("cofmupy").Coordinator()
-    fmus = [
-        {
-            "id": name,
-            "path": str(folder / f"{COMPONENTS[name]}.fmu"),
-            "name": name,
-            "initialization": {v.name: float(v.start) for v in variables if v.causality == "input"},
-        }
-        for name, variables in descriptions(folder).items()
-    ]
-    connections = [
-        {
-            "source": {"id": source, "variable": output},
-            "target": {"id": target, "variable": given},
-        }
-        for source, output, target, given in CONNECTIONS
-    ]
-    coordinator.start(
-        {
-            "root": "",
-            "cosim_method": "jacobi",
-            "iterative": False,
-            "fmus": fmus,
-            "connections": connections,
-        }
-    )
+    fmus = []
+    for name, variables in descriptions(folder).items():
+        start = {v.name: float(v.start) for v in variables if v.causality == "input"}
+        path = str(folder / f"{COMPONENTS[name]}.fmu")
+        fmus.append({"id": name, "path": path, "name": name, "initialization": start})
+    connections = []
+    for source, output, target, given in CONNECTIONS:
+        ends = {"source": (source, output), "target": (target, given)}
+        connections.append({k: {"id": c, "variable": v} for k, (c, v) in ends.items()})
+    how = {"root": "", "cosim_method": "jacobi", "iterative": False}
+    coordinator.start({**how, "fmus": fmus, "connections": connections})
 
     def advance(steps: int) -> None:
         for _ in range(steps):
