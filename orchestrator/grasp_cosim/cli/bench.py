@@ -18,12 +18,11 @@ from .frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
 
 @click.command()
 @click.argument("fmu", type=PATH)
-@click.option("--host", default=DEFAULT_ADDRESS[0], show_default=True, help="Address to listen at.")
+@click.option("--host", default=DEFAULT_ADDRESS[0], help="Address to listen at.")
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
     default=DEFAULT_ADDRESS[1],
-    show_default=True,
     help="UDP port to listen at; 0 takes one that is free.",
 )
 @click.option("--lockstep", is_flag=True, help="Step when asked, not by the clock.")
@@ -31,7 +30,6 @@ from .frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
     "--watchdog",
     type=float,
     default=0.1,
-    show_default=True,
     help="Longest silence in s; after it the inputs are safe values.",
 )
 @click.option(
@@ -125,7 +123,6 @@ def _span(_: Any, __: Any, given: str) -> tuple[float, float]:
     "--seed",
     type=click.IntRange(0),
     default=0,
-    show_default=True,
     help="Another number has other datagrams lost, late or doubled.",
 )
 @click.option("--log", type=PATH, help="CSV to write with the fate of each datagram.")

@@ -13,28 +13,24 @@ from ..base.scratch import sweep
 from .frame import EVERYWHERE, told
 
 SECTIONS = {
-    "Simulate": ("run", "sweep", "evaluate", "identify"),
-    "Look at recorded runs": ("report", "compare"),
-    "Make and check FMUs and systems": ("init", "build", "inspect", "qualify", "ssp"),
-    "Hardware in the loop": ("proxy", "serve", "relay"),
-}
-"""Where the help lists a command."""
-
-MODULES = {
-    "run": ("run",),
-    "sweep": ("sweep",),
-    "paper": ("evaluate", "identify"),
-    "recorded": ("report", "compare"),
-    "systems": ("init", "ssp"),
-    "make": ("build", "proxy"),
-    "check": ("inspect", "qualify"),
-    "bench": ("serve", "relay"),
-}
-"""The commands of each module; paper.py needs the room grasp/."""
+    "Simulate": {"run": "run", "sweep": "run", "evaluate": "paper", "identify": "paper"},
+    "Look at recorded runs": {"report": "check", "compare": "check"},
+    "Make and check FMUs and systems": {
+        "init": "systems", "build": "make", "inspect": "check", "qualify": "check",
+        "ssp": "systems",
+    },
+    "Hardware in the loop": {"proxy": "make", "serve": "bench", "relay": "bench"},
+}  # fmt: skip
+"""Where the help lists a command, and the module that has it; paper.py needs the room grasp/."""
 
 WITH_GRASP = find_spec("..grasp", __package__) is not None
 
-HOMES = {c: m for m, names in MODULES.items() for c in names if WITH_GRASP or m != "paper"}
+HOMES = {
+    command: module
+    for modules in SECTIONS.values()
+    for command, module in modules.items()
+    if WITH_GRASP or module != "paper"
+}
 
 
 class Commands(click.Group):
@@ -70,7 +66,10 @@ class Commands(click.Group):
         return command
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+SHOWN = {"help_option_names": ["-h", "--help"], "show_default": True}
+
+
+@click.group(cls=Commands, context_settings=SHOWN)
 @click.version_option(package_name="grasp-cosim")
 def cli() -> None:
     """FMI co-simulation of a delicate grasp.

@@ -114,21 +114,11 @@ def build(
 @click.command()
 @click.argument("fmu", type=PATH)
 @click.option("-o", "--out", type=PATH, help="File to write, an .fmu.")
-@click.option("--host", default=DEFAULTS.host, show_default=True, help="Address of its peer.")
+@click.option("--host", default=DEFAULTS.host, help="Address of its peer.")
 @click.option(
-    "--port",
-    type=click.IntRange(1, 65535),
-    default=DEFAULTS.port,
-    show_default=True,
-    help="UDP port of the peer.",
+    "--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, help="UDP port of the peer."
 )
-@click.option(
-    "--timeout",
-    type=float,
-    default=DEFAULTS.timeout,
-    show_default=True,
-    help="Longest wait per step in s.",
-)
+@click.option("--timeout", type=float, default=DEFAULTS.timeout, help="Longest wait per step in s.")
 @target_option
 @click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of the proxy. Default: 2")
 @click.option("--c-header", type=PATH, help="Write the peer's side as a C99 header.")

@@ -94,38 +94,38 @@ PLACES = {
 """The places of a system file that have an option of their own."""
 
 
-class Settings(dict[str, Any]):
+Option = Callable[[str], str]
+"""The option that says a place, or the beginning of one, for messages."""
+
+
+def settings_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], Option]:
     """What options of a command, `given` by name, say of a system, by its places.
 
     InputError where two say the same place.
     """
-
-    def __init__(self, given: Mapping[str, Any]) -> None:
-        self._options: dict[str, str] = {}
-        said: list[tuple[str, str, Any]] = [
-            (f"--{o}", place, given.get(o)) for o, place in PLACES.items()
-        ]
-        for text in given.get("swaps", ()):
-            name, fmu = pair("--swap", text, "COMPONENT=FMU")
-            said.append((f"--swap {name}", f"components.{name}.fmu", fmu))
-        for text in given.get("settings", ()):
-            place, value = pair("--set", text, "PLACE=VALUE")
-            said.append((f"--set {place}", place, value))
-        for option, place, value in said:
-            if place in self:
-                other = self._options[place]
-                raise InputError(f"{option}: {place} is given by {other}, too; must be given once")
-            if value is not None:
-                self[place], self._options[place] = value, option
-
-    def option(self, place: str) -> str:
-        """The option that says a place, or the beginning of one, for messages."""
-        return self._options.get(place, f"--set {place}")
+    said: list[tuple[str, str, Any]] = [
+        (f"--{o}", place, given.get(o)) for o, place in PLACES.items()
+    ]
+    for text in given.get("swaps", ()):
+        name, fmu = pair("--swap", text, "COMPONENT=FMU")
+        said.append((f"--swap {name}", f"components.{name}.fmu", fmu))
+    for text in given.get("settings", ()):
+        place, value = pair("--set", text, "PLACE=VALUE")
+        said.append((f"--set {place}", place, value))
+    values: dict[str, Any] = {}
+    options: dict[str, str] = {}
+    for option, place, value in said:
+        if place in values:
+            other = options[place]
+            raise InputError(f"{option}: {place} is given by {other}, too; must be given once")
+        if value is not None:
+            values[place], options[place] = value, option
+    return values, lambda place: options.get(place, f"--set {place}")
 
 
 def set_values(settings: Sequence[str]) -> dict[str, Any]:
     """The values of --set by their places."""
-    return dict(Settings({"settings": settings}))
+    return settings_of({"settings": settings})[0]
 
 
 def load_system(
@@ -154,7 +154,7 @@ def chosen_system(given: Mapping[str, Any]) -> System:
 
     These are its controller, presets, the case last, then single values; what is left out is said.
     """
-    settings = Settings(given)
+    settings, option = settings_of(given)
     step, stop = (plain(settings.get(place)) for place in ("experiment.step", "experiment.stop"))
     stimuli = None
     if "input.file" in settings:
@@ -179,7 +179,7 @@ def chosen_system(given: Mapping[str, Any]) -> System:
             from ..grasp.presets import with_preset
 
             system = with_preset(system, name)
-    changed = system.with_settings(settings, settings.option)
+    changed = system.with_settings(settings, option)
     for note in changed.notes[len(loaded.notes) :]:
         say(note)
     return changed.with_input(replace(stimuli, partial=False)) if stimuli else changed

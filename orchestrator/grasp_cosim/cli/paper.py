@@ -22,7 +22,6 @@ from .options import controller_option, many_runs_option, set_option, set_values
     "--out",
     type=PATH,
     default=Path("results"),
-    show_default=True,
     help="Folder for the page, evaluation.html, and the numbers.",
 )
 @many_runs_option
@@ -56,7 +55,6 @@ def evaluate(
     "--fit",
     multiple=True,
     default=DEFAULT,
-    show_default=True,
     metavar="|".join(GROUPS),
     help="Fit this; may be given several times.",
 )
