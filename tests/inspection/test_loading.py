@@ -37,7 +37,7 @@ int lost(void);
 void *fmi2Instantiate(void) { INSTANTIATE; return &model; }
 """
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="{version}" modelName="N" guid="g">
+<fmiModelDescription fmiVersion="2.0" modelName="N" guid="g">
   {kinds}
   <ModelVariables><ScalarVariable name="p" valueReference="0" causality="parameter"
     variability="fixed"><Real start="0"/></ScalarVariable></ModelVariables><ModelStructure/>
@@ -98,13 +98,6 @@ def test_our_fmu_loads_here(fmus):
     assert fix.endswith("HOST, or grasp-cosim build --native")
 
 
-def test_a_stock_fmu_loads_here(stock):
-    found = examined(stock)
-    assert found["trial"].status == "ok"
-    assert "PythonFMU 0.7.0; needs Python" in found["fmu"].text
-    assert found["host"].fix.endswith(" HOST")
-
-
 def test_text_is_one_line_each_with_the_fix_below():
     findings = [Finding("a", "ok", "fine", None), Finding("b c", "problem", "broken", "mend it")]
     assert loading.as_text(findings, tried=True).splitlines() == [
@@ -122,29 +115,21 @@ BOTH = '<ModelExchange modelIdentifier="M"/><CoSimulation modelIdentifier="N"/>'
 
 
 @pytest.mark.parametrize(
-    ("version", "kinds", "status", "text", "fix"),
+    ("kinds", "status", "text", "fix"),
     [
-        ("2.0", BOTH, "ok", "FMI 2.0, CoSimulation, ModelExchange, made by an unknown", None),
-        ("2.0", '<ModelExchange modelIdentifier="N"/>', "ok", "run here by a solver", None),
-        ("3.0", '<ScheduledExecution modelIdentifier="N"/>', "problem", "scheduled exec", ASK),
-        ("2.0", "", "problem", "declares no kind of FMU", ASK),
-        ("1.0", "", "problem", "is FMI 1.0, for model exchange", ASK),
+        (BOTH, "ok", "FMI 2.0, CoSimulation, ModelExchange, made by an unknown", None),
+        ('<ModelExchange modelIdentifier="N"/>', "ok", "run here by a solver", None),
+        ("", "problem", "declares no kind of FMU", ASK),
     ],
 )
-def test_versions_and_kinds(version, kinds, status, text, fix, tmp_path):
-    described = DESCRIPTION.format(version=version, kinds=kinds)
-    if version == "3.0":
-        described = described.replace('<Real start="0"/>', "").replace("ScalarVariable", "Float64")
+def test_kinds(kinds, status, text, fix, tmp_path):
     with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", described)
+        archive.writestr("modelDescription.xml", DESCRIPTION.format(kinds=kinds))
     fmu = unpack(tmp_path / "n.fmu", tmp_path)
     found = loading.description(fmu)
     assert (found[0], found[2], fmu.binary.stem == "N") == (status, fix, bool(kinds))
     assert text in found[1]
-    assert loading.trial(fmu)[:2] == (
-        "warning",
-        "not loaded: of a kind that is not run here, or without a binary",
-    )
+    assert loading.trial(fmu)[0] == "warning"
 
 
 @gcc
@@ -209,7 +194,6 @@ def test_a_binary_that_is_bound_to_a_libpython_needs_none_from_its_host(opened):
         ({"resources/slavemodule.txt": None}, "resources/slavemodule.txt names none"),
         ({"resources/Stock.py": None}, "resources/slavemodule.txt names Stock"),
         ({"resources/Stock.py": b"class Stock(:"}, "invalid syntax (Stock.py, line 1)"),
-        ({"resources/Stock.py": b"x = '\0'"}, "null bytes"),
     ],
 )
 def test_a_script_that_is_not_there_or_no_python(changes, text, opened):
@@ -226,27 +210,21 @@ def test_a_script_that_is_not_there_or_no_python(changes, text, opened):
         ({"Stock": "try:\n import nope\nexcept ImportError: pass"}, None),
         ({"Stock": "from typing import *\nif TYPE_CHECKING:\n import nope"}, None),
         ({"Stock": "import a.b, c", "a/b": "", "c": ""}, None),
-        ({"Stock": "import math, numpy.linalg, xml.etree, __future__"}, None),
-        ({"Stock": "'\\d'"}, None),
+        ({"Stock": "import math, numpy.linalg, xml.etree, fast", "fast.abi3.so": ""}, None),
     ],
 )
 def test_what_a_script_imports_is_packed_or_installed(files, missing, opened):
-    changes = {f"resources/{name}.py": text.encode() for name, text in files.items()}
+    names = {name: name if name.endswith(".so") else f"{name}.py" for name in files}
+    changes = {f"resources/{names[name]}": text.encode() for name, text in files.items()}
     verdict = loading.script(opened(changes))
     if missing is None:
         assert verdict[0] == "ok"
+        assert verdict[1].endswith(": numpy" if "numpy" in files["Stock"] else ": none")
     else:
         assert verdict[0] == "problem"
         assert verdict[1].endswith(f"neither packed nor installed: {missing}")
         names = missing.replace(",", "")
         assert verdict[2] == f"{quote(sys.executable)} -m pip install {names}"
-
-
-def test_what_is_packed_may_be_an_extension_module_and_what_is_imported_is_named(opened):
-    changes = {"resources/Stock.py": b"import fast, numpy, math", "resources/fast.abi3.so": b""}
-    status, text, _ = loading.script(opened(changes))
-    assert status == "ok"
-    assert text == "resources/Stock.py imports, besides the standard library: numpy"
 
 
 @pytest.mark.parametrize(
@@ -265,7 +243,6 @@ def test_a_packed_module_of_the_name_of_another(name, other, opened):
         (SCRIPT.replace("self.y = 0.0", "raise OSError('no disk')"), "OSError('no disk')"),
         ("import atexit, os\natexit.register(os.abort)\n" + SCRIPT,
          "crashes with SIGABRT after it was freed"),
-        ("import os\nos._exit(0)\n" + SCRIPT, "does not instantiate: no reason given"),
     ],
 )  # fmt: skip
 def test_a_trial_that_fails(script, text, opened):
@@ -292,8 +269,7 @@ def native(folder, instantiate="", options=()):
     subprocess.run(command, cwd=folder, check=True)
     with zipfile.ZipFile(folder / "n.fmu", "w") as archive:
         kinds = '<CoSimulation modelIdentifier="N"/>'
-        text = DESCRIPTION.format(version="2.0", kinds=kinds)
-        archive.writestr("modelDescription.xml", text)
+        archive.writestr("modelDescription.xml", DESCRIPTION.format(kinds=kinds))
         archive.write(folder / "n.so", "binaries/linux64/N.so")
     return folder / "n.fmu"
 

@@ -39,20 +39,11 @@ def test_a_text_is_read_as_it_is_written(shape, value):
 
 
 @pytest.mark.parametrize(
-    ("value", "found"),
-    [(1.5, [1.5] * 6), ([1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 6]), (((1, 2, 3), (4, 5, 6)), None)],
-)
-def test_one_value_a_flat_list_and_rows_are_taken(value, found):
-    assert flattened(value, (2, 3)) == (found or [1, 2, 3, 4, 5, 6])
-
-
-@pytest.mark.parametrize(
     ("value", "message"),
     [
         ([[1, 2], [3, 4], [5, 6]], r"is \[3, 2\]"),
         ([1, 2, 3], r"is \[3\]"),
         ([[1, 2, 3], [4, 5]], "rows of different lengths"),
-        ([[1, 2, 3], 4], "rows of different lengths"),
         ([], r"is \[0\]"),
     ],
 )

@@ -244,12 +244,10 @@ def _table(heading: str, lines: Iterable[str]) -> str:
 
 
 def _line(key: str, value: str, comment: str = "") -> str:
-    """An entry of a table; value as TOML has it."""
     return f"{_key(key)} = {value}{comment and f'  # {comment}'}"
 
 
 def _component(name: str, path: str) -> str:
-    """The table of a component with a foreign FMU."""
     trust = _line("isolation", '"process"', "in a process of its own, until you trust its binary")
     return f"[components.{name}]\n{_line('fmu', _quoted(path))}\n{trust}"
 
@@ -261,22 +259,18 @@ def _names(draft: Draft, name: str) -> str:
 
 
 def _todo(what: str) -> str:
-    """The value that says what is to be put in its place."""
     return _quoted(f"TODO: {what}")
 
 
 def _quoted(text: str) -> str:
-    """A string as TOML writes it."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _key(name: str) -> str:
-    """A key of a table as TOML writes it."""
     return name if _BARE.fullmatch(name) else _quoted(name)
 
 
 def _number(value: Value) -> str:
-    """A value as TOML writes it."""
     if isinstance(value, bool):
         return str(value).lower()
     return _quoted(value) if isinstance(value, str) else repr(value)

@@ -444,14 +444,12 @@ class Interface:
 
     def _unit(self, entry: str, name: str, defined: Mapping[str, Unit]) -> Unit:
         """The unit of a name that is defined or known, with a minus reversed; else InputError."""
-        plain = name[1:] if name.startswith("-") else name
+        plain = name.removeprefix("-")
         found = defined.get(name) or known_unit(name) or defined.get(plain) or known_unit(plain)
         if found is None:
-            like = (
-                "'mm', 'm/s', 'N.s/m', 'deg', 'degC', '1', or '-mm' for what counts the other way"
-            )
             alike = choices(spelt_like(plain, defined))
-            meant = f"did you mean {alike}?" if alike != "none" else f"must be like {like}"
+            like = "must be like 'mm', 'N.s/m', 'degC', '1', or '-mm' for what counts the other way"
+            meant = like if alike == "none" else f"did you mean {alike}?"
             said = f"{entry}: no unit that {self.path.name} defines, or that is known; {meant}"
             raise InputError(said)
         return found if found.name == name else found.reversed(name)
@@ -492,7 +490,6 @@ def _plain(flag: str) -> str:
 
 
 def _convert(variable: Variable, value: Value, version: str) -> Value | None:
-    """The value in the variable's type, or None where it does not fit."""
     if variable.kind == "String":
         return value if isinstance(value, str) else None
     if variable.kind == "Boolean":

@@ -127,7 +127,6 @@ def describe(path: Path) -> Interface:
 
 
 def _platforms(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Those of the folders with a shared library right inside."""
     parts = {name: name.split("/") for name in files if name.endswith((".so", ".dll", ".dylib"))}
     inside = {n: p[1] for n, p in parts.items() if p[0] == "binaries" and len(p) == 3}
     return tuple(sorted({platform_of(folder, files[name]) for name, folder in inside.items()}))
