@@ -54,16 +54,10 @@ def other_prefixes(text):
 
 DOCUMENTS = {
     "BOM": lambda text: b"\xef\xbb\xbf" + text.encode(),
-    "CRLF": lambda text: text.replace(">", ">\r\n"),
     "UTF-16": lambda text: text.replace("UTF-8", "UTF-16").encode("utf-16"),
     "prefixes": lambda text: other_prefixes(text).replace("xmlns:ssc", "xmlns:q"),
-    "default namespace": lambda text: (
-        text.replace("<ssd:", "<").replace("</ssd:", "</").replace("xmlns:ssd", "xmlns")
-    ),
     "comments": lambda text: text.replace("<ssd:E", "<!-- x --><?y z?><ssd:E"),
     "version 1.0.1": lambda text: text.replace('"hand" version="1.0"', '"hand" version="1.0.1"'),
-    "ids": lambda text: text.replace("<ssd:Connection ", '<ssd:Connection id="c1" '),
-    "no DefaultExperiment attributes but the stop": lambda text: text.replace('startTime="0" ', ""),
 }
 
 
