@@ -40,7 +40,7 @@ run --swap hand=x.fmu :: no component 'hand'; valid: plant
 run --swap plant=sensor.fmu :: 'components.plant.rename.gap[1]=NAME', or `grasp-cosim init my_system
 run --controller adaptive --swap controller=x.fmu :: cannot be used with another FMU for controller
 run --set input.interpolation=held :: input.file = None: must be the path of a CSV file
-run --input none.csv :: none.csv: no such input file
+run --input none.csv :: none.csv: No such file or directory
 run --input a.csv --set input.file=b.csv :: input.file is given by --input, too
 run --mdf :: --mdf: needs --out, the folder for signals.mf4
 run --format arrow :: --format arrow: needs --out, the folder for signals.arrow

@@ -12,26 +12,23 @@ import hashlib
 import math
 import re
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import islice
-from operator import le
+from functools import cached_property, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal, get_args
 
 from si_units import known_unit
 
 from ..base.checks import choice, real
-from ..base.errors import InputError
+from ..base.errors import InputError, reason
 from ..base.text import counted, from_cell
 from ..interface.units import conversion
-from .parts import LONGEST, NANOSECONDS, Port
+from .parts import LONGEST, NANOSECONDS, Port, as_port
 
 Interpolation = Literal["linear", "held"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
-
-_Reader = Iterator[list[str]]
 
 _UNIT = re.compile(r"(.*\S)\s+\[([^\[\]]*)\]")
 _TIME = re.compile(r"time\s*(?:\[([^\[\]]*)\])?", re.IGNORECASE)
@@ -87,16 +84,11 @@ class Stimuli:
 
     def __post_init__(self) -> None:
         """ValueError where the columns could not be read from a file."""
-        columns, count = self.columns.values(), len(self.times)
-        good = (
-            count
-            and all(len(c.samples) == count for c in columns)
-            and len(self.lines) in (0, count)
-            and all(map(le, self.times, islice(self.times, 1, None)))
-            and all(all(map(math.isfinite, c.samples)) for c in columns)
-            and all(set(c.samples) <= {*range(len(c.texts))} for c in columns if c.texts)
-        )
-        if not good:
+        count, columns = len(self.times), self.columns.values()
+        good = all(len(c.samples) == count and all(map(math.isfinite, c.samples)) for c in columns)
+        texts = all(set(c.samples) <= {*range(len(c.texts))} for c in columns if c.texts)
+        rises = [*self.times] == sorted(self.times)
+        if not (count and good and texts and rises and len(self.lines) in (0, count)):
             raise ValueError(f"{self.file}: times and samples do not go together")
 
     def place(self, port: Port, row: int | None = None) -> str:
@@ -115,137 +107,101 @@ def read_stimuli(
     """
     path = Path(path)
     chosen: Interpolation = choice(place, interpolation, INTERPOLATIONS)
+    line = 0
+    rows = []
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            return _read(path, csv.reader(file, strict=True, skipinitialspace=True), chosen)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such input file; must be a CSV file") from None
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; must be a CSV file") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text: {error.reason}; must be a CSV file") from error
+            reader = csv.reader(file, strict=True, skipinitialspace=True)
+            for row in reader:
+                line = reader.line_num
+                if any(map(str.strip, row)):
+                    rows.append((line, row))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        after = f"after line {line}: " if line else ""
+        raise InputError(f"{path}: {after}{reason(error)}; must be a CSV file") from error
+    return _stimuli(path.name, rows, chosen)
 
 
-def _read(path: Path, reader: _Reader, interpolation: Interpolation) -> Stimuli:
-    file, rows = path.name, _rows(path.name, reader)
-    _, names = next(rows, (0, []))
-    if not names:
-        raise InputError(f"{file}: is empty; must begin with names: time,component.variable")
-    names = [from_cell(name.strip()) for name in names]
+def _stimuli(file: str, rows: list[tuple[int, list[str]]], interpolation: Interpolation) -> Stimuli:
+    if len(rows) < 2:
+        raise InputError(f"{file}: is empty; must be names, time,component.variable, and rows")
+    names = [from_cell(name.strip()) for name in rows.pop(0)[1]]
     ports, units, factor = _header(file, names)
-    lines: array[int] = array("q")
-    cells: list[list[str]] = [[] for _ in names]
     for line, row in rows:
-        lines.append(line)
-        for column, cell in zip(cells, row, strict=True):
-            column.append(cell)
-    if not lines:
-        raise InputError(f"{file}: has no row after the names; must have one at least")
-    columns = [
-        _column(file, i, name, lines, cells[i - 1], unit)
-        for i, (name, unit) in enumerate(zip(names, [None, *units], strict=True), 1)
-    ]
+        if len(row) != len(names):
+            said = f"{file}: line {line} has {counted(len(row), 'cell')}"
+            raise InputError(f"{said}; must have {len(names)}, as line 1")
+    lines = array("q", (line for line, _ in rows))
+
+    def cell(column: int, row: int) -> str:
+        return _place(file, lines[row], column + 1, names[column])
+
+    cells = zip(*(row for _, row in rows), strict=True)
+    time, *columns = (
+        _column(partial(cell, i), texts, unit)
+        for i, (texts, unit) in enumerate(zip(cells, [None, *units], strict=True))
+    )
     return Stimuli(
         file,
-        _times(file, columns[0], factor, lines),
-        dict(zip(ports, columns[1:], strict=True)),
+        _times(partial(cell, 0), time, factor),
+        dict(zip(ports, columns, strict=True)),
         interpolation,
         array("q") if lines[-1] == len(lines) + 1 else lines,
     )
 
 
-def _column(
-    file: str, number: int, name: str, lines: Sequence[int], cells: list[str], unit: str | None
-) -> Column:
+def _column(place: Callable[[int], str], cells: Sequence[str], unit: str | None) -> Column:
     """The numbers of a column, or its texts; InputError at the first cell without a value."""
-    texts: dict[str, int] = {}
+    stripped, texts = [*map(str.strip, cells)], dict[str, int]()
     try:
         samples = array("d", map(real, cells))
-        good = map(math.isfinite, samples)
     except ValueError:
-        stripped = [*map(str.strip, cells)]
-        samples, good = array("d"), map(bool, stripped)
-        samples.extend(texts.setdefault(cell, len(texts)) for cell in stripped)
-    for line, fine, cell in zip(lines, good, cells, strict=True):
-        if not fine:
-            place, said = _place(file, line, number, name), cell.strip()
-            what = f" = {said}: must be a finite number" if said else ": missing; must be a value"
-            raise InputError(f"{place}{what}")
+        samples = array("d", (texts.setdefault(cell, len(texts)) for cell in stripped))
+    for row, (cell, sample) in enumerate(zip(stripped, samples, strict=True)):
+        if not cell:
+            raise InputError(f"{place(row)}: missing; must be a value")
+        if not math.isfinite(sample):
+            raise InputError(f"{place(row)} = {cell}: must be a finite number")
     return Column(samples, unit, tuple(texts))
-
-
-def _rows(file: str, reader: _Reader) -> Iterator[tuple[int, list[str]]]:
-    """The rows that are not empty, each with its line; InputError where one is not as long."""
-    width = 0
-    try:
-        for row in reader:
-            line: int = reader.line_num  # type: ignore[attr-defined]
-            if not any(map(str.strip, row)):
-                continue
-            width = width or len(row)
-            if len(row) < width:
-                raise InputError(f"{_place(file, line, len(row) + 1)}: missing; must be a value")
-            if len(row) > width:
-                raise InputError(
-                    f"{_place(file, line, width + 1)} = {row[width]!r}: has no name; must have "
-                    f"{counted(width, 'cell')}"
-                )
-            yield line, row
-    except csv.Error as error:
-        line = reader.line_num  # type: ignore[attr-defined]
-        raise InputError(f"{file}: line {line}: not CSV: {error}") from error
 
 
 def _header(file: str, names: Sequence[str]) -> tuple[list[Port], list[str | None], float]:
     """The ports of the columns after the time, their units, and the time's in s."""
-    time, *found = _TIME.fullmatch(names[0]), *map(_UNIT.fullmatch, names[1:])
-    others = [(m[1], m[2]) if m else (name, None) for m, name in zip(found, names[1:], strict=True)]
-    if not time:
+    time = _TIME.fullmatch(names[0])
+    if not time or len(names) < 2:
         raise InputError(
             f"{_place(file, 1, 1)} = {names[0]!r}: must be time, then component.variable, with "
             "commas between them and points in numbers"
         )
-    if not others:
-        raise InputError(
-            f"{file}: line 1: has the time alone; must have columns component.variable"
-        )
-    ports: list[Port] = []
-    for i, (name, _) in enumerate(others, 2):
-        component, dot, variable = name.partition(".")
-        port = Port(component, variable)
-        if not (component and dot and variable):
-            raise InputError(f"{_place(file, 1, i)} = {name!r}: must be component.variable")
+    ports: dict[Port, str | None] = {}
+    for i, name in enumerate(names[1:], 2):
+        found = _UNIT.fullmatch(name)
+        port = as_port(_place(file, 1, i), found[1] if found else name)
         if port in ports:
             raise InputError(f"{_place(file, 1, i)} = {name!r}: appears twice; must appear once")
-        ports.append(port)
+        ports[port] = found[2] if found else None
     second, given = known_unit("s"), known_unit(time[1] or "s")
     change = conversion(given, second) if given and second else None
     if change is None:
         raise InputError(f"{_place(file, 1, 1)} = {names[0]!r}: must be in a unit of time, like ms")
-    return ports, [unit for _, unit in others], change.factor
+    return [*ports], [*ports.values()], change.factor
 
 
-def _times(file: str, column: Column, factor: float, lines: Sequence[int]) -> array[int]:
+def _times(place: Callable[[int], str], column: Column, factor: float) -> array[int]:
     """The times in ns."""
     samples = column.samples
-    for row in range(len(lines) if column.texts else 0):
+    for i, text in enumerate(column.texts):
         try:
-            real(column.text(row))
+            real(text)
         except ValueError:
-            place = _place(file, lines[row], 1, "time")
-            raise InputError(f"{place} = {column.text(row)!r}: must be a number") from None
-    span = max(map(abs, samples)) * factor
-    if span > LONGEST:
-        raise InputError(f"{file}: time to {span:g} s; must be at most {LONGEST:g} s")
-    scale = factor * NANOSECONDS
-    times = array("q", (round(scale * t) for t in samples))
-    for row in range(1, len(times)):
-        if times[row] < times[row - 1]:
-            raise InputError(
-                f"{_place(file, lines[row], 1, 'time')} = {samples[row]!r}: is before "
-                f"{samples[row - 1]!r} of line {lines[row - 1]}; must not fall"
-            )
-    return times
+            where = place(samples.index(i))
+            raise InputError(f"{where} = {text!r}: must be a number") from None
+    for row, (before, time) in enumerate(pairwise(samples), 1):
+        if time < before:
+            raise InputError(f"{place(row)} = {time!r}: is before {before!r}; must not fall")
+    if (last := max(map(abs, samples)) * factor) > LONGEST:
+        raise InputError(f"{place(0)}: to {last:g} s; must be at most {LONGEST:g} s")
+    return array("q", (round(factor * NANOSECONDS * t) for t in samples))
 
 
 def input_entry(stimuli: Stimuli) -> dict[str, str]:
