@@ -39,7 +39,7 @@ def test_a_task_that_travels_is_the_same(system, mine):
     assert here.metrics == {"end": pytest.approx(0.4), "half[1]": True, "half[2]": None}
     for with_fmus in (False, True):
         shared = packed(task, with_fmus)
-        assert run_packed(shared, {3: {"a.gain": 2.0}}) == [here]
+        assert run_packed(shared, (3, {"a.gain": 2.0})) == here
         assert bool(shared.fmus) == with_fmus
 
 
@@ -96,17 +96,17 @@ ARGUMENTS = ["sweep", "system.toml", "--vary", f"a.gain=1:2:{RUNS}", "--metrics"
 PROGRAM = """
 import os, signal, sys
 from grasp_cosim.cli import entry
-from grasp_cosim.sweeps.sweep import Store
+from grasp_cosim.sweeps import sweep
 
-keep, kept = Store.keep, []
+keep, kept = sweep.keep, []
 
-def keep_and_act(store, outcome):
-    keep(store, outcome)
+def keep_and_act(file, outcome):
+    keep(file, outcome)
     kept.append(outcome)
     if len(kept) == COUNT:
         ACT
 
-Store.keep = keep_and_act
+sweep.keep = keep_and_act
 entry()
 """
 KILL = (
@@ -180,7 +180,7 @@ def test_kept_runs_are_bound_to_what_they_are_of(system, mine, tmp_path):
 def test_two_at_a_time_are_refused(system, mine, tmp_path):
     from grasp_cosim.sweeps.sweep import opened
 
-    with opened(tmp_path / "t.csv.rows", "x"), pytest.raises(InputError, match="another process"):
+    with opened(tmp_path / "t.csv", "x", {}), pytest.raises(InputError, match="another process"):
         sweep(system, [{"a.gain": 1.0}], metrics=mine, out=tmp_path / "t.csv", workers=1)
 
 

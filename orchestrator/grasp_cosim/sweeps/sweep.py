@@ -11,7 +11,7 @@ import json
 import os
 import pickle
 import threading
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
@@ -19,7 +19,7 @@ from functools import partial
 from io import FileIO
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
@@ -30,7 +30,6 @@ from ..base.text import counted
 from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of
-from ..recording.result import UNITS
 from ..system.description import System
 from ..system.settings import settings
 from .rows import Row, as_rows, settings_of, unit_of
@@ -45,6 +44,7 @@ KILLED = "KilledWorker"
 CONNECT = 10.0
 """s, to find the scheduler and a worker of a cluster."""
 
+Job = tuple[int, Row]
 Outcomes = Generator[Outcome, None, None]
 
 
@@ -84,24 +84,20 @@ def sweep(
     task = Task(system.natively(native), own)
     given = settings_of(task.system, found)
     file = Path(out) if out is not None else None
-    if file:
-        check_format(file)
-    kept = opened(_beside(file), _identity(task, given)) if file else nullcontext()
-    with kept as store:
-        done: dict[int, Outcome] = dict(store.done) if store else {}
+    done: dict[int, Outcome] = {}
+    with opened(file, _identity(task, given), done) if file else nullcontext() as store:
         left = [(i, row) for i, row in enumerate(given) if i not in done]
         results = _elsewhere(executor, task, left) if executor else _here(task, left, workers)
         bar = Progress("sweep", len(found), shown=progress, initial=len(done))
         with phase(f"sweep, {counted(len(left), 'run')}"), bar, closing(results):
             for outcome in results:
-                done[outcome.index] = outcome
                 if store:
-                    store.keep(outcome)
+                    keep(store, outcome)
+                done[outcome.index] = outcome
                 bar.update()
         table = made(found, [done[i] for i in range(len(found))], units, asked)
-        if file and store:
+        if file:
             table.write(file)
-            store.remove()
     return table
 
 
@@ -134,28 +130,14 @@ def run_row(task: Task, index: int, row: Row) -> Outcome:
     """Run a row; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted."""
     try:
         result = simulate(task.system.with_settings(row, "sweep: {}".format), metrics=task.metrics)
+        if not result.complete:
+            raise KeyboardInterrupt
+        return Outcome(index, result.measured.flat())
     except (InputError, SimulationError) as error:
         return Outcome(index, {}, str(error))
-    if not result.complete:
-        raise KeyboardInterrupt
-    metrics = {name: m for name, m in result.metrics.items() if name not in UNITS}
-    return Outcome(index, dict(_flat("", metrics)))
 
 
-def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Columns: lists as name[1], name[2], ..., tables as name.key."""
-    if isinstance(value, Mapping):
-        for key, entry in value.items():
-            yield from _flat(f"{name}.{key}" if name else key, entry)
-    elif isinstance(value, list | tuple):
-        for i, entry in enumerate(value, 1):
-            yield from _flat(f"{name}[{i}]", entry)
-    else:
-        yield name, value
-
-
-@dataclass(frozen=True, slots=True)
-class Packed:
+class Packed(NamedTuple):
     """A task as bytes, which a process unpacks once; `fmus` are the contents of its FMUs, if any.
 
     They travel to machines that do not have the files.
@@ -171,11 +153,10 @@ def packed(task: Task, with_fmus: bool) -> Packed:
     components = task.system.components if with_fmus else ()
     fmus = tuple((c.native or c.fmu).read_bytes() for c in components)
     content = pickle.dumps(task)
-    return Packed(_hash_of([content, *fmus]), content, fmus)
+    return Packed(_hash_of(content, *fmus), content, fmus)
 
 
-def _hash_of(contents: Iterable[bytes]) -> str:
-    """A hash of the contents of files, in their order."""
+def _hash_of(*contents: bytes) -> str:
     digest = hashlib.sha256()
     for content in contents:
         digest.update(hashlib.sha256(content).digest())
@@ -189,13 +170,12 @@ _one_at_a_time = threading.Lock()
 """All Python FMUs of a process share its modules, and a compiled loop keeps the others waiting."""
 
 
-def run_packed(shared: Packed, rows: Mapping[int, Row]) -> list[Outcome]:
-    """Do the runs of rows by index in this process."""
+def run_packed(shared: Packed, job: Job) -> Outcome:
+    """Do a run in this process."""
     with _one_at_a_time:
         if shared.key not in _unpacked:
             _unpacked[shared.key] = _unpack(shared)
-        task, _ = _unpacked[shared.key]
-        return [run_row(task, index, row) for index, row in rows.items()]
+        return run_row(_unpacked[shared.key][0], *job)
 
 
 def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
@@ -216,46 +196,45 @@ def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
 # ------------------------------------------------------------------------- where runs are done
 
 
-def _here(task: Task, jobs: Sequence[tuple[int, Row]], workers: int | None) -> Outcomes:
+def _here(task: Task, jobs: Sequence[Job], workers: int | None) -> Outcomes:
     """The outcomes of processes of this machine, in the order in which they end."""
-    shared, count = packed(task, with_fmus=False), min(workers or os.cpu_count() or 1, len(jobs))
-    ones = ({i: row} for i, row in jobs)
-    with Crew(count) as crew, closing(crew.results(partial(run_packed, shared), ones)) as results:
-        for (index, *_), found in results:
+    run, count = (
+        partial(run_packed, packed(task, with_fmus=False)),
+        min(workers or os.cpu_count() or 1, len(jobs)),
+    )
+    with Crew(count) as crew, closing(crew.results(run, jobs)) as results:
+        for (index, _), found in results:
             if isinstance(found, Lost):
                 yield Outcome(index, {}, f"the process of the run {found.end}")
             else:
-                yield from found
+                yield found
 
 
 def _same(shared: Any) -> Any:
     return shared
 
 
-def _elsewhere(executor: Executor, task: Task, jobs: Sequence[tuple[int, Row]]) -> Outcomes:
+def _elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
     """The outcomes of an executor, in the order in which they end; closing it cancels the rest."""
     left = iter(jobs)
     shared: Any = packed(task, with_fmus=True)
     if client := getattr(executor, "_client", None):  # Dask: it goes to each worker once,
         shared = client.submit(_same, shared, pure=False)  # and again if the one that has it dies
-    pending: dict[Future[list[Outcome]], int] = {}
-
-    def submit(count: int) -> None:
-        for index, row in islice(left, count):
-            pending[executor.submit(run_packed, shared, {index: row})] = index
-
+    pending: dict[Future[Outcome], int] = {}
     try:
-        submit(AHEAD)
-        while pending:
+        while True:
+            for job in islice(left, AHEAD - len(pending)):
+                pending[executor.submit(run_packed, shared, job)] = job[0]
+            if not pending:
+                break
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 index, failure = pending.pop(future), future.exception()
                 if failure is None:
-                    yield from future.result()
+                    yield future.result()
                 elif type(failure).__name__ == KILLED:
                     yield Outcome(index, {}, "the worker of the run died, several times")
                 else:
                     raise SimulationError(f"sweep: run {index}: {_said(failure)}") from failure
-                submit(1)
     finally:
         for future in pending:
             future.cancel()
@@ -289,38 +268,24 @@ def _said(error: BaseException) -> str:
 # ------------------------------------------------------------------------- what is kept
 
 
-@dataclass
-class Store:
-    """The file of the runs that are done, open and locked; `done` are their outcomes by index."""
-
-    path: Path
-    file: FileIO
-    done: dict[int, Outcome]
-
-    def keep(self, outcome: Outcome) -> None:
-        """Keep the outcome of a run from now on; SimulationError where that fails."""
-        try:
-            self.file.write(json.dumps(asdict(outcome)).encode() + b"\n")
-        except OSError as error:
-            kept = counted(len(self.done), "run")
-            raise SimulationError(
-                f"{self.path}: {error.strerror}; {kept} kept, the same command goes on"
-            ) from error
-        self.done[outcome.index] = outcome
-
-    def remove(self) -> None:
-        """Remove the file, as all runs are done."""
-        self.file.close()  # as Windows wants it
-        self.path.unlink()
+def keep(file: FileIO, outcome: Outcome) -> None:
+    """Keep the outcome of a run from now on; SimulationError where that fails."""
+    try:
+        file.write(json.dumps(asdict(outcome)).encode() + b"\n")
+    except OSError as error:
+        said = f"{file.name!r}: {error.strerror}"
+        raise SimulationError(f"{said}; with room for it the same command goes on") from error
 
 
 @contextmanager
-def opened(path: Path, identity: str) -> Iterator[Store]:
-    """The store in a file, which is made where there is none, for one process at a time.
+def opened(table: Path, identity: str, done: dict[int, Outcome]) -> Iterator[FileIO]:
+    """The file of the runs that are `done`, which these are read from, for one process at a time.
 
-    It is there while not all runs are done; whoever has finished removes it. The lock goes with the
-    process, however that ends. InputError where another process has it, or it is of other runs.
+    It is made where there is none, and removed without an error. The lock goes with the process,
+    however that ends. InputError where another process has it, or it is of other runs.
     """
+    check_format(table)
+    path = _beside(table)
     path.parent.mkdir(parents=True, exist_ok=True)
     lock = Lock(path.with_name(path.name + SUFFIX))
     if not lock.taken():
@@ -328,39 +293,32 @@ def opened(path: Path, identity: str) -> Iterator[Store]:
         raise InputError(f"{said}; wait for its end, or name another --out")
     try:
         with closing(FileIO(path, "a")) as file:
-            yield Store(path, file, _read(path, file, identity))
+            first, *lines = path.read_bytes().splitlines(keepends=True) or [b""]
+            head = json.dumps({"runs of": identity}).encode() + b"\n"
+            if not first.endswith(b"\n"):
+                file.truncate(0)
+                file.write(head)
+            elif first != head:
+                raise InputError(
+                    f"{path}: has runs of another system, other FMUs or other rows; remove it, or "
+                    "name another --out"
+                )
+            if lines and not lines[-1].endswith(b"\n"):  # torn by a kill
+                file.truncate(path.stat().st_size - len(lines.pop()))
+            outcomes = [Outcome(**json.loads(line)) for line in lines]
+            done |= {outcome.index: outcome for outcome in outcomes}
+            yield file
+        path.unlink()  # closed, as Windows wants it
     finally:
         lock.release()
 
 
-def _read(path: Path, file: FileIO, identity: str) -> dict[int, Outcome]:
-    """The outcomes in the file, whose last line may be torn by a kill; that is cut off."""
-    whole, newline, _ = path.read_bytes().rpartition(b"\n")
-    file.truncate(len(whole) + len(newline))
-    head = json.dumps({"runs of": identity}).encode()
-    if not whole:
-        file.write(head + b"\n")
-        return {}
-    first, *lines = whole.split(b"\n")
-    if first != head:
-        raise InputError(
-            f"{path}: has runs of another system, other FMUs or other rows; remove it, or name "
-            "another --out"
-        )
-    found = [Outcome(**json.loads(line)) for line in lines]
-    return {outcome.index: outcome for outcome in found}
-
-
 def _identity(task: Task, rows: Sequence[Row]) -> str:
     """A hash of all that decides the results."""
-    system = settings(task.system)
-    del system["system"]
-    for component in system["components"].values():
-        del component["fmu"]
     metrics = [m.origin or m.name for m in task.metrics]
-    decisive = {"system": system, "rows": rows, "metrics": metrics}
+    decisive = {"system": settings(task.system), "rows": rows, "metrics": metrics}
     contents = [c.fmu.read_bytes() for c in task.system.components]
-    return _hash_of([json.dumps(decisive, sort_keys=True).encode(), *contents])
+    return _hash_of(json.dumps(decisive, sort_keys=True).encode(), *contents)
 
 
 def kept_runs(out: Path) -> int:
