@@ -99,7 +99,7 @@ class Paced:
         return self.timing()
 
     def timing(self):
-        return self.pacer.settled().timing((), ())
+        return self.pacer.meter.timing((), ())
 
 
 @pytest.fixture(params=ENGINES)
@@ -373,8 +373,7 @@ def test_halted_it_stops_at_a_communication_point_and_can_go_on(tmp_path, engine
 
 
 def test_at_a_priority_others_get_to_run_in_overload(tmp_path):
-    run = Paced(tmp_path, {"a": {-1: 101 * MS}}, steps=20)
-    run.pacer.breathes = True
+    run = Paced(tmp_path, {"a": {-1: 101 * MS}}, Realtime(priority=20), steps=20)
     run.to_the_end()
     assert len(run.fake.sleeps) == 20 * 101 * MS // (BREATH_NS + 101 * MS)
     without = Paced(tmp_path, {"a": {-1: 101 * MS}}, steps=20)

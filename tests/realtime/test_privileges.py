@@ -106,23 +106,17 @@ def test_no_garbage_is_collected_on_the_way(collecting):
 
 
 @pytest.mark.parametrize(
-    ("runtime", "sleeps", "said"),
-    [("950000", False, 1), ("950000", True, 0), ("-1", False, 0), (None, False, 0)],
+    ("runtime", "sleeps", "said"), [("950000", False, 1), ("950000", True, 0), ("-1", False, 0)]
 )
 def test_a_priority_that_the_kernel_breaks_off_is_said(
     monkeypatch, tmp_path, runtime, sleeps, said
 ):
     """Where there is no time to sleep, and Linux limits such threads to a share of the time."""
-    monkeypatch.setattr("grasp_cosim.realtime.pacer.THROTTLE", tmp_path)
+    monkeypatch.setattr("grasp_cosim.realtime.pacer.THROTTLE", tmp_path / "runtime")
+    (tmp_path / "runtime").write_text(runtime)
     System(monkeypatch)
-    if runtime:
-        (tmp_path / "sched_rt_runtime_us").write_text(runtime)
-        (tmp_path / "sched_rt_period_us").write_text("1000000")
     with privileges(Realtime(priority=20), sleeps) as found:
-        pass
-    line = "SCHED_FIFO all the time: the period leaves no time to sleep, and the kernel stops such "
-    more = "a thread for 50 ms in every 1000 ms; "
-    assert [text.startswith(line + more) for text in found.refused] == [True] * said
+        assert [line[:23] for line in found.refused] == ["SCHED_FIFO all the time"] * said
 
 
 @linux

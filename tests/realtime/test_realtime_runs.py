@@ -15,7 +15,7 @@ from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
 from grasp_cosim.base.calls import CLOCK, PACE
 from grasp_cosim.master import engine, master
 from grasp_cosim.master.engine import has_compiler
-from grasp_cosim.realtime.pacer import HAS_CLOCK, check_cpu
+from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.load import load_run
@@ -104,11 +104,6 @@ def test_a_timing_is_plain_data_and_what_is_damaged_is_refused_in_one_line(liste
     for wrong in (7, {**json.loads(text), "overruns": 7}, {**json.loads(text), "factor": "much"}):
         with pytest.raises(InputError, match=r"^here: is damaged \([^\n]*$"):
             Timing.from_dict("here", wrong)
-
-
-def test_where_a_system_does_not_list_its_cpus_any_may_be_asked_for(monkeypatch, tmp_path):
-    monkeypatch.setattr("grasp_cosim.realtime.pacer.ONLINE", tmp_path / "none")
-    check_cpu(Realtime(cpu=99))
 
 
 @pytest.mark.parametrize("factor", [1e-12, 1e9])

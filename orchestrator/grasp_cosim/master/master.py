@@ -172,7 +172,7 @@ class Master:
             pass
         except OverrunError:
             assert self._pacer is not None  # noqa: S101 - who else has raised it
-            raise SimulationError(self._pacer.settled().verdict()) from None
+            raise SimulationError(self._pacer.meter.verdict()) from None
         fresh = self._waiting()[max(first - self._handed_on, 0) :]
         wraps = len(self._waiting()) < self.steps_done - self._handed_on
         if self._enough() or wraps or not np.isfinite(fresh).all():
@@ -258,7 +258,6 @@ class Master:
             if pacer.halted():
                 halt()
 
-        pacer.hand_over()
         try:
             with Aside(hand_on, halt, self._cpus) as aside:
                 while step < (until := min(stop, self.total_steps)):
@@ -267,7 +266,7 @@ class Master:
                         self._rows, operation, step, until, *self._clock, row
                     )
                     if status == loop.OVERRUN:
-                        raise OverrunError
+                        raise pacer.overrun()
                     if status == loop.HALTED:
                         if pacer.halted() or aside.error:
                             raise HaltError
@@ -279,7 +278,6 @@ class Master:
                         operation += 1
         finally:
             self.steps_done = shared.done
-            pacer.take_over(status == loop.OVERRUN)
 
     def _resolve(self, step: int, operation: int, status: int) -> None:
         """Make good for a step that was rejected; any other bad status ends the run."""

@@ -158,7 +158,7 @@ class Planner:
                 self._text(connection, period, phase)
 
     def _stamp(self) -> None:
-        """The end of a segment of the step: see realtime.timing.segments_of."""
+        """The end of a segment of the step: see realtime.timing.Meter."""
         if self.pacer is not None:
             self._call(CALL, self.pacer.stamp(self.stamps), None, 1, 0)
             self.stamps += 1

@@ -139,7 +139,6 @@ class Session:
         """What a run in real time asks of the system; what that refuses is a warning."""
         granted = privileges(realtime, pacer.sleeps or self._master.runs_alone)
         self._privileges = self._stack.enter_context(granted)
-        pacer.breathes = realtime.priority is not None
         for line in self._privileges.refused:
             LOGGER.warning("%s", line)
 
@@ -284,7 +283,7 @@ class Session:
             descriptions={s.name: s.description for s in signals},
             rejections=dict(master.rejections),
             log=self._log(),
-            timing=pacer.settled().timing(asked.granted, asked.refused) if pacer else None,
+            timing=pacer.meter.timing(asked.granted, asked.refused) if pacer else None,
             more_metrics=self._metrics,
             to_si=self._in_si.conversions,
             known=self._known(),
@@ -449,4 +448,4 @@ def _drive(session: Session, progress: bool | str) -> None:
             steps = max(1, min(GROWTH * steps, int(steps * LOOK / (now - start))))
             start = now
         if session.pacer:
-            bar.set_postfix_str(session.pacer.settled().live(), refresh=False)
+            bar.set_postfix_str(session.pacer.meter.live(), refresh=False)

@@ -6,11 +6,12 @@ the slots of the ports. So they are in the rows of the loop, and cost nothing wh
 
 import ctypes
 import gc
+import os
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -44,6 +45,9 @@ SOME = 64
 NAP = 1e-4
 """s of a sleep that is there for others only."""
 
+HAS_CLOCK = sys.platform == "linux"
+"""True if time.monotonic_ns() is the clock that compiled code reads, CLOCK_MONOTONIC."""
+
 
 class OverrunError(Exception):
     """A step ended after its deadline, and the run is to stop there."""
@@ -54,7 +58,7 @@ class HaltError(Exception):
 
 
 class _State(ctypes.Structure):
-    """What compiled code knows of a pacer: see master/loop.c."""
+    """The state of a pacer, which compiled code goes on with: see master/loop.c."""
 
     _fields_ = [
         (name, ctypes.c_int64)
@@ -86,53 +90,39 @@ class Pacer:
 
         InputError as of Realtime.period() and Meter, and where the CPU is not there.
         """
-        check_cpu(realtime)
+        last = max(os.cpu_count() or 1, *(cpu + 1 for cpu in cpus())) - 1
+        if realtime.cpu is not None and realtime.cpu > last:
+            raise InputError(f"cpu = {realtime.cpu}: no such CPU here; must be from 0 to {last}")
         period = realtime.period(system.step_ns)
         self.meter = Meter(system, realtime, period)
-        self._period = period.as_integer_ratio()
-        self._spin = min(SPIN_NS, int(MOST_SPIN * period))
-        self.breathes = False
-        """True if it has to sleep from time to time for the sake of other processes."""
-        self._policy = realtime.overrun
+        self.sleeps = period > SPIN_NS
+        """True if there is time to sleep between two steps."""
+        self.width = HEAD + len(self.meter.segments)
+        """The number of values it needs in a row."""
         self.halted = halted
-        self._clock = clock or Clock()
-        self._now = self._clock.now
-        self._origin = self._now()
-        self._slept = 0
-        self._base = 0
-        self._base_step: int | None = None
-        self._end: tuple[int, int] | None = None
-        self._taken = 0
-        self._hand_on: Callable[[int], None] = lambda _: None
         self.spare: Callable[[float], bool] | None = None
         """Does something that may wait within so many ns; False if there is nothing to do."""
-        self._recording = 0
-        self._state = _State()
-        self._head: Any = memoryview(bytearray(8 * HEAD)).cast("d")
-
-    @property
-    def sleeps(self) -> bool:
-        """True if there is time to sleep between two steps."""
-        numerator, denominator = self._period
-        return numerator > SPIN_NS * denominator
-
-    @property
-    def width(self) -> int:
-        """The number of values it needs in a row."""
-        return HEAD + len(self.meter.segments)
+        self._now, self._sleep = clock or Clock()
+        self._period = period.as_integer_ratio()
+        self._state = _State(
+            self._now(), 0, -1, *self._period, min(SPIN_NS, int(MOST_SPIN * period)), 0,
+            BREATH_NS if realtime.priority is not None else 0,
+            realtime.overrun == "continue", realtime.overrun == "stop",
+        )  # fmt: skip
+        self._taken = self._recording = 0
+        self.bind(np.zeros(self.width), lambda _: None)
 
     def bind(self, values: npt.NDArray[np.float64], hand_on: Callable[[int], None]) -> None:
         """Have it write into these values, width of them.
 
         hand_on hands on the rows of the steps before one. It is called while there is time to wait.
         """
-        self._hand_on = hand_on
-        self._head = memoryview(values[:HEAD])  # type: ignore[arg-type]  # numpy's 3.11 stubs
-        self._stamped = values[HEAD:]
+        self._values, self._hand_on = values, hand_on
+        self._head: Any = memoryview(values[:HEAD])  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
     def stamp(self, i: int) -> Call:
         """The call that says when segment i of a step has ended."""
-        data, now, origin = self._stamped[i : i + 1], self._now, self._origin
+        data, now, origin = self._values[HEAD + i :][:1], self._now, self._state.origin
         view: Any = memoryview(data)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
         def python() -> int:
@@ -145,31 +135,14 @@ class Pacer:
 
     def native(self, steps: int) -> Native | None:
         """The same as calling it, in compiled code that nobody else has to wait for; None where
-        that is not possible in a run of so many steps. The state is handed over meanwhile.
+        that is not possible in a run of so many steps.
         """
         if self._now is not time.monotonic_ns or not HAS_CLOCK:
             return None
         if self._period[0] * steps >= 2**62 or self._period[1] >= 2**62:
             return None
-        head = np.frombuffer(self._head)
-        return Native(PACE, 0, ctypes.addressof(self._state), data=head.ctypes.data)
-
-    def hand_over(self) -> None:
-        """Have compiled code go on from here: see native()."""
-        state = self._state
-        state.origin, state.base, state.slept = self._origin, self._base, self._slept
-        state.base_step = -1 if self._base_step is None else self._base_step
-        state.numerator, state.denominator = self._period
-        state.spin, state.breath = self._spin, BREATH_NS if self.breathes else 0
-        state.shifts, state.stops = self._policy == "continue", self._policy == "stop"
-
-    def take_over(self, overrun: bool) -> None:
-        """Go on from where compiled code came to; `overrun` if it was to stop at one."""
-        state = self._state
-        self._base, self._slept = state.base, state.slept
-        self._base_step = None if state.base_step < 0 else state.base_step
-        if overrun:
-            self._end = state.arrived, state.late
+        state = ctypes.addressof(self._state)
+        return Native(PACE, 0, state, data=self._values.ctypes.data)
 
     def __call__(self, step: int) -> None:
         """Wait for the beginning of a step.
@@ -177,20 +150,37 @@ class Pacer:
         HaltError where the run is interrupted meanwhile, OverrunError where it stops at an overrun.
         """
         self._use_the_wait(step)
-        arrived, late = self._arrive(step)
-        if late > 0 and self._policy == "continue":
-            self._base, self._base_step = arrived, step
+        state, head, origin = self._state, self._head, self._state.origin
+        now = self._arrive(step)
         due = self._due(step)
-        begin = self._wait(due, arrived)
-        head = self._head
-        head[ARRIVED], head[LATE], head[DUE], head[BEGIN] = arrived, late, due, begin
+        head[ARRIVED], head[LATE] = now, state.late
+        if state.late > 0 and state.shifts:
+            state.base, state.base_step, due = now, step, now
+        if now + state.spin < due:
+            while (left := due - state.spin - now) > 0:
+                if self.halted():
+                    raise HaltError
+                self._sleep(min(left, SLICE_NS) / 1e9)
+                now = self._now() - origin
+            state.slept = now
+        elif state.breath and now - state.slept > state.breath:
+            self._sleep(NAP)
+            state.slept = now = self._now() - origin
+        while now < due:
+            now = self._now() - origin
+        head[DUE], head[BEGIN] = due, now
 
     def finish(self, step: int, now: int | None = None) -> None:
         """The last step has just ended, or at `now`, where another step would begin.
 
         OverrunError as above.
         """
-        self._end = self._arrive(step, now)
+        self.meter.end(self._arrive(step, now), self._state.late)
+
+    def overrun(self) -> OverrunError:
+        """The error where it is to stop, also of compiled code."""
+        self.meter.end(self._state.arrived, self._state.late)
+        return OverrunError()
 
     def record(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
         """Take steps that were done: the numbers they lead to, and what was written of each.
@@ -206,25 +196,15 @@ class Pacer:
             self._recording = self._now() - start
             self.meter.recorded(self._taken - 1, self._recording)
 
-    def settled(self) -> Meter:
-        """Return the meter with the end of the last step, once the steps until then are recorded.
-
-        After an OverrunError it tells the cause.
-        """
-        if self._end is not None:
-            self.meter.end(*self._end)
-            self._end = None
-        return self.meter
-
     def _use_the_wait(self, step: int) -> None:
         """Do what has to be done some time, where it is not likely to make the step late.
 
         It is expected to take half as long again as it did the last time.
         """
         waiting = step - self._taken
-        if self._base_step is None or (waiting < SOME and self.spare is None):
+        if self._state.base_step < 0 or (waiting < SOME and self.spare is None):
             return
-        spare = self._due(step) - (self._now() - self._origin)
+        spare = self._due(step) - (self._now() - self._state.origin)
         if waiting >= SOME and 2 * spare > 3 * self._recording:
             self._hand_on(step)
         elif self.spare is not None:
@@ -232,57 +212,26 @@ class Pacer:
             if self.spare(2 * spare / 3):
                 self.meter.recorded(step - 1, self._now() - start)
 
-    def _arrive(self, step: int, now: int | None = None) -> tuple[int, int]:
-        """The time now, and by how much the step before ended late; negative where it did not."""
-        arrived = (self._now() if now is None else now) - self._origin
-        if self._base_step is None:
-            self._base, self._base_step, self._slept = arrived, step, arrived
-        late = arrived - self._due(step)
-        if late > 0 and self._policy == "stop":
-            self._end = arrived, late
-            raise OverrunError
-        return arrived, late
+    def _arrive(self, step: int, now: int | None = None) -> int:
+        """The time now; late is by how much the step before ended late, negative if it did not."""
+        state = self._state
+        arrived: int = (self._now() if now is None else now) - state.origin
+        if state.base_step < 0:
+            state.base, state.base_step, state.slept = arrived, step, arrived
+        state.arrived, state.late = arrived, arrived - self._due(step)
+        if state.late > 0 and state.stops:
+            raise self.overrun()
+        return arrived
 
     def _due(self, step: int) -> int:
-        numerator, denominator = self._period
-        return self._base + (step - (self._base_step or 0)) * numerator // denominator
-
-    def _wait(self, due: int, now: int) -> int:
-        """Sleep, then spin, until it is due; the time then."""
-        if now + self._spin < due:
-            while (left := due - self._spin - now) > 0:
-                if self.halted():
-                    raise HaltError
-                self._clock.sleep(min(left, SLICE_NS) / 1e9)
-                now = self._now() - self._origin
-            self._slept = now
-        elif self.breathes and now - self._slept > BREATH_NS:
-            self._clock.sleep(NAP)
-            self._slept = now = self._now() - self._origin
-        while now < due:
-            now = self._now() - self._origin
-        return now
+        since: int = step - self._state.base_step
+        return int(self._state.base) + since * self._period[0] // self._period[1]
 
 
-HAS_CLOCK = sys.platform == "linux"
-"""True if time.monotonic_ns() is the clock that compiled code reads, CLOCK_MONOTONIC."""
+LIMIT = "needs {}, or a limit that is high enough ({} in /etc/security/limits.conf)"
 
-
-ONLINE = Path("/sys/devices/system/cpu/online")
-"""The file in which Linux lists its CPUs, as in 0-3,6."""
-
-
-SCHEDULING = (
-    "needs CAP_SYS_NICE, or a limit of real-time priorities that is high enough "
-    "(ulimit -r, rtprio in /etc/security/limits.conf)"
-)
-LOCKING = (
-    "needs CAP_IPC_LOCK, or a limit of locked memory that is high enough "
-    "(ulimit -l, memlock in /etc/security/limits.conf)"
-)
-
-THROTTLE = Path("/proc/sys/kernel")
-"""The folder in which Linux limits the share of a period for threads of a real-time priority."""
+THROTTLE = Path("/proc/sys/kernel/sched_rt_runtime_us")
+"""The part of a second for threads of a real-time priority, in us; -1 where Linux has no limit."""
 
 
 @dataclass(frozen=True)
@@ -293,22 +242,6 @@ class Privileges:
     refused: list[str] = field(default_factory=list)
 
 
-def check_cpu(realtime: Realtime) -> None:
-    """InputError where Linux runs no such CPU; other systems do not list theirs."""
-    if realtime.cpu is None:
-        return
-    try:
-        listed = ONLINE.read_text("ascii")
-    except OSError:
-        return
-    ends = [tuple(map(int, part.split("-"))) for part in listed.split(",")]
-    online = [number for span in ends for number in range(span[0], span[-1] + 1)]
-    if realtime.cpu not in online:
-        raise InputError(
-            f"cpu = {realtime.cpu}: no such CPU here; must be one of {choices(online)}"
-        )
-
-
 @contextmanager
 def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
     """Asks for what is wanted, and keeps the garbage collector away; all is put back at the end.
@@ -317,6 +250,18 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
     steps: if not, the kernel may break its priority off, which is then said.
     """
     found = Privileges()
+    thread, cpu, priority = threading.get_native_id(), realtime.cpu, realtime.priority
+    wanted: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
+    if cpu is not None:
+        remedy = f"must be one of {choices(cpus())}"
+        wanted.append((f"CPU {cpu}", partial(pin, thread, cpu), remedy))
+    if realtime.lock_memory:
+        remedy = LIMIT.format("CAP_IPC_LOCK", "ulimit -l, memlock")
+        wanted.append(("memory locked", lock_memory, remedy))
+    if priority is not None:
+        remedy = LIMIT.format("CAP_SYS_NICE", "ulimit -r, rtprio")
+        first = partial(put_first, thread, priority)
+        wanted.append((f"SCHED_FIFO, priority {priority}", first, remedy))
     with ExitStack() as stack:
         gc.collect()  # now, and then not before the end: it would take too long on the way
         gc.freeze()
@@ -324,17 +269,6 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
         if gc.isenabled():
             stack.callback(gc.enable)
         gc.disable()
-        thread, there = threading.get_native_id(), cpus()
-        cpu, priority = realtime.cpu, realtime.priority
-        wanted: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
-        if cpu is not None:
-            remedy = f"must be one of {choices(there)}" if there else ""
-            wanted.append((f"CPU {cpu}", partial(pin, thread, cpu), remedy))
-        if realtime.lock_memory:
-            wanted.append(("memory locked", lock_memory, LOCKING))
-        if priority is not None:
-            name = f"SCHED_FIFO, priority {priority}"
-            wanted.append((name, partial(put_first, thread, priority), SCHEDULING))
         for name, ask, remedy in wanted:
             try:
                 stack.callback(ask())
@@ -344,23 +278,11 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
                 found.refused.append(f"{name}: {error.strerror}; {remedy}")
             else:
                 found.granted.append(name)
-        if priority is not None and not sleeps:
-            found.refused.extend(_throttled())
+        with suppress(OSError):  # not Linux, which has no such limit
+            if priority is not None and not sleeps and int(THROTTLE.read_text()) >= 0:
+                found.refused.append(
+                    "SCHED_FIFO all the time: the period leaves no time to sleep, and the kernel "
+                    "stops such a thread for some ms in every second; sysctl "
+                    "kernel.sched_rt_runtime_us=-1 lifts that, or run without a priority"
+                )
         yield found
-
-
-def _throttled() -> list[str]:
-    """A line, where the kernel stops a thread that runs all the time."""
-    try:
-        allowed, period = (
-            int((THROTTLE / f"sched_rt_{name}_us").read_text()) for name in ("runtime", "period")
-        )
-    except OSError:  # not Linux, which has no such limit
-        return []
-    if not 0 <= allowed < period:
-        return []
-    return [
-        "SCHED_FIFO all the time: the period leaves no time to sleep, and the kernel stops "
-        f"such a thread for {(period - allowed) / 1e3:g} ms in every {period / 1e3:g} ms; "
-        "sysctl kernel.sched_rt_runtime_us=-1 lifts that, or run without a priority"
-    ]

@@ -144,8 +144,8 @@ STEP, START = "step", "start"
 EXCHANGE, RECORDING, BETWEEN, BACKLOG = "exchange", "recording", "between", "backlog"
 RESERVED = (STEP, START, EXCHANGE, RECORDING, BETWEEN, BACKLOG)
 
-PER_MILLE = (500, 990, 999)
-"""The ranks of a Spread."""
+QUANTILES = (0.5, 0.99, 0.999)
+"""Those of a Spread."""
 
 FINE = 16
 """Bars of a histogram to an octave."""
@@ -155,43 +155,30 @@ Table = npt.NDArray[np.float64]
 """Times in ns: whole numbers, exact below 2**53."""
 
 
-def segments_of(system: System) -> tuple[int, ...]:
-    """Return the owner of each segment of a step: a component by index, or the exchange, -1.
-
-    The components are called one after the other; in the Jacobi scheme all take their inputs
-    before the first one steps.
-    """
-    components = range(len(system.components))
-    if system.scheme == "sequential":
-        return tuple(i for c in components for i in (-1, c))
-    return (-1, *components, *components)
-
-
 class Meter:
     """The statistics of one run."""
 
     def __init__(self, system: System, realtime: Realtime, period: Fraction) -> None:
         """InputError where a component has the name of another part."""
-        names = [component.name for component in system.components]
-        for name in names:
+        components = [component.name for component in system.components]
+        for name in components:
             if name in RESERVED:
                 raise InputError(
                     f"{system.name}: component {name!r}: in real time must not be called "
                     f"{', '.join(RESERVED)}, which are other parts of a step"
                 )
-        self.segments = segments_of(system)
-        self.overruns = 0
-        """The number of steps that ended late."""
-        self.system, self.realtime, self.period = system, realtime, period
-        self.names = (*names, EXCHANGE)
+        own = range(len(components))
+        each = [owner for i in own for owner in (-1, i)]
+        self.segments = each if system.scheme == "sequential" else [-1, *own, *own]
+        """The owner of each segment of a step: a component by index, or the exchange, -1. In the
+        Jacobi scheme all components take their inputs before the first one steps."""
+        self._system, self._realtime, self._period = system, realtime, float(period)
+        self._names = (*components, EXCHANGE)
         self._file = TemporaryFile(prefix="grasp_times_")  # noqa: SIM115 - open as long as this
         finalize(self, self._file.close)
-        self.first = self._rows = self._worst = 0
-        self._first_due = self._last_end = self._before_last = 0.0
-        self.after: tuple[int, int] | None = None
-        """When the step after the last one would have begun, and how late that was."""
-        self.recordings = array("q"), array("q")
-        """After which steps rows were handed on, and the ns that it took."""
+        self._first = self._rows = self._overruns = self._worst = 0
+        self._after: tuple[int, int] | None = None
+        self._recordings = array("q"), array("q")
 
     def add(self, steps: Steps, rows: Table) -> None:
         """Take the rows (HEAD, then the ends of the segments) of the steps of these numbers.
@@ -199,164 +186,136 @@ class Meter:
         A step counts from when it is known what comes after it.
         """
         if not self._rows:
-            self.first, self._first_due = int(steps[0]), float(rows[0, DUE])
-        ends = np.maximum(rows[-2:, DUE] + float(self.period), rows[-2:, -1]).tolist()
-        self._before_last, self._last_end = [self._last_end, *ends][-2:]
+            self._first = int(steps[0])
         self._file.write(rows.tobytes())
         self._rows += len(rows)
-        self.overruns += int(np.count_nonzero(rows[:, LATE] > 0.0))
+        self._overruns += int(np.count_nonzero(rows[:, LATE] > 0.0))
         self._worst = max(self._worst, int((rows[:, -1] - rows[:, BEGIN]).max()))
 
     def end(self, arrived: int, late: int) -> None:
-        """No step follows the last one; the next one would have begun now."""
-        self.after = arrived, late
-        self.overruns += late > 0
+        """No step follows the last one; the next one would have begun then, and so late."""
+        self._after = arrived, late
+        self._overruns += late > 0
 
     def recorded(self, step: int, took: int) -> None:
         """After that step, recording took so many ns."""
-        self.recordings[0].append(step)
-        self.recordings[1].append(took)
+        self._recordings[0].append(step)
+        self._recordings[1].append(took)
 
     def verdict(self) -> str:
         """The last overrun, in words."""
-        last = _Judged(self).overruns(slice(-1, None))[0]
+        last = self._blame(*self._judged())[-1]
         return (
-            f"{self.system.name}: the step at t = {last.time:.9g} s ended {1e3 * last.late:.3g} ms"
+            f"{self._system.name}: the step at t = {last.time:.9g} s ended {1e3 * last.late:.3g} ms"
             f" late: {last.culprit} took {1e3 * last.took:.3g} ms; "
-            f"must end within {float(self.period) / 1e6:.6g} ms"
+            f"must end within {self._period / 1e6:.6g} ms"
         )
 
     def live(self) -> str:
         """Return the state of the run in a few words."""
-        factor = self.real_time_factor()
-        return f"{factor:.3g}x, worst step {self._worst / 1e6:.3g} ms, {self.overruns} overruns"
-
-    def real_time_factor(self) -> float:
-        """Simulated by wall time, from the first deadline to the last one, or the end after it."""
-        if not self.judged:
-            return 0.0
-        end = self._last_end if self.after else self._before_last
-        return self.judged * self.system.step_ns / (end - self._first_due)
-
-    @property
-    def judged(self) -> int:
-        """The number of steps of which it is known what came after them."""
-        return max(self._rows - (self.after is None), 0)
-
-    def rows(self) -> Table:
-        """All rows so far, mapped from the file."""
-        self._file.flush()
-        shape = self._rows, HEAD + len(self.segments)
-        return (
-            np.memmap(self._file, np.float64, "r", shape=shape) if self._rows else np.empty(shape)
-        )
+        factor, worst = self._real_time_factor(), self._worst / 1e6
+        return f"{factor:.3g}x, worst step {worst:.3g} ms, {self._overruns} overruns"
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """Return the timing so far, with the answers of the operating system."""
-        found = _Judged(self)
-        listed = found.overruns(slice(None))
-        times = found.times()
+        steps, _, _, parts = judged = self._judged()
+        overruns = self._blame(*judged)
+        ran = {name: self._ran(name, steps, part) for name, part in parts.items()}
+        times = {n: (part[ran[n]], steps[ran[n]]) for n, part in parts.items() if len(ran[n])}
         return Timing(
-            factor=float(self.realtime.factor),
-            period=float(self.period) / NANOSECONDS,
-            overrun=self.realtime.overrun,
+            factor=float(self._realtime.factor),
+            period=self._period / NANOSECONDS,
+            overrun=self._realtime.overrun,
             granted=tuple(granted),
             refused=tuple(refused),
-            steps=self.judged,
-            real_time_factor=self.real_time_factor(),
-            overruns=len(listed),
-            listed=tuple(listed[:LISTED]),
-            culprits=dict(Counter(o.culprit for o in listed).most_common()),
-            parts={name: found.spread(*both) for name, both in times.items()},
+            steps=self._count,
+            real_time_factor=self._real_time_factor(),
+            overruns=len(overruns),
+            listed=tuple(overruns[:LISTED]),
+            culprits=dict(Counter(o.culprit for o in overruns).most_common()),
+            parts={name: self._spread(*both) for name, both in times.items()},
             histograms={name: _bars(part) for name, (part, _) in times.items()},
         )
 
+    @property
+    def _count(self) -> int:
+        """The number of steps of which it is known what came after them."""
+        return max(self._rows - (self._after is None), 0)
 
-class _Judged:
-    """The times of the steps that a meter has judged, by part, in ns."""
+    def _table(self) -> Table:
+        """All rows so far, mapped from the file."""
+        self._file.flush()
+        shape = self._rows, HEAD + len(self.segments)
+        if not self._rows:
+            return np.empty(shape)
+        return np.asarray(np.memmap(self._file, np.float64, "r", shape=shape))
 
-    def __init__(self, meter: Meter) -> None:
-        self._meter, self._system = meter, meter.system
-        rows, count = meter.rows(), meter.judged
-        after = rows[1:, :DUE] if meter.after is None else np.vstack((rows[1:, :DUE], meter.after))
-        self._rows, self._arrived, self._late = rows[:count], after[:, ARRIVED], after[:, LATE]
-        self._steps = meter.first + np.arange(count)
-        at, took = (np.frombuffer(values, np.int64) for values in meter.recordings)
-        known = at < meter.first + count
-        self._recordings = took[known].astype(float), at[known]
-        self._recorded = np.bincount(at[known] - meter.first, took[known], count)
+    def _real_time_factor(self) -> float:
+        """Simulated by wall time, from the first deadline to the last one, or the end after it."""
+        if not (count := self._count):
+            return 0.0
+        first, last = self._table()[[0, count - 1]]
+        end = max(last[DUE] + self._period, last[-1])
+        return float(count * self._system.step_ns / (end - first[DUE]))
 
-    def times(self) -> dict[str, tuple[Table, Steps]]:
-        """The times of all parts that happened, and the steps in which they did."""
-        found = {}
-        for name in (STEP, START, *self._meter.names, BETWEEN):
-            # a slow component runs in some steps only
-            period, phase = self._period(name), 0 if self._system.scheme == "jacobi" else -1
-            turn = self._steps % period
-            ran = (turn == period - 1) | (turn == phase)
-            found[name] = self._part(name)[ran], self._steps[ran]
-        found[RECORDING] = self._recordings
-        return {name: both for name, both in found.items() if len(both[0])}
+    def _judged(self) -> tuple[Steps, Table, Table, dict[str, Table]]:
+        """The steps that count, their rows, by how much each was late, and what each part took."""
+        table, count, owners = self._table(), self._count, np.array(self.segments)
+        after, rows = table[1:, :DUE], table[:count]
+        if self._after is not None:
+            after = np.vstack((after, self._after))
+        arrived, late = after[:count].T
+        at, took = (np.frombuffer(values, np.int64) for values in self._recordings)
+        known = at < self._first + count
+        recorded = np.bincount(at[known] - self._first, took[known], count).astype(float)
+        begin, end, spans = rows[:, BEGIN], rows[:, -1], np.diff(rows[:, BEGIN:])
+        parts: dict[str, Table] = {STEP: end - begin, START: begin - rows[:, DUE]}
+        for i, name in enumerate(self._names):
+            parts[name] = spans[:, owners % len(self._names) == i].sum(axis=1)
+        parts |= {BETWEEN: arrived - end - recorded, RECORDING: recorded}
+        return self._first + np.arange(count), rows, late, parts
 
-    def overruns(self, which: slice) -> list[Overrun]:
-        """The steps that ended late, and what may have made each of them so."""
-        late = np.flatnonzero(self._late > 0.0)
-        if not len(late):
+    def _blame(
+        self, steps: Steps, rows: Table, late: Table, parts: dict[str, Table]
+    ) -> list[Overrun]:
+        """The steps that ended late, each with the part that took longest beyond what is usual."""
+        overdue = np.flatnonzero(late > 0.0)
+        if not len(overdue):
             return []
-        names = (START, BACKLOG, *self._meter.names, BETWEEN, RECORDING)
-        usual, late = self._usual(), late[which]
-        rows = self._rows[late]
+        # What a part usually takes is no excuse where a step takes longer than its period anyhow,
+        # and then a backlog is no reason. A slow component takes no time in most steps.
+        usual = {BACKLOG: np.inf}
+        if np.median(parts[STEP]) <= self._period:
+            always = (name for name in self._names if self._every(name) == 1)
+            usual = {name: np.median(parts[name]) for name in (START, *always, BETWEEN)}
         ready = np.maximum(rows[:, DUE], rows[:, ARRIVED])
-        own = [self._part(name)[late] for name in names[2:-1]]
-        suspects = np.column_stack(
-            (rows[:, BEGIN] - ready, ready - rows[:, DUE], *own, self._recorded[late])
-        )
-        worst = (suspects - usual).argmax(axis=1)
-        took = suspects[np.arange(len(late)), worst]
+        names = (START, BACKLOG, *self._names, BETWEEN, RECORDING)
+        suspects = parts | {START: rows[:, BEGIN] - ready, BACKLOG: ready - rows[:, DUE]}
+        spent = np.array([suspects[name][overdue] for name in names])
+        worst = (spent - [[usual.get(name, 0.0)] for name in names]).argmax(axis=0)
+        spent = spent[worst, np.arange(len(overdue))]
+        columns = (v.tolist() for v in (steps[overdue], late[overdue], worst, spent))
         return [
-            Overrun(step, self._time(step), by / NANOSECONDS, names[i], spent / NANOSECONDS)
-            for step, by, i, spent in zip(
-                *(v.tolist() for v in (self._steps[late], self._late[late], worst, took)),
-                strict=True,
-            )
+            Overrun(step, self._time(step), by / NANOSECONDS, names[i], took / NANOSECONDS)
+            for step, by, i, took in zip(*columns, strict=True)
         ]
 
-    def spread(self, times: Table, steps: Steps) -> Spread:
-        """The spread of the times of a part, and in which step the worst one was."""
-        ranks = [-(-len(times) * rank // 1000) - 1 for rank in PER_MILLE]
-        found = [*np.partition(times, ranks)[ranks].tolist(), float(times.max())]
-        at = self._time(int(steps[times.argmax()]))
-        return Spread._make((*(t / NANOSECONDS for t in found), at))
+    def _ran(self, name: str, steps: Steps, times: Table) -> Steps:
+        """The places of the steps in which a part happened: a slow component runs in some only."""
+        if name == RECORDING:
+            return np.flatnonzero(times)
+        turn, last = steps % self._every(name), self._every(name) - 1
+        first = 0 if self._system.scheme == "jacobi" else last
+        return np.flatnonzero((turn == last) | (turn == first))
 
-    def _usual(self) -> Table:
-        """Return the usual times of the suspects in ns: the medians over all steps.
+    def _every(self, name: str) -> int:
+        return self._system.period(name) if name in self._names[:-1] else 1
 
-        Where a step takes longer than its period anyhow, nothing that it usually takes is an
-        excuse, and no backlog a reason. A slow component takes no time in most steps.
-        """
-        names = (*self._meter.names, BETWEEN)
-        if np.median(self._part(STEP)) > self._meter.period:
-            return np.array([0.0, np.inf, *np.zeros(len(names) + 1)])
-        usual = [0.0 if self._period(n) > 1 else np.median(self._part(n)) for n in names]
-        return np.array([np.median(self._part(START)), 0.0, *usual, 0.0])
-
-    def _part(self, name: str) -> Table:
-        """The time that a part took in each step."""
-        rows = self._rows
-        if name == STEP:
-            return np.asarray(rows[:, -1] - rows[:, BEGIN])
-        if name == START:
-            return np.asarray(rows[:, BEGIN] - rows[:, DUE])
-        if name == BETWEEN:
-            return np.asarray(self._arrived - rows[:, -1] - self._recorded)
-        owner, own = self._meter.names.index(name), np.zeros(len(rows))
-        for i, segment in enumerate(self._meter.segments, BEGIN):
-            if segment % len(self._meter.names) == owner:
-                own += rows[:, i + 1] - rows[:, i]
-        return own
-
-    def _period(self, name: str) -> int:
-        return self._system.period(name) if name in self._meter.names[:-1] else 1
+    def _spread(self, times: Table, steps: Steps) -> Spread:
+        worst = times.argmax()
+        found = [*np.quantile(times, QUANTILES, method="inverted_cdf"), times[worst]]
+        at = self._time(int(steps[worst]))
+        return Spread._make((*(float(t) / NANOSECONDS for t in found), at))
 
     def _time(self, step: int) -> float:
         return self._system.time_ns(step) / NANOSECONDS
@@ -365,13 +324,7 @@ class _Judged:
 def _bars(times: Table) -> Histogram:
     """A histogram by octaves; empty bars side by side are one, and there are none at the ends."""
     bars, counts = np.unique(np.floor(FINE * np.log2(np.maximum(times, 1.0))), return_counts=True)
-    edges: list[float] = []
-    heights: list[int] = []
-    for bar, count in zip(bars.tolist(), counts.tolist(), strict=True):
-        if edges and edges[-1] != bar:
-            heights.append(0)
-        if not edges or edges[-1] != bar:
-            edges.append(bar)
-        edges.append(bar + 1)
-        heights.append(count)
-    return Histogram(tuple(2.0 ** (e / FINE) / NANOSECONDS for e in edges), tuple(heights))
+    edges = np.union1d(bars, bars + 1.0)
+    heights = np.zeros(len(edges) - 1, int)
+    heights[np.searchsorted(edges, bars)] = counts
+    return Histogram(tuple((2.0 ** (edges / FINE) / NANOSECONDS).tolist()), tuple(heights.tolist()))
