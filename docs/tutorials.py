@@ -22,7 +22,7 @@ from grasp_cosim import cli
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import CLOSING, FINGERS
 from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
-from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.folder import load_run
 from grasp_cosim.recording.result import Result
 from grasp_cosim.report.caption import Caption, about
 from grasp_cosim.report.plot import (

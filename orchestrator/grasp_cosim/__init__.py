@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .inspection.inspection import inspect_fmu
     from .master.simulation import Session, simulate
     from .metrics.metric import Metric, metric
-    from .recording.load import load_run
+    from .recording.folder import load_run
     from .recording.result import Result
     from .report.page import write_report
     from .ssp.to_archive import write_ssp
@@ -73,7 +73,7 @@ _HOMES = {
     "hand_system": "hand.system",
     "identify": "grasp.identification.identification",
     "inspect_fmu": "inspection.inspection",
-    "load_run": "recording.load",
+    "load_run": "recording.folder",
     "metric": "metrics.metric",
     "qualify": "comparison.qualify",
     "simulate": "master.simulation",

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from grasp_cosim import simulate
-from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.folder import load_run
 from grasp_cosim.report.page import page_html
 from report.runs import grasp_run, write_run
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import cli, simulate
-from grasp_cosim.recording.load import load_run
+from grasp_cosim.recording.folder import load_run
 from support.native_fmus import needs_gcc, vendor_plant
 from support.pictures import assert_same_picture
 

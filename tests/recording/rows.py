@@ -1,6 +1,5 @@
 """What the tests of the listeners share: signals of each kind, and a run that is only rows."""
 
-import tracemalloc
 from contextlib import contextmanager
 
 import numpy as np
@@ -27,26 +26,18 @@ def rows(count, seed=1):
     )
 
 
-def play(listener, table, steps=None, block=1000, signals=SIGNALS, complete=True):
+def play(
+    listener, table, steps=None, block=1000, signals=SIGNALS, complete=True, experiment=EXPERIMENT
+):
     """A run of these rows. Like the master, it reuses the arrays that it hands on."""
     numbers = np.arange(len(table)) if steps is None else steps
-    listener.begin(EXPERIMENT, signals)
+    listener.begin(experiment, signals)
     for first in range(0, len(table), block):
         part = numbers[first : first + block].copy(), table[first : first + block].copy()
         listener.block(*part)
         for array in part:
             array.fill(-1)
     listener.end(complete)
-
-
-def peak(work):
-    """The most bytes that Python and NumPy had at once for the work."""
-    tracemalloc.start()
-    try:
-        work()
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
 
 
 @contextmanager

@@ -1,16 +1,23 @@
-"""The folder of a run while it goes on: never a mixture, whole lines, the same file in the end."""
+"""The folder of a run: never a mixture, whole lines, the same in the end; what is read back."""
 
 import json
-import os
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, simulate
-from grasp_cosim.recording.folder import FORMS, RunFolder
-from grasp_cosim.recording.load import load_run
+from grasp_cosim.exchange.listener import Experiment
+from grasp_cosim.recording.folder import FORMS, RunFolder, load_log, load_run
 from recording.rows import EXPERIMENT, SIGNALS, rows
+
+CSV = '"time","a.x","a.on"\n0.0,1.5,1\n0.1,2.5e-300,0\n'
+MADE = {
+    "system": "made.toml", "scheme": "sequential", "step": 0.1, "stop": 0.1,
+    "initialisation": {}, "components": {}, "connections": [], "events": [], "faults": [],
+}  # fmt: skip
+RUN = {**MADE, "wall_time": 0.5, "complete": True, "log": [], "rejections": {}}
+JSON = {**RUN, "units": {"a.x": "m", "a.on": None}, "types": {"a.on": "bool"}}
 
 DRAWN = ("grasp.png", "timing.png", "report.html", "signals.mf4")
 
@@ -50,7 +57,7 @@ def test_it_ends_as_a_result_writes_it_and_is_read_back_as_it_was(grasp, tmp_pat
             assert (back[name].dtype, back[name].tobytes()) == (column.dtype, column.tobytes())
         assert (back.units, back.settings) == (dict(result.units), result.settings)
         assert back.settings["diverging"] == "continue"
-        assert back.metrics == result.metrics
+        assert (back.metrics, back.timing) == (result.metrics, result.timing)
 
 
 def test_what_waits_is_written_in_spare_time(grasp, tmp_path):
@@ -68,17 +75,14 @@ def test_what_waits_is_written_in_spare_time(grasp, tmp_path):
         folder.end(complete=False)
 
 
-@pytest.mark.parametrize("torn", [0, 1, 7, 40])
+@pytest.mark.parametrize("torn", [0, 1, 40])
 def test_it_can_be_read_while_the_run_goes_on(run, tmp_path, torn):
     """Also where a kill came while a line was written."""
     table = rows(50)
-    run.begin(EXPERIMENT, SIGNALS)
+    run.begin(Experiment.of(MADE), SIGNALS)
     run.block(np.arange(50), table)
     data = (tmp_path / "signals.csv").read_bytes()
     (tmp_path / "signals.csv").write_bytes(data[: len(data) - torn])
-    settings = json.loads((tmp_path / "run.json").read_text())
-    missing = {"components": {}, "connections": [], "events": [], "faults": []}
-    (tmp_path / "run.json").write_text(json.dumps({**missing, "initialisation": {}, **settings}))
     read = load_run(tmp_path)
     whole = 50 if not torn else 49
     assert (read.complete, read.wall_time, len(read.time)) == (False, None, whole)
@@ -136,7 +140,7 @@ def test_a_kill_at_no_moment_leaves_a_mixture(run, tmp_path, monkeypatch, moment
         assert not there & {*DRAWN}
 
 
-def test_two_runs_do_not_share_a_folder(run, grasp, tmp_path):
+def test_two_runs_do_not_share_a_folder_nor_is_one_in_a_file(run, grasp, tmp_path):
     run.begin(EXPERIMENT, SIGNALS)
     run.block(np.arange(2), rows(2))
     with RunFolder(tmp_path, grasp) as second:
@@ -146,11 +150,108 @@ def test_two_runs_do_not_share_a_folder(run, grasp, tmp_path):
         second.end(complete=False)
     run.end(complete=True)
     assert len((tmp_path / "signals.csv").read_text().splitlines()) == 3
+    below = RunFolder(tmp_path / "run.json" / "out", grasp)
+    below.begin(EXPERIMENT, SIGNALS)
+    with pytest.raises(InputError, match="out: cannot be written: Not a directory"):
+        below.block(np.arange(2), rows(2))
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_is_one_line(run, tmp_path):
-    tmp_path.chmod(0o555)
-    run.begin(EXPERIMENT, SIGNALS)
-    with pytest.raises(InputError, match="cannot be written: Permission denied"):
-        run.block(np.arange(1), rows(1))
+# ----------------------------------------------------------------- read back
+
+
+def written(path, csv=CSV, **more):
+    (path / "signals.csv").write_bytes(csv.encode() if isinstance(csv, str) else csv)
+    (path / "run.json").write_text(json.dumps({**JSON, **more}))
+    return path
+
+
+def test_columns_have_their_types_and_real_is_the_default(tmp_path):
+    """Values that are not finite are kept: a run that failed ends with them."""
+    run = load_run(written(tmp_path, CSV + "0.2,nan,1\n0.3,-inf,1\n"))
+    np.testing.assert_array_equal(run.signals["a.x"], [1.5, 2.5e-300, np.nan, -np.inf])
+    assert run.signals["a.on"].dtype == np.bool_
+    assert run.signals["a.on"].tolist() == [True, False, True, True]
+    assert run.descriptions == {}
+    run = load_run(written(tmp_path, '"time"\n0.0\n', units={}))
+    assert (run.time.tolist(), run.signals) == ([0.0], {})
+    (tmp_path / "signals.csv").unlink()
+    with pytest.raises(InputError, match=r"run\.json: this run recorded no signal; must"):
+        load_run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("csv", "reason"),
+    [
+        ("", "the first column is 'nothing'; must be \"time\""),
+        ('"t","a.x"\n0.0,1.5\n', "the first column is 't'; must be \"time\""),
+        ('"time","a.x","a.on"\n', "the last row is cut off, or there is none"),
+        (CSV + "0.2,1,1", "the last row is cut off, or there is none"),
+        (CSV + "0.2,1\n", "damaged: the first line names 3 columns but 2 were found at row 3"),
+        (CSV + "0.2,1,x\n", "damaged: could not convert string 'x' to float64"),
+        (CSV + "0.1,1,1\n", "the time must grow from row to row"),
+        (CSV + "nan,1,1\n", "the time must grow from row to row"),
+        (CSV.replace("a.on", "a.x"), "two columns have the same name"),
+        ('"time","a.x\n0.0,1\n', "is damaged: unexpected end of data"),
+        (CSV.encode("utf-16"), "is damaged: 'utf-8' codec can't decode byte"),
+    ],
+)
+def test_signals_that_are_damaged_are_refused_in_one_line(tmp_path, csv, reason):
+    with pytest.raises(InputError) as caught:
+        load_run(written(tmp_path, csv))
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'signals.csv'}: ")
+    assert reason in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"{", "is damaged, not JSON in UTF-8: "),
+        (b"\xff", "is damaged, not JSON in UTF-8: "),
+        (b"[]", "is list; must be a JSON object"),
+        (b"{}", "no entry 'system'; must be a string, as `grasp-cosim run --out` writes"),
+        ({"units": 1}, "units = 1; must be a JSON object"),
+        ({"step": True}, "step = True; must be a number"),
+        ({"wall_time": "3"}, "wall_time = '3'; must be a number or null"),
+        ({"complete": 1}, "complete = 1; must be true or false"),
+        ({"log": {}}, "log = {}; must be a list"),
+        ({"rejections": {"a": {"count": 1}}}, "a = {'count': 1}; must be count and first"),
+        ({"types": {"a.on": []}}, "type of a.on = []: must be one of float64,"),
+        ({"types": {"a.x": "int64"}}, "a.x = int64: must be a type of its values, like 1.5"),
+        ({"units": {"a.x": "m"}}, "those of the recorded columns: a.x, a.on"),
+        ({"to_si": {"a.x": 1.0}}, "to_si: a.x = 1.0; must be factor and offset"),
+    ],
+)
+def test_a_run_json_that_is_damaged_is_refused_in_one_line(tmp_path, content, reason):
+    written(tmp_path, **(content if isinstance(content, dict) else {}))
+    if isinstance(content, bytes):
+        (tmp_path / "run.json").write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        load_run(tmp_path)
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'run.json'}: ")
+    assert reason in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize("name", ["run.json", "signals.csv"])
+def test_a_file_that_is_missing_is_named(tmp_path, name):
+    (written(tmp_path) / name).unlink()
+    with pytest.raises(InputError, match=f"{name}: No such file or directory; must be a folder"):
+        load_run(tmp_path)
+
+
+def test_metrics_and_logs_get_si_as_run_json_says_and_signals_stay_as_recorded(tmp_path):
+    entry = {"a.x": {"factor": 0.5, "offset": 1.0}}
+    run = load_run(written(tmp_path, to_si=entry, units={"a.x": "mm", "a.on": None}))
+    assert run.by_role["a.x"][0] == 0.5 * 1.5 + 1.0
+    assert (run["a.x"][0], run.units["a.x"]) == (1.5, "mm")
+    said, other = [], tmp_path / "measured.csv"
+    assert load_log(tmp_path / "signals.csv", said.append)["a.x"][0] == 0.5 * 1.5 + 1.0
+    assert not said
+    other.write_text(CSV, "utf-8")
+    assert load_log(other, said.append)["a.x"][0] == 1.5
+    assert said == [
+        f"{other}: there is no run.json beside it; its values are taken to be in SI units"
+    ]

@@ -15,7 +15,7 @@ from ..base.errors import InputError
 from ..base.files import check_nature
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals, measure
-from ..recording.load import ARROW, SETTINGS, SIGNALS, load_run
+from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run
 from ..recording.mdf import read_mdf
 from ..recording.result import Result
 from ..system.parts import NANOSECONDS

@@ -14,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.checks import extra_module
-from ..base.errors import InputError, SimulationError
-from ..base.files import unwritable
+from ..base.errors import InputError
 from ..exchange.listener import Experiment, Signal
-from .memory import TYPES, Batch, typed
+from .memory import TYPES, Batch, typed, writing
 
 BATCH = 4096
 """Rows that are written together, if they do not take longer than LONG to come."""
@@ -36,30 +35,29 @@ def pyarrow() -> Any:
 
 
 class ArrowListener:
-    """Writes time and signals; `said` is the name of the file in messages, if it is another."""
+    """Writes time and signals at path, or into another `place`, which messages do not name."""
 
-    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
+    def __init__(self, path: str | Path, place: Path | None = None) -> None:
         """InputError without pyarrow."""
-        self._path, self._said, self._arrow = Path(path), Path(said or path), pyarrow()
+        self._path, self._arrow = Path(path), pyarrow()
+        self._place = place or self._path
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the schema; InputError where the file cannot be written."""
         arrow = self._arrow
         types = {kind: arrow.from_numpy_dtype(own) for kind, own in TYPES.items()}
         types["String"] = arrow.string()
-        self._experiment, self._signals = experiment, tuple(signals)
+        self._experiment, self._signals = experiment, signals
         fields = [arrow.field("time", arrow.float64(), metadata={"unit": "s"})]
         for s in signals:
             about = {"unit": s.unit or "", "description": s.description}
             fields.append(arrow.field(s.name, types[s.kind], metadata=about))
         self._schema = arrow.schema(fields)
         self._batch, self._since = Batch(), time.monotonic()
-        try:
-            self._file = self._path.open("wb")
+        with writing(self._path, InputError):
+            self._file = self._place.open("wb")
             self._writer = arrow.ipc.new_file(self._file, self._schema)
             self._file.flush()
-        except OSError as error:
-            raise InputError(unwritable(self._said, error)) from error
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Take the rows; SimulationError where writing fails, the batches until then are whole."""
@@ -69,25 +67,19 @@ class ArrowListener:
 
     def end(self, complete: bool) -> None:
         """Write what is left, and the end of the file; SimulationError where that fails."""
-        try:
-            with self._file:  # closed even where that fails
+        with writing(self._path), self._file:  # closed even where that fails
+            if self._batch.count:
                 self._flush()
-                self._writer.close()
-        except OSError as error:
-            raise SimulationError(unwritable(self._said, error)) from error
+            self._writer.close()
 
     def _flush(self) -> None:
-        if not self._batch.count:
-            return
         steps, rows = self._batch.take()
         self._since = time.monotonic()
         own = (np.ascontiguousarray(typed(s, rows[:, i])) for i, s in enumerate(self._signals))
         columns = [self._experiment.times(steps), *own]
-        try:
+        with writing(self._path):
             self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
             self._file.flush()
-        except OSError as error:
-            raise SimulationError(unwritable(self._said, error)) from error
 
 
 def read_arrow(path: Path) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:

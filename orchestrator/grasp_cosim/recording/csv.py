@@ -2,10 +2,10 @@
 
 import csv
 import os
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack, nullcontext, suppress
+from importlib import import_module
 from io import FileIO
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from one_piece import in_one_piece
 
-from ..base.checks import extra_module, real
-from ..base.errors import InputError, SimulationError
-from ..base.files import unwritable
-from ..base.text import counted, from_cell, to_cell
+from ..base.checks import real
+from ..base.errors import InputError
+from ..base.text import from_cell, to_cell
 from ..exchange.listener import Experiment, Signal
-from .arrow import pyarrow
+from .memory import writing
 
 PIECE = 1024
 """Rows turned into text at once; a block may be long."""
@@ -33,33 +32,24 @@ class CsvListener:
     The file has a temporary name beside path until the run ends, in whatever way: what was
     recorded is kept, in whole lines. There is no file where nothing was. A Real is the shortest
     text that reads back as the same number, a Boolean is 0 or 1, names and Strings are quoted texts
-    as base.text.to_cell() makes them. In place, the file has its name from the start: whoever
-    wants that sees to it that it gets rows.
+    as base.text.to_cell() makes them.
     """
 
-    def __init__(
-        self, path: str | Path, said: str | Path | None = None, in_place: bool = False
-    ) -> None:
-        """`said` is the name in messages, if it is another."""
-        self._path, self._said = Path(path), Path(said or path)
-        self._in_place = in_place
+    def __init__(self, path: str | Path, place: Path | None = None) -> None:
+        """Where a `place` is given, that is written from the start, by whoever sees to the rest."""
+        self._path, self._place = Path(path), place
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
-        self._experiment = experiment
+        self._experiment, self._empty = experiment, True
         self._whole = [i for i, s in enumerate(signals, 1) if s.kind in ("Integer", "Boolean")]
         self._texts = {i: s.texts for i, s in enumerate(signals, 1) if s.kind == "String"}
         names = ("time", *(s.name for s in signals))
-        try:
-            with ExitStack() as stack:
-                named = nullcontext(self._path) if self._in_place else in_one_piece(self._path)
-                part = stack.enter_context(named)
-                self._file = stack.enter_context(FileIO(part, "w"))
-                self._append(",".join(map(quoted, names)) + "\n")
-                self._finish = stack.pop_all()
-                self._empty = True
-        except OSError as error:
-            raise InputError(unwritable(self._said, error)) from error
+        named = nullcontext(self._place) if self._place else in_one_piece(self._path)
+        with writing(self._path, InputError), ExitStack() as stack:
+            self._file = stack.enter_context(FileIO(stack.enter_context(named), "w"))
+            self._append(",".join(map(quoted, names)) + "\n")
+            self._finish = stack.pop_all()
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Append the rows; SimulationError where that fails, the lines until then are whole."""
@@ -71,20 +61,15 @@ class CsvListener:
             texts = [map(repr, column) for column in columns]
             for i, own in self._texts.items():
                 texts[i] = map(quoted, own.column(rows[piece, i - 1]))
-            try:
+            with writing(self._path):
                 self._append("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
-            except OSError as error:
-                raise SimulationError(unwritable(self._said, error)) from error
             self._empty = False
 
     def end(self, complete: bool) -> None:
         """Give the file its name; SimulationError where that fails."""
-        try:
-            with suppress(_NothingRecordedError), self._finish:
-                if self._empty:
-                    raise _NothingRecordedError
-        except OSError as error:
-            raise SimulationError(unwritable(self._said, error)) from error
+        with writing(self._path), suppress(EOFError), self._finish:
+            if self._empty:
+                raise EOFError  # has the temporary file removed
 
     def _append(self, text: str) -> None:
         """Write all of the text, or none of it and raise OSError; a pipe may have got a part."""
@@ -97,10 +82,6 @@ class CsvListener:
             if written is not None:
                 self._file.truncate(written)
             raise
-
-
-class _NothingRecordedError(Exception):
-    """Has the temporary file removed."""
 
 
 def quoted(text: str) -> str:
@@ -116,111 +97,77 @@ def read_csv(
     `texts` are the names of those, by default of all that begin with something else than a number.
     A last row that is `torn` does not count. InputError where it is missing or damaged.
     """
-    names = _names(path, torn)
-    count = path.read_bytes().count(b"\n") - 1 if torn else None
+    count = None
     try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = csv.reader(file, strict=True)
+            names = [*map(from_cell, next(rows, []))] or ["nothing"]
+            cells = next(rows, [])
+        if torn:
+            count = path.read_bytes().count(b"\n") - 1
+        if names[0] != "time":
+            raise ValueError(f'the first column is {names[0]!r}; must be "time"')
+        if len({*names}) != len(names):
+            raise ValueError("two columns have the same name")
+        if not (cells and (count if torn else _ends(path))):
+            raise ValueError("the last row is cut off, or there is none")
         if texts is None:
-            texts = _not_numbers(names, next(_rows(path), [])[1:])
-        columns = _texts(path, names, texts, count) if texts else {}
-        places = [0, *(i for i, name in enumerate(names, 1) if name not in columns)]
-        table = [] if columns or torn else _fast(path, len(places))
-        if not table:
-            some: dict[str, Any] = {"usecols": places, "quotechar": '"'} if columns else {}
-            plain: dict[str, Any] = {"delimiter": ",", "skiprows": 1, "comments": None, "ndmin": 2}
-            table = [*np.loadtxt(path, encoding="utf-8", max_rows=count, **plain, **some).T]
+            texts = [name for name, cell in zip(names, cells, strict=False) if not _number(cell)]
+        kinds: list[Any] = [object if name in texts else np.float64 for name in names]
+        table = None if torn else _fast(path, kinds)
+        if table is None:
+            whole = np.loadtxt(
+                path, [("", kind) for kind in kinds], encoding="utf-8", delimiter=",",
+                quotechar='"', comments=None, skiprows=1, max_rows=count, ndmin=1,
+            )  # fmt: skip
+            table = [whole[f"f{i}"] for i in range(len(kinds))]
+        if not (np.diff(table[0], prepend=-np.inf) > 0.0).all():
+            raise ValueError("the time must grow from row to row")
+    except OSError as error:
+        raise unreadable(path, error) from error
     except (ValueError, csv.Error) as error:  # also where it is no UTF-8
-        raise InputError(f"{path}: is damaged: {str(error).splitlines()[0]}") from error
-    if len(table) != len(places):
-        raise InputError(f"{path}: is damaged: {_uneven(len(table), names)}")
-    if not (np.diff(table[0], prepend=-np.inf) > 0.0).all():
-        raise InputError(f"{path}: is damaged: the time must grow from row to row")
-    columns |= {names[i - 1]: table[k] for k, i in enumerate(places[1:], 1)}
-    return table[0], {name: columns[name] for name in names}
+        said = str(error).replace("the dtype passed requires", "the first line names")
+        raise InputError(f"{path}: is damaged: {said.partition('; use ')[0]}") from error
+    columns = {
+        name: np.array([*map(from_cell, column)], object) if kind is object else column
+        for name, kind, column in zip(names, kinds, table, strict=True)
+    }
+    return columns.pop("time"), columns
 
 
-def _fast(path: Path, width: int) -> list[npt.NDArray[np.float64]]:
+def _fast(path: Path, kinds: Sequence[Any]) -> list[npt.NDArray[Any]] | None:
     """The columns of a large file, if pyarrow is here, and nothing is wrong with them.
 
     They have the same bits, in a tenth of the time.
     """
     if path.stat().st_size < LARGE:
-        return []
-    with suppress(InputError):
-        arrow, reader = pyarrow(), extra_module("pyarrow.csv", "it reads CSV", "arrow")
-        names = [str(i) for i in range(width)]
-        floats = dict.fromkeys(names, arrow.float64())
+        return None
+    with suppress(ImportError):
+        arrow, reader = import_module("pyarrow"), import_module("pyarrow.csv")
+        of = {np.float64: arrow.float64(), object: arrow.string()}
+        types = {str(i): of[kind] for i, kind in enumerate(kinds)}
         with suppress(arrow.ArrowInvalid):  # which the other reader says better
             table = reader.read_csv(
                 path,
-                reader.ReadOptions(skip_rows=1, column_names=names),
-                convert_options=reader.ConvertOptions(column_types=floats, null_values=[]),
+                reader.ReadOptions(skip_rows=1, column_names=[*types]),
+                convert_options=reader.ConvertOptions(column_types=types, null_values=[]),
             )
             return [column.to_numpy() for column in table]
-    return []
+    return None
 
 
-def _texts(
-    path: Path, names: Sequence[str], wanted: Collection[str], count: int | None
-) -> dict[str, npt.NDArray[Any]]:
-    """The columns of these names that are texts; ValueError where a row has not all values."""
-    places = {i: name for i, name in enumerate(names, 1) if name in wanted}
-    cells: dict[str, list[str]] = {name: [] for name in places.values()}
-    for row in islice(_rows(path), count):
-        if len(row) != len(names) + 1:
-            raise ValueError(_uneven(len(row), names))
-        for i, name in places.items():
-            cells[name].append(from_cell(row[i]))
-    return {name: np.array(column, object) for name, column in cells.items()}
+def _number(cell: str) -> bool:
+    with suppress(ValueError):
+        real(cell)
+        return True
+    return False
 
 
-def _uneven(values: int, names: Sequence[str]) -> str:
-    """What is wrong with a row of so many values, the time among them."""
-    return f"{counted(values, 'value')} in a row, {counted(len(names) + 1, 'name')}"
-
-
-def _rows(path: Path) -> Iterator[list[str]]:
-    """The rows after the names."""
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = csv.reader(file, strict=True)
-        next(rows)
-        yield from rows
-
-
-def _not_numbers(names: Sequence[str], cells: Sequence[str]) -> set[str]:
-    texts = {*names}
-    for name, cell in zip(names, cells, strict=False):
-        with suppress(ValueError):
-            real(cell)
-            texts.remove(name)
-    return texts
-
-
-def _names(path: Path, torn: bool) -> list[str]:
-    """The names of the columns after time; InputError where no whole row follows them.
-
-    Where the last one may be `torn`, another one must be before it.
-    """
-    try:
-        with path.open("rb") as file:
-            first = file.readline()
-            file.seek(max(len(first), file.seek(0, os.SEEK_END) - 1))
-            whole = file.read() == b"\n"
-            file.seek(len(first))
-            whole = whole or (torn and file.readline().endswith(b"\n"))
-    except OSError as error:
-        raise unreadable(path, error) from error
-    try:
-        cells = next(csv.reader([first.decode("utf-8")], strict=True), [])
-        time, *names = [from_cell(cell) for cell in cells] or ["nothing"]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: is damaged: the first line names no columns") from error
-    if time != "time":
-        raise InputError(f'{path}: the first column is {time!r}; must be "time"')
-    if len(set(names)) != len(names):
-        raise InputError(f"{path}: is damaged: two columns have the same name")
-    if not whole:
-        raise InputError(f"{path}: is damaged: the last row is cut off, or there is none")
-    return names
+def _ends(path: Path) -> bool:
+    """True if the last line of a file is whole."""
+    with path.open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read() == b"\n"
 
 
 def unreadable(path: Path, error: OSError) -> InputError:

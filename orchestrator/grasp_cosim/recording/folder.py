@@ -1,38 +1,46 @@
-"""The folder of a run, on disk while it runs: its rows, and run.json beside them."""
+"""The folder of a run, on disk while it runs, its rows and run.json beside them, and read back."""
 
+import json
 import os
 import platform
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from importlib.metadata import version
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
+from si_units import known_unit
 
-from ..base.errors import InputError
-from ..base.files import of_any_format, remove, unwritable, write_json
+from ..base.checks import choice, is_number
+from ..base.errors import InputError, choices
+from ..base.files import check_nature, of_any_format, remove, unwritable
 from ..base.higher import groups
 from ..base.scratch import SUFFIX, Lock
 from ..exchange.listener import Experiment, Signal
+from ..interface.units import Conversion
 from ..metrics.in_si import in_si
+from ..metrics.metric import Measured, Metric, Signals, metrics_of
+from ..realtime.timing import Timing
 from ..system.description import System
-from .arrow import ArrowListener
-from .csv import CsvListener
-from .load import ARROW, SETTINGS, SIGNALS, TEXT
-from .memory import TYPES, Rows
-from .result import OF_ANY, Result
+from .arrow import ArrowListener, read_arrow
+from .csv import CsvListener, read_csv, unreadable
+from .mdf import read_mdf
+from .memory import Rows, typed
+from .result import OF_ANY, UNITS, Known, Rejection, Result
+
+SIGNALS, ARROW, SETTINGS = "signals.csv", "signals.arrow", "run.json"
+"""The files of a run's folder, of which it has one of the former two."""
 
 DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
 """The files that may be made of a run in its folder, beside its picture."""
 
 Form = Literal["csv", "arrow"]
 FORMS: tuple[str, ...] = get_args(Form)
-FILES = (SIGNALS, ARROW)
 
 FIRST_GUESS = 20e3
 """ns that it takes to write a row."""
@@ -70,7 +78,7 @@ class RunFolder:
         if form == "arrow":
             self._file = ArrowListener(folder / ARROW)
         else:
-            self._file = CsvListener(folder / SIGNALS, in_place=True)
+            self._file = CsvListener(folder / SIGNALS, folder / SIGNALS)
         self._begun, self._broken = False, False
         self._waiting: deque[Rows] = deque()
         self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
@@ -148,35 +156,30 @@ class RunFolder:
                     f"{self._folder}: another process records a run in it; must end first, or --out"
                     " be another folder"
                 )
-            if settings.is_file() and any((self._folder / name).is_file() for name in FILES):
+            if settings.is_file() and any(
+                (self._folder / name).is_file() for name in (SIGNALS, ARROW)
+            ):
                 remove(self._folder, *DRAWN, *of_any_format(OF_ANY.stem, *groups()))
-            remove(self._folder, SETTINGS, *FILES)
+            remove(self._folder, SETTINGS, SIGNALS, ARROW)
             if self._signals:
                 self._file.begin(self._experiment, self._signals)
             self._begun = True
             self._write(steps, rows)
-            write_json(settings, self._unfinished())
+            first = {s.name: typed(s, rows[:1, i]) for i, s in enumerate(self._signals)}
+            begun = Result(
+                self._experiment.settings,
+                self._experiment.times(steps[:1]),
+                first,
+                {s.name: s.unit for s in self._signals},
+                wall_time=None,
+                complete=False,
+                descriptions={s.name: s.description for s in self._signals},
+                to_si=self._to_si,
+                known=Known(Measured({}, (), ()), {}),
+            )
+            self.finish(begun)
         except OSError as error:
             raise InputError(unwritable(Path(error.filename or self._folder), error)) from error
-
-    def _unfinished(self) -> dict[str, Any]:
-        """The run.json of a run that goes on: see Result.to_json()."""
-        types = {kind: str(np.dtype(own)) for kind, own in TYPES.items()}
-        signals = self._signals
-        return {
-            "wall_time": None,
-            "complete": False,
-            **self._experiment.settings,
-            "units": {s.name: s.unit for s in signals},
-            "to_si": {name: c._asdict() for name, c in self._to_si.items()},
-            "types": {s.name: types.get(s.kind, TEXT) for s in signals},
-            "descriptions": {s.name: s.description for s in signals},
-            "metric_units": {},
-            "missing_metrics": [],
-            "log": [],
-            "rejections": {},
-            **self._origin,
-        }
 
 
 def now() -> datetime:
@@ -195,6 +198,8 @@ def now() -> datetime:
 
 def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
     """The date now, the versions of what makes the run, which FMUs those are, and the command."""
+    from importlib.metadata import version
+
     fmus = {c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool} for c in system.components}
     for c in system.components:
         if c.native:  # the FMU whose place it takes
@@ -208,3 +213,195 @@ def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
         "fmus": fmus,
         "command": list(command),
     }
+
+
+# ------------------------------------------------------------------ read back
+
+NUMBER, MAYBE = (int, float), (int, float, type(None))
+NEEDED: Mapping[str, Any] = {
+    "system": str, "scheme": str, "step": NUMBER, "stop": NUMBER, "initialisation": dict,
+    "components": dict, "connections": list, "events": list, "faults": list,
+}  # fmt: skip
+MADE: Mapping[str, Any] = {
+    **NEEDED, "roles": dict, "input": dict, "changed": dict, "metrics": list, "diverging": str,
+    "start": NUMBER,
+}  # fmt: skip
+"""Entries of run.json that say how the run was made, of which some are needed, and their types."""
+
+ORIGIN: Mapping[str, Any] = {
+    "title": str, "date": str, "versions": dict, "fmus": dict, "command": list,
+}  # fmt: skip
+"""Entries that say when it was made, and with what."""
+
+ALSO_NEEDED: Mapping[str, Any] = {
+    "wall_time": MAYBE, "complete": bool, "log": list, "rejections": dict, "units": dict,
+}  # fmt: skip
+ENTRIES: Mapping[str, Any] = {
+    **MADE, **ALSO_NEEDED, **ORIGIN, "types": dict, "descriptions": dict, "metric_units": dict,
+    "to_si": dict,
+}  # fmt: skip
+"""All entries besides metrics."""
+
+WORDS = {
+    str: "a string", NUMBER: "a number", MAYBE: "a number or null", bool: "true or false",
+    list: "a list", dict: "a JSON object",
+}  # fmt: skip
+TEXT = "str"
+TYPES = ("float64", "int32", "int64", "bool", TEXT)
+"""The element types of recorded columns, the last that of Strings."""
+
+
+def run_folder(path: Path) -> Path:
+    """The folder of a run, which one of its files names as well; InputError where it is none."""
+    if path.name in (SIGNALS, ARROW, SETTINGS) and path.is_file():
+        return path.parent
+    check_nature(path, "run")
+    return path
+
+
+def load_run(folder: str | Path) -> Result:
+    """The result in a folder that `run --out` wrote, or is writing: then as far as it got.
+
+    One of its files stands for it.
+
+    Metrics are worked out anew from the signals; those of a user's file, and of a run that recorded
+    only some of its steps, are as they were recorded.
+    InputError where a file is missing or damaged, or the two files are not of the same run.
+    """
+    folder = run_folder(Path(folder))
+    path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS
+    written = _settings(path)
+    units, types, realtime = written["units"], written.get("types", {}), written.get("realtime")
+    if arrow.exists():
+        time, columns = read_arrow(arrow)
+    elif not units and not signals.exists():
+        raise InputError(f"{path}: this run recorded no signal; must have recorded one")
+    else:
+        unfinished = not written["complete"] and written["wall_time"] is None
+        texts = {name for name, kind in types.items() if kind == TEXT}
+        time, columns = read_csv(signals, texts, unfinished)
+    if list(units) != list(columns):
+        raise InputError(
+            f"{path}: units are those of {choices(units)}; "
+            f"must be those of the recorded columns: {choices(columns)}"
+        )
+    read = Result(
+        settings={k: written[k] for k in MADE if k in written},
+        time=time,
+        signals={
+            name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
+            for name, column in columns.items()
+        },
+        units=units,
+        wall_time=written["wall_time"],
+        complete=written["complete"],
+        descriptions=written.get("descriptions", {}),
+        rejections=_records(path, written, "rejections", Rejection),
+        log=tuple(written["log"]),
+        timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
+        more_metrics=_as_recorded(written),
+        origin={key: written[key] for key in ORIGIN if key in written},
+        to_si=_records(path, written, "to_si", Conversion),
+        folder=folder,
+    )
+    return _with_known(read, written) if read.every > 1 else read
+
+
+def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
+    """A result of thinned rows with the metrics that run.json has, which are of every step."""
+    asked = metrics_of(read.groups, read.more_metrics)
+    there = tuple(m for m in asked if m.name in written)
+    if not asked:
+        return read
+    if not there:  # it did not come to its end
+        line = f"one row in {read.every} was recorded: the metrics are of these"
+        return replace(read, log=(*read.log, line))
+    values = {m.name: written[m.name] for m in there}
+    measured = Measured(values, there, tuple(written.get("missing_metrics", ())))
+    return replace(read, known=Known(measured, written.get("proxies", {})))
+
+
+def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
+    """The metrics in run.json that nothing here would work out again, as they are there."""
+    known = {*UNITS, *(m.name for m in metrics_of(written.get("metrics", ())))}
+    return tuple(
+        Metric(name, partial(_constant, written[name]), unit)
+        for name, unit in written.get("metric_units", {}).items()
+        if name not in known and name in written
+    )
+
+
+def _constant(value: Any, _: Signals) -> Any:
+    return value
+
+
+def _records(path: Path, written: Mapping[str, Any], key: str, make: type[Any]) -> dict[str, Any]:
+    """The objects by name in an entry of run.json, of a class whose fields are all numbers."""
+    fields, found = list(make.__annotations__), {}
+    for name, entry in written.get(key, {}).items():
+        numbers = [entry.get(field) for field in fields] if isinstance(entry, dict) else [None]
+        if not all(map(is_number, numbers)):
+            must = " and ".join(fields)
+            raise InputError(f"{path}: {key}: {name} = {entry!r}; must be {must}")
+        found[name] = make(*numbers)
+    return found
+
+
+def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
+    """The column with the element type of that name; InputError where its values have another."""
+    if choice(place, name, TYPES) == TEXT or column.dtype == name:
+        return column
+    with np.errstate(invalid="ignore"):
+        typed = column.astype(name)
+    if not np.array_equal(typed, column, equal_nan=name == "float64"):
+        value = column[np.flatnonzero(typed != column)[0]]
+        raise InputError(f"{place} = {name}: must be a type of its values, like {value:g}")
+    return typed
+
+
+def _settings(path: Path) -> dict[str, Any]:
+    """The object in run.json, whose entries have their types."""
+    try:
+        settings = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except ValueError as error:
+        raise InputError(f"{path}: is damaged, not JSON in UTF-8: {error}") from error
+    if not isinstance(settings, dict):
+        raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
+    for key, kind in ENTRIES.items():
+        there, value = key in settings, settings.get(key)
+        wrong = not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)
+        if (there and wrong) or (not there and key in (*NEEDED, *ALSO_NEEDED)):
+            said = f"{key} = {value!r}" if there else f"no entry {key!r}"
+            must = f"{WORDS[kind]}, as `grasp-cosim run --out` writes it"
+            raise InputError(f"{path}: {said}; must be {must}")
+    return settings
+
+
+def load_log(path: Path, note: Callable[[str], None] | None = None) -> Signals:
+    """The numbers in a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
+
+    They come in SI units where the run.json of the run beside it tells of others, or the channels
+    of an MDF do; else they are taken to be in SI, which `note` is told of a CSV. InputError where
+    it is missing, damaged or of another kind, or where asammdf is not installed.
+    """
+    kind = path.suffix.lower()
+    if not path.is_file():
+        raise InputError(f"{path}: no such log; must be a .csv or .mf4 file")
+    if kind not in (".mf4", ".csv"):
+        raise InputError(f"{path}: must be a .csv or .mf4 file")
+    to_si: Mapping[str, Conversion] = {}
+    if kind == ".mf4":
+        time, columns, units = read_mdf(path)
+        known = {name: known_unit(unit) for name, unit in units.items()}
+        to_si = {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
+    else:
+        time, columns = read_csv(path)
+    beside = path.with_name(SETTINGS)
+    if path.stem == Path(SIGNALS).stem and beside.is_file():
+        to_si = _records(beside, _settings(beside), "to_si", Conversion)
+    elif note and kind == ".csv":
+        note(f"{path}: there is no {SETTINGS} beside it; its values are taken to be in SI units")
+    numbers = {name: column for name, column in columns.items() if column.dtype != object}
+    return Signals(time, numbers, to_si=to_si)

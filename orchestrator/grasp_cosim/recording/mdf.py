@@ -13,10 +13,9 @@ import numpy.typing as npt
 from one_piece import in_one_piece
 
 from ..base.checks import extra_module
-from ..base.errors import InputError, SimulationError
-from ..base.files import unwritable
+from ..base.errors import InputError
 from ..exchange.listener import Experiment, Signal
-from .memory import Batch
+from .memory import Batch, writing
 
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8, "String": np.uint32}
 """The element type of a channel by its signal's kind."""
@@ -43,10 +42,11 @@ class MdfListener:
     There is no file where nothing was recorded.
     """
 
-    def __init__(self, path: str | Path, said: str | Path | None = None) -> None:
-        """`said` is the name in messages, if it is another. InputError without asammdf."""
+    def __init__(self, path: str | Path, place: Path | None = None) -> None:
+        """Written into another `place`, messages name path. InputError without asammdf."""
         check_mdf()
-        self._path, self._said = Path(path), Path(said or path)
+        self._path = Path(path)
+        self._place = place or self._path
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Describe the channels; InputError where there are none or the folder is not writable."""
@@ -54,16 +54,14 @@ class MdfListener:
         from asammdf import Signal as Channel
 
         if not signals:
-            raise InputError(f"{self._said}: nothing to record; must be a system with outputs")
+            raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
         self._experiment, self._signals, none = experiment, signals, np.empty(0)
         self._batch = Batch()
         folder = self._path.parent
-        try:
+        with writing(self._path, InputError):
             folder.mkdir(parents=True, exist_ok=True)
             # the first version with compressed blocks; every tool of today reads it
             self._mdf = MDF(version="4.10", temporary_folder=str(folder))
-        except OSError as error:
-            raise InputError(unwritable(self._said, error)) from error
         channels = [
             Channel(none.astype(TYPES[s.kind]), none, s.unit or "", s.name, comment=s.description)
             for s in signals
@@ -78,15 +76,14 @@ class MdfListener:
 
     def end(self, complete: bool) -> None:
         """Make the file; SimulationError where that fails, and there is none."""
-        try:
-            with closing(self._mdf):
+        # also of close(), which writes what is still in a buffer
+        with writing(self._path), closing(self._mdf):
+            if self._batch.count:
                 self._flush()
-                if self._mdf.groups[0].channel_group.cycles_nr:
-                    self._describe(complete)
-                    with in_one_piece(self._path) as part, part.open("wb+") as file:
-                        self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
-        except OSError as error:  # also of close(), which writes what is still in a buffer
-            raise SimulationError(unwritable(self._said, error)) from error
+            if self._mdf.groups[0].channel_group.cycles_nr:
+                self._describe(complete)
+                with in_one_piece(self._place) as part, part.open("wb+") as file:
+                    self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
 
     def _describe(self, complete: bool) -> None:
         """Write the header's comment, in the XML that MDF 4 asks for, and the texts of Strings."""
@@ -108,15 +105,11 @@ class MdfListener:
                 channel.conversion = from_dict(table)
 
     def _flush(self) -> None:
-        if not self._batch.count:
-            return
         steps, rows = self._batch.take()
         pairs = zip(rows.T, self._signals, strict=True)
         own = (column.astype(TYPES[signal.kind]) for column, signal in pairs)
-        try:
+        with writing(self._path):
             self._mdf.extend(0, [(c, None) for c in (self._experiment.times(steps), *own)])
-        except OSError as error:
-            raise SimulationError(unwritable(self._said, error)) from error
 
 
 def read_mdf(

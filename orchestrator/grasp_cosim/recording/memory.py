@@ -1,6 +1,7 @@
 """Keeps a run in memory, as NumPy columns."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile, gettempdir
 from typing import Any
@@ -9,7 +10,7 @@ from weakref import finalize
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import InputError
+from ..base.errors import InputError, SimulationError
 from ..base.files import unwritable
 from ..base.system_calls import memory
 from ..exchange.listener import Experiment, Signal
@@ -24,6 +25,15 @@ Columns = tuple[npt.NDArray[np.float64], Mapping[str, npt.NDArray[Any]]]
 """Time in s, and columns by name."""
 
 FLOAT = np.dtype(np.float64).itemsize
+
+
+@contextmanager
+def writing(path: Path, failure: type[Exception] = SimulationError) -> Iterator[None]:
+    """What fails meanwhile is the writing of the file at path."""
+    try:
+        yield
+    except OSError as error:
+        raise failure(unwritable(path, error)) from error
 
 
 class Batch:

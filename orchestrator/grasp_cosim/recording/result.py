@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -147,8 +147,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def _repr_html_(self) -> str:
         """The run and its metrics, as notebooks show them."""
-        html: str = higher("report.tables").result_html(self)
-        return html
+        return str(higher("report.tables").result_html(self))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.signals)
@@ -163,14 +162,12 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @property
     def roles(self) -> Mapping[str, str]:
         """The component that plays a role, where its name does not say it."""
-        found: Mapping[str, str] = self.settings.get("roles", {})
-        return found
+        return dict(self.settings.get("roles", {}))
 
     @property
     def groups(self) -> Sequence[str]:
         """The groups of metrics that its system names."""
-        groups: Sequence[str] = self.settings.get("metrics", ())
-        return groups
+        return list(self.settings.get("metrics", ()))
 
     @property
     def given(self) -> dict[str, Any]:
@@ -212,19 +209,18 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     @cached_property
     def _figures(self) -> Mapping[str, Any]:
         """The metrics without those that fail."""
-        known, wall_time = self.known, self.wall_time
-        simulated = float(self.time[-1]) - self.settings.get("start", 0.0)
+        known, took, settings = self.known, self.wall_time, self.settings
+        simulated = float(self.time[-1]) - settings.get("start", 0.0)
         proxies = known.proxies if known else proxy_figures(self.time, self.signals)
         figures = {
             **self.measured.values,
-            "wall_time": wall_time,
-            "real_time_factor": simulated / wall_time if wall_time else wall_time,
+            "wall_time": took,
+            "real_time_factor": simulated / took if took else took,
             "steps": int(self._steps[-1]),
-            **{key: self.settings[key] for key in ("scheme", "step", "stop")},
+            **{key: settings[key] for key in ("scheme", "step", "stop")},
             "complete": self.complete,
-            **({"proxies": proxies} if proxies else {}),
         }
-        return Figures(figures)
+        return Figures(figures | ({"proxies": proxies} if proxies else {}))
 
     @property
     def metric_units(self) -> dict[str, str | None]:
@@ -233,7 +229,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
-        self._play(path, partial(CsvListener, in_place=True))
+        self._play(path, CsvListener)
 
     def to_arrow(self, path: str | Path) -> None:
         """Write an Arrow file (Feather 2), with the units; InputError without pyarrow."""
@@ -250,15 +246,13 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
         A metric that fails is a line among the missing ones: the rest of the run is kept.
         """
+        types = {name: str(column.dtype) for name, column in self.signals.items()}
         report = {
             **self._figures,
             **self.settings,
             "units": dict(self.units),
             "to_si": {name: c._asdict() for name, c in self.to_si.items()},
-            "types": {
-                name: "str" if column.dtype == object else str(column.dtype)
-                for name, column in self.signals.items()
-            },
+            "types": {n: "str" if kind == "object" else kind for n, kind in types.items()},
             "descriptions": dict(self.descriptions),
             "metric_units": self.metric_units,
             "missing_metrics": list(self.measured.missing),
@@ -275,9 +269,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         With a `path` it is written there too, as its suffix says: .png, .svg or .pdf. InputError
         where that is another one, or without matplotlib.
         """
-        where = None if path is None else Path(path)
-        figure: Figure = self.view.draw(self.titled(title), where)
-        return figure
+        run, where = self.titled(title), None if path is None else Path(path)
+        return self.view.draw(run, where)  # type: ignore[no-any-return]
 
     def titled(self, title: str) -> Result:
         """Return the result under another title, which its pictures and pages have; not if ''."""
@@ -299,13 +292,12 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         `long_name`. InputError without xarray.
         """
         module = extra_module("xarray", "it makes the data set", "xarray")
-        variables = {}
+        data: xr.Dataset = module.Dataset(attrs=self._about)
+        data["time"] = "time", self.time, {"units": "s", "long_name": "time"}
         for name, column in self.signals.items():
             said = {"units": self.units.get(name), "long_name": self.descriptions.get(name)}
             # what there is none of is left out, as netCDF has it
-            variables[name] = "time", column, {key: text for key, text in said.items() if text}
-        coordinate = {"time": ("time", self.time, {"units": "s", "long_name": "time"})}
-        data: xr.Dataset = module.Dataset(variables, coords=coordinate, attrs=self._about)
+            data[name] = "time", column, {key: text for key, text in said.items() if text}
         return data
 
     @property
@@ -343,15 +335,15 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         steps: npt.NDArray[np.int64] = np.rint(since * (NANOSECONDS / step_ns)).astype(np.int64)
         return steps
 
-    def _play(self, path: str | Path, make: Callable[[Path, str | Path], Listener]) -> None:
-        """Have a listener hear the recorded run again: who writes a file, and its name."""
+    def _play(self, path: str | Path, make: Callable[[Path, Path], Listener]) -> None:
+        """Have a listener hear the recorded run again, which writes a file in a place."""
         said = self.descriptions
         signals = [
             Signal(name, self.units[name], KINDS[column.dtype.kind], said.get(name, ""))
-            for name, column in self.signals.items()
+            for name, column in self.items()
         ]
         with in_one_piece(Path(path)) as part, ExitStack() as stack:
-            listener = make(part, path)
+            listener = make(Path(path), part)
             listener.begin(Experiment.of(self.settings), signals)
             stack.callback(listener.end, self.complete)
             for first in range(0, len(self.time), PIECE):

@@ -30,7 +30,7 @@ from ..base.files import check_file, of_any_format, remove_parts, write_text
 from ..base.text import grouped
 from ..exchange.listener import Texts
 from ..recording.csv import quoted
-from ..recording.load import load_run, run_folder
+from ..recording.folder import load_run, run_folder
 from ..recording.result import Result
 from .caption import Caption, caption
 from .diagram import Link, diagram_svg

@@ -8,7 +8,7 @@ from grasp_cosim import InputError, simulate
 from grasp_cosim.grasp.identification.identification import OF_A_LOG, chosen
 from grasp_cosim.grasp.identification.log import identify_from_log
 from grasp_cosim.metrics.metric import Signals
-from grasp_cosim.recording.load import load_log
+from grasp_cosim.recording.folder import load_log
 from scipy.integrate import solve_ivp
 
 MASS = 0.5

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...base.errors import InputError, nearest
 from ...base.text import counted
-from ...recording.load import load_log
+from ...recording.folder import load_log
 from ...system.description import System
 from ..metrics import FINGERS
 from ..published.tables import table_csv
