@@ -223,7 +223,9 @@ def test_a_full_disk_is_said_and_leaves_whole_lines_or_nothing(tmp_path, form, m
     [("csv", 4000), ("arrow", 4000), ("mdf", 4000), ("json", 100), slow("png", 100)],
 )
 def test_a_full_disk_leaves_the_file_of_a_result_that_was_there(tmp_path, form, size):
-    made = {"system": "bare", "scheme": "sequential", "step": 1e-3, "stop": 1.0}
+    made = {
+        "system": "bare", "scheme": "sequential", "step": 1e-3, "stop": 1.0, "components": {},
+    }  # fmt: skip
     time = np.arange(1001, dtype=np.float64) * 0.001
     noise = np.random.default_rng(1).standard_normal(1001)
     result = Result(made, time, {"a.x": noise}, {"a.x": "m"}, 1.0, True)
