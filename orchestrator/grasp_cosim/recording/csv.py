@@ -4,7 +4,6 @@ import csv
 import os
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack, nullcontext, suppress
-from importlib import import_module
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 from one_piece import in_one_piece
 
-from ..base.checks import real
+from ..base.checks import extra_module, real
 from ..base.errors import InputError
 from ..base.text import from_cell, to_cell
 from ..exchange.listener import Experiment, Signal
+from .arrow import pyarrow
 from .memory import writing
 
 PIECE = 1024
@@ -142,8 +142,8 @@ def _fast(path: Path, kinds: Sequence[Any]) -> list[npt.NDArray[Any]] | None:
     """
     if path.stat().st_size < LARGE:
         return None
-    with suppress(ImportError):
-        arrow, reader = import_module("pyarrow"), import_module("pyarrow.csv")
+    with suppress(InputError):
+        arrow, reader = pyarrow(), extra_module("pyarrow.csv", "it reads CSV", "arrow")
         of = {np.float64: arrow.float64(), object: arrow.string()}
         types = {str(i): of[kind] for i, kind in enumerate(kinds)}
         with suppress(arrow.ArrowInvalid):  # which the other reader says better
