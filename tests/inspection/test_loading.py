@@ -29,7 +29,7 @@ class Stock(Fmi2Slave):
         return True
 """
 LINUX64 = "binaries/linux64/Stock.so"
-FMU_CHECKS = ["fmu", "binary", "script", "modules", "host", "libraries", "trial"]
+FMU_CHECKS = ["fmu", "binary", "script", "host", "libraries", "trial"]
 
 NATIVE = """\
 static int model;
@@ -84,7 +84,7 @@ def examined(fmu):
 def test_of_the_file_alone_nothing_is_run(fmus, monkeypatch):
     monkeypatch.setattr(loading, "_run", None)
     findings = loading.examine(fmus / "GripperPlant.fmu")
-    assert [f.check for f in findings] == ["fmu", "binary", "script", "modules"]
+    assert [f.check for f in findings] == ["fmu", "binary", "script"]
     assert {f.status for f in findings} == {"ok"}
 
 
@@ -225,15 +225,6 @@ def test_what_a_script_imports_is_packed_or_installed(files, missing, opened):
         assert verdict[1].endswith(f"neither packed nor installed: {missing}")
         names = missing.replace(",", "")
         assert verdict[2] == f"{quote(sys.executable)} -m pip install {names}"
-
-
-@pytest.mark.parametrize(
-    ("name", "other"), [("json", "the standard library"), ("numpy", "numpy/__init__.py"), ("a", "")]
-)
-def test_a_packed_module_of_the_name_of_another(name, other, opened):
-    status, text, fix = loading.modules(opened({f"resources/{name}.py": b""}))
-    assert status == ("warning" if other else "ok")
-    assert f"{other} too: the first one imported" in text if other else fix is None
 
 
 @pytest.mark.parametrize(

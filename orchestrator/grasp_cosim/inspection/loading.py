@@ -12,7 +12,7 @@ import time
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib.machinery import ModuleSpec, all_suffixes
+from importlib.machinery import all_suffixes
 from pathlib import Path
 from shlex import quote
 from typing import Literal
@@ -82,7 +82,7 @@ def examine(fmu: Path, load: bool = False) -> list[Finding]:
         verdicts: dict[str, Verdict | None]
         verdicts = {"fmu": description(unpacked), "binary": binary(unpacked)}
         if unpacked.declared.python:
-            verdicts |= {"script": script(unpacked), "modules": modules(unpacked)}
+            verdicts["script"] = script(unpacked)
         if load:
             tried = trial(unpacked)
             linked = linker(unpacked.binary)
@@ -154,7 +154,8 @@ def script(fmu: Unpacked) -> Verdict:
         outside = _outside(resources, name) - sys.stdlib_module_names
     except (SyntaxError, ValueError) as error:
         return "problem", f"no Python {VERSION}: {error}", "correct it and build the FMU again"
-    if missing := sorted(name for name in outside if not _spec(name)):
+    finders = [f.find_spec for f in sys.meta_path]  # sys.modules may hold an earlier one
+    if missing := sorted(n for n in outside if not any(find(n, None) for find in finders)):
         fix = install_command(*(_PACKAGES.get(name, name) for name in missing))
         return "problem", f"imports what is neither packed nor installed: {choices(missing)}", fix
     text = f"resources/{name}.py imports, besides the standard library: {choices(sorted(outside))}"
@@ -174,24 +175,6 @@ def _outside(resources: Path, script: str) -> set[str]:
     packed = ("", *all_suffixes())
     tops = {name.partition(".")[0] for name in names}
     return {t for t in tops if not any((resources / f"{t}{end}").exists() for end in packed)}
-
-
-def modules(fmu: Unpacked) -> Verdict:
-    """Check module names, for all Python FMUs of a host share sys.modules."""
-    files = [*fmu.folder.glob("resources/*.py"), *fmu.folder.glob("resources/*/__init__.py")]
-    names = {p.parent.name if p.stem == "__init__" else p.stem for p in files}
-    for name in sorted(names - {"pythonfmu"}):
-        spec = _spec(name)
-        other = "the standard library" if name in sys.stdlib_module_names else spec and spec.origin
-        if other:
-            text = f"packs {name!r}, which is in {other} too: the first one imported serves both"
-            return "warning", text, f"give {name!r} a name of its own and build the FMU again"
-    return "ok", "no packed module has the name of another", None
-
-
-def _spec(name: str) -> ModuleSpec | None:
-    """File this Python would import under a name; sys.modules may hold an earlier one."""
-    return next(filter(None, (f.find_spec(name, None) for f in sys.meta_path)), None)
 
 
 def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple[int | None, str]:

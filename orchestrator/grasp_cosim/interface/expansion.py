@@ -73,7 +73,8 @@ def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:
             lengths.get(name or "", length) for name, length in zip(v.sizes, v.shape, strict=True)
         )
         size = size_of(shape)
-        apart = v.is_array_of_numbers and v.causality in TAKEN_APART
+        numbers = bool(v.shape) and v.kind in ("Real", "Integer", "Boolean")
+        apart = numbers and v.causality in TAKEN_APART
         names = element_names(v.name, shape) if apart and size <= room else ()
         if not apart or size > room or not interface.by_name.keys().isdisjoint(names):
             variables.append(replace(v, shape=shape) if shape != v.shape else v)

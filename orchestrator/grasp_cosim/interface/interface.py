@@ -210,11 +210,6 @@ class Variable:
         return self.supported and self.kind != "String"
 
     @property
-    def is_array_of_numbers(self) -> bool:
-        """True if it is an array of Reals, Integers or Booleans that was not taken apart."""
-        return bool(self.shape) and self.kind in SUPPORTED[:3]
-
-    @property
     def nature(self) -> str:
         """Its type in words, as of what is not supported: array of Float64, Binary, Clock."""
         if size_of(self.shape) > MOST_ELEMENTS:

@@ -71,14 +71,6 @@ class Connectors:
             into[hop.target] = hop
         return into
 
-    @cached_property
-    def out_of(self) -> dict[Node, list[Hop]]:
-        """The hops that lead away from a node."""
-        out_of: dict[Node, list[Hop]] = {}
-        for hop in self.into.values():
-            out_of.setdefault(hop.source, []).append(hop)
-        return out_of
-
     def trace(self, node: Node) -> list[Hop]:
         """The hops that lead to a node, from where its value comes first."""
         hops: list[Hop] = []

@@ -97,10 +97,10 @@ def _settled(network: Connectors) -> Iterator[tuple[Node, Parameter]]:
                 given[node] = _adapted(network, node, entry)
             if not nodes:
                 origin.notes.add(entry.place, "nothing of that name to give it to; not used")
-    for node in given:
-        network.trace(node)  # refuses circles, in which there are no ends
-        for end in _ends(network, node):
-            yield end, _arriving(network, end, given)
+    for node in dict.fromkeys((*given, *network.into)):
+        ways = (node, *(hop.source for hop in network.trace(node)))
+        if node.path in network.parts and not given.keys().isdisjoint(ways):
+            yield node, _arriving(network, node, given)
 
 
 def _bindings(network: Connectors) -> Iterator[tuple[Element, Origin, Any]]:
@@ -165,15 +165,6 @@ def _nodes(network: Connectors, element: Element, name: str) -> Iterator[Node]:
     for inner in element.elements.values():
         if name.startswith(f"{inner.name}."):
             yield from _nodes(network, inner, name[len(inner.name) + 1 :])
-
-
-def _ends(network: Connectors, node: Node) -> Iterator[Node]:
-    """Yield the variables of components that a value at a node is for, there or passed on to."""
-    if node.path in network.parts:
-        yield node
-        return
-    for hop in network.out_of.get(node, ()):
-        yield from _ends(network, hop.target)
 
 
 def _arriving(network: Connectors, node: Node, given: Mapping[Node, Parameter]) -> Parameter:

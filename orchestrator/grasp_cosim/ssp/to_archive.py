@@ -19,9 +19,10 @@ from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Component, Connection, Port
+from ..system.validity import transforms
 from .annotations import PREFIXES, extras_of, write_extras, write_hint, write_steps
 from .archive import RESOURCES, STRUCTURE, write_archive
-from .document import VERSION, add, change, new, same, to_bytes, write_units
+from .document import VERSION, add, new, same, to_bytes, write_units
 from .elements import FMU
 
 SET = "initialValues"
@@ -137,10 +138,10 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
         name = component.name
         _write_component(elements, component, sources[name], bindings.get(name), units)
     if system.connections:
-        connections = add(top, "ssd:Connections")
+        connections, changes = add(top, "ssd:Connections"), transforms(system)
         names = {c.name: _own_names(c) for c in system.components}
-        for connection in system.connections:
-            _write_connection(connections, system, connection, names)
+        for c in system.connections:
+            _write_connection(connections, c, changes[c.target], names)
     for_oms = add(top, "ssd:Annotations")
     write_units(root, "ssd", units.values())
     start, stop = (repr(t / NANOSECONDS) for t in (system.start_ns, system.stop_ns))
@@ -184,26 +185,21 @@ def _connected(component: Component) -> list[Variable]:
 
 
 def _write_connection(
-    connections: Any, system: System, connection: Connection, names: Mapping[str, Mapping[str, str]]
+    connections: Any,
+    connection: Connection,
+    change: tuple[float, float],
+    names: Mapping[str, Mapping[str, str]],
 ) -> None:
-    start, end = connection.source, connection.target
-    start_unit, end_unit = (_unit_of(system, port) for port in (start, end))
-    element = add(
-        connections,
-        "ssd:Connection",
-        startElement=start.component,
-        startConnector=names[start.component][start.variable],
-        endElement=end.component,
-        endConnector=names[end.component][end.variable],
-    )
+    ends = {}
+    for side, port in (("start", connection.source), ("end", connection.target)):
+        ends[f"{side}Element"] = port.component
+        ends[f"{side}Connector"] = names[port.component][port.variable]
+    element = add(connections, "ssd:Connection", **ends)
     given = connection.factor is not None or connection.offset is not None
-    factor = 1.0 if connection.factor is None else connection.factor
-    offset = 0.0 if connection.offset is None else connection.offset
-    if not given and start_unit and end_unit and not same(start_unit, end_unit):
-        factor, offset = change(str(connection.target), start_unit, end_unit)
-    if given or (factor, offset) != (1.0, 0.0):
+    if given or change != (1.0, 0.0):
         element.set("suppressUnitConversion", "true")
-        add(element, "ssc:LinearTransformation", factor=repr(factor), offset=repr(offset))
+        factor, offset = map(repr, change)
+        add(element, "ssc:LinearTransformation", factor=factor, offset=offset)
 
 
 def _own_names(component: Component) -> dict[str, str]:
@@ -211,11 +207,6 @@ def _own_names(component: Component) -> dict[str, str]:
     declared = component.sized(read_interface(component.fmu)).variables
     pairs = zip(component.interface.variables, declared, strict=True)
     return {new.name: own.name for new, own in pairs}
-
-
-def _unit_of(system: System, port: Port) -> Unit | None:
-    interface = system.component(port.component, str(port)).interface
-    return interface.unit(interface.by_name[port.variable])
 
 
 def _units(components: Iterable[Component]) -> dict[str, Unit]:
