@@ -1,6 +1,5 @@
 """System files for foreign FMUs, and which of their variables are meant by those of ours."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,8 +10,6 @@ from grasp_cosim.inspection.alike import candidates, matches
 from grasp_cosim.inspection.draft import alone, replacing
 from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.interface.read import read_interface
-from hypothesis import given
-from hypothesis import strategies as st
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +41,9 @@ def names(plant, *variables, certain=None):
     ("pair", "doubt"),
     [
         (("GapRight", "GapLeft"), ""),
+        (("fingerGap1", "fingerGap2"), ""),
+        (("Gripper.Fingers[1].gap", "Gripper.Fingers[2].gap"), ""),
+        (("Gaps[1]", "Gaps[2]"), ""),
         (("plant.l_1", "plant.l_2"), ""),
         (("finger.r.distance", "finger.l.distance"), ""),
         (("GAP_RH", "GAP_LH"), ""),
@@ -87,31 +87,6 @@ def test_parameters(plant):
     assert names(plant, start, certain=True) == {}
     initial = settable("initial_part_pos", "parameter", "cm")
     assert names(plant, initial, certain=True) == {"initial_object_position": "initial_part_pos"}
-
-
-WORDS = {"force": "input", "position": "output", "velocity": "output", "gap": "output"}
-STYLES = {
-    "camel": lambda word, j: f"finger{word.title()}{j}",
-    "side": lambda word, j: f"{word.title()}{'Right' if j == 1 else 'Left'}",
-    "snake": lambda word, j: f"{word}_{'r' if j == 1 else 'l'}",
-    "tree": lambda word, j: f"gripper.finger[{j}].{word}",
-    "plural": lambda word, j: f"{word}s[{j}]",
-}
-
-
-@given(
-    st.permutations(sorted((w, j) for w in WORDS for j in (1, 2))),
-    st.fixed_dictionaries({word: st.sampled_from(sorted(STYLES)) for word in WORDS}),
-    st.booleans(),
-)
-def test_any_style_in_any_order_with_and_without_units(plant, order, styles, units):
-    ours = {f"{word}[{j}]": plant.by_name[f"{word}[{j}]"] for word, j in order}
-    theirs = {
-        name: replace(v, name=STYLES[styles[word]](word, j), unit=v.unit if units else None)
-        for (name, v), (word, j) in zip(ours.items(), order, strict=True)
-    }
-    chosen = names(plant, *theirs.values(), certain=True)
-    assert chosen == {name: v.name for name, v in theirs.items()}
 
 
 def test_no_force_is_proposed_for_a_position(plant):

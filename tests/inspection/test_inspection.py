@@ -1,10 +1,8 @@
 """What inspect says of an FMU: of ours and of hand-written ones of FMI 1.0, 2.0 and 3.0."""
 
-import io
 import json
 import zipfile
 
-import fmpy
 import pytest
 from grasp_cosim.inspection.inspection import as_text, inspect_fmu
 
@@ -160,11 +158,8 @@ SLOPPY = {
 
 @pytest.mark.parametrize("mistake", SLOPPY)
 def test_a_sloppy_fmu_is_shown_all_the_same(archive, mistake):
-    """FMPy refuses each of these even where it need not validate."""
     valve = inspect_fmu(archive(FMI_2))
     path = archive(FMI_2.replace(*SLOPPY[mistake]))
-    with pytest.raises(Exception, match=r"."):
-        fmpy.read_model_description(io.BytesIO(path.read_bytes()), validate=False)
     report = inspect_fmu(path)
     if mistake == "a continuous parameter":
         report["variables"][6]["variability"] = "tunable"

@@ -10,7 +10,6 @@ from shlex import quote
 
 import fmpy
 import pytest
-from fmpy.fmi2 import FMU2Slave
 from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.loading import Finding, unpack
 from support import native_fmus
@@ -31,11 +30,6 @@ class Stock(Fmi2Slave):
 LINUX64 = "binaries/linux64/Stock.so"
 FMU_CHECKS = ["fmu", "binary", "script", "host", "libraries", "trial"]
 
-NATIVE = """\
-static int model;
-int lost(void);
-void *fmi2Instantiate(void) { INSTANTIATE; return &model; }
-"""
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="N" guid="g">
   {kinds}
@@ -234,6 +228,8 @@ def test_what_a_script_imports_is_packed_or_installed(files, missing, opened):
         (SCRIPT.replace("self.y = 0.0", "raise OSError('no disk')"), "OSError('no disk')"),
         ("import atexit, os\natexit.register(os.abort)\n" + SCRIPT,
          "crashes with SIGABRT after it was freed"),
+        ("import os\nprint('oh', flush=True)\nos.abort()\n" + SCRIPT,
+         "crashes with SIGABRT when instantiated; it says oh"),
     ],
 )  # fmt: skip
 def test_a_trial_that_fails(script, text, opened):
@@ -251,33 +247,20 @@ def test_a_trial_that_does_not_end(opened):
     assert not pid.exists() or not Path("/proc", pid.read_text()).exists()
 
 
-def native(folder, instantiate="", options=()):
-    """A native FMU, compiled here."""
-    others = {f for f in dir(FMU2Slave) if f.startswith("fmi2")} - {"fmi2Instantiate"}
-    code = [NATIVE.replace("INSTANTIATE", instantiate), *(f"void {f}(void) {{}}" for f in others)]
-    (folder / "n.c").write_text("\n".join(code))
-    command = ["gcc", "-shared", "-fPIC", "-w", "-o", "n.so", "n.c", *options]
-    subprocess.run(command, cwd=folder, check=True)
-    with zipfile.ZipFile(folder / "n.fmu", "w") as archive:
-        kinds = '<CoSimulation modelIdentifier="N"/>'
-        archive.writestr("modelDescription.xml", DESCRIPTION.format(kinds=kinds))
-        archive.write(folder / "n.so", "binaries/linux64/N.so")
-    return folder / "n.fmu"
-
-
-@gcc
-def test_a_native_fmu_that_crashes(tmp_path):
-    found = examined(native(tmp_path, "*(volatile int *)0 = 1"))
-    assert found["trial"].text == "crashes with SIGSEGV when instantiated; it says nothing"
-
-
 @gcc
 def test_a_native_fmu_without_a_library(tmp_path):
-    (tmp_path / "lost.c").write_text("int lost(void) { return 1; }")
-    command = ["gcc", "-shared", "-fPIC", "-o", "liblost.so", "lost.c"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    fmu = native(tmp_path, "return lost() ? &model : 0", ("-L.", "-llost"))
-    found = examined(fmu)
+    for name, code, *options in (
+        ("liblost", "int lost(void) { return 1; }"),
+        ("n", "int lost(void); int found(void) { return lost(); }", "-L.", "-llost"),
+    ):
+        (tmp_path / f"{name}.c").write_text(code)
+        command = ["gcc", "-shared", "-fPIC", "-o", f"{name}.so", f"{name}.c", *options]
+        subprocess.run(command, cwd=tmp_path, check=True)
+    with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
+        kinds = '<CoSimulation modelIdentifier="N"/>'
+        archive.writestr("modelDescription.xml", DESCRIPTION.format(kinds=kinds))
+        archive.write(tmp_path / "n.so", "binaries/linux64/N.so")
+    found = examined(tmp_path / "n.fmu")
     assert found["libraries"].text == "not found: liblost.so"
     assert found["trial"].text.startswith(
         "does not instantiate: Failed to load shared library binaries/linux64/N.so. liblost.so: "

