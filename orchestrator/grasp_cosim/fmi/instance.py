@@ -121,12 +121,10 @@ class Inputs:
 
     def __str__(self) -> str:
         """The end of a one-line error, like " (inputs: gap = 45 m)"; empty without inputs."""
-        found: dict[Variable, Value] = {}
-        for variables, data in self._bound:  # the connected ones before those that stay as they are
-            found |= zip(variables, data.tolist(), strict=True)
-        if not self.running:
-            found = {v: self._given[v] for v in found if v in self._given}
-        found |= {v: value for v, value in self._given.items() if v not in found}
+        connected: dict[Variable, Value] = {}
+        for variables, data in self._bound if self.running else ():
+            connected |= zip(variables, data.tolist(), strict=True)
+        found = {**connected, **self._given, **connected}  # before those that stay as they are
         named = sorted(found, key=lambda v: _usual(v, found[v]))
         return f" (inputs: {choices((_named(v, found[v]) for v in named), MOST)})" if found else ""
 

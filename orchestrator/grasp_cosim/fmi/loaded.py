@@ -46,14 +46,8 @@ _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
     "Real": float,
     "Integer": int,
     "Boolean": bool,
-    "String": lambda value: value if isinstance(value, str) else _decoded(value),
+    "String": lambda x: x if isinstance(x, str) else (x or b"").decode(errors="replace"),
 }
-
-
-def _decoded(text: bytes | None) -> str:
-    return (text or b"").decode(errors="replace")
-
-
 _OF_THIS_MACHINE = tuple(f"binaries/{name}/" for name in map(this_machine, ("2.0", "3.0")))
 _UNUSED = ("documentation/", "sources/", "binaries/")
 
@@ -87,7 +81,6 @@ class LoadedInstance(ABC):
         self._keep: list[Any] = []
         self._inputs = Inputs()
         self._arrays: dict[int, list[Any]] = {}
-        self._running = False
         self._clock: npt.NDArray[np.float64] | None = None
         self._unread: deque[str] = deque(maxlen=KEPT)
         self._said_before = 0  # of these, on longer parts of a step that is divided
@@ -122,10 +115,6 @@ class LoadedInstance(ABC):
     @abstractmethod
     def last_successful_time(self) -> float | None:
         """Return the end of that step in s, None if the FMU does not say."""
-
-    @abstractmethod
-    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0]."""
 
     @property
     def _identifier(self) -> str:
@@ -172,7 +161,7 @@ class LoadedInstance(ABC):
 
     def close(self) -> None:
         """Terminate and free the FMU as far as it permits; remove what was extracted."""
-        if self._running and self._worst < ERROR:
+        if self._inputs.running and self._worst < ERROR:
             try:
                 self._slave.terminate()
             except FMICallException as error:
@@ -205,7 +194,7 @@ class LoadedInstance(ABC):
     def exit_initialization(self) -> None:
         with self._refusals():
             self._slave.exitInitializationMode()
-        self._running = self._inputs.running = True
+        self._inputs.running = True
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         whole: dict[int, list[Any]] = {}

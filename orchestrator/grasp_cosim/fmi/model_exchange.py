@@ -10,7 +10,7 @@ of the solver; the discrete states are then iterated until they settle.
 import ctypes
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +24,7 @@ from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import NANOSECONDS, Solver
-from .cvode import Cvode, CvodeError
+from .cvode import Cvode, CvodeError, Function
 from .fmi2 import FmuInstance
 from .fmi3 import Fmi3Instance, Lenient
 from .instance import DISCARD, EARLY, OK, WARNING
@@ -61,6 +61,7 @@ class ModelInstance(LoadedInstance):
         self._solver: Cvode | None = None
         self._now = 0.0
         self._next = math.inf
+        self._get_indicators: Any = None
         self._ended: float | None = None
         self._failed = OK
         self._given: dict[Variable, Value] = {}
@@ -122,7 +123,7 @@ class ModelInstance(LoadedInstance):
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         """Set inputs or tunable parameters; in the run they change as the next step begins."""
         given = dict(zip(variables, values, strict=True))
-        if self._running:
+        if self._inputs.running:
             self._waiting |= given
         else:
             super().set(variables, values)
@@ -276,6 +277,8 @@ class ModelInstance(LoadedInstance):
             self._get_slopes = self._bound(self.SLOPES, place, size)
         if self._indicators:
             self._get_indicators = self._bound("GetEventIndicators", place, size)
+        slopes = self._evaluation(self._get_slopes if self._states else _no_slope, self._states)
+        crossings = self._evaluation(self._get_indicators, self._indicators)
         if self._states > MOST_STATES:
             raise InputError(
                 f"{self.name}: {self.interface.path.name} has {self._states} continuous states; "
@@ -283,7 +286,7 @@ class ModelInstance(LoadedInstance):
             )
         if self._states or self._indicators:
             sizes = max(self._states, 1), self._indicators  # CVode needs a state; it stays 0
-            self._solver = Cvode(*sizes, self._slopes_at, self._indicators_at, self._chosen)
+            self._solver = Cvode(*sizes, slopes, crossings, self._chosen)
             self._x = self._solver.x.ctypes.data
 
     def _bound(self, name: str, *kinds: Any) -> Any:
@@ -295,37 +298,20 @@ class ModelInstance(LoadedInstance):
             raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from None
         return partial(function, self._slave.component)
 
-    def _slopes_at(self, time: float, states: int, slopes: int) -> int:
-        """The derivatives, for the solver."""
-        status = self._at(time, states)
-        if status <= WARNING and self._states:
-            status = self._get_slopes(slopes, self._states)
-        elif status <= WARNING:
-            ctypes.c_double.from_address(slopes).value = 0.0
-        return self._answer(status)
+    def _evaluation(self, get: Callable[[int, int], int], size: int) -> Function:
+        """For the solver: what to get at the time and states that it tries."""
 
-    def _indicators_at(self, time: float, states: int, values: int) -> int:
-        """The event indicators, for the solver."""
-        status = self._at(time, states)
-        if status <= WARNING:
-            status = self._get_indicators(values, self._indicators)
-        return self._answer(status)
+        def evaluate(time: float, states: int, values: int) -> int:
+            status: int = self._set_time(time)
+            if self._states and status <= WARNING:
+                status = self._set_states(states, self._states)
+            if status <= WARNING:
+                status = get(values, size)
+            if status > DISCARD:
+                self._failed = status
+            return 0 if status <= WARNING else 1 if status == DISCARD else -1
 
-    def _at(self, time: float, states: int) -> int:
-        """Set time and states to what the solver tries."""
-        status: int = self._set_time(time)
-        if self._states and status <= WARNING:
-            status = self._set_states(states, self._states)
-        return status
-
-    def _answer(self, status: int) -> int:
-        """The meaning of a status to the solver: go on, try a shorter step, or give up."""
-        if status <= WARNING:
-            return 0
-        if status == DISCARD:
-            return 1
-        self._failed = status
-        return -1
+        return evaluate
 
     def _indicators_now(self) -> npt.NDArray[np.float64]:
         values = np.zeros(self._indicators)
@@ -342,6 +328,11 @@ class ModelInstance(LoadedInstance):
         if self._failed:
             return self.failure(self._failed, self._now)
         return self._error(f"cannot be integrated by CVode ({error})", self._now)
+
+
+def _no_slope(slopes: int, _: int) -> int:
+    ctypes.c_double.from_address(slopes).value = 0.0
+    return OK
 
 
 class _Buffer:

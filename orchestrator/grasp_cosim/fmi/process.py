@@ -41,7 +41,6 @@ from ..system.parts import Component, Solver
 from .fmi2 import FmuInstance, SharedInstance
 from .fmi3 import Fmi3Instance
 from .instance import EARLY, OK, WARNING, Inputs, Instance, dtype
-from .loaded import LoadedInstance
 
 POSIX = os.name == "posix"
 """Elsewhere a process is not handed open files."""
@@ -83,7 +82,7 @@ def load(component: Component) -> Instance:
     return load_here(component.name, component.loaded, component.solver)
 
 
-def load_here(name: str, interface: Interface, solver: Solver | None = None) -> LoadedInstance:
+def load_here(name: str, interface: Interface, solver: Solver | None = None) -> Instance:
     """The instance of an FMU in this process; by model exchange with a solver, or if it has to."""
     three = interface.version.startswith("3")
     if not solver and "CoSimulation" in interface.kinds:
