@@ -111,7 +111,7 @@ FMU = [
     *("init my.toml --as plant={}", "qualify {} --as plant"),
 ]
 OF_A_SYSTEM = ["run {}", "ssp {} -o out.ssp", "qualify plant.fmu --as a --system {}"]
-BLOCK = ("b.py", "a Python file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block")
+BLOCK = ("b.py", "a .py file", "`grasp-cosim build b.py` makes an FMU of it, if it is a block")
 REPORT = "`grasp-cosim report run` shows the run"
 OF_THE_RUN = [
     ("run", "a folder that `grasp-cosim run --out` wrote", REPORT),
@@ -123,8 +123,8 @@ NOT_A_SYSTEM = [
     ("my.zip", "an FMU", "--as COMPONENT=my.zip`"),
     ("b.zip", "an SSP archive", "its name must end in .ssp"),
     ("run/run.json", "a file of a run", REPORT),
-    ("OspSystemStructure.xml", "an XML file", ""),
-    ("drive.csv", "a CSV file", "`grasp-cosim run --input drive.csv` drives"),
+    ("OspSystemStructure.xml", "a .xml file", ""),
+    ("drive.csv", "a .csv file", "`grasp-cosim run --input drive.csv` drives"),
     (".", "a folder", ""),
     *(BLOCK, *OF_THE_RUN),
 ]
@@ -132,7 +132,7 @@ NOT_AN_FMU = [
     (".", "a folder", ""),
     *(BLOCK, *OF_THE_RUN),
     ("a.ssp", "an SSP archive", "`grasp-cosim run a.ssp` runs it; its FMUs are in it"),
-    ("a.toml", "a TOML file", "`grasp-cosim run a.toml` runs it, if it is a system"),
+    ("a.toml", "a .toml file", "`grasp-cosim run a.toml` runs it, if it is a system"),
 ]
 NOT_A_RUN = [
     ("plant.fmu", "an FMU", "`grasp-cosim inspect plant.fmu` shows it"),

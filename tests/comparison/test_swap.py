@@ -232,7 +232,7 @@ REFUSED = [
     ({"values": {"plant.width": 2.0}}, r"width = 2.0: must be a finite number from 0 to 1 m"),
     ({"component": "hand"}, r"^--as hand: no component 'hand'; valid: plant, spring"),
     ({"candidate": "none.fmu"}, r"none.fmu: no such FMU file"),
-    ({"candidate": "loop.toml"}, r"loop.toml: is a TOML file; must be an FMU"),
+    ({"candidate": "loop.toml"}, r"loop.toml: is a .toml file; must be an FMU"),
 ]
 
 

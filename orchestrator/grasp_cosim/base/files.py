@@ -57,60 +57,54 @@ WANTED = {
 }
 """The natures of files that a command may want, in words."""
 
+_TAKEN = {"fmu": ("an FMU",), "system": ("a .toml file",), "run": (WANTED["run"], "a folder")}
+"""In the place of a run, what is missing in a folder is to be said."""
+
 _OF_A_RUN = {"run.json", "signals.csv", "signals.arrow"}
 _OF_AN_ARCHIVE = {"modelDescription.xml": "an FMU", "SystemStructure.ssd": "an SSP archive"}
-_OF_A_SUFFIX = {
-    ".toml": ("a TOML file", "`grasp-cosim run {}` runs it, if it is a system"),
-    ".py": ("a Python file", "`grasp-cosim build {}` makes an FMU of it, if it is a block"),
-    ".csv": ("a CSV file", "`grasp-cosim run --input {}` drives inputs of the grasp with it"),
-    ".xml": ("an XML file", ""),
+_ADVICE = {
+    WANTED["run"]: "`grasp-cosim report {}` shows the run",
+    "a file of a run": "`grasp-cosim report {}` shows the run",
+    "an FMU": "`grasp-cosim inspect {}` shows it, `grasp-cosim init my_system.toml --fmu NAME={}` "
+    "makes a system of it alone, `--as COMPONENT={}` the grasp with it, `grasp-cosim run --swap "
+    "COMPONENT={}` runs that",
+    "an SSP archive": "`grasp-cosim run {}` runs it; its FMUs are in it, below resources/, and "
+    "its name must end in .ssp",
+    "a .toml file": "`grasp-cosim run {}` runs it, if it is a system",
+    "a .py file": "`grasp-cosim build {}` makes an FMU of it, if it is a block",
+    "a .csv file": "`grasp-cosim run --input {}` drives inputs of the grasp with it",
 }
+"""What to do with a file, {} for its name, or that of the folder of a run."""
 
 
 def check_nature(path: Path, wanted: str) -> None:
-    """InputError where there is plainly something else than is wanted, which says what to do then.
+    """InputError where there is plainly something else than is wanted, a key of WANTED.
 
-    wanted is a key of WANTED. A file of its suffix, or of an unknown content, is not looked into.
+    It says what that is, and what to do with it. A file of an unknown content is not looked into.
     """
-    found, advice = _nature(path, wanted)
-    if found not in ("", {"fmu": "an FMU", "run": WANTED["run"]}.get(wanted)):
-        said = advice and "; " + advice.replace("{}", quote(str(path)))
-        raise InputError(f"{path}: is {found}; must be {WANTED[wanted]}{said}")
+    found = _nature(path)
+    archive = wanted == "system" and found == "an SSP archive" and path.suffix.lower() == ".ssp"
+    if found and found not in _TAKEN[wanted] and not archive:
+        name = path.parent if found == "a file of a run" else path
+        advice = _ADVICE.get(found, "").replace("{}", quote(str(name)))
+        said = f"must be {WANTED[wanted]}{advice and '; '}{advice}"
+        raise InputError(f"{path}: is {found}; {said}")
 
 
-def _nature(path: Path, wanted: str) -> tuple[str, str]:
-    """The nature of a file, and what to do with it, {} for its name; empty where not plain."""
-    folder = path if path.is_dir() else path.parent
-    if (folder / "run.json").is_file() and (folder == path or path.name in _OF_A_RUN):
-        what = WANTED["run"] if folder == path else "a file of a run"
-        return what, f"`grasp-cosim report {quote(str(folder))}` shows the run"
-    if folder == path:  # in the place of a run, what is missing in it is to be said
-        return ("", "") if wanted == "run" else ("a folder", "")
-    found = _archive_nature(path)
-    if found == "an FMU" and wanted == "system":
-        return found, (
-            "`grasp-cosim init my_system.toml --fmu NAME={}` makes a system of it alone, "
-            "`--as COMPONENT={}` the grasp with it, `grasp-cosim run --swap COMPONENT={}` runs that"
-        )
-    if found == "an FMU":
-        return found, "`grasp-cosim inspect {}` shows it"
-    suffix = path.suffix.lower()
-    if found and wanted == "system":
-        return ("", "") if suffix == ".ssp" else (found, "its name must end in .ssp")
-    if found:
-        return found, "`grasp-cosim run {}` runs it; its FMUs are in it, below resources/"
-    own = {"system": ".toml", "run": ".csv", "fmu": ".csv"}[wanted]
-    return _OF_A_SUFFIX.get(suffix, ("", "")) if suffix != own and path.is_file() else ("", "")
-
-
-def _archive_nature(path: Path) -> str:
-    """The nature of an archive by its content; empty for another file, or a damaged one."""
+def _nature(path: Path) -> str:
+    """What there is, in words; empty where that is not plain."""
+    if path.is_dir():
+        return WANTED["run"] if (path / "run.json").is_file() else "a folder"
+    if path.name in _OF_A_RUN and path.with_name("run.json").is_file():
+        return "a file of a run"
     with suppress(OSError, ValueError, RuntimeError, NotImplementedError, zipfile.BadZipFile):
         if zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as archive:
                 names = set(archive.namelist())
             return next((what for file, what in _OF_AN_ARCHIVE.items() if file in names), "")
-    return ""
+    suffix = path.suffix.lower()
+    told = suffix in (".toml", ".py", ".csv", ".xml") and path.is_file()
+    return f"a {suffix} file" if told else ""
 
 
 def check_fmu_file(path: Path) -> None:
