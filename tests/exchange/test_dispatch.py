@@ -11,7 +11,7 @@ from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.interface.interface import Interface, Variable
 from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.system.parts import Connection, Port
+from grasp_cosim.system.parts import Port
 from hypothesis import given
 from hypothesis import strategies as st
 from recording.rows import full_disk
@@ -86,7 +86,7 @@ ROWS = 4000
 K = np.arange(ROWS)
 
 
-def watch(*columns, block=1000, unit=None, nominal=None, kind="Real", factor=None):
+def watch(*columns, block=1000, unit=None, nominal=None, kind="Real"):
     """What runs away of signals a.y0, ... 1 ms apart; rows are counted over all blocks."""
     names = [f"y{i}" for i in range(len(columns))]
     variables = tuple(
@@ -95,7 +95,6 @@ def watch(*columns, block=1000, unit=None, nominal=None, kind="Real", factor=Non
     interface = Interface(Any, "", "", variables, units=UNITS)
     system = SimpleNamespace(
         component=lambda name, place: SimpleNamespace(interface=interface),
-        connections=(Connection(Port("a", "y0"), Port("b", "u"), factor),),
         scheme="jacobi",
         step_ns=1_000_000,
         time_ns=lambda step: 1_000_000 * step,
@@ -209,5 +208,3 @@ def test_the_first_to_run_away_is_named():
         "a.y0 ran away: 1e+06 N at t = 3 s, ten times as much every 0.5 s; look at the signs and "
         "gains, or try a shorter step"
     )
-    found = watch(-late, factor=-1.0)
-    assert found.text.endswith("; look at factor = -1 of a.y0 -> b.u, or try a shorter step")

@@ -101,12 +101,6 @@ def test_units_of_the_source_are_those_of_the_connections():
     assert energies[:, 0] == pytest.approx(run.drift, rel=1e-9, abs=1e-14)
 
 
-def test_a_connection_with_a_factor_of_zero_shows_the_source_no_motion():
-    rows = _run().rows
-    (energy,) = ExchangeEnergy([BOND], COLUMN, {SEEN: (0.0, 0.0)})(rows).T
-    assert energy[-1] == pytest.approx(float(np.sum(rows[1:, 2] * np.diff(rows[:, 1]))))
-
-
 @examples()
 @given(
     rows=arrays.arrays(np.float64, (23, 4), elements=st.floats(-1e6, 1e6)),

@@ -169,14 +169,13 @@ def test_events_after_a_step_and_iterations_of_one(tmp_path, version, kind, gain
 
 STUCK = {
     1: r"chatters, or does not come to rest \(1000 events in a row, each within 1% of the step "
-    r"after the one before\) at t = .*; must have a hysteresis, or a shorter step than 0.1 s",
+    r"after the one before\) at t = .*; must have a hysteresis, name later times for its ev",
     3: "does not settle an event in 1000 iterations at t = 0.5 s",
-    5: r"names t = .* s as the time of its next event, 1000 times in a row at t = .*; must name a",
     6: "returned error at t = 0.5 s",
     7: r"cannot be integrated by CVode \(At t = 0.5 repeated recoverable right-hand side",
     8: r"cannot be integrated by CVode \(At t = 0.5 and h = .*\) at t = 0.5 s",
     10: r"names nan as the time of its next event at t = 0.5 s",
-    9: r"names t = 0.25 s as the time of its next event, 1000 times in a row at t = 0.5 s; must",
+    9: r"chatters, .* one before, the next at t = 0.25 s\) at t = 0.5 s; must have",
 }
 
 

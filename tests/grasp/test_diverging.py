@@ -12,7 +12,7 @@ from grasp_cosim.system.parts import Port
 from support.marks import slow
 
 AWAY = r"^controller\.force\[1\] ran away: -1e\+06 N at t = 0\.413\d s, ten times as much every "
-HINT = "; look at factor = -1 of controller.force[1] -> plant.force[1], or try a shorter step"
+HINT = "; look at the signs and gains, or try a shorter step"
 
 
 def turned(grasp):

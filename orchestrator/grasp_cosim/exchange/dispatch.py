@@ -209,7 +209,7 @@ class Divergence:
         if _grows(self._reached[i]):
             length = decade * self._system.step_ns / NANOSECONDS
             text += f", ten times as much every {length:.2g} s"
-        return Runaway(row, f"{text}; {self._advice()}")
+        return Runaway(row, f"{text}; look at the signs and gains, or try a shorter step")
 
     def _follow(
         self, i: int, steps: npt.NDArray[np.int64], column: npt.NDArray[np.float64]
@@ -225,11 +225,6 @@ class Divergence:
                 return row
             self._limits[i] *= 10.0
         return None
-
-    def _advice(self) -> str:
-        turned = [c for c in self._system.connections if c.factor is not None and c.factor < 0.0]
-        look = f"factor = {turned[0].factor:g} of {turned[0]}" if turned else "the signs and gains"
-        return f"look at {look}, or try a shorter step"
 
 
 def _scale(system: System, port: Port) -> float:

@@ -167,7 +167,6 @@ class _Ledger:
         of_seen = [transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY for bond in bonds]
         self._plain = {*of_force, *of_seen} == {IDENTITY}
         self._of_force, self._of_seen = np.array([of_force, of_seen]).transpose(0, 2, 1)[..., None]
-        self._of_seen[0, self._of_seen[0] == 0.0] = np.inf  # hides all motion
         self._moved = self._answered = np.empty((2 * len(bonds), 0))
         self._total = np.zeros((len(bonds), 1))
 

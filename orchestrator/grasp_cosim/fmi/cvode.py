@@ -5,7 +5,7 @@ the time that a step is told to stop at, where an input may jump.
 """
 
 from collections.abc import Callable, Sequence
-from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_int64, c_long, c_void_p
+from ctypes import CFUNCTYPE, byref, c_char_p, c_double, c_int, c_int64, c_void_p
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,6 @@ _set_linear = _of_cvode("CVodeSetLinearSolver", c_void_p, c_void_p)
 _set_longest = _of_cvode("CVodeSetMaxStep", c_double)
 _set_stop = _of_cvode("CVodeSetStopTime", c_double)
 _no_warning = _of_cvode("CVodeSetNoInactiveRootWarn")
-_no_limit = _of_cvode("CVodeSetMaxNumSteps", c_long)
 _step = _of_cvode("CVode", c_double, c_void_p, c_void_p, c_int)
 _free = _bound(libraries.sundials_cvode, "CVodeFree", [c_void_p], None)
 

@@ -83,7 +83,6 @@ class LoadedInstance(ABC):
         self._arrays: dict[int, list[Any]] = {}
         self._clock: npt.NDArray[np.float64] | None = None
         self._unread: deque[str] = deque(maxlen=KEPT)
-        self._said_before = 0  # of these, on longer parts of a step that is divided
         self._read_log()  # forgets what an earlier instance of this name said
         self._folder: ScratchFolder | None = None
         self._python = False
@@ -280,7 +279,6 @@ class LoadedInstance(ABC):
         return list(getter([variable.reference], size))
 
     def the_end(self) -> float | None:
-        self._said_before = len(self._unread)
         if not self._wants_the_end():
             return None
         reached = self.last_successful_time()
@@ -296,10 +294,9 @@ class LoadedInstance(ABC):
     def _error(self, what: str, time: float, must: str = "") -> SimulationError:
         """The error for what the FMU did, with what it said of it, and its inputs."""
         said = self._messages()
-        reason = as_reason(said[self._said_before :] or said)
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{must}{reason}"
-            f"{self._inputs}"
+            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{must}"
+            f"{as_reason(said)}{self._inputs}"
         )
         for text in said:
             error.add_note(text)

@@ -247,20 +247,15 @@ class ModelInstance(LoadedInstance):
     def _count(self, near: float) -> None:
         """Count events that come close upon each other; SimulationError where they do not end."""
         self._dense = self._dense + 1 if self._now - self._last_event <= near else 0
-        behind, self._last_event = self._next <= self._last_event, self._now
-        if self._dense >= MOST_DENSE and behind:
-            raise self._error(
-                f"names t = {self._next:.9g} s as the time of its next event, {MOST_DENSE} times "
-                "in a row",
-                self._now,
-                "; must name a later time than that of the event",
-            )
+        self._last_event = self._now
         if self._dense >= MOST_DENSE:
+            next_one = f", the next at t = {self._next:.9g} s" if self._next < math.inf else ""
             raise self._error(
                 f"chatters, or does not come to rest ({MOST_DENSE} events in a row, each within "
-                f"{DENSE:.0%} of the step after the one before)",
+                f"{DENSE:.0%} of the step after the one before{next_one})",
                 self._now,
-                f"; must have a hysteresis, or a shorter step than {self._step:g} s",
+                "; must have a hysteresis, name later times for its events, or have a shorter step "
+                f"than {self._step:g} s",
             )
 
     def _bind(self) -> None:
