@@ -148,12 +148,6 @@ def test_ramps_powers_and_their_sums_do_not_trip(parts):
     assert watch(total) is None
 
 
-@given(ten(-3.0, 13.0), ten(-4.0, -1.0), ten(-8.0, -3.0), st.booleans())
-def test_a_chirp_does_not_trip(size, start, rise, growing):
-    envelope = K / ROWS if growing else 1.0
-    assert watch(size * envelope * np.sin(start * K + rise * K**2)) is None
-
-
 @given(ten(-2.3, 0.7), ten(-4.0, 0.497), st.floats(0.0, 6.3), ten(-9.0, 3.0), st.integers(1, 2000))
 def test_what_grows_exponentially_trips_whatever_its_rate_and_frequency(
     rate, turn, phase, size, block

@@ -150,11 +150,6 @@ def test_a_step_ends_early_only_where_its_length_may_vary(tmp_path):
         assert Bound(part, 0.2).step() == OK
 
 
-def test_structural_parameters_are_set_in_configuration_mode(tmp_path):
-    with running(tmp_path, "3.0", values={"size": 7, "gain": 2.0}) as part:
-        assert part.get([variable(part, "size_out"), variable(part, "gain")]) == [7, 2.0]
-
-
 @both
 def test_without_a_binary_for_this_machine(tmp_path, version, isolation):
     whole, other = build(tmp_path, version=version), tmp_path / "other.fmu"
@@ -316,10 +311,6 @@ def test_a_step_that_no_part_of_can_be_taken_ends_the_run(tmp_path, version, iso
 def declared(name, kind="Real", causality="input", **more):
     given = {"unit": None, "start": None, "minimum": None, "maximum": None, **more}
     return Variable(name, kind, causality, 1, **given)  # type: ignore[arg-type]
-
-
-def test_an_fmu_without_inputs_names_none():
-    assert str(Inputs()) == ""
 
 
 def test_of_many_those_that_are_out_of_range_come_first():

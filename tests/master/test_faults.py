@@ -9,7 +9,6 @@ from grasp_cosim.system.faults import INITIAL
 from grasp_cosim.system.parts import Fault, Port
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 from support.marks import examples
 
 QUICK = examples(100)
@@ -117,17 +116,6 @@ def test_how_many_a_dropout_loses(share):
 def noise(seed=1, target=WIRE, n=20_000):
     function = on_connection(fault("noise", target=target, seed=seed, standard_deviation=2.0))
     return passed(function, np.zeros(n))
-
-
-def test_noise_is_gaussian_and_white():
-    """Bounds of five standard errors of the mean, the deviation and the correlations."""
-    x = noise() / 2.0
-    n = len(x)
-    assert abs(x.mean()) < 5 / math.sqrt(n)
-    assert abs(x.std() - 1) < 5 / math.sqrt(2 * n)
-    assert stats.kstest(x, "norm").pvalue > 1e-3
-    for lag in (1, 2, 3, 64):
-        assert abs((x[lag:] * x[:-lag]).mean()) < 5 / math.sqrt(n)
 
 
 def test_noise_of_another_seed_or_connection_or_beside_it_is_independent():

@@ -116,13 +116,6 @@ def test_types_that_may_be_connected_pass_their_values(tmp_path, source, target,
 
 
 @engines
-@pytest.mark.parametrize(("source", "least"), [("Int8", -(2**7)), ("Int16", -(2**15))])
-def test_a_float32_takes_every_small_integer(tmp_path, source, least, engine):
-    system = pair(tmp_path, connected(source, "Float32"), given=f"u_{source} = {least}")
-    assert simulate(system, engine=engine)["b.y_Float32"].tolist() == [least] * 11
-
-
-@engines
 @pytest.mark.parametrize(("source", "value"), [("Int64", -(2**53)), ("UInt64", 2**63)])
 def test_an_integer_that_gets_too_long_on_the_way_ends_the_run(tmp_path, source, value, engine):
     """The event acts on the step from 0.5 s on, the sixth."""

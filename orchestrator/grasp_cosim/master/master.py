@@ -6,7 +6,7 @@ The schemes, components with a longer step and time are in docs/system_files.md.
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -105,16 +105,15 @@ class Master:
             self.log += propagation.run()
         except SimulationError as error:
             raise InputError(str(error)) from error
+        values = propagation.values
         for component, instance in zip(self.system.components, self.instances, strict=True):
             instance.exit_initialization()
-            if component.integrated:
-                self._settled(instance, propagation.values)
-        kept = self._kept(propagation.values)
+            self._fetch(instance, component.integrated is not None, values)
+            if component.integrated and (ended := instance.the_end()) is not None:
+                self._end(instance, ended, 0)
         for port, slot in self.slots.items():
-            if drive := self._drives.get(port):
-                value: Value = drive.at(self.system.start_ns)
-            else:
-                value = propagation.values[port] if port in propagation.values else kept[port]
+            drive = self._drives.get(port)
+            value = drive.at(self.system.start_ns) if drive else values[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             exact(str(port), value, f"{value} at step 0")
@@ -122,23 +121,19 @@ class Master:
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
 
-    def _kept(self, values: Mapping[Port, Value]) -> dict[Port, Value]:
-        """The elements of connected arrays that have no source themselves."""
-        found: dict[Port, Value] = {}
-        rest = [port for port in self.slots if port not in values and port not in self._drives]
-        for instance in self.instances:
-            ports = [port for port in rest if port.component == instance.name]
-            variables = [instance.interface.by_name[port.variable] for port in ports]
-            found |= zip(ports, instance.get(variables) if ports else (), strict=True)
-        return found
+    def _fetch(self, instance: Instance, anew: bool, values: dict[Port, Value]) -> None:
+        """What was not passed on, such as elements of connected arrays that have no source.
 
-    def _settled(self, instance: Instance, values: dict[Port, Value]) -> None:
-        """Take the outputs of a model anew: its initialisation has ended with an event."""
-        outputs = [v for v in instance.interface.of("output") if v.supported]
-        ports = [Port(instance.name, v.name) for v in outputs]
-        values |= zip(ports, instance.get(outputs), strict=True)
-        if (ended := instance.the_end()) is not None:
-            self._end(instance, ended, 0)
+        And outputs `anew`: the initialisation of a model has ended with an event.
+        """
+        by_name, ports = instance.interface.by_name, []
+        for port in self.slots:
+            if port.component == instance.name and port not in self._drives:
+                output = by_name[port.variable].causality == "output"
+                ports += [port] if port not in values or (anew and output) else []
+        if ports:
+            found = instance.get([by_name[port.variable] for port in ports])
+            values |= zip(ports, found, strict=True)
 
     def _end(self, instance: Instance, time: float, step: int) -> None:
         """Have the run end with the row of a step, as an FMU asked for at a time in s.
