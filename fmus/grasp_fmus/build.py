@@ -314,15 +314,11 @@ def _made(make: Callable[[Path], None], name: str) -> Path:
                 LOGGER.warning(NOT_KEPT, cache.folder() or "the user's cache")
             atexit.register(stack.pop_all().close)
             _until_the_end[name] = made
-        else:
-            _forget_old(kept.parent)
-    return kept
-
-
-def _forget_old(folder: Path) -> None:
+            return made
     with suppress(OSError):  # another process does so, too
-        for old in sorted(folder.iterdir(), key=lambda f: f.stat().st_mtime)[:-MOST_KEPT]:
+        for old in sorted(kept.parent.iterdir(), key=lambda f: f.stat().st_mtime)[:-MOST_KEPT]:
             shutil.rmtree(old)
+    return kept
 
 
 def _brought(out: Path, made: Path, names: Sequence[str] = ()) -> list[Built]:
@@ -385,12 +381,9 @@ def is_twin(fmu: Path, content: str) -> bool:
 def _runs_here(archive: zipfile.ZipFile) -> bool:
     """Return True if a binary is for this machine: linux64 may hold one for another processor."""
     places = tuple(f"binaries/{name}/" for name in (here().folder, here().tuple))
-    binaries = [name for name in archive.namelist() if name.startswith(places)]
+    heads = [archive.read(name)[:20] for name in archive.namelist() if name.startswith(places)]
     with Path(sys.executable).open("rb") as python:
-        ours = _processor(python.read(20))
-    return any(_processor(archive.read(name)) == ours for name in binaries)
-
-
-def _processor(binary: bytes) -> bytes:
-    """Return the processor that an ELF file is for; of other files nothing."""
-    return binary[18:20] if binary.startswith(b"\x7fELF") else b""
+        heads.append(python.read(20))
+    # The processor that an ELF file is for, of other files nothing
+    *found, ours = (head[18:] if head.startswith(b"\x7fELF") else b"" for head in heads)
+    return ours in found

@@ -69,13 +69,6 @@ class Variable:
             raise ValueError(f"{self.name} = {value!r}: {valid}")
 
 
-DECLARATIONS: dict[Causality, type[Parameter | Input | Output]] = {
-    "parameter": Parameter,
-    "input": Input,
-    "output": Output,
-}
-
-
 class Block(Protocol):
     """The shape of a block module; it may have LONGEST_STEP, in s, too."""
 
@@ -246,7 +239,7 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
 
 
 def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
-    valid = DECLARATIONS[causality]
+    valid: type[Any] = {"parameter": Parameter, "input": Input, "output": Output}[causality]
     declared = getattr(hint, "__metadata__", (None,))[0]
     if not isinstance(declared, valid):
         raise TypeError(f'{name}: must be Annotated[type, {valid.__name__}("meaning", unit=...)]')

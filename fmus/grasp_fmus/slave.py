@@ -177,10 +177,8 @@ class Slave:
         if step_size > self._longest_step:
             raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
         step, outputs, pack, unpack = self._functions
-        params = self._read_params() if self._params is None else self._params
-        inputs = self._inputs
-        if inputs is None:
-            self._inputs = inputs = pack(self._values)
+        params = self._read_params()
+        inputs = self._inputs = self._inputs or pack(self._values)
         try:
             state = step(params, self._state, inputs, step_size)
             values = unpack(outputs(params, state, inputs))
@@ -239,7 +237,7 @@ class Slave:
     def _refresh(self) -> None:
         """Work out the outputs; before the end of initialisation the initial state as well."""
         _, outputs, pack, unpack = self._functions
-        params = self._read_params() if self._params is None else self._params
+        params = self._read_params()
         self._inputs = inputs = pack(self._values)
         if self._phase < STEPPING:
             self._state = self._block.initial_state(params, inputs)
@@ -248,7 +246,8 @@ class Slave:
         self._values[self._outputs] = values
 
     def _read_params(self) -> Any:
-        self._params = contract.build_params(self._block, self._fields, self._values)
+        if self._params is None:
+            self._params = contract.build_params(self._block, self._fields, self._values)
         return self._params
 
     # States
