@@ -4,16 +4,14 @@ from ctypes import byref, c_int
 from math import inf, nan
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
-from fmpy import simulate_fmu
-from grasp_fmus.contract import declared, longest_step, unpacker
+from grasp_fmus.contract import longest_step
 from grasp_fmus.shipped import blocks
 from hypothesis import given
 from hypothesis import strategies as st
 from support.fmi2 import OK, H, Instance, drive
 from support.kinds import all_kinds
-from support.marks import examples, skip_without_pythonfmu
+from support.marks import examples
 
 pytestmark = all_kinds
 
@@ -28,31 +26,6 @@ PARAMETERS = {
 }
 NAMES = tuple(PARAMETERS)
 PLANTS = NAMES[:3]
-
-
-@pytest.fixture(scope="module")
-def of(folder_of, kind):
-    """The folder with the FMUs of the kind that the test is run on."""
-    return folder_of(kind)
-
-
-@pytest.mark.parametrize("name", BLOCKS)
-def test_runs_in_plain_fmpy(of, name):
-    skip_without_pythonfmu()
-    result = simulate_fmu(of / f"{name}.fmu", stop_time=0.01, validate=True)
-    assert len(result) > 10
-    assert all(np.isfinite(result[column]).all() for column in result.dtype.names)
-
-
-@pytest.mark.parametrize("name", BLOCKS)
-def test_start_values_are_those_of_the_block(load, name):
-    block = BLOCKS[name]
-    with Instance(load(name)) as instance:
-        assert (instance.setup(), instance.enter()) == (OK, OK)
-        u = block.Inputs()
-        y = block.outputs(block.Params(), block.initial_state(block.Params(), u), u)
-        values = unpacker(declared(block))(y)
-        assert instance.outputs() == [value for value in values if not isinstance(value, bool)]
 
 
 def test_outputs_agree_with_inputs_in_initialisation_mode(load):
