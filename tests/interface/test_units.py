@@ -99,7 +99,7 @@ def test_the_offset_of_a_unit_does_not_apply_to_a_difference(tmp_path):
 
 @pytest.mark.parametrize("relative", ["", 'relativeQuantity="false"'])
 def test_a_difference_is_no_temperature(tmp_path, relative):
-    with pytest.raises(InputError, match=r"only one of them is a difference .* factor = "):
+    with pytest.raises(InputError, match=r"only one of them is a difference; .* factor = "):
         from_y_to_u(tmp_path, f'unit="degF" {relative}', RISE)
 
 

@@ -178,7 +178,7 @@ UNKNOWN = r"which their FMUs do not define in SI units; \{ from = .*gives the fa
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (ends("m", "N"), "a.y_Float64 is in m and b.u_Float64 in N, which cannot be converted; mu"),
+        (ends("m", "N"), "a.y_Float64 is in m and b.u_Float64 in N, which cannot be converted"),
         (ends("m", "yard"), f"{UNKNOWN}m to yard"),
         (ends("bare", "m"), f"{UNKNOWN}bare to m"),
         ({"given": "u_Binary = '00'"}, "u_Binary is of type Binary, which cannot be set; must"),

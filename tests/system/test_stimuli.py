@@ -167,5 +167,5 @@ def test_a_file_given_goes_before_the_one_that_is_named(tmp_path):
     assert list(samples_of(System.load(path), FORCE)) == [1.0]
     other = System.load(path, input=tmp_path / "other.csv")
     assert list(samples_of(other, FORCE)) == [7.0]
-    with pytest.raises(InputError, match=r"a.u_Real has no source.*--input"):
+    with pytest.raises(InputError, match=r"no source for a.u_Real.*--input"):
         other.with_input(None)

@@ -23,9 +23,9 @@ from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
 from ..system.changes import converted, replaced
 from ..system.description import System
-from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Isolation
-from ..system.structure import SCHEMES, between, output_units
-from ..system.validity import transforms
+from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Connection, Isolation
+from ..system.structure import SCHEMES, output_units
+from ..system.validity import connection_transform, transforms
 from .bands import SHARE, Bands, Compared, plain
 from .compare import FEWEST_STEPS, Comparison, judge
 from .interface_difference import (
@@ -287,7 +287,7 @@ def component_of(found: System, name: str, system: System) -> Component:
         if same and (same.factor, same.offset) != (None, None):
             factor, offset = same.factor or 1.0, same.offset or 0.0
         else:
-            factor, offset = between(found, place, c.source, c.target)
+            factor, offset = connection_transform(found, Connection(c.source, c.target))
         own = passed[c.target]
         if not (isclose(own[0], factor) and isclose(own[1], offset)):
             raise InputError(

@@ -187,9 +187,7 @@ def _lost(before: Interface, after: Interface, name: str, value: bool) -> str:
     if was.unit and now.unit is None and now.kind == "Real" and (unit is None or not unit.si):
         return f"has no unit in {after.path.name}, but is set in {was.unit}; must be named in units"
     if change is None:
-        return (
-            f"is in {now.unit}, which its value in {was.unit} cannot be converted to; set it anew"
-        )
+        return f"is in {now.unit}, which {was.unit} cannot be converted to; must be set anew"
     if change != IDENTITY and not value:
         return (
             f"is in {now.unit}, but an event, a fault or the factor of a connection, or an input "

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Any
 
 from ..base.errors import InputError, choices
 from ..base.files import NATIVE_FOLDER
@@ -28,17 +29,23 @@ def natives(system: Structure, native: bool | None) -> dict[str, Path | None]:
         if needy := next((c for c in system.components if c.needs_native), None):
             raise InputError(f"{needy.name}: {_lacking(needy)}; its native twin must run")
         return {c.name: None for c in system.components}
-    found, failure = _twins([c for c in system.components if not c.native])
+    asked = [c for c in system.components if not c.native]
+    found, failure = _twins(asked)
     if native and failure:
         raise InputError(f"native FMUs cannot be built: {failure}")
-    without = [c for c in system.components if not c.native and c.name not in found]
-    left = {c.name: _why(c) for c in without if c.interface.python}
+    left, odd = [], bool(native)
+    for c in asked:
+        if c.interface.python and c.name not in found:
+            users = next((path for path in _users_twins(c) if path.is_file()), None)
+            odd, why = odd or bool(users), f"{c.fmu.name} has no native twin"
+            if users:
+                why = f"{users} is not the twin of this {c.fmu.name}, or not for this machine"
+            left.append(f"{c.name} ({why})")
     if failure:
         LOGGER.warning("FMUs run in Python, which takes longer: %s", failure)
     elif left:
-        odd = native or any(p.is_file() for c in without for p in _users_twins(c))
-        but = choices((f"{name} ({why})" for name, why in left.items()), FEW)
-        LOGGER.log(logging.WARNING if odd else logging.INFO, "no native FMU runs as %s", but)
+        level = logging.WARNING if odd else logging.INFO
+        LOGGER.log(level, "no native FMU runs as %s", choices(left, FEW))
     return {**found}
 
 
@@ -70,44 +77,32 @@ def _twins(components: list[Component]) -> tuple[dict[str, Path], str]:
     ours = [c for c in components if _is_ours(c)]
     if not ours:
         return {}, ""
-    from grasp_fmus.build import NoTwinsError, shipped_twins
+    from grasp_fmus.build import NoTwinsError, is_twin, shipped_twins
     from grasp_fmus.shipped import together
 
-    folders, failure = {}, ""
-    shipped = {c.name: names for c in ours if (names := together(c.interface.identifier))}
-    for names in dict.fromkeys(shipped.values()):
-        try:
-            folders[names] = shipped_twins(names)
-            LOGGER.info("native FMUs: %s", folders[names])
-        except NoTwinsError as error:
-            failure = str(error)
-    built = {name: folders.get(names) for name, names in shipped.items()}
-    found = {c.name: twin for c in ours if (twin := _twin(c, built.get(c.name)))}
-    missing = [c for c in ours if c.name in shipped and c.name not in found]
-    for component in missing:
-        if failure and component.needs_native:
-            raise InputError(f"{component.name}: {_lacking(component)}; {failure}")
-    return found, failure if missing else ""
+    folders: dict[Any, Path | None] = {None: None}
+    found, failure, why = dict[str, Path](), "", ""
+    for c in ours:
+        names, file = together(c.interface.identifier), f"{c.interface.identifier}.fmu"
+        if names not in folders:
+            try:
+                folders[names] = shipped_twins(names)
+                LOGGER.info("native FMUs: %s", folders[names])
+            except NoTwinsError as error:
+                folders[names], failure = None, str(error)
+        folder = folders[names]
+        places = [folder / file, *_users_twins(c)] if folder else _users_twins(c)
+        twin = next((path for path in places if is_twin(path, c.interface.guid)), None)
+        if twin:
+            found[c.name] = twin
+        elif names and not folder:
+            why = failure
+            if c.needs_native:
+                raise InputError(f"{c.name}: {_lacking(c)}; {failure}")
+    return found, why
 
 
 def _is_ours(component: Component) -> bool:
     """True for an FMU that runs a block of ours in Python."""
     made = component.interface
     return made.python and (made.tool or "").startswith("grasp-cosim ")
-
-
-def _twin(component: Component, shipped: Path | None) -> Path | None:
-    """The native FMU of the same content as the component's, of those built and of the user's."""
-    from grasp_fmus.build import is_twin
-
-    built = [shipped / f"{component.interface.identifier}.fmu"] if shipped else []
-    places = (*built, *_users_twins(component))
-    return next((p for p in places if is_twin(p, component.interface.guid)), None)
-
-
-def _why(component: Component) -> str:
-    there = [p for p in _users_twins(component) if p.is_file()]
-    name = component.fmu.name
-    if there:
-        return f"{there[0]} is not the twin of this {name}, or not for this machine"
-    return f"{name} has no native twin"

@@ -184,24 +184,14 @@ def _settable(system: Structure) -> list[Port]:
 def check_setting(system: Structure, port: Port, value: Value, place: str) -> None:
     """InputError where the value cannot be set at the port during a run."""
     interface = system.component(port.component, place).interface
-    for connection in system.connections:
-        if connection.target == port:
-            raise InputError(
-                f"{place}: has a connection, from {connection.source}; put a fault of kind 'stuck' "
-                "on it, with a value"
-            )
-    if system.input and port in driven(system):
-        raise InputError(f"{place}: has a column in {system.input.file}; must have one source")
     settable = _settable(system)
     if port not in settable:
-        variable = interface.by_name.get(port.variable)
-        found = f"is a {variable.variability} {variable.causality}" if variable else "not there"
+        v = interface.by_name.get(port.variable)
+        found = f"is a {v.variability} {v.causality}" if v else "not there"
         own = [p for p in settable if p.component == port.component]
-        if port.variable in interface.arrays:
-            found, names = "is an array", interface.arrays[port.variable].names
-            own = [p for p in own if p.variable in names]
         raise InputError(
-            f"{place}: {found}; must be a tunable parameter or an input without a connection; "
+            f"{place}: {found}; must be a tunable parameter, or an input without a column or a "
+            "connection, on which a fault of kind 'stuck' puts a value; "
             f"{nearest(port, own or settable, interface.listing)}"
         )
     values_of(interface, place, port.variable, value)

@@ -13,7 +13,7 @@ from si_units import Unit
 from ..base.checks import choice
 from ..base.errors import InputError
 from ..interface.interface import Given, Interface, Variable
-from ..interface.units import IDENTITY, Conversion, conversion
+from ..interface.units import IDENTITY, Conversion
 from .parts import (
     LONGEST,
     Component,
@@ -147,25 +147,6 @@ def unit_of(interface: Interface, variable: Variable) -> Unit | None:
     """The unit that a variable has, without its offset where that is a difference."""
     unit = interface.unit(variable)
     return unit.without_offset if unit and variable.relative else unit
-
-
-def between(system: Structure, place: str, source: Port, target: Port) -> Conversion:
-    """The conversion of a number for one variable into that for another, in the units they have.
-
-    Without a unit, it is taken as the other one. InputError where there is no way.
-    """
-    ends = [system.component(p.component, place).interface for p in (source, target)]
-    start, end = (i.by_name[p.variable] for i, p in zip(ends, (source, target), strict=True))
-    units = unit_of(ends[0], start), unit_of(ends[1], end)
-    if start.unit is None or end.unit is None or (start.unit == end.unit and None in units):
-        return IDENTITY
-    found = conversion(units[0], units[1]) if units[0] and units[1] else None
-    if found is None:
-        raise InputError(
-            f"{place}: {source} is in {start.unit} and {target} in {end.unit}, which cannot be "
-            "converted; must be of one quantity"
-        )
-    return found
 
 
 def parameter_in_si(system: Structure, place: str, port: Port) -> Conversion:

@@ -120,12 +120,10 @@ def check_connections(system: Structure) -> None:
         outputs = [
             Port(c.name, v.name) for c in system.components for v in c.interface.of("output")
         ]
-        plural = len(missing) > 1
         raise InputError(
-            f"{system.name}: input{'s' * plural} {choices(missing)} {'have' if plural else 'has'} "
-            f"no source; connect one of {choices(outputs)} to {'each' if plural else 'it'}, or "
-            f"give it a value in the system file, or --set {missing[0]}=VALUE where another FMU "
-            "brings it; or drive it with --input"
+            f"{system.name}: no source for {choices(missing)}; must have a connection from one of "
+            f"{choices(outputs)}, or a value in the system file, or --set {missing[0]}=VALUE where "
+            "another FMU brings it; or drive it with --input"
         )
 
 
@@ -177,16 +175,13 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
         for port, variable in ((connection.source, source), (connection.target, target))
     ]
     found = conversion(units[0], units[1]) if units[0] and units[1] else None
-    if None in units:
-        why = "which their FMUs do not define in SI units;"
-    elif found is None:
-        why = "which cannot be converted; must be the same quantity, or"
-    elif found.offset and source.relative != target.relative:
-        why = "and only one of them is a difference (relativeQuantity); must be both, or"
-    else:
+    if found and (source.relative == target.relative or not found.offset):
         return found.factor, 0.0 if target.relative else found.offset
+    why = "which cannot be converted" if found is None else "and only one of them is a difference"
+    if None in units:
+        why = "which their FMUs do not define in SI units"
     raise InputError(
-        f"{place}: {connection.source} is in {given} and {connection.target} in {taken}, {why} "
+        f"{place}: {connection.source} is in {given} and {connection.target} in {taken}, {why}; "
         f'{{ from = "{connection.source}", to = "{connection.target}", factor = ... }} '
         f"gives the factor from {given} to {taken}, and a component's units correct a wrong one"
     )
