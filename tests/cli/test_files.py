@@ -30,12 +30,16 @@ EACH = pytest.mark.parametrize(
 )
 
 
+def record(grasp, folder, stop=0.01):
+    folder.mkdir()
+    result = simulate(grasp, step=1e-3, stop=stop)
+    result.to_json(folder / "run.json")
+    result.to_csv(folder / "signals.csv")
+
+
 @pytest.fixture
 def here(grasp, fmus, tmp_path):
-    result = simulate(grasp, step=1e-3, stop=0.01)
-    (tmp_path / "run").mkdir()
-    result.to_json(tmp_path / "run" / "run.json")
-    result.to_csv(tmp_path / "run" / "signals.csv")
+    record(grasp, tmp_path / "run")
     (tmp_path / "GripperPlant.fmu").write_bytes((fmus / "GripperPlant.fmu").read_bytes())
     return tmp_path
 
@@ -55,30 +59,19 @@ def test_a_pipe_has_its_reader_get_it(name, command, here):
 
 
 @EACH
-def test_a_link_stays(name, command, here):
+def test_a_link_stays_and_a_folder_is_refused(name, command, here):
     (here / "other").mkdir()
     (here / name).symlink_to(Path("other") / f"own_{name}")
     code, _, err = command(*WRITERS[name], name)
     assert code == 0, err
     assert (here / name).is_symlink()
     assert (here / "other" / f"own_{name}").stat().st_size > 100
-
-
-@EACH
-def test_a_folder_is_refused(name, command, here):
+    (here / name).unlink()
     (here / name).mkdir()
     code, out, err = command(*WRITERS[name], name)
     assert (code, out) == (2, ""), err
     assert f"{name}: is a folder; must be" in err.splitlines()[-1]
     assert list((here / name).iterdir()) == []
-
-
-def test_fmus_are_built_through_links(command, here):
-    (here / "out").mkdir()
-    (here / "out" / "GripperPlant.fmu").symlink_to(Path("..") / "mine.fmu")
-    assert command("build", "--out", "out")[0] == 0
-    assert (here / "out" / "GripperPlant.fmu").is_symlink()
-    assert (here / "mine.fmu").read_bytes() == (here / "GripperPlant.fmu").read_bytes()
 
 
 def test_a_run_is_not_written_in_the_place_of_a_file(command, here):
@@ -151,10 +144,7 @@ def things(grasp, fmus, tmp_path):
     (tmp_path / "drive.csv").write_text("time,plant.u\n")
     (tmp_path / "OspSystemStructure.xml").write_text("<OspSystemStructure/>\n")
     (tmp_path / "b.py").write_text("import json\n")
-    result = simulate(grasp, step=1e-3, stop=0.002)
-    (tmp_path / "run").mkdir()
-    result.to_json(tmp_path / "run" / "run.json")
-    result.to_csv(tmp_path / "run" / "signals.csv")
+    record(grasp, tmp_path / "run", 0.002)
 
 
 @pytest.mark.usefixtures("things")
@@ -211,6 +201,7 @@ def test_a_line_of_toml_is_named(text, said, command, tmp_path):
 # Modules in the current folder, which may be that of a stranger, are not run.
 
 MARK = "imported.txt"
+BLOCK_FILE = Path(__file__).parents[2] / "docs/spring_plant.py"
 
 
 def poison(folder, names):
@@ -263,17 +254,11 @@ def installed(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_component_in_a_process(installed, everything, system):
-    text = system.read_text("utf-8")
-    system.write_text(text.replace("[components.plant]", '[components.plant]\nisolation="process"'))
-    not_imported(everything, installed, "run", str(system), "--stop", "0.001")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "line",
     [
         "run {SYSTEM} --stop 0.001",
+        "run {SYSTEM} --stop 0.001 --set components.plant.isolation=process",
         "qualify {FMUS}/GripperPlant.fmu --as plant --system {SYSTEM} --stop 0.001",
         "inspect {FMUS}/GripperPlant.fmu --load",
         "inspect {FMUS}/GripperPlant.fmu",
@@ -284,18 +269,13 @@ def test_a_component_in_a_process(installed, everything, system):
     ],
 )
 def test_a_command(line, installed, everything, system, fmus, tmp_path):
-    block = Path(__file__).parents[2] / "docs" / "spring_plant.py"
-    places = {
-        "SYSTEM": system, "FMUS": fmus, "BLOCK": block,
-        "OUT": tmp_path / "out",
-    }  # fmt: skip
+    places = {"SYSTEM": system, "FMUS": fmus, "BLOCK": BLOCK_FILE, "OUT": tmp_path / "out"}
     not_imported(everything, installed, *(word.format(**places) for word in line.split()))
 
 
 @pytest.mark.slow
 def test_python_m_imports_what_it_needs_to_find_us_alone(tmp_path, system):
-    text = system.read_text("utf-8")
-    system.write_text(text.replace("[components.plant]", '[components.plant]\nisolation="process"'))
     names = {"numpy", "socket", "click", "fmpy", "lxml", "ctypes", "tomllib", "multiprocessing"}
-    folder = poison(tmp_path / "strange", names)
-    not_imported(folder, ["-m", "grasp_cosim"], "run", str(system), "--stop", "0.001")
+    folder, here = poison(tmp_path / "strange", names), ("-m", "grasp_cosim")
+    isolated = ("--set", "components.plant.isolation=process")
+    not_imported(folder, here, "run", str(system), "--stop", "0.001", *isolated)

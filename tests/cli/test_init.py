@@ -93,21 +93,6 @@ def test_a_foreign_plant(fmus_here, tmp_path):
     assert component.interface.by_name["velocity[2]"].unit == "mm/s"
 
 
-def test_the_unit_of_what_is_not_found_is_to_do_where_none_is_declared(fmus_here, tmp_path):
-    """Kraft and Weg, which could be anything, say so; of what declares its unit it is known."""
-    force = {f"Kraft[{j}]": 'causality="input" | Real start="0" unit="N"' for j in (1, 2)}
-    way = {f"Weg[{j}]": 'causality="output" | Real' for j in range(1, 7)}
-    write_fmu(tmp_path / "vendor.fmu", {**force, **way}, {})
-    assert fmus_here("init", "a.toml", "--as", "plant=vendor.fmu")[0] == 0
-    text = (tmp_path / "a.toml").read_text("utf-8")
-    units = text.partition("[components.plant.units]")[2].partition("\n\n")[0]
-    assert re.findall(r'^"(\w+\[\d\])" = "TODO: its unit, like (.*?);', units, re.MULTILINE) == [
-        (f"{name}[{j}]", unit)
-        for name, unit in (("position", "m"), ("velocity", "m/s"), ("gap", "m"))
-        for j in (1, 2)
-    ]
-
-
 def test_values_and_presets_are_in_the_units_of_the_fmu(fmus_here, tmp_path):
     parameter = 'causality="parameter" variability="fixed" | Real start="0"'
     more = {"obj_width": f'{parameter} unit="mm"'}

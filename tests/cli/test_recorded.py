@@ -4,7 +4,6 @@ import json
 import sys
 
 import pytest
-from grasp_cosim import simulate
 from grasp_cosim.recording.folder import load_run
 from grasp_cosim.report.page import page_html
 from report.runs import grasp_run, write_run
@@ -63,16 +62,6 @@ def test_a_folder_that_is_no_run_is_one_line(name, text, message, runs, tmp_path
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
     assert not (tmp_path / "a/report.html").exists()
-
-
-def test_a_run_as_it_is_recorded_makes_a_page(grasp, command, tmp_path):
-    result = simulate(grasp, stop=0.05)
-    result.to_csv(tmp_path / "signals.csv")
-    result.to_json(tmp_path / "run.json")
-    assert command("report", ".")[0] == 0
-    html = (tmp_path / "report.html").read_text("utf-8")
-    assert all(f"{c.name}</text>" in html for c in grasp.components)
-    assert all(f"{w.source} → {w.target}" in html for w in grasp.connections)
 
 
 def test_what_differs_is_exit_code_1(runs, tmp_path):

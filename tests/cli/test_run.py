@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, load_run, simulate
-from grasp_cosim.ssp.to_archive import write_ssp
+from grasp_cosim import load_run, simulate
 from support.grasps import CASES
 from support.marks import slow
 from support.native_fmus import TYPES, build, needs_gcc
@@ -95,8 +94,6 @@ def sensor_toml(tmp_path, fmus):
     ("arguments", "pictures"),
     [
         (["--step", "1e-3", "--stop", "0.02"], ["grasp.png"]),
-        slow(["--step", "1e-3", "--stop", "0.02", "--realtime"], ["grasp.png", "timing.png"]),
-        (["sensor.toml"], ["signals.png"]),
         slow(["sensor.toml", "--realtime"], ["signals.png", "timing.png"]),
     ],
 )
@@ -108,14 +105,6 @@ def test_what_there_is_to_draw_is_drawn(arguments, pictures, command, tmp_path):
     for name in pictures:
         assert (tmp_path / "results" / name).read_bytes().startswith(PNG)
         assert f"drew results/{name}\n" in err
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("sensor_toml")
-def test_pictures_go_to_the_current_folder_without_out(command, tmp_path):
-    assert command("run", "sensor.toml", "--realtime", "--plot")[0] == 0
-    found = sorted(path.name for path in tmp_path.iterdir())
-    assert found == ["sensor.toml", "signals.png", "timing.png"]
 
 
 @pytest.mark.usefixtures("sensor_toml")
@@ -227,15 +216,6 @@ def test_columns_that_fit_no_input(command, tmp_path, columns, more, said):
     code, out, err = command("run", "driven.toml", *more)
     assert (code, out) == (2, "")
     assert said in err.splitlines()[-1]
-
-
-@needs_gcc
-def test_an_archive_whose_input_would_keep_its_start_value(command, tmp_path):
-    system = System.load(driven(tmp_path, TEXT, more='[input]\nfile = "drive.csv"\n'))
-    write_ssp(system, tmp_path / "a.ssp")
-    assert last(command, "a.ssp")[0] == pytest.approx(9.0)
-    Path("drive.csv").write_text("time,a.u_Real\n0,5\n", "utf-8")
-    assert last(command, "a.ssp", "--input", "drive.csv")[0] == 5.0
 
 
 # ------------------------------------------------------------------ remarks

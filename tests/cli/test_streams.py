@@ -28,11 +28,7 @@ def shell(line, **more):
         ("$C --version >&-", 3, "standard output: Bad file descriptor"),
         ("$C --version >&- <&-", 3, "standard output: Bad file descriptor"),
         ("$C --version > /dev/full", 3, "standard output: No space left on device"),
-        (
-            "(sleep 1; $C --help) | :; exit ${PIPESTATUS[0]}",
-            3,
-            "standard output: Broken pi",
-        ),
+        ("(sleep 1; $C --help) | :; exit ${PIPESTATUS[0]}", 3, "standard output: Broken pi"),
         ("$C inspect nothing.fmu 2>&-", 2, ""),
         ("$C inspect nothing.fmu 2> /dev/full", 2, ""),
         ("$C inspect nothing.fmu <&- >&- 2>&-", 2, ""),

@@ -9,14 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import simulate
-from grasp_cosim.comparison.bands import read_bands
 from grasp_cosim.grasp.identification import identification
 from grasp_cosim.grasp.identification.fit import Estimate, Fit
 from grasp_cosim.grasp.presets import SYSTEM
 from support.native_fmus import needs_gcc
 from support.native_systems import write_integrator
 
-BEFORE = "high=1e3, tunable=True)\n    ] = (0.5, 0.5)"
 STEP = ("--set", "experiment.step=1e-3")
 HERE = ("--stop", "0.05", *STEP, "--set", "components.plant.isolation=none", "--python")
 
@@ -54,24 +52,6 @@ def test_a_system_file_has_the_candidate_with_its_names_and_values(command, fmus
     path.write_text(text.replace("components.plant", "components.gripper"), "utf-8")
     code, _, err = command("qualify", path, "--as", "plant", *HERE)
     assert (code, err.count("\n")) == (2, 1)
-
-
-@pytest.mark.slow
-def test_what_is_found_is_on_the_page_and_its_bands_can_be_used(command, altered):
-    heavy = altered(
-        "GripperPlant", "gripper_plant/fingers.py", BEFORE, BEFORE.replace("0.5)", "0.6)")
-    )
-    page = ("-o", "page.html", "--json")
-    code, out, err = command("qualify", heavy, "--as", "plant", *HERE, *page)
-    report = json.loads(out)
-    assert (code, report["qualified"], err) == (1, False, "wrote page.html\n")
-    html = Path("page.html").read_text("utf-8")
-    for text in ("NOT QUALIFIED", "finger_mass[2]: starts with 0.6 kg", "plant.position[2]"):
-        assert text in html
-    Path("used.json").write_text(out)
-    bands = read_bands(Path("used.json"))
-    assert set(bands.signals) == {s["name"] for s in report["signals"]}
-    assert set(bands.metrics) == {m["name"] for m in report["metrics"]}
 
 
 def test_a_candidate_that_does_not_fit_is_not_run_nor_drawn(command, fmus):
