@@ -232,15 +232,3 @@ def test_it_dies_out_with_the_slowest_root(natives, x_m, before):
         z = np.log(np.abs(rest(result)[[at - 20, at + 20]]))
         d = float(np.mean(distances(result)[:, at]))
         assert (z[0] - z[1]) / 0.04 == pytest.approx(slowest(d), rel=rel)
-
-
-@pytest.mark.parametrize("x_m", CENTRES)
-def test_the_contacts_are_apart_by_the_rest_over_the_speed(natives, x_m):
-    """At the first contact the other finger has still 2·z·d to go."""
-    for result in grasps(natives, x_m):
-        t_1, t_2 = result.metrics["time_to_contact"]
-        at = round(min(t_1, t_2) * 1e3)
-        gap = 2.0 * abs(float(rest(result)[at])) * float(np.mean(distances(result)[:, at]))
-        later = 0 if t_1 > t_2 else 1
-        speed = result.metrics["impact_velocity"][later]
-        assert apart(result) == pytest.approx(gap / speed, rel=0.1)

@@ -6,11 +6,10 @@ import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from grasp_cosim import InputError, grasp_system
+from grasp_cosim import grasp_system
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
 from grasp_cosim.grasp.system import CONTROLLERS, with_controller
 from grasp_fmus import build as builds
@@ -120,24 +119,9 @@ def test_one_that_is_not_beside_the_other_is_that_of_the_cache(grasp, tmp_path):
     assert mine.component("controller", "test").fmu == tmp_path / ADAPTIVE
 
 
-def test_a_system_without_a_controller_is_one_line(grasp):
-    plant = replace(grasp.components[0], values={"force[1]": 0.0, "force[2]": 0.0})
-    bare = replace(grasp, components=(plant,), connections=())
-    with pytest.raises(InputError, match=r"^controller adaptive: grasp.toml has no component 'con"):
-        with_controller(bare, "adaptive")
-
-
 def test_run_goes_by_the_role_and_says_which_it_was(command, brain, tmp_path):
     arguments = ("--controller", "adaptive", "--case", "1", "--stop", "0.01", "--step", "1e-3")
     assert command("run", brain, *arguments, "--out", "out")[0] == 0
     made = json.loads((tmp_path / "out/run.json").read_text("utf-8"))["components"]
     assert made["brain"]["fmu"] == ADAPTIVE
     assert made["brain"]["values"]["simultaneous_contact.enabled"] is False
-
-
-def test_one_controller_is_not_replaced_twice(command):
-    code, _, err = command("run", "--controller", "adaptive", "--swap", "controller=mine.fmu")
-    assert (code, err.splitlines()) == (
-        2,
-        ["grasp-cosim: controller adaptive: cannot be used with another FMU for controller"],
-    )

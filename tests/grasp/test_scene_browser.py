@@ -35,7 +35,7 @@ for (const t of %s) {
 return seen;
 """
 
-BLUE, RED, DARK_BLUE = "31,95,168", "192,57,43", "107,165,231"
+BLUE, RED = "31,95,168", "192,57,43"
 
 
 @pytest.fixture(scope="module")
@@ -52,26 +52,6 @@ def test_the_traces_of_a_grasp_are_drawn_in_the_colours_of_the_fingers(html, tmp
         assert panel["colors"][RED] > 100
     gap = panels[0]
     assert (gap["low"], gap["high"]) == pytest.approx((0.0, 0.11 + CENTRE - WIDTH / 2), abs=1e-6)
-
-
-def test_a_zoom_can_be_linked(html, tmp_path):
-    """The panels then fit what is in view, between the neighbours of its first and last row."""
-    panels = in_browser(
-        html, CANVASES + "return panels();", tmp_path, "t=0.9,1.1&show=plant.gap%5B1%5D"
-    )
-    (gap,) = panels
-    speed = (0.11 - CENTRE - WIDTH / 2) / TOUCH[1]
-    assert gap["title"] == "gap in mm"
-    assert gap["low"] == pytest.approx(0.0, abs=1e-12)
-    assert gap["high"] == pytest.approx(0.1 * speed, abs=1.1e-3 * speed)
-    assert gap["colors"][BLUE] > 100
-    assert RED not in gap["colors"]
-
-
-def test_dark_colours(html, tmp_path):
-    panels = in_browser(html, CANVASES + "return panels();", tmp_path, dark=True)
-    assert panels[0]["colors"][DARK_BLUE] > 100
-    assert BLUE not in panels[0]["colors"]
 
 
 def test_the_animation_shows_fingers_and_object_where_they_are(html, tmp_path):

@@ -152,19 +152,6 @@ def test_processes_give_the_same_fit(grasp):
     assert parallel.estimates[0].remark == "the data do not determine it"  # without friction
 
 
-def test_the_scatter_is_that_of_equal_grasps():
-    """Two settings were repeated: three times with a variance of 0.04, twice with 0.02."""
-    white, brown, mixed = Setting(0.03), Setting(0.03, 0.86, 0.86), Setting(0.03, 0.86, 1.0)
-    contacts = [
-        *(Contact("", s, 1, 1, t) for s, t in ((white, 1.0), (brown, 1.2), (white, 1.4))),
-        *(Contact("", white, 1, 2, t) for t in (2.0, 2.2)),
-        Contact("", white, 2, 1, 5.0),
-        Contact("", mixed, 1, 1, 9.0),
-    ]
-    assert scatter(contacts) == pytest.approx(math.sqrt((2 * 0.04 + 0.02) / 3))
-    assert scatter(contacts[-2:]) is None
-
-
 def test_the_published_experiments_scatter():
     """Of the five equal colours, from the paper's table by hand: 0.036, 0.196, 0.140, 0.150 s."""
     by_hand = math.sqrt((0.036**2 + 0.196**2 + 0.140**2 + 0.150**2) / 4)

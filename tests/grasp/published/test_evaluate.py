@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
-from grasp_cosim.grasp.published import compared as module
 from grasp_cosim.grasp.published import evaluation
 from grasp_cosim.grasp.published.compared import LOOK, close, compared
 from grasp_cosim.grasp.published.evaluation import as_report
@@ -168,16 +167,6 @@ def test_the_page_has_the_published_figures_beside_ours(
     assert cells[::3] == published
     for shown, simulated, difference in zip(cells[::3], cells[1::3], cells[2::3], strict=True):
         assert float(simulated) == pytest.approx(float(shown) + float(difference), abs=2e-3)
-
-
-def test_ctrl_c_is_130_and_nothing_is_written(command, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(module, "run_all", interrupted)
-    code, out, err = command("evaluate")
-    assert (code, out, err.split()) == (130, "", ["grasp-cosim:", "interrupted"])
-    assert not list(Path().rglob("evaluation*"))
 
 
 @pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
