@@ -156,7 +156,11 @@ FLAWS = [
     ('min="1"', 'min="x"', "variable 'y': min = 'x': must be a number"),
     ('max="2"', 'max="1_0"', "variable 'y': max = '1_0': must be a number"),
     ('m="1"', 'm="0.5"', "unit 'mm': m = '0.5': must be a whole number"),
-    ('"0.001"', '"inf"', "unit 'mm': factor = inf, offset = 0"),
+    (
+        '"0.001"',
+        '"inf"',
+        "unit 'mm': factor = inf, offset = 0: must be finite, and the factor other than 0",
+    ),
     ('value="1"', 'value="I"', "type 'Mode': item 'open' = 'I': must be a whole number"),
     ('stepSize="0.01"', 'stepSize="1ms"', "DefaultExperiment: stepSize = '1ms': must be a number"),
 ]

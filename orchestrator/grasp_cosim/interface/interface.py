@@ -358,52 +358,48 @@ class Interface:
         return f"{self.path.name}{several}"
 
     def _renamed(self, rename: Mapping[str, str], place: str) -> "Interface":
-        arrays = self.arrays
-        whole = {own: new for new, own in rename.items() if own in arrays}
-        rename = {
-            name: element
-            for new, own in rename.items()
-            for name, element in (
-                zip(element_names(new, arrays[own].shape), arrays[own].names, strict=True)
-                if own in arrays
-                else [(new, own)]
-            )
-        }
         names: dict[str, str] = {}
+        arrays: dict[str, str] = {}
         for new, own in rename.items():
-            entry = f"{place}: {new!r} = {own!r}"
-            known(f"{entry}: {self.short} has no variable", own, self.by_name, see=self.listing)
-            if own in names:
-                raise InputError(
-                    f"{entry}: {own!r} is renamed to {names[own]!r} already; must have one name"
-                )
-            names[own] = new
-        for new, own in rename.items():
+            entry, pairs = f"{place}: {new!r} = {own!r}", {own: new}
+            if array := self.arrays.get(own):
+                arrays[own] = new
+                pairs = dict(zip(array.names, element_names(new, array.shape), strict=True))
+            for one, name in pairs.items():
+                known(f"{entry}: {self.short} has no variable", one, self.by_name, see=self.listing)
+                if one in names:
+                    raise InputError(
+                        f"{entry}: {one!r} is renamed to {names[one]!r} already; must have one name"
+                    )
+                names[one] = name
+        for own, new in names.items():
             if new in self.by_name and new not in names:
                 raise InputError(
                     f"{place}: {new!r} = {own!r}: {self.path.name} has a variable {new!r} itself; "
                     "must be a name that is free, or rename that one, too"
                 )
 
-        def new_names(listed: tuple[str, ...] | None) -> tuple[str, ...] | None:
-            return None if listed is None else tuple(names.get(name, name) for name in listed)
+        def listed(own: tuple[str, ...] | None) -> tuple[str, ...] | None:
+            return None if own is None else tuple(names.get(name, name) for name in own)
 
-        variables = (
-            replace(
+        variables = []
+        for v in self.variables:
+            element = v.element
+            if element and element.array in arrays:
+                element = replace(element, array=arrays[element.array])
+            renamed = replace(
                 v,
                 name=names.get(v.name, v.name),
-                dependencies=new_names(v.dependencies),
-                initial_dependencies=new_names(v.initial_dependencies),
-                element=v.element
-                and replace(v.element, array=whole.get(v.element.array, v.element.array)),
+                dependencies=listed(v.dependencies),
+                initial_dependencies=listed(v.initial_dependencies),
+                element=element,
             )
-            for v in self.variables
-        )
-        arrays = {
-            whole.get(name, name): Array(a.shape, tuple(names.get(n, n) for n in a.names))
+            variables.append(renamed)
+        taken_apart = {
+            arrays.get(name, name): Array(a.shape, tuple(names.get(n, n) for n in a.names))
             for name, a in self.arrays.items()
         }
-        return replace(self, variables=tuple(variables), arrays=arrays)
+        return replace(self, variables=tuple(variables), arrays=taken_apart)
 
     def in_units(self, units: Mapping[str, str], place: str = "units") -> "Interface":
         """The same with other units: `units` maps a variable to the name of its unit.

@@ -206,7 +206,7 @@ class _Reader:
             name, base = _printable("unit", element.get("name", "")), element.find("BaseUnit")
             if base is not None:
                 with self.tolerated():
-                    unit, known = _unit(name, base), known_unit(name)
+                    unit, known = base_unit(name, base.attrib), known_unit(name)
                     empty = unit.si and not any(unit.exponents)
                     if not (empty and known and not known.measures(unit)):
                         found[name] = unit
@@ -368,13 +368,15 @@ class _Reader:
         return _whole(place, text, 2**64 - 1), name
 
 
-def _unit(name: str, base: Element) -> Unit:
+def base_unit(name: str, base: Mapping[str, str]) -> Unit:
+    """The unit of the attributes of a BaseUnit of FMI or SSP; ValueError where it is none."""
     place = f"unit {name!r}"
     exponents = tuple(_whole(f"{place}: {key}", base.get(key, "0")) for key in BASE)
     factor = _real(f"{place}: factor", base.get("factor", "1"))
     offset = _real(f"{place}: offset", base.get("offset", "0"))
     if not factor or not math.isfinite(factor) or not math.isfinite(offset):
-        raise ValueError(f"{place}: factor = {factor:g}, offset = {offset:g}")
+        said = f"{place}: factor = {factor:g}, offset = {offset:g}"
+        raise ValueError(f"{said}: must be finite, and the factor other than 0")
     return Unit(name, exponents, factor, offset)
 
 

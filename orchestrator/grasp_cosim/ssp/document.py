@@ -6,7 +6,6 @@ signatures are left out. Arrays, clocks and the new kinds of connectors that are
 refused by name. After: the schemas of SSP 2.0 (2024-12-20), compared with those of 1.0.
 """
 
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -21,6 +20,7 @@ from si_units import BASE, Unit, known_unit
 from ..base.checks import known
 from ..base.errors import InputError
 from ..fmi import fmpy
+from ..interface.read import base_unit
 from ..interface.units import conversion
 from .archive import STRUCTURE, Archive, Notes
 
@@ -240,8 +240,14 @@ def _schema(form: str) -> Any:
 
 def read_units(file: str, parent: Any, prefix: str) -> Mapping[str, Unit]:
     """The units below an element of the format with that prefix; file is for error messages."""
-    entries = children(parent, f"{prefix}:Units", "ssc:Unit")
-    return {entry.get("name"): _unit(file, entry) for entry in entries}
+    units = {}
+    for base in children(parent, f"{prefix}:Units", "ssc:Unit", "ssc:BaseUnit"):
+        name = base.getparent().get("name")
+        try:
+            units[name] = base_unit(name, base.attrib)
+        except ValueError as error:
+            raise InputError(f"{at(file, base)}: {error}") from error
+    return units
 
 
 def write_units(parent: Any, prefix: str, units: Iterable[Unit]) -> None:
@@ -277,18 +283,6 @@ def change(place: str, source: Unit, target: Unit) -> tuple[float, float]:
             "units must be of the same quantity, or suppressUnitConversion set"
         )
     return found
-
-
-def _unit(file: str, element: Any) -> Unit:
-    base = child(element, "ssc:BaseUnit")
-    factor, offset = float(base.get("factor", "1")), float(base.get("offset", "0"))
-    if not factor or not math.isfinite(factor) or not math.isfinite(offset):
-        raise InputError(
-            f"{at(file, base)}: unit {element.get('name')!r}: factor = {factor:g}, "
-            f"offset = {offset:g}: must be finite, and the factor other than 0"
-        )
-    exponents = tuple(int(base.get(name, "0")) for name in BASE)
-    return Unit(element.get("name"), exponents, factor, offset)
 
 
 _TYPE_OF = {
