@@ -102,10 +102,17 @@ def matches(ours: Interface, theirs: Interface) -> dict[str, Match]:
 
 
 def _may_be(ours: Interface, v: Variable, theirs: Interface, w: Variable) -> bool:
-    """True for the same type, causality and, where both are known, quantity."""
-    units = ours.unit(v), theirs.unit(w)
-    alike = (v.kind, v.causality) == (w.kind, w.causality)
-    return alike and (units[0] is None or units[1] is None or units[0].measures(units[1]))
+    """True if w could be v: of the same causality, type and quantity, by its unit or else its name.
+
+    An Integer output, 0 or 1, could be a Boolean one that is only recorded.
+    """
+    flag = (v.causality, v.kind, w.kind) == ("output", "Boolean", "Integer")
+    if v.causality != w.causality or (v.kind != w.kind and not flag):
+        return False
+    if (unit := ours.unit(v)) and (other := theirs.unit(w)):
+        return unit.measures(other)
+    meant, its = (_meaning(name) & _SAME.keys() for name in (v.name, w.name))
+    return not its or not meant or bool(its & meant)
 
 
 def _readings(interface: Interface) -> Iterator[_Reading]:
@@ -140,27 +147,9 @@ def _numbered(name: str) -> Iterator[tuple[str, str, int]]:
 def candidates(
     ours: Interface, name: str, theirs: Interface, taken: Collection[str]
 ) -> list[Variable]:
-    """The variables of another FMU, other than those taken, that could be one of ours.
-
-    An Integer output, 0 or 1, could be a Boolean one that is only recorded.
-    """
-    variable = ours.by_name[name]
-    flag = (variable.kind, variable.causality) == ("Boolean", "output")
-    unit, meant = ours.unit(variable), _meaning(name) & _SAME.keys()
-
-    def may_be(v: Variable) -> bool:
-        """False where one without a unit has the name of another quantity."""
-        if unit and (other := theirs.unit(v)):
-            return unit.measures(other)
-        its = _meaning(v.name) & _SAME.keys()
-        return not its or not meant or bool(its & meant)
-
-    return [
-        v
-        for v in theirs.of(variable.causality)
-        if v.supported and v.name not in taken and may_be(v)
-        if v.kind == variable.kind or (flag and v.kind == "Integer")
-    ]
+    """The variables of another FMU, other than those taken, that could be one of ours."""
+    variable, left = ours.by_name[name], (v for v in theirs.variables if v.name not in taken)
+    return [v for v in left if v.supported and _may_be(ours, variable, theirs, v)]
 
 
 def _meaning(name: str) -> frozenset[str]:

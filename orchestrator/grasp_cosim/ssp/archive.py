@@ -140,5 +140,4 @@ def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
 
 @cache
 def _folder() -> ScratchFolder:
-    """The folder of this process."""
     return ScratchFolder()

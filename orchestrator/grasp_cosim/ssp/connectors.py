@@ -112,7 +112,7 @@ class Connectors:
             variable = self.variable(node)
             return variable.causality, variable.kind
         connector = self.systems[node.path].connectors[node.name]
-        return connector.kind, connector.value_kind
+        return connector.kind, connector.type
 
     def carry(self, hop: Hop, carried: Carried) -> Carried:
         """Return what is carried after one more hop; InputError where units do not fit."""
@@ -156,8 +156,7 @@ def _check_connectors(part: Part) -> None:
                 f"{place}: {part.interface.path.name} has no {connector.kind} of that name; "
                 f"{nearest(connector.name, names)}"
             )
-        kind = connector.value_kind
-        if kind is not None and kind != variable.kind:
+        if connector.type not in (None, variable.kind):
             raise InputError(f"{place}: {connector.type}; the FMU has {variable.kind}")
         declared = part.interface.unit(variable)
         if not declared or not connector.unit or same(declared, connector.unit):

@@ -43,18 +43,13 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """A connector; type and unit are None where they are left out."""
+    """A connector; type, Integer of an Enumeration, and unit are None where they are left out."""
 
     place: str
     name: str
     kind: str
     type: str | None = None
     unit: Unit | None = None
-
-    @property
-    def value_kind(self) -> str | None:
-        """The kind of value, as an interface has it; None where the type is left out."""
-        return "Integer" if self.type == "Enumeration" else self.type
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,11 +122,7 @@ def read_system(
 
 def transformation(element: Any) -> Any:
     """The element of a transformation below a connection or mapping entry, or None."""
-    for name in ("Linear", "BooleanMapping", "IntegerMapping", "EnumerationMapping"):
-        found = child(element, f"ssc:{name}Transformation")
-        if found is not None:
-            return found
-    return None
+    return next((e for e in element if short(e.tag).endswith("Transformation")), None)
 
 
 def linear(element: Any) -> tuple[float, float]:
@@ -165,7 +156,12 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     if kind != FMU:
         return _nested(origin, entry, path, place)
     fmu = origin.resolve(place, entry.get("source"))
-    interface = _interface(origin, place, fmu)
+    file = origin.archive.extract(fmu)
+    try:
+        interface = read_interface(file)
+    except InputError as error:
+        reason = str(error).removeprefix(f"{file}: ")
+        raise InputError(f"{place}: {fmu}: {reason}") from error
     asked = entry.get("implementation", "any")
     if asked != "any" and asked not in interface.kinds:
         raise InputError(
@@ -176,16 +172,6 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     bindings, exchange = _bindings(replace(origin, fmu=fmu), entry), asked == "ModelExchange"
     line = at(origin.place, entry)
     return Element(line, path, name, origin, connectors, bindings, interface, exchange=exchange)
-
-
-def _interface(origin: Origin, place: str, fmu: str) -> Interface:
-    """The interface of the FMU of a component."""
-    path = origin.archive.extract(fmu)
-    try:
-        return read_interface(path)
-    except InputError as error:
-        reason = str(error).removeprefix(f"{path}: ")
-        raise InputError(f"{place}: {fmu}: {reason}") from error
 
 
 def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
@@ -233,7 +219,6 @@ def _referred(origin: Origin, entry: Any, place: str, source: str) -> tuple[Orig
 
 
 def _dictionary(origin: Origin, entry: Any, path: Path) -> Element:
-    """A signal dictionary, as a system with a connector for each entry."""
     name, place = entry.get("name"), at(origin.place, entry)
     inner, root = origin.inner(f"{place}: {name!r}", entry, "ssb", entry)
     signals = [
@@ -285,7 +270,8 @@ def _connector(
         known(f"{place}: connector {name!r}: type", declared, _TYPES, " is not supported")
     unit = child(entry, "ssc:Real").get("unit") if declared == "Real" else None
     own = variable.unit if variable else None
-    return Connector(place, name, kind, declared, origin.unit(f"{place}: {name!r}", unit, own))
+    type_ = "Integer" if declared == "Enumeration" else declared
+    return Connector(place, name, kind, type_, origin.unit(f"{place}: {name!r}", unit, own))
 
 
 def _hop(origin: Origin, entry: Any, system: Element) -> Hop:

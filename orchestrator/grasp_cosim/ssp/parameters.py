@@ -113,7 +113,6 @@ def _bindings(network: Connectors) -> Iterator[tuple[Element, Origin, Any]]:
 
 
 def _given(origin: Origin, place: str, binding: Any) -> Iterator[Given]:
-    """Yield what a binding gives."""
     holder = child(binding, "ssd:ParameterValues")
     parameters = _set(*origin.inner(place, binding, "ssv", holder), binding.get("prefix", ""))
     mapping = child(binding, "ssd:ParameterMapping")
@@ -244,7 +243,6 @@ def _mapped(given: Parameter, element: Any) -> Parameter:
 
 
 def _value(network: Connectors, node: Node, given: Parameter) -> Value:
-    """The value for a variable of a component, checked."""
     part = network.parts[node.path]
     variable = part.interface.by_name[node.name]
     if variable.causality not in SETTABLE:
