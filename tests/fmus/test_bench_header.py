@@ -287,7 +287,7 @@ def test_outputs_that_are_none_fail_and_are_named(tmp_path):
     header = bench_header("M", Signature(tuple(outputs)))
     done = subprocess.run([compile_c(tmp_path, header, "M", source)], capture_output=True)
     assert done.returncode == 0
-    assert done.stdout[80:].decode() == "output with no valid value: µ"
+    assert done.stdout[80:].decode() == "output with no valid value: ??"
     assert done.stdout[6:8] == bytes([link.REFUSE, link.FAILED])
 
 
@@ -339,10 +339,12 @@ class Proxies:
         return s.request(STEP, time, values, step)
 
     def _hello(self, s):
-        """One of the same interface, longer or not, of another, of any length, or version."""
+        """One of the same interface, longer or not, of another, of any bytes, or version."""
         rng = self.rng
         text = EVERY_KIND.text.encode() + bytes(rng.choice((0, 0, 50)))
-        odd = {"body": text[: rng.randrange(len(text))], "interface": bytes(16)}
+        other = bytearray(text[: 1 + rng.randrange(len(text))])
+        other[rng.randrange(len(other))] ^= rng.choice((0, 2, 96, 128))
+        odd = {"body": bytes(other), "interface": bytes(16)}
         odd = odd if rng.random() < 0.2 else {"body": text}
         cookie = s._cookie
         datagram = s.hello(s._session, version=rng.choice((*[link.VERSION] * 9, 1, 3)), **odd)

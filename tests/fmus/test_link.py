@@ -267,7 +267,7 @@ def test_another_version_or_interface_is_refused_with_its_reason(key):
     assert (opened.code, opened.version) == (link.OTHER_VERSION, VERSION)
     assert len(answer) == link.HEAD.size + (link.TAG_SIZE if key else 0)
     other = bench.proxy(Signature((U._replace(name="µ"), Y)), key)
-    reason = "the proxy has input Real m ?, the peer input Real m u"
+    reason = "the proxy has input Real m ??, the peer input Real m u"
     assert refused(other.begin, 2, [0.0]) == (link.OTHER_INTERFACE, reason)
     assert bench.counts() == {"foreign": 1, "other_version": 1}
 

@@ -8,12 +8,13 @@ than that while there is no session: who sends in another's name has nothing to 
 
 import hmac
 import os
+import re
 import stat
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from io import StringIO
+from io import BytesIO
 from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
@@ -65,10 +66,16 @@ class Signature:
 
     def difference(self, proxy: bytes) -> str:
         """Return the first variable that is another one in a proxy's text, whatever that is."""
-        theirs = proxy.partition(b"\0")[0].decode(errors="replace")
-        pairs = zip_longest(StringIO(theirs), StringIO(self.text), fillvalue="no more")
-        first, own = next((pair for pair in pairs if pair[0] != pair[1]), ("no more", "no more"))
-        return f"the proxy has {first}, the peer {own}".replace("\t", " ").replace("\n", "")
+        theirs, ours = BytesIO(proxy.partition(b"\0")[0]), BytesIO(self.text.encode())
+        pairs = zip_longest(theirs, ours, fillvalue=b"no more")
+        differ = (pair for pair in pairs if pair[0] != pair[1])
+        first, own = (_ascii(line.strip(b"\n")) for line in next(differ, [b"no more"] * 2))
+        return f"the proxy has {first.decode()}, the peer {own.decode()}"
+
+
+def _ascii(words: bytes) -> bytes:
+    """Return ? for each byte that is none of printable ASCII, and a space for a tab."""
+    return re.sub(rb"[^ -~]", b"?", words.replace(b"\t", b" "))
 
 
 Value = float | int | bool | str
@@ -404,7 +411,7 @@ class Peer:
         return self._count(done, Request(m.kind, m.time, m.step, values, fresh))
 
     def _refuse(self, m: Message, code: int, reason: str = "", most: int = LARGEST) -> bytes:
-        words = reason.encode("ascii", "replace")[: min(most, LARGEST_REASON)]
+        words = _ascii(reason.encode(errors="replace"))[: min(most, LARGEST_REASON)]
         return self._pack(m, REFUSE, code, words)
 
     def _pack(
