@@ -16,7 +16,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import mkdtemp
-from threading import Event, Lock
 from typing import NamedTuple
 
 from . import cache
@@ -102,12 +101,11 @@ def find_compiler(zig_target: str = "") -> Compiler:
             return Compiler((*zig.command, "-target", zig_target, "-s"))
         raise ValueError(f"no C compiler for {zig_target}: must be zig; {INSTALL}")
     if given := os.environ.get("CC"):
-        command: list[str] = []
         with suppress(ValueError):  # a quote without the other
             command = shlex.split(given)
-        if not command or not shutil.which(command[0]):
-            raise ValueError(f"CC={given}: no such program; must be a C compiler, or unset")
-        return Compiler(tuple(command))
+            if command and shutil.which(command[0]):
+                return Compiler(tuple(command))
+        raise ValueError(f"CC={given}: no such program; must be a C compiler, or unset")
     if own := next(filter(shutil.which, OWN), None):
         return Compiler((own,))
     if zig := find_zig():
@@ -133,35 +131,34 @@ def environment(scratch: Path) -> dict[str, str]:
 def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
     """Return the library of each job, which is compiled in scratch where it is not kept.
 
-    That is done while the next job is waited for, as many at once as there are processors. What
-    cannot be kept stays in scratch. CompilerError where a compiler fails; however this ends, none
-    runs on.
+    As many at once as there are processors, while the next job is waited for. What cannot be kept
+    stays in scratch. CompilerError where a compiler fails; however this ends, none runs on.
     """
-    from concurrent.futures import ThreadPoolExecutor  # only now: it takes time to load
-
     most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    started: list[subprocess.Popen[str]] = []
-    starting, over = Lock(), Event()
+    libraries: dict[int, Path] = {}
+    running: dict[int, tuple[Job, Path, subprocess.Popen[str]]] = {}
 
-    def run(job: Job) -> Path:
-        if library := cache.kept(job.kept_as):
-            return library
-        folder = Path(mkdtemp(dir=scratch))
-        with starting:  # or it would be started behind the back of who ends them all
-            if over.is_set():
-                raise CompilerError(f"{job.name}.c: was not compiled any more")
-            started.append(process := _started(job, folder))
-        return cache.keep(_made(job, process, folder), job.kept_as)
+    def finish_first() -> None:
+        first = next(iter(running))
+        job, folder, process = running[first]
+        libraries[first] = cache.keep(_made(job, process, folder), job.kept_as)
+        del running[first]
 
-    with ThreadPoolExecutor(most) as pool:
-        try:
-            return [*pool.map(run, jobs)]
-        finally:  # on Ctrl-C, too, which comes to the main thread alone
-            pool.shutdown(wait=False, cancel_futures=True)
-            with starting:
-                over.set()
-            for process in started:
-                _end(process)
+    try:
+        for i, job in enumerate(jobs):
+            if library := cache.kept(job.kept_as):
+                libraries[i] = library
+                continue
+            if len(running) == most:
+                finish_first()
+            folder = Path(mkdtemp(dir=scratch))
+            running[i] = job, folder, _started(job, folder)
+        while running:
+            finish_first()
+        return [libraries[i] for i in sorted(libraries)]
+    finally:
+        for _, _, process in running.values():
+            _end(process)
 
 
 def _started(job: Job, folder: Path) -> subprocess.Popen[str]:
@@ -191,10 +188,7 @@ def _made(job: Job, process: subprocess.Popen[str], folder: Path) -> Path:
 
 def _end(process: subprocess.Popen[str]) -> None:
     """End a compiler with what it has started."""
-    with suppress(ProcessLookupError):
-        if process.poll() is not None:
-            return
-        if hasattr(os, "killpg") and hasattr(signal, "SIGKILL"):
+    with process, suppress(ProcessLookupError):
+        if process.poll() is None and hasattr(os, "killpg") and hasattr(signal, "SIGKILL"):
             os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
+        process.kill()

@@ -67,20 +67,16 @@ def bench_header(
     """
     check_size(signature)
     prefix = c_prefix(name)
-    inputs, parameters, outputs = groups = [
-        Group(prefix, c, f"{prefix}_{c}s", *members(signature, c)) for c in ORDER
-    ]
-    packing = [*map(_check, groups), _unpack(inputs), _unpack(parameters), _pack(outputs)]
+    groups = [Group(prefix, c, f"{prefix}_{c}s", *members(signature, c)) for c in ORDER]
+    pairs = [*((g, _CHECK) for g in groups), *zip(groups, (_UNPACK, _UNPACK, _PACK), strict=True)]
     return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
         title=comment(name),
         structs=structs(groups, _MEANINGS, starts or {}, descriptions or {}),
         wire=wire(prefix, signature),
-        packing="\n".join(packing),
+        packing="\n".join(_function(group, *texts) for group, texts in pairs),
         too_long=TOO_LONG,
-        inputs_size=inputs.size,
-        parameters_size=parameters.size,
-        outputs_size=outputs.size,
-        answer_size=link.HEAD.size + link.TAG_SIZE + max(outputs.size, LARGEST_REASON),
+        answer_size=link.HEAD.size + link.TAG_SIZE + max(groups[-1].size, LARGEST_REASON),
+        **{f"{group.causality}s_size": group.size for group in groups},
     )
 
 
@@ -136,15 +132,13 @@ def members(signature: Signature, causality: Causality) -> tuple[list[Member], i
     """Return the variables of a causality in C, and the size in bytes of a body with them."""
     found: list[Member] = []
     taken = set(WORDS)
-    offset = 0
     for variable in signature.of(causality):
         wanted = _identifier(variable.name, "v")
         endings = chain(["_"] if wanted in WORDS else [""], (f"_{i}" for i in count(2)))
         identifier = next(n for n in (f"{wanted}{ending}" for ending in endings) if n not in taken)
         taken.add(identifier)
-        found.append(Member(variable, identifier, offset))
-        offset += 8
-    return found, offset
+        found.append(Member(variable, identifier, 8 * len(found)))
+    return found, 8 * len(found)
 
 
 def _struct(group: Group, meaning: str, descriptions: Mapping[str, str]) -> str:
@@ -181,38 +175,32 @@ def _literal(v: LinkVariable, value: Value) -> str:
     return "(-2147483647 - 1)" if start == -(2**31) and v.kind == "Integer" else repr(start)
 
 
-def _check(group: Group) -> str:
+_CHECK = (
+    "const char *{prefix}_check_{causality}s(const uint8_t *body)",
+    "    if (!{prefix}_is_{kind}(body + {at}))\n        return {text};",
+    "(void)body;",
+    "    return NULL;\n}",
+)
+_UNPACK = (
+    "void {prefix}_unpack_{causality}s(const uint8_t *body, {struct} *values)",
+    "    values->{name} = {prefix}_get_{kind}(body + {at});",
+    "(void)body, (void)values;",
+)
+_PACK = (
+    "void {prefix}_pack_{causality}s(const {struct} *values, uint8_t *body)",
+    "    {prefix}_put_{kind}(body + {at}, values->{name});",
+    "(void)values, (void)body;",
+)
+
+
+def _function(group: Group, head: str, line: str, unused: str, end: str = "}") -> str:
+    """Return a function with a line for each member; `unused` where there is none."""
     lines = [
-        f"    if (!{group.prefix}_is_{v.kind.lower()}(body + {offset}))\n"
-        f"        return {string(v.name)};"
-        for v, _, offset in group.members
+        line.format(prefix=group.prefix, kind=v.kind.lower(), name=name, at=at, text=string(v.name))
+        for v, name, at in group.members
     ]
-    head = f"const char *{group.prefix}_check_{group.causality}s(const uint8_t *body)"
-    return _function(head, lines, "(void)body;", "    return NULL;\n}")
-
-
-def _unpack(group: Group) -> str:
-    lines = [
-        f"    values->{identifier} = {group.prefix}_get_{v.kind.lower()}(body + {offset});"
-        for v, identifier, offset in group.members
-    ]
-    arguments = f"(const uint8_t *body, {group.struct} *values)"
-    head = f"void {group.prefix}_unpack_{group.causality}s{arguments}"
-    return _function(head, lines, "(void)body, (void)values;")
-
-
-def _pack(group: Group) -> str:
-    lines = [
-        f"    {group.prefix}_put_{v.kind.lower()}(body + {offset}, values->{identifier});"
-        for v, identifier, offset in group.members
-    ]
-    arguments = f"(const {group.struct} *values, uint8_t *body)"
-    head = f"void {group.prefix}_pack_{group.causality}s{arguments}"
-    return _function(head, lines, "(void)values, (void)body;")
-
-
-def _function(head: str, lines: list[str], unused: str, end: str = "}") -> str:
-    return _lines(f"static inline {head}\n{{", lines, f"    {unused}", end)
+    begin = f"static inline {head.format_map(group._asdict())}\n{{"
+    return _lines(begin, lines, f"    {unused}", end)
 
 
 def _lines(head: str, lines: list[str], none: str, end: str) -> str:

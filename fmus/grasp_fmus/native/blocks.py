@@ -49,7 +49,7 @@ def translated(name: str, block: Any, file: Path | None = None) -> str:
 
 
 def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
-    p, u = Group(block.Params), Record(block.Inputs)
+    p, u = program.params, Record(block.Inputs)
     first = _part(program, block, "initial_state", [p, u])
     x = first.returns
     step = _part(program, block, "step", [p, x, u, REAL], x)
@@ -62,21 +62,20 @@ def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
     yield HEAD.format(title=comment(f"{name}: {block.__doc__ or ''}"))
     yield _table(block, described, len(scalars))
     named = "".join(f"typedef {program.c(t)} Block{kind};\n" for kind, t in types.items())
-    yield from (program.structs(), program.constants(), *program.bodies, named)
+    yield from (program.structs(), "".join(program.constants.values()), *program.bodies, named)
     yield from _conversions(program, described)
     yield _function("int block_check(const BlockParams *p, Text *why)", [*checks, "return 1;"])
-    yield _function(
-        "void block_initial_state(const BlockParams *p, const BlockInputs *u, BlockState *x)",
-        [f"*x = {_call(first, 'pu')};"],
-    )
-    yield _function(
-        f"void block_step({PXU}, double h, BlockState *after)",
-        [f"*after = {_call(step, 'pxuh')};"],
-    )
-    yield _function(
-        f"void block_outputs({PXU}, BlockOutputs *y)", [f"*y = {_call(evaluate, 'pxu')};"]
-    )
-    yield from _states(scalars)
+    head = "void block_initial_state(const BlockParams *p, const BlockInputs *u, BlockState *x)"
+    yield _function(head, [f"*x = {_call(first, 'pu')};"])
+    head = f"void block_step({PXU}, double h, BlockState *after)"
+    yield _function(head, [f"*after = {_call(step, 'pxuh')};"])
+    head = f"void block_outputs({PXU}, BlockOutputs *y)"
+    yield _function(head, [f"*y = {_call(evaluate, 'pxu')};"])
+    truth = [" != 0.0" * (kind == BOOLEAN) for _, kind in scalars]
+    save = [f"numbers[{i}] = {path};" for i, (path, _) in enumerate(scalars)]
+    load = [f"{path} = numbers[{i}]{truth[i]};" for i, (path, _) in enumerate(scalars)]
+    yield _function("void block_save(const BlockState *x, double *numbers)", save)
+    yield _function("void block_load(const double *numbers, BlockState *x)", load)
     yield "#endif\n"
 
 
@@ -117,40 +116,35 @@ def _table(block: Any, described: list[Field], states: int) -> str:
     rows = []
     for v in found:
         kind = "INTEGER" if v.enumeration else v.type.upper()
-        limits = v.limits or (0.0, 0.0)
-        numbers = [*limits, float(v.start or 0.0)]
         cells = [string(v.name), string(v.in_unit), f"KIND_{kind}", v.causality.upper()]
         cells += [str(int(v.variability == "fixed")), str(int(v.limits is not None))]
-        rows.append(f"    {{{', '.join([*cells, *map(number, numbers)])}}},\n")
-    longest = longest_step(block)
+        cells += map(number, (*(v.limits or (0.0, 0.0)), float(v.start or 0.0)))
+        rows.append(f"    {{{', '.join(cells)}}},\n")
     return (
         f"enum {{ {', '.join(f'N_{kind.upper()} = {n}' for kind, n in counts.items())} }};\n\n"
-        f"#define BLOCK_LONGEST_STEP {number(longest)} /* s */\n\n"
+        f"#define BLOCK_LONGEST_STEP {number(longest_step(block))} /* s */\n\n"
         f"static const Variable variables[N_VARIABLES + 1] = {{\n{''.join(rows)}}};\n"
     )
 
 
 def _conversions(program: Program, described: list[Field]) -> Iterator[str]:
     """Params and Inputs from the values of the variables, and the values of outputs."""
-    lines: dict[str, list[str]] = {"input": [], "output": [], "parameter": []}
-    place = 0
+    params, inputs, outputs = list[str](), list[str](), list[str]()
     for f in described:
-        own = lines[f.causality]
         path = ".".join(map(identifier, f.name.split(".")))
+        truth = " != 0.0" if f.kind is bool else ""
         for member in [path] if f.size is None else [f"{path}.at[{i}]" for i in range(f.size)]:
+            value = f"values[{len(inputs) + len(params) + len(outputs)}]{truth}"
             if f.causality == "output":
-                own.append(f"values[{len(own)}] = y->{member};")
+                outputs.append(f"values[{len(outputs)}] = y->{member};")
+            elif f.causality == "input":
+                inputs.append(f"u->{member} = {value};")
             else:
-                truth = " != 0.0" if f.kind is bool else ""
-                own.append(
-                    f"{f.causality[0].replace('i', 'u')}->{member} = values[{place}]{truth};"
-                )
-            place += 1
-    kept = [f"p->{identifier(name)} = {made.name}(p);" for name, made in program.kept.items()]
-    set_params = lines["parameter"] + kept
-    yield _function("void block_params(const double *values, BlockParams *p)", set_params)
-    yield _function("void block_inputs(const double *values, BlockInputs *u)", lines["input"])
-    yield _function("void block_outputs_to(const BlockOutputs *y, double *values)", lines["output"])
+                params.append(f"p->{member} = {value};")
+    params += [f"p->{identifier(name)} = {made.name}(p);" for name, made in program.kept.items()]
+    yield _function("void block_params(const double *values, BlockParams *p)", params)
+    yield _function("void block_inputs(const double *values, BlockInputs *u)", inputs)
+    yield _function("void block_outputs_to(const BlockOutputs *y, double *values)", outputs)
 
 
 def _checks(program: Program, cls: type[Any], path: str) -> Iterator[str]:
@@ -177,12 +171,3 @@ def _scalars(program: Program, t: Type, path: str) -> Iterator[tuple[str, Type]]
         yield "*x" if path == "x->" else path, t
     for i, kind in enumerate(parts(t)):
         yield from _scalars(program, kind, (path + program.member(t, i)).replace("->.", "->"))
-
-
-def _states(scalars: list[tuple[str, Type]]) -> Iterator[str]:
-    save, load = [], []
-    for i, (path, kind) in enumerate(scalars):
-        save.append(f"numbers[{i}] = {path};")
-        load.append(f"{path} = numbers[{i}]{' != 0.0' if kind == BOOLEAN else ''};")
-    yield _function("void block_save(const BlockState *x, double *numbers)", save)
-    yield _function("void block_load(const double *numbers, BlockState *x)", load)

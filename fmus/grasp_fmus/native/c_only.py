@@ -12,7 +12,7 @@ from string import Template
 
 from c_compilers import BITS, LIBM
 
-from ..contract import Scalar, Variable
+from ..contract import Scalar
 from ..link import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file
 from .bench_header import Group, Member, comment, members, structs
@@ -42,7 +42,8 @@ def c_only(model: Model) -> dict[str, bytes]:
     name, variables = model.description.name, model.description.variables
     block = translated(name, model.block, model.file)
     helpers = {file: (FOLDER / "c" / file).read_text("utf-8") for file in HELPERS}
-    signature = Signature(tuple(map(_link_variable, variables)))
+    links = (LinkVariable(v.name, _KINDS[v.kind], v.causality, v.unit or None) for v in variables)
+    signature = Signature(tuple(links))
     groups = [Group(name, c, f"{name}_{c.title()}s", *members(signature, c)) for c in ORDER]
     places = {v.name: i for i, v in enumerate(variables)}
     inputs, parameters, outputs = ([*group.members] for group in groups)
@@ -80,10 +81,6 @@ def called_of_libm(block: str) -> list[str]:
     called = {*re.findall(r"\w+(?=\()", re.sub(r"/\*.*?\*/", "", block, flags=re.DOTALL))}
     exact = {name for name, as_called in EXACT.items() if as_called in called}
     return sorted(exact | (called & {*LIBM}))
-
-
-def _link_variable(v: Variable) -> LinkVariable:
-    return LinkVariable(v.name, _KINDS[v.kind], v.causality, v.unit or None)
 
 
 def _got(m: Member, struct: str, places: Mapping[str, int]) -> str:

@@ -9,7 +9,7 @@ import builtins
 import inspect
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from functools import cached_property
 from types import FunctionType, ModuleType
@@ -36,19 +36,16 @@ from .types import (
 CHOICE, OR, AND, EQUAL, LESS, SUM, PRODUCT, SIGN, WORD = range(1, 10)
 """How tightly operators bind in C; WORD is what needs no parentheses."""
 
-OPERATORS = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}
-OPERATORS[ast.Div] = "/", PRODUCT
-COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
-EQUALITIES = {ast.Eq: "==", ast.NotEq: "!="}
-FUNCTIONS = {
-    getattr(math, name): name
-    for name in re.findall(
-        r"\w+",
-        "acos acosh asin asinh atan atan2 atanh copysign cos cosh exp expm1 fabs fmod log log10 "
-        "log1p log2 pow sin sinh sqrt tan tanh",
-    )
-}
-FUNCTIONS |= {math.ldexp: "scaled"}
+OPERATORS: dict[type[ast.operator], tuple[str, int]] = {
+    ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT), ast.Div: ("/", PRODUCT)
+}  # fmt: skip
+COMPARISONS = {ast.Lt: ("<", LESS), ast.LtE: ("<=", LESS), ast.Gt: (">", LESS)}
+COMPARISONS |= {ast.GtE: (">=", LESS), ast.Eq: ("==", EQUAL), ast.NotEq: ("!=", EQUAL)}
+_FUNCTIONS = """
+acos acosh asin asinh atan atan2 atanh copysign cos cosh exp expm1 fabs fmod log log10 log1p log2
+pow sin sinh sqrt tan tanh
+"""
+FUNCTIONS = {getattr(math, name): name for name in _FUNCTIONS.split()} | {math.ldexp: "scaled"}
 OF_TWO = (math.atan2, math.copysign, math.fmod, math.pow, math.ldexp)
 TO_WHOLE = {math.floor: "floored", math.ceil: "ceiled", math.trunc: "truncated", int: "truncated"}
 
@@ -57,18 +54,14 @@ ADVICE: dict[Any, str] = {
     "List": "a list is not in the subset; use a tuple",
     "ListComp": "a list is not in the subset; use tuple(... for ...)",
     "Dict": "a dict is not in the subset; use a MappingProxyType of the module",
-    "Set": "a set is not in the subset; use a tuple",
     "NamedExpr": ":= is not in the subset; assign before",
-    "JoinedStr": "a text is only for the reason of a raise",
     "GeneratorExp": "a generator is only for any, all and tuple",
     "FloorDiv": "// is not in the subset; write floor(a / b)",
     "Mod": "% is not in the subset; write fmod(a, b)",
     sum: "sum: its rounding depends on the version of Python; write a + b, or a loop",
     math.fsum: "math.fsum is not in the subset; write a + b, or a loop",
     math.hypot: "math.hypot is CPython's own; write sqrt(x * x + y * y)",
-    math.dist: "math.dist is CPython's own; write sqrt(x * x + y * y)",
     round: "round is not in the subset; write floor(x + 0.5)",
-    print: "print is not in the subset: a block has no output",
 }
 
 _UNKNOWN = object()
@@ -78,6 +71,9 @@ _PATH = re.compile(r"-?([*&]?[A-Za-z_]\w*(->|\.\w|\[\d+\]|\w)*|[\d.]+(e[-+]?\d+)
 
 class Expressions:
     """The expressions of one function, for the types that it is called with."""
+
+    translate: Callable[[Any, Sequence[Type]], Function]
+    """The function in C for arguments of these types."""
 
     def __init__(self, program: Program, source: Source, names: dict[str, Any]) -> None:
         self.program, self.source, self.names = program, source, names
@@ -91,12 +87,6 @@ class Expressions:
     def refuse(self, node: Any, reason: str) -> NoReturn:
         """End with a reason, and the line of a node."""
         raise self.source.error(node, reason)
-
-    def translate(self, function: Any, arguments: Sequence[Value], node: ast.AST) -> Function:
-        """The function in C for these arguments."""
-        raise NotImplementedError
-
-    # Lines and names of variables
 
     def say(self, line: str) -> None:
         """Add a line."""
@@ -128,8 +118,6 @@ class Expressions:
     def at(self, value: Value, level: int) -> str:
         """The text of a value where an operator of this level takes it."""
         return value.text if value.level >= level else f"({value.text})"
-
-    # What is known before a block runs
 
     def known(self, node: ast.expr) -> Any:
         """The object of Python that an expression names, whatever the inputs are."""
@@ -164,19 +152,18 @@ class Expressions:
         kind = REAL if isinstance(value, float) else WHOLE
         return Value(text, kind, SIGN if text[0] == "-" else WORD)
 
-    # Expressions
-
     def value(self, node: ast.expr) -> Value:
         """An expression."""
         found = self.known(node)
         if found is not _UNKNOWN:
             return self.constant(node, found)
-        kind = type(node).__name__
-        translate = getattr(self, f"_{kind.lower()}", None)
-        if translate is None:
-            self.refuse(node, ADVICE.get(kind, f"{ast.unparse(node)}: is not in the subset"))
+        translate = getattr(self, f"_{type(node).__name__.lower()}", self._other)
         made: Value = translate(node)
         return made
+
+    def _other(self, node: ast.expr, kind: Any = None) -> NoReturn:
+        kind = kind or type(node).__name__
+        self.refuse(node, ADVICE.get(kind, f"{ast.unparse(node)}: is not in the subset"))
 
     def number(self, node: ast.expr) -> Value:
         """An expression that must be a number."""
@@ -219,8 +206,7 @@ class Expressions:
                 self.refuse(node, f"{ast.unparse(node)}: of two ints; write float(...)")
             return Value(f"pow({a.text}, {b.text})", REAL)
         if type(node.op) not in OPERATORS:
-            kind = type(node.op).__name__
-            self.refuse(node, ADVICE.get(kind, f"{ast.unparse(node)}: is not in the subset"))
+            self._other(node, type(node.op).__name__)
         symbol, level = OPERATORS[type(node.op)]
         text = f"{self.at(a, level)} {symbol} {self.at(b, level + 1)}"
         if a.type == b.type == WHOLE and symbol != "/":  # the zero of an int has no sign
@@ -254,10 +240,9 @@ class Expressions:
         values[1:-1] = [self.simple(v) for v in values[1:-1]]
         found = []
         for a, op, b in zip(values, node.ops, values[1:], strict=False):
-            symbol = COMPARISONS.get(type(op)) or EQUALITIES.get(type(op))
-            if symbol is None:
+            if type(op) not in COMPARISONS:
                 self.refuse(node, f"{ast.unparse(node)}: is not in the subset; compare numbers")
-            level = EQUAL if type(op) in EQUALITIES else LESS
+            symbol, level = COMPARISONS[type(op)]
             found.append(Value(f"{self.at(a, SUM)} {symbol} {self.at(b, SUM)}", BOOLEAN, level))
         return self._all(found, "&&", AND)
 
@@ -272,8 +257,6 @@ class Expressions:
         if a != b:
             self.refuse(node, f"{ast.unparse(node)} is {said(a)} or {said(b)}: must be one of them")
         return a
-
-    # Tuples
 
     def display(self, items: Sequence[Value], kind: Type | None = None) -> Value:
         """A tuple, or a NamedTuple, of these items."""
@@ -344,7 +327,7 @@ class Expressions:
         found = inspect.getattr_static(t.cls, name, None)
         if isinstance(found, cached_property) and t == self.program.params:
             if name not in self.program.kept:
-                self.program.kept[name] = self.translate(found.func, [Value("p", t)], node)
+                self.program.kept[name] = self.translate(found.func, [t])
             return Value(self._arrow(value) + identifier(name), self.program.kept[name].returns)
         if isinstance(found, property | cached_property):
             getter = found.fget if isinstance(found, property) else found.func
@@ -353,8 +336,6 @@ class Expressions:
 
     def _arrow(self, value: Value) -> str:
         return f"{value.text[1:]}." if value.text[0] == "&" else f"{value.text}->"
-
-    # Calls
 
     def _call(self, node: ast.Call) -> Value:
         function = self.known(node.func)
@@ -373,13 +354,13 @@ class Expressions:
                 self.refuse(node, f"{ast.unparse(node)}: has another number of arguments in C")
             return Value(f"{FUNCTIONS[function]}({', '.join(given)})", REAL)
         if function in ADVICE:
-            self.refuse(node, ADVICE[function])
+            self._other(node, function)
         arguments = self.starred(node.args)
         named = {k.arg: self.value(k.value) for k in node.keywords if k.arg}
         if types.is_record(function):
             return self._record(node, function, arguments, named)
         if not isinstance(function, FunctionType):
-            self.refuse(node, f"{ast.unparse(node.func)}: is not in the subset")
+            self._other(node.func)
         return self.call(function, arguments, named, node)
 
     def call(
@@ -387,17 +368,12 @@ class Expressions:
     ) -> Value:
         """A call of a function, with its defaults."""
         arguments = self._matched(inspect.signature(function), given, named, node)
-        made = self.translate(function, arguments, node)
-        texts = [
-            self._address(a) if by_address else a.text
-            for a, by_address in zip(arguments, made.by_address, strict=True)
-        ]
+        made = self.translate(function, [a.type for a in arguments])
+        texts = [a.text for a in arguments]
+        for i in (i for i, by_address in enumerate(made.by_address) if by_address):
+            text = self.simple(arguments[i]).text
+            texts[i] = text[1:] if text[0] == "*" else f"&{text}"
         return Value(f"{made.name}({', '.join(texts)})", made.returns)
-
-    def _address(self, value: Value) -> str:
-        """Where a NamedTuple is."""
-        text = self.simple(value).text
-        return text[1:] if text[0] == "*" else f"&{text}"
 
     def _matched(
         self, signature: inspect.Signature, given: Any, named: Any, node: ast.AST
@@ -422,25 +398,18 @@ class Expressions:
         table = self.known(of.value)
         if isinstance(table, Mapping) and of.attr == "get":
             key, default = (self.number(a) for a in node.args)
-            return self._looked_up(table, key, default)
+            at = self.simple(key).text
+            text = "".join(f"{at} == {number(k)} ? {number(v)} : " for k, v in table.items())
+            return Value(text + self.at(default, CHOICE), default.type, CHOICE)
         value = self.value(of.value)
-        if of.attr == "_replace" and isinstance(value.type, Record):
-            return self._replaced(node, value)
-        return self.refuse(
-            node, f"{ast.unparse(of)}: is not in the subset; use a function of the module"
-        )
-
-    def _replaced(self, node: ast.Call, value: Value) -> Value:
+        if of.attr != "_replace" or not isinstance(value.type, Record):
+            said = f"{ast.unparse(of)}: is not in the subset"
+            self.refuse(node, f"{said}; use a function of the module")
         new = [(identifier(str(k.arg)), self.value(k.value).text) for k in node.keywords]
         copy = self.copied(value, "changed")
         for name, text in new:
             self.say(f"{copy.text}.{name} = {text};")
         return copy
-
-    def _looked_up(self, table: Mapping[Any, Any], key: Value, default: Value) -> Value:
-        at = self.simple(key).text
-        text = "".join(f"{at} == {number(k)} ? {number(v)} : " for k, v in table.items())
-        return Value(text + self.at(default, CHOICE), default.type, CHOICE)
 
     def _builtin(self, node: ast.Call, function: Any) -> Value:
         given = self.starred(node.args)
@@ -461,35 +430,30 @@ class Expressions:
             return Value(f"fabs({value.text})", value.type)
         return value if value.type == WHOLE else Value(f"{TO_WHOLE[function]}({value.text})", WHOLE)
 
-    # Generators
-
     def _over_items(self, node: ast.Call, function: Any) -> Value:
         over = node.args[0] if node.args else node
         if not isinstance(over, ast.GeneratorExp):
             return self.display(self.items(self.value(over), over))
-        found = self._each(over, conditions=function is not tuple)
-        if function is tuple:
-            return self.display(found)
-        return self._all(found, *(("||", OR) if function is any else ("&&", AND)))
-
-    def _each(self, node: ast.GeneratorExp, conditions: bool) -> list[Value]:
-        loop = node.generators[0]
-        if len(node.generators) > 1 or loop.ifs:
-            self.refuse(node, "a generator must have one for, and no if")
+        loop = over.generators[0]
+        if len(over.generators) > 1 or loop.ifs:
+            self.refuse(over, "a generator must have one for, and no if")
         before, hidden, found = dict(self.bound), self.locals, []
         self.locals = hidden | {n.id for n in ast.walk(loop.target) if isinstance(n, ast.Name)}
         for row in self._rows(loop.iter):
             self._bind(loop.target, row)
-            made = self.condition(node.elt) if conditions else self.value(node.elt)
-            found.append(made if conditions else self.simple(made, "item"))
+            if function is tuple:
+                found.append(self.simple(self.value(over.elt), "item"))
+            else:
+                found.append(self.condition(over.elt))
         self.bound, self.locals = before, hidden
-        return found
+        if function is tuple:
+            return self.display(found)
+        return self._all(found, *(("||", OR) if function is any else ("&&", AND)))
 
     def _rows(self, node: ast.expr) -> list[Value]:
         if isinstance(node, ast.Call) and self.known(node.func) is zip:
             columns = [self.items(self.value(a), a) for a in node.args]
-            rows = zip(*columns, strict=True)
-            return [self.display(row) for row in rows]
+            return [self.display(row) for row in zip(*columns, strict=True)]
         return self.items(self.value(node), node)
 
     def _bind(self, target: ast.expr, value: Value) -> None:

@@ -1,8 +1,9 @@
 """Puts together a native FMU but for its binaries: the C of NAME.c, and all that describes it."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from ..description import Version, build_description, model_description
 from ..package import HASH, Model, hashed, python_members
@@ -41,7 +42,7 @@ $how */
 #endif
 $system
 #define TOKEN "$guid"
-$defined
+#define $defined
 #define SLAVE "$slave"
 
 $included
@@ -83,8 +84,8 @@ def native_sources(
     16 hexadecimal digits; `guid` is that of this FMU.
     """
     defined = f'CONTENT "{content}" /* of the FMU in Python, with which states are exchanged */'
-    main = _main(name, guid, fmi, _BLOCK, "", defined, ["block.h"])
-    return {f"{name}.c": main, "block.h": block.encode(), **_files(fmi, *OF_BLOCK)}
+    texts = {"how": _BLOCK, "system": "", "defined": defined}
+    return _sources(name, guid, fmi, {"block.h": block}, OF_BLOCK, texts)
 
 
 def proxy_sources(
@@ -94,27 +95,23 @@ def proxy_sources(
 
     `own` are the files that only this proxy has: the wire with its signature, its variables.
     """
-    defined = f"PROXY_ORIGINAL {string(original)}"
-    main = _main(name, guid, fmi, _PROXY, _SYSTEM, defined, own)
-    files = {file: text.encode() for file, text in own.items()}
-    return {f"{name}.c": main, **files, **_files(fmi, *OF_PROXY)}
+    texts = {"how": _PROXY, "system": _SYSTEM, "defined": f"PROXY_ORIGINAL {string(original)}"}
+    return _sources(name, guid, fmi, own, OF_PROXY, texts)
 
 
-def _main(
-    name: str, guid: str, fmi: Version, how: str, system: str, defined: str, own: Iterable[str]
-) -> bytes:
-    texts = {"name": name, "fmi": str(fmi), "guid": guid, "how": how, "system": system}
-    texts["slave"] = OF_PROXY[-1] if system else OF_BLOCK[-1]
-    texts["defined"] = f"#define {defined}"
-    texts["included"] = "\n".join(f'#include "{file}"' for file in own)
-    return Template(_MAIN).substitute(texts).encode()
-
-
-def _files(fmi: Version, *names: str) -> dict[str, bytes]:
-    """Return files that are the same in every FMU of a kind, and those of every slave."""
-    files = [C / file for file in ("variable.h", "slave.h", *names, f"fmi{fmi}.h")]
+def _sources(
+    name: str, guid: str, fmi: Version, own: Mapping[str, str], kind: Sequence[str], texts: Any
+) -> dict[str, bytes]:
+    """Return NAME.c, own files, those that are the same in every FMU of a kind, and in all."""
+    included = "\n".join(f'#include "{file}"' for file in own)
+    more = {"name": name, "fmi": fmi, "guid": guid, "slave": kind[-1], "included": included}
+    files = [C / file for file in ("variable.h", "slave.h", *kind, f"fmi{fmi}.h")]
     files += [C / "headers" / file for file in HEADERS[fmi]]
-    return {file.name: file.read_bytes() for file in files}
+    return {
+        f"{name}.c": Template(_MAIN).substitute(texts, **more).encode(),
+        **{file: text.encode() for file, text in own.items()},
+        **{file.name: file.read_bytes() for file in files},
+    }
 
 
 def with_description(model: Model, sources: Mapping[str, bytes], fmi: Version) -> dict[str, bytes]:

@@ -5,7 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 from .expressions import SIGN, WORD, Expressions
 from .text import comment, string, wrapped
@@ -15,14 +15,10 @@ ADVICE = {
     "While": "while is not in the subset, as a step must end; use for ... in range(n) with break",
     "FunctionDef": "a function in a function is not in the subset; put it into the module",
     "Try": "try is not in the subset; ask before",
-    "With": "with is not in the subset; a block has no resources",
-    "Assert": "assert is not in the subset; leave it out",
     "Global": "global is not in the subset; what is to be kept belongs into State",
     "Match": "match is not in the subset; use if and elif",
     "Raise": "raise is only for __post_init__; a step whose outputs are not finite is refused",
-    "Import": "import in a function is not in the subset; put it at the top of the module",
     "ImportFrom": "import in a function is not in the subset; put it at the top of the module",
-    "Delete": "del is not in the subset; leave it out",
 }
 
 LARGE = 30
@@ -35,7 +31,7 @@ class Body(Expressions):
     def __init__(self, program: Program, function: Any) -> None:
         source = program.source(function.__code__.co_filename)
         super().__init__(program, source, function.__globals__)
-        self.function = function
+        self.translate = partial(translated_function, program)
         self.node = source.functions[function.__code__.co_firstlineno]
         self.returns: Type | None = None
         self.by_address: tuple[bool, ...] = ()
@@ -50,11 +46,6 @@ class Body(Expressions):
         self._exits: list[list[set[str]]] = []
         """What has a value where each open loop is left, or goes on."""
 
-    def translate(self, function: Any, arguments: Sequence[Value], node: ast.AST) -> Function:
-        """The function in C for these arguments."""
-        recursion = partial(self.refuse, node)
-        return translated_function(self.program, function, [a.type for a in arguments], recursion)
-
     def definition(self, name: str, types: Sequence[Type]) -> str:
         """The text of the function in C."""
         heads, given = [], self.node.args
@@ -63,15 +54,14 @@ class Body(Expressions):
             c_name, is_copy = self.fresh(argument.arg, own=True), argument.arg in changed
             large = isinstance(kind, Record) and size(kind) > LARGE and not is_copy
             self.by_address += (large,)
-            self.bound[argument.arg] = Value(
-                f"{'*' * large}{c_name}", kind, SIGN if large else WORD
-            )
+            text, level = (f"*{c_name}", SIGN) if large else (c_name, WORD)
+            self.bound[argument.arg] = Value(text, kind, level)
             star = "const {} *{}" if isinstance(kind, Group) or large else "{} {}"
             heads.append(star.format(self.program.c(kind, self.names), c_name))
         self.block(self.node.body)
-        if self.returns is None or not _ends(self.node.body):
+        if not _leaves(self.node.body, ast.Return):
             self.refuse(self.node, f"{self.node.name}: must return a value on every way")
-        return self._text(name, heads, self.program.c(self.returns, self.names))
+        return self._text(name, heads, self.program.c(cast(Type, self.returns), self.names))
 
     def _text(self, name: str, heads: Sequence[str], returns: str) -> str:
         text = "\n".join(self.lines)
@@ -79,17 +69,9 @@ class Body(Expressions):
         names = [head.split()[-1].lstrip("*") for head in heads]
         unused = [f"    (void){n};" for n in names if not re.search(rf"\b{n}\b", text)]
         said = ast.get_docstring(self.node)
-        lines = [
-            *([comment(said)] if said else []),
-            wrapped(f"static {returns} {name}({', '.join(heads) or 'void'})"),
-            "{",
-            *map(wrapped, [*late, *unused, *self.lines]),
-            "}",
-            "",
-        ]
-        return "\n".join(lines)
-
-    # Statements
+        head = wrapped(f"static {returns} {name}({', '.join(heads) or 'void'})")
+        lines = [head, "{", *map(wrapped, [*late, *unused, *self.lines]), "}", ""]
+        return "\n".join([comment(said), *lines] if said else lines)
 
     def block(self, body: Sequence[ast.stmt], inner: bool = False) -> None:
         """The statements of a block, with the comments before and behind them."""
@@ -109,11 +91,9 @@ class Body(Expressions):
 
     def _remark(self, line: int, alone: bool) -> None:
         text, own_line = self.source.comments.get(line, ("", alone))
-        if not text or own_line != alone:
-            return
-        if alone:
+        if text and alone and own_line:
             self.say(comment(text))
-        elif self.lines:
+        elif text and self.lines and not (alone or own_line):
             self.lines[-1] += f"  {comment(text)}"
 
     def statement(self, node: ast.stmt) -> None:
@@ -163,8 +143,6 @@ class Body(Expressions):
         operation = ast.copy_location(ast.BinOp(read, node.op, node.value), node)
         self.assign(target, self.value(operation), node)
 
-    # Variables
-
     def assign(self, target: ast.expr, value: Value, node: ast.AST) -> None:
         """Give a value to a variable, or its items to several."""
         pairs = [(name, v) for name, v in self._pairs(target, value) if name != "_"]
@@ -212,8 +190,6 @@ class Body(Expressions):
             self.say(f"{c_name} = {value.text};")
         else:
             self.say(f"{kind} {c_name} = {value.text};")
-
-    # Branches and loops
 
     def _on_if(self, node: ast.If) -> None:
         branches, rest = [(self.condition(node.test).text, node.body)], node.orelse
@@ -332,41 +308,29 @@ class Check(Body):
             self.refuse(part, f"{{...:{spec}}}: must be {{x}}, {{x!r}}, {{x:g}} or {{x:.3g}}")
 
 
-def translated_function(
-    program: Program, function: Any, types: Sequence[Type], recursion: Any = None
-) -> Function:
-    """The function in C for arguments of these types, translated when it is first asked for.
-
-    `recursion` refuses one that is being translated.
-    """
+def translated_function(program: Program, function: Any, types: Sequence[Type]) -> Function:
+    """The function in C for arguments of these types, translated when it is first asked for."""
     key = function.__code__, tuple(types)
-    if key in program.functions:
-        found = program.functions[key]
-        return found or recursion(f"{function.__name__}: calls itself; use a loop")
-    program.functions[key] = None
-    body = Body(program, function)
-    name = program.unique(function.__module__, function.__qualname__, key)
-    text = body.definition(name, types)
-    assert body.returns is not None  # noqa: S101 - definition() has refused what returns nothing
-    program.functions[key] = made = Function(name, body.returns, body.by_address)
-    program.bodies.append(text)
-    return made
+    if key not in program.functions:
+        program.functions[key] = None
+        body = Body(program, function)
+        name = program.unique(function.__module__, function.__qualname__, key)
+        text = body.definition(name, types)
+        program.functions[key] = Function(name, cast(Type, body.returns), body.by_address)
+        program.bodies.append(text)
+    if made := program.functions[key]:
+        return made
+    where = program.source(key[0].co_filename)
+    reason = f"{function.__name__}: calls itself; use a loop"
+    raise where.error(key[0].co_firstlineno, reason)
 
 
-def _ends(body: Sequence[ast.stmt]) -> bool:
-    """Return True if a block always ends in a return."""
+def _leaves(body: Sequence[ast.stmt], *by: type[ast.stmt]) -> bool:
+    """Return True if nothing comes after a block; `by` says what may leave it, if not anything."""
     last = body[-1] if body else None
     if isinstance(last, ast.If):
-        return _ends(last.body) and _ends(last.orelse)
-    return isinstance(last, ast.Return)
-
-
-def _leaves(body: Sequence[ast.stmt]) -> bool:
-    """Return True if nothing comes after a block."""
-    last = body[-1]
-    if isinstance(last, ast.If):
-        return bool(last.orelse) and _leaves(last.body) and _leaves(last.orelse)
-    return isinstance(last, ast.Return | ast.Break | ast.Continue | ast.Raise)
+        return _leaves(last.body, *by) and _leaves(last.orelse, *by)
+    return isinstance(last, by or (ast.Return, ast.Break, ast.Continue, ast.Raise))
 
 
 def _names(node: ast.AST, context: type[ast.expr_context] = ast.expr_context) -> list[str]:

@@ -2,12 +2,13 @@
 
 import ast
 import io
-import re
 import tokenize
 from functools import cached_property
-from math import copysign, isinf, isnan
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+from c_compilers import LIBM
 
 WIDTH = 100
 
@@ -16,40 +17,30 @@ class UntranslatableError(ValueError):
     """A block has what cannot be C: where, what, and what to write instead, in one line."""
 
 
-WORDS = frozenset(
-    re.findall(
-        r"\w+",
-        """
-    auto break case char const continue default do double else enum extern float for goto if inline
-    int long register restrict return short signed sizeof static struct switch typedef union
-    unsigned void volatile while
+_WORDS = """
+auto break case char const continue default do double else enum extern float for goto if inline
+int long register restrict return short signed sizeof static struct switch typedef union
+unsigned void volatile while
 
-    alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class co_await
-    co_return co_yield compl concept const_cast consteval constexpr constinit decltype delete
-    dynamic_cast explicit export false friend mutable namespace new noexcept not not_eq nullptr
-    operator or or_eq private protected public reinterpret_cast requires static_assert static_cast
-    template this thread_local throw true try typeid typename typeof typeof_unqual using virtual
-    wchar_t xor xor_eq
+alignas alignof and and_eq asm bitand bitor bool catch char8_t char16_t char32_t class co_await
+co_return co_yield compl concept const_cast consteval constexpr constinit decltype delete
+dynamic_cast explicit export false friend mutable namespace new noexcept not not_eq nullptr
+operator or or_eq private protected public reinterpret_cast requires static_assert static_cast
+template this thread_local throw true try typeid typename typeof typeof_unqual using virtual
+wchar_t xor xor_eq
 
-    NULL I errno linux unix stdin stdout stderr assert offsetof
-        """,
-    )
-)
+NULL I errno linux unix stdin stdout stderr assert offsetof
+"""
+WORDS = frozenset(_WORDS.split())
 """Words of C and C++, and macros, that no member may be called."""
 
-RESERVED = WORDS | {
-    *re.findall(
-        r"\w+",
-        """
-    far near CLOCKS_PER_SEC EOF HUGE_VAL INFINITY NAN
-    abs acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh div erf erfc exp exp2
-    expm1 fabs fdim floor fma fmax fmin fmod free frexp gamma hypot index j0 j1 jn ldexp lgamma log
-    log10 log1p log2 logb malloc modf nan pow remainder rint round scalb signal signgam sin sinh
-    sqrt tan tanh tgamma trunc y0 y1 yn
-    larger smaller scaled floored ceiled truncated values numbers why
-        """,
-    )
-}
+_MORE = """
+far near CLOCKS_PER_SEC EOF HUGE_VAL INFINITY NAN
+abs ceil copysign div fabs fdim floor fma fmax fmin free gamma index j0 j1 jn logb malloc nan
+remainder rint round scalb signal signgam sqrt trunc y0 y1 yn
+larger smaller scaled floored ceiled truncated values numbers why
+"""
+RESERVED = WORDS.union(_MORE.split(), LIBM)
 """Those, words of old compilers, functions of the library, more macros, names of arithmetic.h."""
 
 
@@ -61,12 +52,7 @@ def identifier(name: str) -> str:
 
 def number(value: float) -> str:
     """A number of Python as C reads it: the same double."""
-    if isnan(value):
-        return "NAN"
-    if isinf(value):
-        return "INFINITY" if value > 0 else "-INFINITY"
-    value = float(value)
-    return repr(value) if copysign(1.0, value) > 0 or value else "-0.0"
+    return repr(float(value)).replace("inf", "INFINITY").replace("nan", "NAN")
 
 
 def string(text: str) -> str:
@@ -84,18 +70,13 @@ def comment(text: str) -> str:
     return f"/* {lines.strip()} */"
 
 
-def wrapped(line: str) -> str:
+def wrapped(line: str, begin: str = "") -> str:
     """A line of C in several, where it is too long; a string stays in one piece."""
-    indent = re.match(" *", line)
-    begin = f"{indent[0] if indent else ''}        "
-    rows = []
-    while len(line) > WIDTH and '"' not in line and "/*" not in line:
-        at = line.rfind(" ", len(begin) + 1, WIDTH)
-        if at < 0:
-            break
-        rows.append(line[:at])
-        line = begin + line[at + 1 :]
-    return "\n".join([*rows, line])
+    begin = begin or " " * (len(line) - len(line.lstrip(" ")) + 8)
+    at = line.rfind(" ", len(begin) + 1, WIDTH)
+    if len(line) <= WIDTH or at < 0 or '"' in line or "/*" in line:
+        return line
+    return f"{line[:at]}\n{wrapped(begin + line[at + 1 :], begin)}"
 
 
 class Source:
@@ -128,14 +109,10 @@ class Source:
         """What the docstring below a member of a class says of it, or ""."""
         for node in self.tree.body:
             if isinstance(node, ast.ClassDef) and node.name == cls:
-                for at, said in zip(node.body, node.body[1:], strict=False):
-                    is_it = isinstance(at, ast.AnnAssign) and getattr(at.target, "id", "") == name
-                    if (
-                        is_it
-                        and isinstance(said, ast.Expr)
-                        and isinstance(said.value, ast.Constant)
-                    ):
-                        return str(said.value.value).strip()
+                for pair in pairwise(node.body):
+                    match pair:
+                        case ast.AnnAssign(ast.Name(n)), ast.Expr(ast.Constant(said)) if n == name:
+                            return str(said).strip()
         return ""
 
     def error(self, at: Any, reason: str) -> UntranslatableError:

@@ -2,12 +2,12 @@
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, is_dataclass
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, cast, get_args, get_origin, get_type_hints
 
 from .text import Source, comment, identifier, number, wrapped
 
@@ -60,8 +60,7 @@ def of_hint(hint: Any) -> Type | None:
     if get_origin(hint) is Annotated:
         return of_hint(get_args(hint)[0])
     if get_origin(hint) is tuple:
-        items = tuple(of_hint(item) for item in get_args(hint))
-        return Tuple(tuple(i for i in items if i)) if all(items) else None
+        return _tuple_of(map(of_hint, get_args(hint)))
     if not isinstance(hint, type):
         return None
     if issubclass(hint, IntEnum):
@@ -75,10 +74,12 @@ def of_hint(hint: Any) -> Type | None:
 
 def of_value(value: Any) -> Type | None:
     """The type of a constant."""
-    if type(value) is tuple:
-        items = tuple(of_value(item) for item in value)
-        return Tuple(tuple(i for i in items if i)) if all(items) else None
-    return of_hint(type(value))
+    return _tuple_of(map(of_value, value)) if type(value) is tuple else of_hint(type(value))
+
+
+def _tuple_of(items: Iterable[Type | None]) -> Type | None:
+    known = [*items]
+    return Tuple(tuple(i for i in known if i)) if all(known) else None
 
 
 def is_record(cls: Any) -> bool:
@@ -138,27 +139,21 @@ class Program:
 
     def __init__(self, params: type[Any], file: Path | None = None) -> None:
         self.params, self.file = Group(params), file
+        self._source = cache(Source)
         self.functions: dict[Any, Function | None] = {}
         """By code and the types of the arguments; None while it is being translated."""
         self.kept: dict[str, Function] = {}
         """The cached properties of the parameters, which are worked out when those are read."""
         self.bodies: list[str] = []
-        self._sources: dict[str, Source] = {}
         self.names: dict[str, Any] = {}
-        self._constants: dict[Any, str] = {}
+        self.constants: dict[str, str] = {}
+        """The definitions of constants, by their names in C."""
         self._structs: dict[Type, str] = {}
-        self._definitions: list[str] = []
-
-    # Sources
 
     def source(self, file: str) -> Source:
         """The source in a file."""
-        if file not in self._sources:
-            own = self.file is not None and Path(file).name == self.file.name
-            self._sources[file] = Source(file, str(self.file) if own else Path(file).name)
-        return self._sources[file]
-
-    # Names
+        own = self.file is not None and Path(file).name == self.file.name
+        return self._source(file, str(self.file) if own else Path(file).name)
 
     def unique(self, module: str, name: str, key: Any) -> str:
         """The name in C of what a module has, behind the module's own name."""
@@ -170,8 +165,6 @@ class Program:
             count += 1
             found = f"{wanted}_{count}"
         return found
-
-    # Types
 
     def c(self, t: Type, near: dict[str, Any] | None = None) -> str:
         """A type in C; `near` are the names of the module that asks, one of which a tuple gets."""
@@ -189,11 +182,7 @@ class Program:
         modules = [near, *(vars(m) for m in near.values() if type(m) is type(sys))]
         for names in modules:
             for name, hint in names.items():
-                if (
-                    not name.startswith("_")
-                    and str(hint).startswith("tuple[")
-                    and of_hint(hint) == t
-                ):
+                if name[0] != "_" and get_origin(hint) is tuple and of_hint(hint) == t:
                     return self.unique(names["__name__"], name, t)
         return self.unique("Tuple", str(len(t.items)), t)
 
@@ -205,79 +194,63 @@ class Program:
 
     def braces(self, t: Type, items: list[str]) -> str:
         """The initialiser of a struct."""
-        text = ", ".join(items)
-        return f"{{{{{text}}}}}" if alike(t) else f"{{{text}}}"
+        text = f"{{{', '.join(items)}}}"
+        return f"{{{text}}}" if alike(t) else text
 
     def structs(self) -> str:
         """The definitions of all structs that were asked for, each after those in it."""
-        done: set[Type] = set()
+        done: dict[Type, str] = {}
         while waiting := [t for t in self._structs if t not in done]:
             for t in waiting:
                 self._define(t, done)
-        return "\n".join(self._definitions)
+        return "\n".join(done.values())
 
-    def _define(self, t: Type, done: set[Type]) -> None:
+    def _define(self, t: Type, done: dict[Type, str]) -> None:
         t = plain(t)
         if isinstance(t, Scalar) or t in done:
             return
-        done.add(t)
-        members = list(self._members(t))
-        for _, kind, _ in members:
+        lines = [] if isinstance(t, Tuple) else [comment(t.cls.__doc__ or t.cls.__name__)]
+        lines.append("typedef struct {")
+        for name, kind, meaning in self._members(t):
             self._define(kind, done)
-        lines = []
-        for name, kind, meaning in members:
-            line = f"    {self.c(kind)} {name};"
-            lines.append(f"{line}{' ' + comment(meaning) if meaning else ''}")
-        head = [] if isinstance(t, Tuple) else [comment(t.cls.__doc__ or t.cls.__name__)]
-        self._definitions.append(
-            "\n".join([*head, "typedef struct {", *lines, f"}} {self.c(t)};", ""])
-        )
+            said = f" {comment(meaning)}" if meaning else ""
+            lines.append(f"    {self.c(kind)} {name};{said}")
+        done[t] = "\n".join([*lines, f"}} {self.c(t)};", ""])
 
     def _members(self, t: Type) -> Iterator[tuple[str, Type, str]]:
-        if isinstance(t, Tuple):
-            several = enumerate(t.items)
-            alone = [(f"at[{len(t.items)}]", t.items[0], "")] if alike(t) else []
-            yield from alone or ((f"at_{i}", kind, "") for i, kind in several)
-            return
-        assert not isinstance(t, Scalar)  # noqa: S101 - it has no members
-        for name, kind in fields(t).items():
-            yield identifier(name), kind, self._meaning(t.cls, name)
-        if t == self.params:
-            for name, made in self.kept.items():
-                yield identifier(name), made.returns, "worked out from the others"
+        if isinstance(t, Record | Group):
+            for name, kind in fields(t).items():
+                yield identifier(name), kind, self._meaning(t.cls, name)
+        elif alike(t):
+            yield f"at[{len(parts(t))}]", parts(t)[0], ""
+        else:
+            yield from ((f"at_{i}", kind, "") for i, kind in enumerate(parts(t)))
+        for name, made in self.kept.items() if t == self.params else ():
+            yield identifier(name), made.returns, "worked out from the others"
 
     def _meaning(self, cls: type[Any], name: str) -> str:
-        declared = getattr(get_type_hints(cls, include_extras=True)[name], "__metadata__", None)
-        if declared:
-            unit = f", {declared[0].unit}" if declared[0].unit else ""
-            return f"{declared[0].description}{unit}"
+        hint = get_type_hints(cls, include_extras=True)[name]
+        for declared in getattr(hint, "__metadata__", ())[:1]:
+            return str(declared.description) + f", {declared.unit}" * bool(declared.unit)
         spec: Any = sys.modules[cls.__module__].__spec__
         return re.sub(r"\s+", " ", self.source(spec.loader.path).member(cls.__name__, name))
-
-    # Constants
 
     def constant(self, names: dict[str, Any], name: str, value: Any) -> str:
         """The name in C of a constant of a module."""
         key = names["__name__"], name
         c_name = self.unique(*key, key)
-        if key not in self._constants:
-            kind = of_value(value)
-            assert kind  # noqa: S101 - the caller has made sure
-            line = f"static const {self.c(kind, names)} {c_name} = {self.literal(value)};"
-            self._constants[key] = line
+        if c_name not in self.constants:
+            kind, text = self._literal(value)
+            line = f"static const {self.c(kind, names)} {c_name} = {text};"
+            self.constants[c_name] = f"{wrapped(line)}\n"
         return c_name
 
-    def literal(self, value: Any) -> str:
-        """A constant as an initialiser."""
+    def _literal(self, value: Any) -> tuple[Type, str]:
+        """The type of a constant, which it has, and its initialiser."""
+        kind = cast(Type, of_value(value))
         if isinstance(value, tuple):
-            kind = of_value(value)
-            assert kind  # noqa: S101 - the caller has made sure
-            return self.braces(kind, [self.literal(item) for item in value])
-        return str(int(value)) if isinstance(value, bool) else number(value)
-
-    def constants(self) -> str:
-        """The definitions of all constants."""
-        return "".join(f"{wrapped(line)}\n" for line in self._constants.values())
+            return kind, self.braces(kind, [self._literal(item)[1] for item in value])
+        return kind, str(int(value)) if isinstance(value, bool) else number(value)
 
 
 def alike(t: Type) -> bool:
