@@ -78,6 +78,9 @@ GUID = "{0f1e2d3c}"
 CONTENT = "0123456789abcdef"
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
+CHECKED = "-DTEXT_LIKE_PRINTF=__attribute__((format(printf, 2, 3)))"
+"""Has the formats of messages checked."""
+
 BLOCK = sys.modules[__name__]
 
 
@@ -89,10 +92,10 @@ def write_sources(folder, fmi=2):
         (folder / file).write_bytes(data)
 
 
-def compile_in(folder, fmi=2, options=(), cc="gcc"):
+def compile_in(folder, fmi=2, options=()):
     """The shared library of sources in a folder; without warnings."""
     plain = (f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", *options, str(folder / f"{NAME}.c"), "-lm")
-    return compile_c([cc, *FLAGS, *STRICT, *plain], folder / f"{NAME}.so")
+    return compile_c(["gcc", *FLAGS, *STRICT, CHECKED, *plain], folder / f"{NAME}.so")
 
 
 def native_fmu(folder, fmi=2, options=()):

@@ -49,7 +49,7 @@ EXPRESSIONS = {
     "a // b": "write floor(a / b)",
     "a % b": "write fmod(a, b)",
     "sorted(p.weights)[0]": "sorted: is not in the subset",
-    "(lambda x: x)(a)": "",
+    "(lambda x: x)(a)": "use a function of the module",
     "[a, b][0]": "a list is not in the subset; use a tuple",
     "[w for w in p.weights][0]": "use tuple(... for ...)",
     "{1: a}[1]": "use a MappingProxyType of the module",
@@ -72,12 +72,12 @@ EXPRESSIONS = {
     "Point(1, b).x": "is int or float",
     "Point(a).x": "missing a required argument: 'y'",
     "TEXTS[0]": "is not in the subset",
-    "f'{a}'": "a text is only for the reason of a raise",
+    "f'{a}'": "is not in the subset",
     "recursive(a)": "recursive: calls itself; use a loop",
     "variadic(a, b)": "*args, **kwargs",
     "unfit(a)": "unfit: must return a value on every way",
     "either(a)": "is float or tuple[float, float]",
-    "print(a)": "a block has no output",
+    "print(a)": "print: is not in the subset",
     "a is b": "compare numbers",
 }
 BODIES = {

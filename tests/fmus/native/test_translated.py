@@ -1,4 +1,4 @@
-"""The shipped blocks, also of N fingers, those of docs/, blocks by chance: the bits of Python."""
+"""The shipped blocks, also of N fingers, and those of docs/: the bits of Python."""
 
 import os
 import subprocess
@@ -9,7 +9,6 @@ from random import Random
 
 import pytest
 from fmus.native.c_block import Both, loaded
-from fmus.native.random_block import random_block
 from grasp_fmus.shipped import block_of as block_of_ours
 from support.kinds import TRANSLATED
 from support.marks import part, platforms, seeds, slow
@@ -48,32 +47,15 @@ def test_a_hand_of_n_fingers(name, tmp_path):
     assert sum(both.random_run(Random(seed), 10) for seed in range(15)) > 50
 
 
-def test_a_block_by_chance(tmp_path):
-    with loaded(tmp_path / "chance.py", random_block(Random(1))) as block:
-        both = Both("chance", block, tmp_path / "c", options=["-O0", "-w"])
-        assert sum(both.random_run(Random(seed), 10) for seed in range(20)) > 100
-
-
 @pytest.mark.slow
 @pytest.mark.campaign
-def test_ten_million_values(tmp_path):
-    """Half of them of shipped blocks, those of docs/, half of blocks by chance."""
-    whole = part(10_000_000)
-    for name in NAMES:
-        with block_of(name, tmp_path) as block:
-            both, count, random = (
-                Both(name, block, tmp_path / "c"),
-                0,
-                Random(f"{name} {seeds(1)[0]}"),
-            )
-            while count < whole / 2 / len(NAMES):
-                count += both.random_run(random, 200)
-    count, tries = 0, 0
-    while count < whole / 2:
-        random, tries = Random(seeds(1)[0] + tries), tries + 1
-        with loaded(tmp_path / f"chance_{tries}.py", random_block(random)) as block:
-            both = Both(f"chance_{tries}", block, tmp_path / "chance", options=["-O1", "-w"])
-            count += sum(both.random_run(random, 100) for _ in range(100))
+@pytest.mark.parametrize("name", NAMES)
+def test_ten_million_values(name, tmp_path):
+    with block_of(name, tmp_path) as block:
+        both, random = Both(name, block, tmp_path / "c"), Random(f"{name} {seeds(1)[0]}")
+        count = 0
+        while count < part(10_000_000) / len(NAMES):
+            count += both.random_run(random, 200)
 
 
 @pytest.mark.slow

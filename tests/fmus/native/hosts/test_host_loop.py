@@ -1,7 +1,6 @@
 """The grasp of native FMUs in a host in C: what the blocks give in Python, to the bit.
 
-Also when it goes back, starts again, loads again, in threads, with a decimal comma, and whatever
-the host leaves out.
+Also with a decimal comma, and under what finds errors of memory.
 """
 
 import shutil
@@ -18,7 +17,6 @@ from support.platforms import host_of
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 
 H = 1e-3
-STEPS = 200
 PLANTS = ("GripperPlant", "GripperPlantCompliant", "GripperPlantMovable")
 
 
@@ -27,29 +25,15 @@ def same_bits(found, expected):
     assert np.array_equal(found.view(np.uint64), expected.view(np.uint64))
 
 
-def rows(host, grasp, script, path, **environment):
-    """What a script that records gives; it must be all well."""
-    (answers,) = host.run(script, folder=path.parent, **environment)
-    good(answers)
-    return grasp.read(path)
-
-
 @pytest.fixture
 def grasp(parts):
     return Grasp(parts, BENCH)
 
 
-@pytest.fixture
-def expected(grasp, host, tmp_path):
-    """A whole run of STEPS steps."""
-    path = tmp_path / "expected"
-    return rows(host, grasp, grasp.whole(path, STEPS, H), path)
-
-
-def started(grasp, **how):
-    script = Script()
+def started(grasp, script=None):
+    script = script or Script()
     grasp.load(script)
-    grasp.make(script, **how)
+    grasp.make(script)
     grasp.initialise(script)
     return script
 
@@ -65,105 +49,27 @@ def started(grasp, **how):
 )
 def test_the_loop_is_that_of_the_blocks_to_the_bit(parts, host, tmp_path, steps, h, plant, values):
     grasp = Grasp(parts, values, plant)
-    found = rows(host, grasp, grasp.whole(tmp_path / "rows", steps, h), tmp_path / "rows")
+    (answers,) = host.run(grasp.whole(tmp_path / "rows", steps, h), folder=tmp_path)
+    good(answers)
+    found = grasp.read(tmp_path / "rows")
     same_bits(found, rows_in_python(values, steps, h, plant))
     assert len(np.unique(found[:, 0])) > 10  # it moves
 
 
-def test_back_by_a_state_and_on_again_also_in_another_process(grasp, expected, host, tmp_path):
-    """By its bytes, in instances that were made for something else, as FMI lets them."""
-    script = started(grasp)
-    grasp.record(script, tmp_path / "rows")
-    script.add("loop", 0, 50, bits(H))
-    grasp.all_of(script, "save")
-    grasp.all_of(script, "bytes")
-    script.add("loop", 50, 100, bits(H))
-    grasp.all_of(script, "restore")
-    script.add("loop", 50, 150, bits(H))
-    grasp.all_of(script, "forget")
-    grasp.end(script)
-    (answers,) = host.run(script, folder=tmp_path)
-    good(answers)
-    same_bits(grasp.read(tmp_path / "rows"), np.vstack([expected[:151], expected[51:]]))
-    saved = [answer.found[0] for answer in answers if answer.command == "bytes"]
-    script = started(Grasp({part.fmu.name: part for part in grasp.parts.values()}))
-    for i, data in enumerate(saved):
-        script.add("from", i, i, data).add("restore", i, i).add("forget", i, i)
-    grasp.record(script, tmp_path / "second")
-    script.add("loop", 50, 150, bits(H))
-    grasp.end(script)
-    same_bits(rows(host, grasp, script, tmp_path / "second"), expected[50:])
-
-
-def test_again_by_a_reset_and_by_loading_again(grasp, expected, host, tmp_path):
-    """As in a fast restart, in the middle of a run; then in the same process, as if new."""
-    script = started(grasp)
-    grasp.record(script, tmp_path / "first")
-    script.add("loop", 0, 50, bits(H))
-    for i in grasp.index.values():
-        script.add("reset", i)
-    grasp.initialise(script)
-    for life in ("second", "third"):
-        script.add("rows", tmp_path / life).add("row").add("loop", 0, STEPS, bits(H))
-        grasp.end(script)
-        grasp.unload(script)
-        if life == "second":
-            grasp.load(script)
-            grasp.make(script)
-            grasp.initialise(script)
-    same_bits(rows(host, grasp, script, tmp_path / "second"), expected)
-    same_bits(grasp.read(tmp_path / "third"), expected)
-
-
-@pytest.mark.parametrize(
-    ("callbacks", "resources"),
-    [("own", None), ("mute", ""), ("bare", "http://localhost/x"), ("none", "/x" * 5000)],
-    ids=["own", "mute", "bare", "none"],
-)
-def test_whatever_callbacks_and_place_the_host_has(
-    callbacks, resources, grasp, expected, host, tmp_path
-):
-    """Memory of its own, which must come back to it; no logger; none at all. Refusals included."""
-    script = started(grasp, callbacks=callbacks, resources=resources)
-    grasp.record(script, tmp_path / "rows")
-    for i in grasp.index.values():
-        script.add("step", i, bits(9.0), bits(H)).add("set", i, "real", 10**6, bits(1.0))
-    grasp.all_of(script, "save")
-    script.add("loop", 0, STEPS, bits(H))
-    grasp.all_of(script, "forget")
-    grasp.end(script)
-    (answers,) = host.run(script, folder=tmp_path)
-    wrong = [answer for answer in answers if answer.status]
-    assert [(a.command, a.status) for a in wrong] == [("step", 3), ("set", 3)] * 4
-    assert all(bool(a.said) == (callbacks == "own") for a in wrong)
-    same_bits(grasp.read(tmp_path / "rows"), expected)
-
-
-def german(folder):
-    """An environment with a locale that has a decimal comma, made for the purpose."""
+@pytest.mark.slow
+def test_where_a_decimal_point_is_a_comma(grasp, host, tmp_path):
     if not shutil.which("localedef") or not Path("/usr/share/i18n/locales/de_DE").exists():
         pytest.skip("NO localedef, or no definition of de_DE: in the package locales")
-    command = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(folder / "de_DE.UTF-8")]
+    command = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(tmp_path / "de_DE.UTF-8")]
     subprocess.run(command, check=True, capture_output=True)
-    return {"LOCPATH": str(folder)}
-
-
-@pytest.mark.slow
-def test_where_a_decimal_point_is_a_comma(grasp, expected, host, tmp_path):
-    environment = german(tmp_path)
-    script = Script().add("locale", "de_DE.UTF-8")
-    grasp.load(script)
-    grasp.make(script)
-    grasp.initialise(script)
+    script = started(grasp, Script().add("locale", "de_DE.UTF-8"))
     grasp.record(script, tmp_path / "rows")
-    script.add("loop", 0, STEPS, bits(H))
-    plant = grasp.parts["plant"].fmu.references["object_width"]
-    script.add("step", 0, bits(9.25), bits(0.125)).add("set", 0, "real", plant, bits(0.5))
-    (answers,) = host.run(script, folder=tmp_path, **environment)
-    good(answers[:-2])
-    ((_, _, _, text),) = answers[-2].said
+    script.add("loop", 0, 200, bits(H)).add("step", 0, bits(9.25), bits(0.125))
+    (answers,) = host.run(script, folder=tmp_path, LOCPATH=str(tmp_path))
+    good(answers[:-1])
+    ((_, _, _, text),) = answers[-1].said
     assert text == "plant, t = 0.2 s: step from 9.25 s: must be from 0.2 s"
-    same_bits(grasp.read(tmp_path / "rows"), expected)
+    same_bits(grasp.read(tmp_path / "rows"), rows_in_python(BENCH, 200, H))
 
 
 def test_memory_is_asked_for_at_the_start_and_for_states_alone(grasp, tmp_path):

@@ -3,25 +3,23 @@
 Each file to compile is compiled alone, with nothing but its own folder, and linked with others.
 """
 
-import ctypes
+import platform
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
-from copy import copy
+import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from c_compilers import LIBM
-from support.c_host import COMPONENTS, CONNECTIONS, rows_in_python
-from support.fmi2 import OK, Instance
+from fmus.native.mass import GUID, NAME, compile_in, write_sources
+from support.c_host import COMPONENTS
+from support.compiled import compile_c
 from support.kinds import TRANSLATED
-from support.platforms import MINGW, Parts
+from support.marks import slow
+from support.platforms import MINGW, needs_programs
 
 PLAIN = ["gcc", "-std=c99", "-O1", "-ffp-contract=off"]
-
-PartsOf = Callable[[int], Parts]
 
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="NO gcc")
 
@@ -41,62 +39,25 @@ def fmu(parts, name):
     return parts[name].fmu
 
 
-every = pytest.mark.parametrize(
-    "name",
-    TRANSLATED,
-)
-
-
-# Linked into one program
-
-
-class Prefixed:
-    """Those functions of a library whose names begin with a prefix, without it."""
-
-    def __init__(self, library, prefix):
-        self._library, self._prefix = library, prefix
-        self.fmi2Instantiate.restype = ctypes.c_void_p
-
-    def __getattr__(self, name):
-        return getattr(self._library, self._prefix + name)
+every = pytest.mark.parametrize("name", TRANSLATED)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("given", [False, True])
-def test_three_fmus_in_one_program_are_the_grasp(given, parts_of, tmp_path):
-    """Each compiled alone, first in folders of the others, and linked with no name left open."""
-    fmus = {name: part.fmu for name, part in parts_of(2).items() if name in COMPONENTS.values()}
-    objects, grasp = [], {}
-    for name, fmu in fmus.items():
-        others = [f"-I{sources(fmus[other])}" for other in fmus if other != name]
-        own = [f"-DFMI2_FUNCTION_PREFIX=rt_{name}_"] if given else []
-        objects.append(tmp_path / f"{name}.o")
-        command = [*PLAIN, "-fPIC", *others, *own, "-c", sources(fmu) / f"{name}.c"]
-        subprocess.run([*command, "-o", objects[-1]], check=True)
-    whole = tmp_path / "whole.so"
-    command = ["gcc", "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", whole]
+def test_three_fmus_link_into_one_program(parts_of, tmp_path):
+    """Each is compiled alone, also in folders of the others, and leaves no name open."""
+    fmus = [parts_of(2)[name].fmu for name in dict.fromkeys(COMPONENTS.values())]
+    objects = []
+    for fmu in fmus:
+        others = [f"-I{sources(other)}" for other in fmus if other is not fmu]
+        made = []
+        for i, options in enumerate((others, [])):
+            made.append(tmp_path / f"{fmu.name}_{i}.o")
+            command = [*PLAIN, "-fPIC", *options, "-c", sources(fmu) / f"{fmu.name}.c"]
+            subprocess.run([*command, "-o", made[-1]], check=True)
+        assert made[0].read_bytes() == made[1].read_bytes()
+        objects.append(made[0])
+    command = ["gcc", "-shared", "-Wl,--no-undefined", *objects, "-lm", "-o", tmp_path / "it.so"]
     subprocess.run(command, check=True)
-    for component, name in COMPONENTS.items():
-        fmu = copy(fmus[name])
-        fmu.library = Prefixed(ctypes.CDLL(str(whole)), f"rt_{name}_" if given else f"{name}_")
-        grasp[component] = Instance(fmu)
-        assert (grasp[component].setup(), grasp[component].enter()) == (OK, OK)
-
-    def feed(component):
-        for source, output, target, name in CONNECTIONS:
-            if target == component:
-                assert grasp[component].set({name: grasp[source].get(output)[0]}) == OK
-
-    for component in ("sensor_1", "sensor_2", "controller"):
-        feed(component)
-    assert [part.exit() for part in grasp.values()] == [OK] * 4
-    rows = [grasp["plant"].get("position[1]", "position[2]")]
-    for k in range(200):
-        for component, part in grasp.items():
-            feed(component)
-            assert part.step(k * 1e-3, 1e-3) == OK
-        rows.append(grasp["plant"].get("position[1]", "position[2]"))
-    assert np.array_equal(rows, rows_in_python({}, 200, 1e-3)[:, :2])
 
 
 @pytest.mark.slow
@@ -126,9 +87,6 @@ def test_all_but_the_functions_of_fmi_is_static(fmu, tmp_path):
     linker = {"_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
     plain = {"floor", "ceil", "fabs", "sqrt", "copysign", "sincos"}  # gcc makes one of two
     assert kinds["U"] <= {*LIBM, *memory, *texts, *linker, *plain}
-
-
-# What other tools find in the folder
 
 
 @every
@@ -205,3 +163,99 @@ def test_strict_compilers_say_nothing(fmu, options, tmp_path):
     command = [*options, "-fsyntax-only", f"{fmu.name}.c"]
     done = subprocess.run(command, cwd=sources(fmu), capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+# Of the mass
+
+
+@pytest.mark.skipif(not shutil.which("nm"), reason="NO nm")
+@pytest.mark.parametrize("fmi", [2, slow(3)])
+@pytest.mark.parametrize(
+    ("define", "prefix"),
+    [
+        ((), f"{NAME}_"),
+        (("-DFMI{}_FUNCTION_PREFIX=Mine_",), "Mine_"),
+        (("-DFMI{}_FUNCTION_PREFIX=",), ""),  # FMPy on Windows
+        (("-DFMI{}_OVERRIDE_FUNCTION_PREFIX",), ""),  # the standard's way
+        ((f"-D{NAME}_EXPORTS",), ""),  # CMake's, and so FMPy's elsewhere
+    ],
+)
+def test_names_of_functions(define, prefix, fmi, tmp_path):
+    """All else is static: any number of FMUs link into one program."""
+    write_sources(tmp_path / "c", fmi)
+    defined = [text.format(fmi) for text in define]
+    source = tmp_path / "c" / f"{NAME}.c"
+    command = ["gcc", "-std=c99", "-O0", "-fPIC", "-shared", *defined]
+    library = compile_c([*command, source, "-lm"], tmp_path / "found.so")
+    done = subprocess.run(["nm", "-D", library], capture_output=True, text=True, check=True)
+    names = set(re.findall(r" [TDB] (\w+)", done.stdout))
+    assert len(names) == {2: 44, 3: 75}[fmi]
+    assert all(name.startswith(f"{prefix}fmi{fmi}") for name in names)
+
+
+SCRIPT = f"""
+import ctypes, sys
+text = ctypes.c_char_p
+kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, text, ctypes.c_int, text, text)
+log = kind(lambda *message: print(message[-1].decode()))
+callbacks = (ctypes.c_void_p * 5)(ctypes.cast(log, ctypes.c_void_p))
+instantiate = ctypes.CDLL(sys.argv[1]).fmi2Instantiate
+instantiate.restype = ctypes.c_void_p
+print(bool(instantiate(b"one", 1, {GUID.encode()!r}, None, callbacks, 0, 0)))
+"""
+
+
+def said_of(library):
+    """Why a library makes no instance, in a process of its own; None where it makes one."""
+    command = [sys.executable, "-c", SCRIPT, str(library)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    *said, lives = done.stdout.splitlines()
+    assert len(said) == (lives == "False")
+    return said[0] if said else None
+
+
+FAST = "infinity, NaN, -0.0 and sums are not those of IEEE 754: must be compiled without"
+FUSED = "a * b + c is not rounded twice: must be compiled with -ffp-contract=off"
+SMALL = "numbers below 2.3e-308 become 0: must be compiled and linked without -ffast-math"
+EXACT = "-ffp-contract=off"
+CPU = Path("/proc/cpuinfo")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="NO x86-64")
+@pytest.mark.parametrize(
+    "cc", ["gcc", pytest.param("clang", marks=[pytest.mark.platforms, needs_programs("clang")])]
+)
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ([EXACT, "-march=native", "-O3"], None),
+        (["-ffp-contract=fast", "-march=native"], FUSED),
+        ([EXACT, "-ffinite-math-only"], FAST),
+        ([EXACT, "-fno-signed-zeros"], FAST),
+        ([EXACT, "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"], FAST),
+        (["-Ofast"], FAST),
+    ],
+)
+def test_a_compiler_that_calculates_otherwise_makes_no_instance(cc, options, reason, tmp_path):
+    if "-march=native" in options and not (CPU.is_file() and " fma " in CPU.read_text()):
+        pytest.skip("NO fused multiply-add in this processor")
+    write_sources(tmp_path / "c")
+    plain = ["-std=c99", "-O2", "-fPIC", "-shared", "-DFMI2_OVERRIDE_FUNCTION_PREFIX"]
+    command = [cc, *plain, *options, f"{NAME}.c", "-o", "fast.so", "-lm"]
+    subprocess.run(command, cwd=tmp_path / "c", check=True)
+    said = said_of(tmp_path / "c" / "fast.so")
+    assert said is None if reason is None else str(said).startswith(f"one, t = 0 s: {reason}")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="NO x86-64")
+def test_a_processor_that_drops_small_numbers_makes_no_instance(tmp_path):
+    """As a library that is linked with -ffast-math leaves it in the thread that loads it."""
+    write_sources(tmp_path / "c")
+    library = compile_in(tmp_path / "c")
+    (tmp_path / "c" / "empty.c").write_text("int nothing;\n", "utf-8")
+    plain = ["-fPIC", "-shared", "empty.c", "-L.", f"-l:{library.name}", "-Wl,-rpath,$ORIGIN"]
+    command = ["gcc", "-Ofast", "-Wl,--no-as-needed", *plain, "-o", "over.so"]
+    subprocess.run(command, cwd=tmp_path / "c", check=True, capture_output=True)
+    assert SMALL in str(said_of(tmp_path / "c" / "over.so"))
