@@ -23,7 +23,7 @@ from grasp_cosim.metrics.metric import Signals
 from gripper_plant import rigid
 from hypothesis import Phase, assume, given
 from hypothesis import strategies as st
-from proximity_sensor import optics
+from proximity_sensor import channel
 from support.approach import pairs
 from support.continuous import Adaptive, Grasp, solve
 from support.direct import closed_loop
@@ -86,29 +86,30 @@ def fast_enough(g):
 
 def blocks(g):
     """The parameters of the blocks for a grasp of the reference."""
-    sensor_1, sensor_2 = (optics.Params(r, g.K, g.n, g.l_0) for r in g.reflectance)
-    return (
-        rigid.Params(g.m, g.x_init, g.W, g.x_m, g.alpha, g.beta),
-        (sensor_1, sensor_2),
-        series.Params(
+    sensor_1, sensor_2 = (channel.Params(r, g.K, g.n, g.l_0) for r in g.reflectance)
+    return {
+        "plant": rigid.Params(g.m, g.x_init, g.W, g.x_m, g.alpha, g.beta),
+        "sensor_1": sensor_1,
+        "sensor_2": sensor_2,
+        "controller": series.Params(
             simultaneous_contact.Params(g.case == 2, g.M_a2, g.D_a2, g.K_a2, g.K_s),
             impact_reduction.Params(g.case > 0, g.M_a1, g.D_a1, g.K_a1, g.D_p),
             contact_force.Params(g.D_i, g.K_i),
         ),
-    )
+    }
 
 
 @cache
 def contact_times(g, step):
-    columns = closed_loop(*blocks(g), step, round(STOP / step), until_contact=True)
+    columns = closed_loop(blocks(g), step, round(STOP / step), until_contact=True)
     signals = Signals(columns["time"], columns)
     contacts = [first_contact(signals, j) for j in FINGERS]
     return np.array([np.nan if c is None else c[0] for c in contacts])
 
 
 def test_the_defaults_of_the_blocks_are_the_numbers_of_the_reference():
-    sensors = (optics.Params(), optics.Params())
-    assert blocks(Grasp()) == (rigid.Params(), sensors, series.Params())
+    defaults = [rigid.Params(), channel.Params(), channel.Params(), series.Params()]
+    assert [*blocks(Grasp()).values()] == defaults
     p, h = reflectance_ratio.Params(), holding.Params()
     learnt = (p.diffusion_exponent, p.time_constant, p.weight_exponent, p.intensity_noise)
     held = (h.squeeze, h.speed, h.time_constant)
@@ -148,7 +149,7 @@ def test_contact_times_err_in_proportion_to_the_step(case):
 def test_the_force_builds_up_as_in_the_reference(case):
     g = Grasp(case=case, x_m=X_M)
     expected = reference(g, BUILD_UP[case], True)
-    signals = closed_loop(*blocks(g), STEP, round(BUILD_UP[case] / STEP))
+    signals = closed_loop(blocks(g), STEP, round(BUILD_UP[case] / STEP))
     forces = [float(signals[f"plant.contact_force[{j}]"][-1]) for j in FINGERS]
     assert forces == pytest.approx(expected.contact_force, abs=1e-3)
     assert signals["controller.target_position"][-1] == pytest.approx(expected.target, abs=1e-6)
@@ -270,7 +271,7 @@ def test_the_fmus_give_the_bits_of_the_blocks(grasp, case, step):
     """The last at the published step, from free flight into contact."""
     steps = round((0.5 if case == 0 else 2.56) / step)
     ours = simulate(grasp.with_values(CASES[case]), step=step, stop=step * steps)
-    direct = closed_loop(*blocks(Grasp(case=case, x_m=X_M)), step, steps)
+    direct = closed_loop(blocks(Grasp(case=case, x_m=X_M)), step, steps)
     outputs = [name for name in ours if "exchange_energy" not in name]
     assert set(direct) == {"time", *outputs}
     assert ours.time.tobytes() == direct["time"].tobytes()

@@ -3,7 +3,6 @@
 import os
 import struct
 import subprocess
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,40 +10,14 @@ from typing import NamedTuple
 
 import fmpy
 import numpy as np
-import numpy.typing as npt
-from grasp_cosim.grasp.presets import SYSTEM
-from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
-from grasp_fmus.shipped import blocks
 
+from .direct import COMPONENTS, CONNECTIONS
 from .fmi2 import Fmu
 
 SOURCE = Path(__file__).parents[1] / "fmus" / "native" / "hosts" / "host.c"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 MISSING = 99
 """The status of a command that the host could not even try."""
-
-Rows = npt.NDArray[np.float64]
-
-GRASP = tomllib.loads(SYSTEM.read_text("utf-8"))
-COMPONENTS = {name: Path(c["fmu"]).stem for name, c in GRASP["components"].items()}
-CONNECTIONS = [
-    (*source.split(".", 1), *target.split(".", 1))
-    for source, target in (text.split(" -> ") for text in GRASP["connections"])
-]
-"""Of the grasp: FMUs by component; source, output, target, input."""
-
-BENCH = {
-    **GRASP["presets"]["bench"],
-    "sensor_1.pattern.enabled": True,
-    "sensor_2.surface": 4,
-    "plant.friction.coulomb[1]": 0.7,
-    "plant.friction.viscous[2]": 3.0,
-    "plant.initial_object_position": 0.02,
-}
-"""Values that have every function of a block run, and all of libm's that they call."""
-
-
-# The host
 
 
 def bits(value):
@@ -224,59 +197,3 @@ class Grasp:
 def good(answers):
     """Every command was answered with OK, and nothing was logged."""
     assert [answer for answer in answers if answer.status or answer.said] == []
-
-
-# The same loop, of the blocks
-
-
-class _Block:
-    def __init__(self, name, values):
-        self.block = blocks()[name]
-        fields = declared(self.block)
-        self.names = {v.name: i for i, v in enumerate(variables(fields))}
-        self.values = [start for f in fields for start in f.starts]
-        for variable, value in values.items():
-            self.values[self.names[variable]] = value
-        self.params = build_params(self.block, fields, self.values)
-        self.pack, self.unpack = packer(self.block.Inputs, fields), unpacker(fields)
-        self.first_output = sum(len(f.names) for f in fields if f.causality == "input")
-        self.x = None
-
-    def advance(self, h):
-        """A step of h seconds; without one, the initial state."""
-        u = self.pack(self.values)
-        if h:
-            self.x = self.block.step(self.params, self.x, u, h)
-        else:
-            self.x = self.block.initial_state(self.params, u)
-        self.outputs = self.unpack(self.block.outputs(self.params, self.x, u))
-        end = self.first_output + len(self.outputs)
-        self.values[self.first_output : end] = self.outputs
-
-
-def rows_in_python(values, steps, h, plant="GripperPlant", controller="GraspController"):
-    """The outputs that the blocks have at each communication point, in a plain loop in Python."""
-    own = {component: {} for component in COMPONENTS}
-    for name, value in values.items():
-        component, _, variable = name.partition(".")
-        own[component][variable] = value
-    parts = {
-        component: _Block(name, own[component])
-        for component, name in {**COMPONENTS, "plant": plant, "controller": controller}.items()
-    }
-    feeds = {
-        component: [
-            (parts[source], parts[source].names[output], parts[component].names[name])
-            for source, output, target, name in CONNECTIONS
-            if target == component
-        ]
-        for component in parts
-    }
-    rows = []
-    for k in range(steps + 1):
-        for component, part in parts.items():
-            for source, from_, to in feeds[component] if k or component != "plant" else ():
-                part.values[to] = source.values[from_]
-            part.advance(h if k else 0.0)
-        rows.append([value for part in parts.values() for value in part.outputs])
-    return np.array(rows, dtype=np.float64)

@@ -7,10 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from grasp_controller import series
 from grasp_cosim import cli
-from gripper_plant import rigid
-from proximity_sensor import optics
 from support.compiled import compile_c
 from support.direct import closed_loop
 
@@ -98,8 +95,7 @@ def rows(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs").symlink_to(ROOT / "docs")
     run(COMMANDS[0])
-    sensors = optics.Params(), optics.Params()
-    signals = closed_loop(rigid.Params(), sensors, series.Params(), 1e-3, 50)
+    signals = closed_loop({}, 1e-3, 50)
     columns = [*signals.values()]
     return [
         [*map(repr, map(float, row))] for row in zip(*columns[1:5], *columns[12:22], strict=True)

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from c_compilers import LIBM
 from fmus.native.mass import GUID, NAME, compile_in, write_sources
-from support.c_host import COMPONENTS
 from support.compiled import compile_c
+from support.direct import COMPONENTS
 from support.kinds import TRANSLATED
 from support.marks import slow
 from support.platforms import MINGW, needs_programs

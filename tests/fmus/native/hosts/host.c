@@ -7,8 +7,7 @@
    digits, the bits of the double: no locale and no rounding comes between.
 
      load L FMI PATH                          unload L
-     new I L CALLBACKS NAME TOKEN RESOURCES   CALLBACKS: full, own (memory of the host), mute
-                                              (no logger), bare (but the structure), none
+     new I L CALLBACKS NAME TOKEN RESOURCES   CALLBACKS: full, own (memory of the host)
      init I START   leave I   terminate I   reset I   free I
      set I KIND VR VALUE    get I KIND VR...  KIND: real, boolean, integer
      step I TIME H          last I            the time it came to, of FMI 2.0
@@ -257,25 +256,20 @@ static int make(Host *host)
 {
     int i = place(host, 1);
     Instance *s = &host->instances[i];
-    const char *kind = host->words[3];
     const char *name = text(host, 4), *token = text(host, 5), *resources = text(host, 6);
-    int own = strcmp(kind, "own") == 0, none = strcmp(kind, "none") == 0;
-    int mute = none || strcmp(kind, "mute") == 0 || strcmp(kind, "bare") == 0;
-    fmi2CallbackFunctions callbacks = {mute ? NULL : log_2, own ? own_allocate : calloc,
-                                       own ? own_free : free, NULL, host};
+    int own = strcmp(host->words[3], "own") == 0;
+    fmi2CallbackFunctions callbacks = {log_2, own ? own_allocate : calloc, own ? own_free : free,
+                                       NULL, host};
     memset(s, 0, sizeof *s);
-    if (strcmp(kind, "bare") == 0) {
-        memset(&callbacks, 0, sizeof callbacks);
-    }
     memcpy(&s->callbacks, &callbacks, sizeof callbacks);  /* its members are const */
     s->l = &host->libraries[place(host, 2)];
     host->most = i >= host->most ? i + 1 : host->most;
     s->component = s->l->fmi == 2
                        ? s->l->twoInstantiate(name, fmi2CoSimulation, token, resources,
-                                              none ? NULL : &s->callbacks, fmi2False, mute)
+                                              &s->callbacks, fmi2False, fmi2False)
                        : s->l->threeInstantiateCoSimulation(name, token, resources, fmi3False,
-                                                            mute, fmi3False, fmi3False, NULL, 0,
-                                                            host, mute ? NULL : log_3, NULL);
+                                                            fmi3False, fmi3False, fmi3False,
+                                                            NULL, 0, host, log_3, NULL);
     return s->component ? 0 : MISSING;
 }
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_fmus.native.targets import here
-from support.c_host import BENCH, Grasp, Host, Part, Script, bits, good, rows_in_python
+from support.c_host import Grasp, Host, Part, Script, bits, good
+from support.direct import BENCH, rows_in_python
 from support.marks import platforms, slow
 from support.platforms import host_of
 
@@ -52,7 +53,7 @@ def test_the_loop_is_that_of_the_blocks_to_the_bit(parts, host, tmp_path, steps,
     (answers,) = host.run(grasp.whole(tmp_path / "rows", steps, h), folder=tmp_path)
     good(answers)
     found = grasp.read(tmp_path / "rows")
-    same_bits(found, rows_in_python(values, steps, h, plant))
+    same_bits(found, rows_in_python(values, steps, h, plant=plant))
     assert len(np.unique(found[:, 0])) > 10  # it moves
 
 

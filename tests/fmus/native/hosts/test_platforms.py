@@ -33,7 +33,8 @@ from grasp_fmus.native.targets import (
     Target,
     here,
 )
-from support.c_host import BENCH, Grasp, Host, Script, bits, good, number, rows_in_python
+from support.c_host import Grasp, Host, Script, bits, good, number
+from support.direct import BENCH, rows_in_python
 from support.fmi2 import Fmu, Instance, read_members
 from support.marks import needs_zig
 from support.platforms import ARM, WIN, X86, Parts, Platform, cases, needs_programs, windows
@@ -75,7 +76,7 @@ LOOPS = [
 @cache
 def in_python(loop):
     plant, controller, values, steps, h = LOOPS[loop]
-    return rows_in_python(values, steps, h, plant, controller)
+    return rows_in_python(values, steps, h, plant=plant, controller=controller)
 
 
 @pytest.mark.parametrize(("platform", "fmi"), [*cases(X86, [2]), *cases([*ARM, *WIN])])
