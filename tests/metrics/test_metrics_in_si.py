@@ -92,7 +92,7 @@ def test_an_angle_may_be_a_number(load):
         (
             {"x": "m"},
             [travel, wanting("force", x="N")],
-            "force: needs room.x in N, travel in m; must be of one quantity",
+            "room.x is in m; force must know its unit, one like N",
         ),
     ],
 )

@@ -28,10 +28,7 @@ Floats = npt.NDArray[np.float64]
 
 
 def balance_weights(angles: Sequence[float]) -> tuple[float, ...]:
-    """The weights of fingers in these directions, in degrees; see above.
-
-    InputError where the fingers cannot hold, with the reason.
-    """
+    """The weights of fingers in these directions, in degrees; InputError where they cannot hold."""
     return _balanced(tuple(angles))
 
 

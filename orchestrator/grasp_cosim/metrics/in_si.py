@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from si_units import Unit, known_unit
+from si_units import known_unit
 
 from ..base.errors import InputError, choices
 from ..interface.units import Conversion
@@ -24,14 +24,6 @@ class InSi(NamedTuple):
     notes: tuple[str, ...]
 
 
-class _Expected(NamedTuple):
-    """The unit that a signal is to have or convert to, and for what."""
-
-    unit: str
-    purpose: str
-    quantity: Unit
-
-
 def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     """How `metrics` get the outputs of a system.
 
@@ -40,21 +32,29 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     """
     asked, recorded = tuple(metrics), {str(port): v for port, v in system.recorded.items()}
     units = {str(port): unit for port, unit in system.once(output_units).items()}
-    expected = _expected(system, asked)
-    for name, expects in expected.items():
-        declared, unit = recorded[name].unit, units.get(name)
-        if (
-            name in units
-            and declared is not None
-            and not (unit and unit.measures(expects.quantity))
-        ):
-            undefined = "" if unit else ", which its FMU does not define in SI units"
-            component, _, variable = name.partition(".")
-            raise InputError(
-                f"{system.name}: {name} is in {unit.name if unit else repr(declared)}{undefined}; "
-                f"{expects.purpose} must know its unit, one like {expects.unit}: "
-                f"{naming(component, [variable])}"
-            )
+    expected = set()
+    for metric in available(asked, recorded, system.roles)[0]:
+        purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
+        for need, wanted in metric.expects.items():
+            if wanted is None:
+                continue
+            name, quantity = resolved(need, system.roles), known_unit(wanted)
+            if quantity is None or not quantity.si:
+                raise InputError(
+                    f"{purpose}: needs {need} in {wanted!r}; must be a unit of SI like 'm' or "
+                    "'N.s/m', as signals come in these"
+                )
+            expected.add(name)
+            declared, unit = recorded[name].unit, units.get(name)
+            fits = declared is None or (unit and unit.measures(quantity))
+            if name in units and not fits:
+                undefined = "" if unit else ", which its FMU does not define in SI units"
+                component, _, variable = name.partition(".")
+                raise InputError(
+                    f"{system.name}: {name} is in {unit.name if unit else repr(declared)}"
+                    f"{undefined}; {purpose} must know its unit, one like {wanted}: "
+                    f"{naming(component, [variable])}"
+                )
     free = any(not m.expects for m in asked)
     silent = [n for n, v in recorded.items() if v.kind == "Real" and v.unit is None]
     read = [name for name in silent if free or name in expected]
@@ -63,28 +63,3 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
         {name: Conversion(unit.factor, unit.offset) for name, unit in others.items()},
         (f"{choices(read, 6)}: no unit, taken to be in SI",) if read else (),
     )
-
-
-def _expected(system: Structure, metrics: Iterable[Metric]) -> dict[str, _Expected]:
-    """What is expected of signals by their names, by the first metric that does."""
-    recorded = {str(port) for port in system.recorded}
-    found: dict[str, _Expected] = {}
-    for metric in available(metrics, recorded, system.roles)[0]:
-        purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
-        for name, unit in metric.expects.items():
-            if unit is None:
-                continue
-            quantity = known_unit(unit)
-            if quantity is None or not quantity.si:
-                raise InputError(
-                    f"{purpose}: needs {name} in {unit!r}; must be a unit of SI like 'm' or "
-                    "'N.s/m', as signals come in these"
-                )
-            own = _Expected(unit, purpose, quantity)
-            first = found.setdefault(resolved(name, system.roles), own)
-            if not first.quantity.measures(quantity):
-                raise InputError(
-                    f"{purpose}: needs {name} in {unit}, {first.purpose} in {first.unit}; must "
-                    "be of one quantity"
-                )
-    return found

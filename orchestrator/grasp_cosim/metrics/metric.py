@@ -66,10 +66,9 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
     """Recorded signals by names like plant.gap[1], where plant is a role or a component.
 
     `time` in s and every signal have the shape (rows,). They come in SI base units, by_name has
-    them as recorded. `roles` maps a role to the component that plays it; a component of a role's
-    name plays it where `roles` does not say otherwise. `to_si` are the conversions of those that
-    are not recorded in SI. `start_values` are those that the system sets, by names like
-    plant.angle[1], in the units of their components.
+    them as recorded, and to_si how those are converted that are not in SI. `roles` maps a role to
+    the component that plays it, if not the one of its name. `start_values` are those that the
+    system sets, by names like plant.angle[1], in the units of their components.
     """
 
     time: npt.NDArray[np.float64]
@@ -113,16 +112,13 @@ class Metric:
 
     `unit` is that of the value ("1" for a share, None for true or false); in tables the value is
     shown times `factor` in `shown_unit`. `entries` name its values where it has several, like
-    ("finger 1", "finger 2").
-    A name with [*] stands for all elements that there are of an array, like plant.gap[*], of which
-    there must be one; an entry with * is then one for each, like "finger *".
-    `needs` are the signals without which there is no value; a mapping gives the SI unit in which
-    each is expected as well, or None, so that a signal of another quantity, or in a unit that is in
-    doubt, is refused before a run. Metrics of one `group` are there
-    together or not at all, and why not is said once; an `optional` one is then left out in silence.
-    A `reason` says why others have no value: it is left out where it has none itself, and
-    a qualification does not compare it.
-    `none` says what it means where it has no value: "nothing was touched".
+    ("finger 1", "finger 2"). `needs` are the signals without which there is no value; a mapping
+    gives the SI unit in which each is expected, or None, so that one of another quantity is refused
+    before a run. plant.gap[*] stands for all elements of an array, and the entry "finger *" then
+    for one each. Metrics of one `group` are there together or not at all, and why not is said once;
+    an `optional` one is left out in silence. A `reason` says why others have no value: it is left
+    out where it has none itself, and a qualification does not compare it. `none` says what having
+    no value means: "nothing was touched".
     """
 
     name: str
@@ -237,10 +233,7 @@ def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """The values of metrics by name, the metrics they are of, and why others have none.
-
-    `failures` are those lines of `missing` that say how a function failed.
-    """
+    """The values of metrics by name, those metrics, why others have none, and which failed."""
 
     values: Mapping[str, Any]
     metrics: tuple[Metric, ...]
@@ -258,10 +251,7 @@ class Measured:
         return {m.name: m.unit for m in self.metrics}
 
     def flat(self) -> dict[str, Value]:
-        """Single values by name, or name[1], name[2], ... where a metric has several.
-
-        InputError where a function failed.
-        """
+        """Single values by column, name or name[1]; InputError where a function failed."""
         self.check()
         found: dict[str, Value] = {}
         for name, value in self.values.items():
@@ -273,10 +263,7 @@ class Measured:
 
 
 def metrics_of(names: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
-    """The metrics of groups of ours, as a system names them, then `more`.
-
-    InputError where there is no such group, or two metrics have one name.
-    """
+    """The metrics of groups, then `more`; InputError for no such group, or two of one name."""
     found: dict[str, Metric] = {}
     for group in names:
         known("metrics: no group", group, groups())
@@ -289,10 +276,7 @@ def metrics_of(names: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metri
 
 
 def check_groups(system: Any) -> None:
-    """InputError where a group of ours has something against the values of a System that names it.
-
-    It says so in a function check() of its metrics.py, if it has one.
-    """
+    """InputError where check() of a group's metrics.py has something against a System's values."""
     for group in system.metrics:
         getattr(higher(f"{group}.metrics"), "check", lambda _: None)(system)
 
@@ -397,10 +381,7 @@ def available(
 def needed(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> frozenset[str]:
-    """The signals of these `names` that the metrics may read.
-
-    Of groups these are those they need, of a user's functions nobody knows: then all.
-    """
+    """The signals of these `names` that the metrics may read: all, where one is of no group."""
     there = available(metrics, names, roles)[0]
     if not all(m.group for m in there):
         return frozenset(names)

@@ -35,10 +35,7 @@ def grid(varied: Mapping[str, Iterable[Value]]) -> list[dict[str, Value]]:
 
 
 def varied(text: str) -> tuple[str, list[Value]]:
-    """The place and the values of a text like "plant.object_width=0.05:0.07:3", or "...=0.05,0.06".
-
-    InputError where it is no such text.
-    """
+    """The place and the values of a text in the FORM; InputError where it is none."""
     place, equals, said = text.partition("=")
     where = f"--vary {text!r}"
     if not (equals and all(place.partition("."))):
@@ -83,10 +80,7 @@ def as_rows(given: Any) -> list[dict[str, Value]]:
 
 
 def read_rows(path: Path) -> list[dict[str, Value]]:
-    """The rows of a CSV file whose head has places, with a unit in brackets where it is not of SI.
-
-    InputError where it cannot be read.
-    """
+    """The rows of a CSV file whose head has places, with a unit in brackets if it is not of SI."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             head, *lines = csv.reader(file)
@@ -106,10 +100,7 @@ def read_rows(path: Path) -> list[dict[str, Value]]:
 
 
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
-    """The rows with the values in the units that the system's FMUs have.
-
-    InputError where a unit is not defined, or the first row does not fit the system.
-    """
+    """The rows in the units of the system's FMUs; InputError where the first one does not fit."""
     back: dict[str, Any] = {}
     for place in dict.fromkeys(place for row in rows for place in row):
         port = _port(system, place)

@@ -61,14 +61,13 @@ def sweep(
 ) -> Table:
     """Run the system once for each row, and return a table of rows and metrics.
 
-    rows are mappings of places in the system file, as with_settings() has them, to values in SI
-    units; or columns by place, a pandas DataFrame, or the path of a CSV file. metrics are worked
-    out beside those of the system. With `out`, the path of a .csv or .parquet file, the table is
-    written there; until all are done, finished runs are kept in a file beside it, and the same call
-    goes on where it was ended. workers are processes here, by default as many as there are
-    processors; an executor of concurrent.futures takes their place, and that of a Dask client gets
-    the FMUs along. native is as of System.natively(). The table is the same to the bit in each
-    case; a run that fails is an error in its row. progress shows how far it is on standard error.
+    rows are mappings of places, as with_settings() has them, to values in SI units; or columns by
+    place, a pandas DataFrame, or the path of a CSV file. metrics are worked out beside those of the
+    system. The table is written to `out`, a .csv or .parquet file; until all are done, finished
+    runs are kept beside it, and the same call goes on. workers are processes here, by default one
+    for each processor; an executor of concurrent.futures takes their place, and gets the FMUs. The
+    table is the same to the bit in each case; a run that fails is an error in its row. native is as
+    of System.natively().
 
     InputError where the rows do not fit the system, nothing would be measured, or `out` has runs of
     something else; SimulationError where processes do not start or a run cannot be kept;
@@ -138,10 +137,7 @@ def run_row(task: Task, index: int, row: Row) -> Outcome:
 
 
 class Packed(NamedTuple):
-    """A task as bytes, which a process unpacks once; `fmus` are the contents of its FMUs, if any.
-
-    They travel to machines that do not have the files.
-    """
+    """A task as bytes, which a process unpacks once, with what its FMUs hold for other machines."""
 
     key: str
     task: bytes
@@ -242,10 +238,7 @@ def _elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
 
 @contextmanager
 def cluster(address: str) -> Iterator[Executor]:
-    """The executor of the Dask cluster whose scheduler is at an address like tcp://host:8786.
-
-    InputError without the extra `dask`, a scheduler or a worker.
-    """
+    """The executor of the Dask cluster whose scheduler is at an address like tcp://host:8786."""
     dask = extra_module("distributed", "it talks to Dask clusters", "dask")
     try:
         client = dask.Client(address, timeout=CONNECT, set_as_default=False)

@@ -89,9 +89,7 @@ class Table:
         return column, 1.0, "" if unit in (None, "1") else str(unit)
 
     def summary(self) -> dict[str, dict[str, float | int | None]]:
-        """For each metric: how many runs have a finite one, its least and greatest, its mean, and
-        the values below which 5 %, 50 % and 95 % lie.
-        """
+        """For each metric: how many runs have a finite one, and its STATISTICS."""
         found: dict[str, dict[str, float | int | None]] = {}
         for name in self.metrics:
             there = self[name][np.isfinite(self[name])]
@@ -195,8 +193,7 @@ def _array(arrow: Any, name: str, column: Sequence[Any]) -> Any:
 class Convergence:
     """How far a metric is from that of the finest step, for each of the coarser `steps` in s.
 
-    errors and finest are in the metric's SI unit, None where a run has no value. order is that of
-    the three finest steps; None where they show none, or there are fewer.
+    They are in its SI unit. order is that of the three finest steps; None where they show none.
     """
 
     steps: tuple[float, ...]
@@ -225,10 +222,7 @@ def convergence(table: Table) -> Mapping[str, Convergence]:
 
 
 def observed_order(steps: Sequence[float], results: Sequence[float | None]) -> float | None:
-    """The p of three results that err by C h^p, for rising steps h in s.
-
-    None where there is none from LOWEST to HIGHEST.
-    """
+    """The p from LOWEST to HIGHEST of three results that err by C h^p, for rising steps h in s."""
     y_1, y_2, y_3 = results
     if y_1 is None or y_2 is None or y_3 is None or y_2 == y_1:
         return None

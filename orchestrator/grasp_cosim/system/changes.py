@@ -147,10 +147,7 @@ def _check_ends(system: Structure, was: Component, after: Interface, place: str)
 
 
 def stated(system: Structure, name: str) -> frozenset[str]:
-    """The variables of a component for which the system states numbers, beside its values.
-
-    In events, conditions, faults, factors of connections and columns without a unit.
-    """
+    """The variables of a component for which the system states numbers, beside its values."""
     faulty = {fault.target for fault in system.faults}
     ports = [
         port

@@ -71,11 +71,10 @@ class System(Structure):
         stop: float | None = None,
         input: str | Path | Stimuli | None = None,  # noqa: A002 - as in the file and on the command line
     ) -> "System":
-        """The system of a TOML file or SSP archive.
+        """The system of a TOML file or SSP archive; an archive has its own FMUs.
 
-        step and stop in s, and a CSV file of inputs, go before what it says.
-
-        fmus is where the FMUs of a TOML file are, by default beside it; an archive has its own.
+        step and stop in s, and a CSV file of inputs, go before what it says. fmus is where the FMUs
+        of a TOML file are, by default beside it.
         """
         path = Path(path)
         check_nature(path, "system")
@@ -89,10 +88,7 @@ class System(Structure):
         return system
 
     def start(self, key: str) -> float:
-        """The number that 'component.variable' starts with, in the unit that it has in the system.
-
-        Given there, or by its FMU.
-        """
+        """The number that 'component.variable' starts with, given by the system or by its FMU."""
         name, _, variable = key.partition(".")
         component = self.component(name, key)
         declared = component.interface.by_name.get(variable)
@@ -102,10 +98,7 @@ class System(Structure):
         return float(value)
 
     def with_values(self, values: Mapping[str, Given]) -> "System":
-        """A copy with start values changed; the keys are like 'plant.object_width'.
-
-        The value of a whole array is a list of lists, a NumPy array, or one for all elements.
-        """
+        """A copy with other start values, by names like plant.object_width; of an array a list."""
         return self.with_settings(values, "with_values ".__add__)
 
     def swap(
@@ -136,14 +129,12 @@ class System(Structure):
     ) -> "System":
         """A copy with single values of its file changed, by their places in it.
 
-        "experiment.scheme", "components.plant.fmu", "components.plant.rename.gap[1]" or
-        "realtime.priority" are such; "plant.object_width" is short for
-        "components.plant.values.object_width". A text stands for a number or a boolean where there
-        must be one. An FMU takes the place of another as by swap(), with the names and units that
-        are given with it; values that are given, too, are in its units.
-
-        `place` says of a key, or of the beginning of one, where it comes from, for messages.
-        InputError where there is no such place, or one is given twice, or a value does not fit it.
+        "experiment.scheme", "components.plant.fmu" or "components.plant.rename.gap[1]" are such;
+        "plant.object_width" is short for "components.plant.values.object_width". A text stands for
+        a number or a boolean where there must be one. An FMU takes the place of another as by
+        swap(), and values that are given with it are in its units. `place` says of a key where it
+        comes from, for messages. InputError where there is no such place, or it is given twice, or
+        a value does not fit it.
         """
         file = as_file(self, settings, place)
         tables = file.pop("components", {})
@@ -175,19 +166,15 @@ class System(Structure):
         return system
 
     def with_input(self, input: str | Path | Stimuli | None) -> "System":  # noqa: A002
-        """A copy whose inputs without a connection or value are driven by a CSV file, or by none.
-
-        Held instead of linear: `read_stimuli(path, "held")`.
-        """
+        """A copy whose inputs without another source are driven by a CSV file, or by none."""
         return replace(self, input=_stimuli(input))
 
     def natively(self, native: bool | None = None) -> "System":
         """A copy that runs native twins of its FMUs, with the same bits; False: as they are named.
 
-        None takes the twins that there are or that can be built; where there are none, FMUs run as
-        they are, which a warning on the logger says. InputError where with True those of our blocks
-        cannot be built, or with False an FMU in Python has no binary for this machine. An FMU that
-        is swapped in afterwards runs as it is.
+        None takes the twins that there are or that can be built; other FMUs run as they are, which
+        the logger says. InputError where with True those of our blocks cannot be built, or with
+        False an FMU in Python has no binary here. What is swapped in afterwards runs as it is.
         """
         return self.with_natives(natives(self, native))
 
@@ -205,19 +192,15 @@ class System(Structure):
         scheme: str | None = None,
         diverging: str | None = None,
     ) -> "System":
-        """A copy with another communication step or stop time in seconds, or another scheme.
-
-        Or that does something else where a signal runs away.
-        """
+        """A copy with another communication step or stop time in s, or another scheme, or end."""
         given = {"step": step, "stop": stop, "scheme": scheme, "diverging": diverging}
         changed = {key: value for key, value in given.items() if value is not None}
         return replace(self, **experiment(str, changed)) if changed else self
 
     def _with_parameters(self, components: tuple[Component, ...]) -> "System":
-        """A copy with components that differ in values of parameters, which nothing else goes by.
+        """A copy with other values of parameters, which nothing goes by that is checked or shared.
 
-        These are checked already, so that a thousand runs do not check the rest as often, nor work
-        out again what follows from it.
+        So a thousand runs do not check the rest as often, nor work out what follows from it.
         """
         self.recorded, self._known  # noqa: B018 - there from now on, and shared
         made = object.__new__(type(self))

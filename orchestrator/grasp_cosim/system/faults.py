@@ -1,7 +1,6 @@
 """The kinds of faults of a connection: what each makes of a value, and its parameters.
 
-FAULTS is the one table of them. The checks, the system file and the run take from it what they need
-of a kind; what it makes of a value is in the table of docs/system_files.md.
+FAULTS is the one table of them; what a kind makes of a value: docs/system_files.md.
 
 At run time a fault gets each value that its connection passes, units converted, with the number of
 the base step in which it does so, INITIAL in initialisation mode, and whether the fault acts in it.
@@ -68,6 +67,10 @@ class Draws:
         return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
 
 
+Start = Callable[[Parameters, Draws, int], Act]
+"""Makes a fault from its parameters, its random numbers and the base step in ns."""
+
+
 def _stuck(given: Parameters, *_: object) -> Act:
     """The given value, or the one of the first step in which it is asked."""
     held = float(given.get("value", math.nan))
@@ -101,16 +104,6 @@ def _dropout(given: Parameters, draws: Draws, _: int) -> Act:
     return act
 
 
-def _bias(given: Parameters, *_: object) -> Act:
-    bias: float = given["value"]
-    return lambda value, _, acts: value + bias if acts else value
-
-
-def _noise(given: Parameters, draws: Draws, _: int) -> Act:
-    deviation: float = given["standard_deviation"]
-    return lambda value, step, acts: value + deviation * draws.normal(step) if acts else value
-
-
 def _delay(given: Parameters, _: Draws, step_ns: int) -> Act:
     """The last value passed at least so many base steps ago; the first one where there is none."""
     steps = round(given["time"] * NANOSECONDS / step_ns)
@@ -137,11 +130,6 @@ def _check_delay(place: str, given: Parameters, step_ns: int) -> None:
         )
 
 
-def _saturation(given: Parameters, *_: object) -> Act:
-    low, high = given.get("low", -math.inf), given.get("high", math.inf)
-    return lambda value, _, acts: min(max(value, low), high) if acts else value
-
-
 def _check_saturation(place: str, given: Parameters, _: int) -> None:
     low, high = given.get("low"), given.get("high")
     if low is None and high is None:
@@ -150,22 +138,25 @@ def _check_saturation(place: str, given: Parameters, _: int) -> None:
         raise InputError(f"{place}: high = {high!r}: must be above low = {low!r}")
 
 
-def _quantisation(given: Parameters, *_: object) -> Act:
-    width: float = given["step"]
+def _rounded(value: float, width: float) -> float:
+    count = value / width
+    return round(count) * width if math.isfinite(count) else value
 
-    def act(value: float, _: int, acts: bool) -> float:
-        count = value / width
-        return round(count) * width if acts and math.isfinite(count) else value
 
-    return act
+def _each(change: Callable[[float, Parameters, Draws, int], float]) -> Start:
+    """A fault that changes each value by its parameters, random numbers and the step number."""
+
+    def start(given: Parameters, draws: Draws, _: int) -> Act:
+        return lambda value, step, acts: change(value, given, draws, step) if acts else value
+
+    return start
 
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
     """One kind of fault."""
 
-    start: Callable[[Parameters, Draws, int], Act]
-    """Make a fault from its parameters, its random numbers and the base step in ns."""
+    start: Start
     parameters: Mapping[str, Range | None]
     """The range of each; None where it is a value that the input takes, and may be left out."""
     discrete: bool = False
@@ -188,9 +179,11 @@ FAULTS: Mapping[str, FaultKind] = MappingProxyType(
             discrete=True,
             random=True,
         ),
-        "bias": FaultKind(_bias, {"value": FINITE}),
+        "bias": FaultKind(_each(lambda x, p, *_: x + p["value"]), {"value": FINITE}),
         "noise": FaultKind(
-            _noise, {"standard_deviation": Range("a finite number of at least 0", 0.0)}, random=True
+            _each(lambda x, p, draws, k: x + p["standard_deviation"] * draws.normal(k)),
+            {"standard_deviation": Range("a finite number of at least 0", 0.0)},
+            random=True,
         ),
         "delay": FaultKind(
             _delay,
@@ -199,12 +192,13 @@ FAULTS: Mapping[str, FaultKind] = MappingProxyType(
             check=_check_delay,
         ),
         "saturation": FaultKind(
-            _saturation,
+            _each(lambda x, p, *_: min(max(x, p.get("low", x)), p.get("high", math.inf))),
             dict.fromkeys(("low", "high"), FINITE._replace(needed=False)),
             check=_check_saturation,
         ),
         "quantisation": FaultKind(
-            _quantisation, {"step": Range("a finite number above 0", 0.0, above=True)}
+            _each(lambda x, p, *_: _rounded(x, p["step"])),
+            {"step": Range("a finite number above 0", 0.0, above=True)},
         ),
     }
 )

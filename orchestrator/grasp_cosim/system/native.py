@@ -71,8 +71,7 @@ def _users_twins(component: Component) -> list[Path]:
 def _twins(components: list[Component]) -> tuple[dict[str, Path], str]:
     """The twins that there are or can be built, and why one of our own blocks has none, or "".
 
-    An FMU without a twin has none here, and so has one that needs no Python. InputError where one
-    that has no binary for this machine lacks its twin because none can be built.
+    InputError where the twin of an FMU that has no binary for this machine cannot be built.
     """
     ours = [c for c in components if _is_ours(c)]
     if not ours:

@@ -94,16 +94,12 @@ class Solver:
 class Component:
     """An instance of an FMU and what it is given: the system's names, values, step and process.
 
-    values differ from the FMU's own start values, by the system's names, of arrays by elements, of
-    which there are as many as values of structural parameters say. rename maps the system's
-    name of a variable to the FMU's, where they differ. step_ns is the component's own communication
-    step in nanoseconds, None for the system's. With isolation "process" it runs in a process of its
-    own. units name the units of variables that the FMU declares without one, or wrongly, by the
-    system's names. native is the FMU that runs in the place of fmu, its native twin: with the same
-    variables and the same bits, so that all else goes by fmu. With a solver its equations are
-    integrated here, by model exchange, though it may have a co-simulation of its own.
-
-    What its FMUs declare is read once; is_current says if the files are still the same.
+    values differ from the FMU's own start values; of arrays they are by elements, as many as values
+    of structural parameters say. rename maps the system's name of a variable to the FMU's; all else
+    goes by the system's. step_ns is its own communication step, None for the system's. units are of
+    variables that the FMU declares without one, or wrongly. native is the FMU that runs in the
+    place of fmu, its twin with the same bits. With a solver its equations are integrated here, by
+    model exchange, though it may have a co-simulation of its own.
     """
 
     name: str
@@ -125,10 +121,7 @@ class Component:
 
     @cached_property
     def interface(self) -> Interface:
-        """The declared interface of the FMU, under the system's names and with its units.
-
-        Arrays of numbers are taken apart: each element is a variable.
-        """
+        """The interface of the FMU in the system's names and units, with its arrays taken apart."""
         return self.declared.in_units(self.units, f"{self.name}: units")
 
     @cached_property
@@ -259,9 +252,8 @@ class Event:
 class Fault:
     """A change of the values that a connection passes, in steps from t >= start_ns to t < end_ns.
 
-    end_ns is None where there is no end. With a condition it begins where that holds first in this
-    window, and stays. The connection is named by its target. What the kinds do and their
-    parameters: faults.py. seed is that of a random kind.
+    With a condition it begins where that holds first in this window, and stays. The connection is
+    named by its target. The kinds and their parameters: faults.py. seed is that of a random kind.
     """
 
     target: Port

@@ -61,10 +61,7 @@ def read_events(name: str, entries: Any) -> tuple[Event, ...]:
 
 
 def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> tuple[Fault, ...]:
-    """The faults of a list of entries on connections; a System checks them.
-
-    InputError where one is malformed.
-    """
+    """The faults of a list of entries on connections; as read_events()."""
     found = []
     for place, entry in _entries(name, "faults", entries):
         kind: Any = entry.get("kind")

@@ -18,10 +18,7 @@ def run_settings(system: Structure) -> dict[str, Any]:
 
 
 def settings(system: Structure) -> dict[str, Any]:
-    """The settings of a system, of types that JSON has. Times are in s.
-
-    Events and faults are as a system file has them.
-    """
+    """The settings of a system, of types that JSON has; times in s."""
     return {
         "system": system.name,
         "scheme": system.scheme,

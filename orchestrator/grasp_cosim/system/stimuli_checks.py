@@ -110,10 +110,7 @@ def _value(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Valu
 
 
 def _conversion(place: str, interface: Interface, port: Port, column: Column) -> Conversion:
-    """The conversion of a column into the unit of its input; one that has none takes it as it is.
-
-    InputError where there is no way.
-    """
+    """The conversion of a column into the unit of its input; InputError where there is none."""
     variable = interface.by_name[port.variable]
     if column.unit is None or variable.unit in (None, column.unit):
         return IDENTITY

@@ -41,15 +41,11 @@ Made = TypeVar("Made")
 class Structure:
     """Components, their connections, and the experiment.
 
-    step_ns, stop_ns and start_ns are in nanoseconds; from start to stop it is a whole multiple of
-    step_ns, and of the step of each component. notes are what its reader decided or did not use, a
-    line each. roles name the component that plays a role, such as plant; where they do not, the
-    component of that name plays it. presets are values under a name, like
-    {"bench": {"sensor_1.noise.seed": 1}}.
-    diverging is what a run does where a signal runs away. input drives inputs without a connection.
-    realtime is how a run is paced that is to be in real time. metrics are the names of groups of
-    ours, like grasp.
-    as_read is what the system was made of when it was read, see settings.made_of.
+    Times are in nanoseconds; from start to stop it is a whole multiple of step_ns, and of the step
+    of each component. notes are what its reader decided or did not use, a line each. roles name the
+    component that plays a role; where they do not, the component of that name plays it. presets are
+    values under a name, like {"bench": {"sensor_1.noise.seed": 1}}. input drives inputs without a
+    connection. metrics are names of groups of ours. as_read is settings.made_of() when it was read.
     """
 
     name: str
@@ -91,10 +87,7 @@ class Structure:
         }
 
     def once(self, work: Callable[[Any], Made]) -> Made:
-        """What a function makes of the system, worked out once, so it must not be changed.
-
-        Copies with other values of parameters share it: the function must not go by these.
-        """
+        """What a function makes of the system but for values of parameters, worked out once."""
         if work not in self._known:
             self._known[work] = work(self)
         found: Made = self._known[work]
@@ -119,10 +112,7 @@ class Structure:
 
 
 def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[str, Any]:
-    """The attributes of a system that entries of its [experiment] stand for.
-
-    place names an entry for messages; InputError where one is not as it must be.
-    """
+    """The attributes of a system that entries of its [experiment] stand for; place names one."""
     made: dict[str, Any] = {}
     for key, value in table.items():
         if key == "start":
@@ -150,10 +140,7 @@ def unit_of(interface: Interface, variable: Variable) -> Unit | None:
 
 
 def parameter_in_si(system: Structure, place: str, port: Port) -> Conversion:
-    """The conversion of a parameter to SI base units, the identity without a unit.
-
-    InputError where its unit is not defined.
-    """
+    """The conversion of a parameter to SI base units; InputError where its unit is not defined."""
     interface = system.component(port.component, place).interface
     variable = interface.by_name.get(port.variable)
     unit = unit_of(interface, variable) if variable else None

@@ -132,10 +132,7 @@ def _list(place: Place, file: Mapping[str, Any], key: str, form: str) -> list[An
 def sections(
     was: Structure | None, file: Mapping[str, Any], place: Place, folder: Path = Path()
 ) -> dict[str, Any]:
-    """The attributes of a system that stand in sections of single values, with those of a file.
-
-    folder is that of the file.
-    """
+    """The attributes of a system that stand in sections of single values, with those of a file."""
     tables = {section: file.get(section, {}) for section in PLACES}
     for role, name in tables["roles"].items():
         text(place(f"roles.{role}"), name, "the name of a component")
@@ -246,11 +243,7 @@ def _connection(place: str, entry: Any) -> Connection:
 
 
 def as_file(system: Structure, settings: Mapping[str, Any], place: Place) -> dict[str, Any]:
-    """The tables that a file of the system with these settings would have.
-
-    InputError, with what `place` makes of a key, where there is no such place, or one is given
-    twice.
-    """
+    """The tables of a file with these settings; InputError where one is no place, or twice."""
     root: dict[str, Any] = {}
     names = [component.name for component in system.components]
     for key, value in settings.items():

@@ -33,10 +33,7 @@ def as_written(system: Structure) -> tuple[Connection, ...]:
 def by_element(
     name: str, components: Sequence[Component], connections: Sequence[Connection]
 ) -> tuple[Connection, ...]:
-    """The connections of a system of that name, between whole arrays one for each element.
-
-    InputError where the shapes differ.
-    """
+    """The connections, between whole arrays one for each element; InputError for other shapes."""
     arrays = {c.name: c.interface.arrays for c in components}
     made: list[Connection] = []
     for connection in connections:
@@ -128,10 +125,7 @@ def check_connections(system: Structure) -> None:
 
 
 def check_arrays(system: Structure) -> None:
-    """InputError where only a part of an array is given, and nothing is known of the rest.
-
-    The rest of what is given keeps its start value, which must be declared for the size it has.
-    """
+    """InputError where a part of an array is given, and the rest has no start for its size."""
     fed, stimuli = _fed(system), driven(system)
     for c in system.components:
         given = {*c.values, *(p.variable for p in stimuli if p.component == c.name)}
@@ -263,11 +257,7 @@ def check_steps(system: Structure) -> None:
 
 
 def remarks(system: Structure) -> tuple[str, ...]:
-    """Remarks on a system that is valid, a line each.
-
-    Units other than the declared ones, values that lose digits, units that cannot be compared,
-    variables that are left alone.
-    """
+    """Remarks on a system that is valid, a line each."""
     return (*_of_components(system), *_of_connections(system), *_of_the_rest(system))
 
 
