@@ -80,6 +80,7 @@ EXPANDED = {
     "many dimensions": ({"more": of(*[1] * 20, 2)}, {}, {}, {}),
     "a variable by the name of an element": ({"more": of(3) + SCALAR}, {}, {}, {}),
     "renamed whole": ({}, SMALL, {"force": "u"}, {}),
+    "renamed twice alike": ({}, SMALL, {"force[1]": "u[1]", "force": "u"}, {}),
     "renamed by elements": ({}, SMALL, {"left": "u[2]", "u[2]": "u[1]"}, {}),
     "units": ({}, {"r": 2}, {}, {"u": "mm", "y[2]": "N"}),
 }

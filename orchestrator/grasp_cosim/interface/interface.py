@@ -360,18 +360,21 @@ class Interface:
     def _renamed(self, rename: Mapping[str, str], place: str) -> "Interface":
         names: dict[str, str] = {}
         arrays: dict[str, str] = {}
+        elements: dict[str, str] = {}
         for new, own in rename.items():
-            entry, pairs = f"{place}: {new!r} = {own!r}", {own: new}
             if array := self.arrays.get(own):
                 arrays[own] = new
-                pairs = dict(zip(array.names, element_names(new, array.shape), strict=True))
-            for one, name in pairs.items():
-                known(f"{entry}: {self.short} has no variable", one, self.by_name, see=self.listing)
-                if one in names:
-                    raise InputError(
-                        f"{entry}: {one!r} is renamed to {names[one]!r} already; must have one name"
-                    )
-                names[one] = name
+                elements.update(zip(element_names(new, array.shape), array.names, strict=True))
+            else:
+                elements[new] = own
+        for new, own in elements.items():
+            entry = f"{place}: {new!r} = {own!r}"
+            known(f"{entry}: {self.short} has no variable", own, self.by_name, see=self.listing)
+            if own in names:
+                raise InputError(
+                    f"{entry}: {own!r} is renamed to {names[own]!r} already; must have one name"
+                )
+            names[own] = new
         for own, new in names.items():
             if new in self.by_name and new not in names:
                 raise InputError(
