@@ -32,11 +32,10 @@ QUANTITIES: Mapping[str, str | None] = {
 }  # fmt: skip
 """The outputs of every plant on each of its fingers, and their units."""
 
-PLANT_OUTPUTS: Mapping[str, str | None] = {
-    f"plant.{name}[{j}]": unit for name, unit in QUANTITIES.items() for j in FINGERS
+NEEDS: Mapping[str, str | None] = {
+    "controller.target_position": "m",
+    **{f"plant.{name}[{j}]": unit for name, unit in QUANTITIES.items() for j in FINGERS},
 }
-
-NEEDS: Mapping[str, str | None] = {"controller.target_position": "m", **PLANT_OUTPUTS}
 """The signals of a grasp, and their units."""
 
 OBJECT_NEEDS: Mapping[str, str | None] = {**NEEDS, "plant.object_position": "m"}
@@ -108,18 +107,16 @@ def time_difference(signals: Signals) -> float | None:
     return max(times) - min(times) if len(times) == len(contacts) else None
 
 
-def _of_free_fingers(name: str, label: str, words: str, pick: Callable[[Floats], Any]) -> None:
-    """A metric that says how far from the object a finger stays that never touches it."""
-    description = f"{words} of a finger that never touches; None where it does."
-
-    @of_fingers(name, "m", label=label, description=description, reason=True)
-    def gap(signals: Signals, finger: int) -> float | None:
-        touches = first_contact(signals, finger)
-        return None if touches else float(pick(signals[f"plant.gap[{finger}]"]))
+@of_fingers("remaining_gap", "m", label="gap left, no contact", reason=True)
+def remaining_gap(signals: Signals, finger: int) -> float | None:
+    """Gap at the end of a finger that never touches; None where it does."""
+    return None if first_contact(signals, finger) else float(_gap(signals, finger)[-1])
 
 
-_of_free_fingers("remaining_gap", "gap left, no contact", "Gap at the end", lambda gap: gap[-1])
-_of_free_fingers("smallest_gap", "smallest gap left", "Smallest gap", np.min)
+@of_fingers("smallest_gap", "m", label="smallest gap left", reason=True)
+def smallest_gap(signals: Signals, finger: int) -> float | None:
+    """Smallest gap of a finger that never touches; None where it does."""
+    return None if first_contact(signals, finger) else float(_gap(signals, finger).min())
 
 
 @of_fingers("impact_velocity", "m/s")
@@ -194,7 +191,7 @@ def time_to_settle(signals: Signals, finger: int) -> float | None:
     k = int(outside[-1])
     if after[k] >= after[-1] - STEADY_WINDOW:
         return None
-    edge = copysign(SETTLED * steady, error[k])
+    edge = copysign(band, error[k])
     fraction = (error[k] - edge) / (error[k] - error[k + 1])
     return float(after[k] + fraction * (after[k + 1] - after[k]))
 
@@ -208,7 +205,8 @@ def target_position(signals: Signals) -> float:
 @of_grasp("object_shift", "m", needs=OBJECT_NEEDS)
 def object_shift(signals: Signals) -> float:
     """Largest displacement of the object, either way."""
-    return float(_displacement(signals).max())
+    ways = [np.abs(x - x[0]) for x in _centre(signals)]
+    return float((ways[0] if len(ways) == 1 else np.hypot(*ways)).max())
 
 
 @of_grasp("object_drift", "m/s", needs=OBJECT_NEEDS)
@@ -265,10 +263,8 @@ def _centre(signals: Signals) -> list[Floats]:
     return [signals[f"plant.object_position[{i}]"] for i in (1, 2)]
 
 
-def _displacement(signals: Signals) -> Floats:
-    """How far the object is from where it was at the start, m."""
-    ways = [np.abs(x - x[0]) for x in _centre(signals)]
-    return ways[0] if len(ways) == 1 else np.asarray(np.hypot(*ways))
+def _gap(signals: Signals, finger: int) -> Floats:
+    return signals[f"plant.gap[{finger}]"]
 
 
 def _force(signals: Signals, finger: int) -> Floats:
@@ -280,7 +276,7 @@ def _force(signals: Signals, finger: int) -> Floats:
 def _last(signals: Signals, finger: int) -> Floats:
     """The contact force over the last STEADY_WINDOW, N."""
     late = int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
-    return np.asarray(np.abs(signals[f"plant.contact_force[{finger}]"][late:]))
+    return _force(signals, finger)[late:]
 
 
 def steady_force(signals: Signals, finger: int) -> float:
@@ -290,8 +286,7 @@ def steady_force(signals: Signals, finger: int) -> float:
 
 def held_force(signals: Signals, finger: int) -> float | None:
     """The steady contact force, N; None where it is 0 at any time: the finger does not hold on."""
-    last = _last(signals, finger)
-    return float(last.mean()) if last.min() > 0.0 else None
+    return steady_force(signals, finger) if _last(signals, finger).min() > 0.0 else None
 
 
 def since_contact(signals: Signals, finger: int) -> tuple[Floats, Floats]:
@@ -326,7 +321,7 @@ def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
     k = max(row - 1, 0)
     own = float(_closing(signals, finger) * signals[f"plant.velocity[{finger}]"][k])
     speed = own - _surface_speed(signals, finger, k)
-    gap = max(float(signals[f"plant.gap[{finger}]"][k]), 0.0)
+    gap = max(float(_gap(signals, finger)[k]), 0.0)
     span = float(time[row] - time[k])
     wait = min(gap / speed, span) if speed > 0.0 else span
     return FirstContact(float(time[k]) + wait, speed, row)
@@ -348,19 +343,6 @@ def _surface_speed(signals: Signals, finger: int, k: int) -> float:
     own = int(np.diff(given).min())
     last = k - (k - int(given[-1])) % own  # it may have stepped since, and nothing moved
     rows = [last - own, last]
-    gap = signals[f"plant.gap[{finger}]"][rows]
-    surface = _closing(signals, finger) * signals[f"plant.position[{finger}]"][rows] + gap
+    way = _closing(signals, finger) * signals[f"plant.position[{finger}]"][rows]
+    surface = way + _gap(signals, finger)[rows]
     return float((surface[1] - surface[0]) / (signals.time[last] - signals.time[last - own]))
-
-
-def time_at_gap(signals: Signals, finger: int, gap: float) -> float | None:
-    """Time in s at which a finger's gap first falls to `gap` in m, interpolated; None if never."""
-    time, gaps = signals.time, signals[f"plant.gap[{finger}]"]
-    below = np.flatnonzero(gaps <= gap)
-    if not len(below):
-        return None
-    k = int(below[0])
-    if k == 0:
-        return float(time[0])
-    fraction = (gaps[k - 1] - gap) / (gaps[k - 1] - gaps[k])
-    return float(time[k - 1] + fraction * (time[k] - time[k - 1]))

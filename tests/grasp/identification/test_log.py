@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grasp_cosim import InputError, simulate
-from grasp_cosim.grasp.identification.identification import OF_A_LOG, chosen
-from grasp_cosim.grasp.identification.log import identify_from_log
+from grasp_cosim.grasp.identification.identification import OF_A_LOG, chosen, identify_from_log
 from grasp_cosim.metrics.metric import Signals
 from grasp_cosim.recording.folder import load_log
 from scipy.integrate import solve_ivp

@@ -66,13 +66,11 @@ def published_contacts() -> list[Contact]:
 
     White on both sides is the row of x_m = 0.03 m once more, so it is left out.
     """
-    found = []
-    for table, condition, setting, case, finger, published in published_rows("experiment"):
-        position = table == "position"
-        if finger and (position or (setting.equal_colours and setting.alpha_1 != 1.0)):
-            label = f"x_m = {condition} m" if position else str(condition)
-            found.append(Contact(label, setting, case, finger, published))
-    return found
+    return [
+        Contact(f"x_m = {c} m" if table == "position" else str(c), setting, case, finger, time)
+        for table, c, setting, case, finger, time in published_rows("experiment")
+        if finger and setting.equal_colours and c != "white/white"
+    ]
 
 
 def is_contacts(path: Path) -> bool:
@@ -151,11 +149,9 @@ def scatter(contacts: Sequence[Contact]) -> float | None:
     equal: dict[tuple[Grasp, int], list[float]] = {}
     for c in contacts:
         equal.setdefault((_grasp(c, (), np.empty(0)), c.finger), []).append(c.time)
-    repeated = [np.array(times) for times in equal.values() if len(times) > 1]
-    if not repeated:
-        return None
-    squares = math.fsum(float(np.sum((times - times.mean()) ** 2)) for times in repeated)
-    return math.sqrt(squares / sum(len(times) - 1 for times in repeated))
+    free = sum(len(times) - 1 for times in equal.values())
+    squares = [np.sum((np.array(times) - np.mean(times)) ** 2) for times in equal.values()]
+    return math.sqrt(math.fsum(squares) / free) if free else None
 
 
 def _grasp(c: Contact, parameters: Sequence[Parameter], x: Vector) -> Grasp:

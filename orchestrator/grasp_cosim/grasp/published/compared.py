@@ -22,7 +22,7 @@ from ...metrics.metric import resolved
 from ...recording.result import Result
 from ...system.description import System
 from ...system.parts import NANOSECONDS
-from ..metrics import FINGERS, IMPACT_WINDOW, time_at_gap
+from ..metrics import FINGERS, IMPACT_WINDOW
 from ..presets import CASES, start_in_si, with_case, with_si_values
 from .tables import REFLECTANCE_X_M, Row, Setting, Source, published_rows
 
@@ -94,8 +94,7 @@ Runs = dict[tuple[Setting, int], Run]
 
 def as_run(result: Result, setting: Setting, case: int) -> Run:
     """Part of a grasp that an evaluation keeps; InputError where a finger does not touch."""
-    moments = [time_at_gap(result.by_role, j, SENSOR_CONTACT) for j in FINGERS]
-    first, second = moments
+    first, second = (_sensor_contact(result, j) for j in FINGERS)
     if first is None or second is None or None in result.metrics["time_to_contact"]:
         raise InputError(
             f"evaluate: x_m = {setting.x_m} m, Case {case}: a finger does not reach the object"
@@ -105,6 +104,20 @@ def as_run(result: Result, setting: Setting, case: int) -> Run:
     shown = result if setting == Setting(REFLECTANCE_X_M) else None
     right, left = (_touch_force(result, j) for j in FINGERS)
     return Run(setting, case, dict(result.metrics), (first, second), beyond, (right, left), shown)
+
+
+def _sensor_contact(result: Result, finger: int) -> float | None:
+    """When a finger's gap first falls to SENSOR_CONTACT in s, interpolated; None if it never does.
+
+    No published finger begins so near.
+    """
+    time, gap = result.time, result.by_role[f"plant.gap[{finger}]"]
+    below = np.flatnonzero(gap <= SENSOR_CONTACT)
+    if not len(below):
+        return None
+    k = max(int(below[0]), 1)
+    fraction = (gap[k - 1] - SENSOR_CONTACT) / (gap[k - 1] - gap[k])
+    return float(time[k - 1] + fraction * (time[k] - time[k - 1]))
 
 
 def _touch_force(result: Result, finger: int) -> float:
