@@ -65,7 +65,6 @@ docs: .venv/dev
 
 bench: .venv/dev
 	$(BIN)/python -m benchmarks.masters
-	$(BIN)/python -m benchmarks.sweep
 
 mutants: .venv/mutants
 	$(BIN)/python -m benchmarks.mutants $(ROOM) $(MORE)

@@ -15,17 +15,43 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from grasp_cosim.base.system_calls import cpus
 from grasp_fmus.build import build
 
-from benchmarks.harness import Program, by_turns, head, row, spread
-
 WORKER = Path(__file__).parent / "worker.py"
+
+
+class Program(subprocess.Popen[str]):
+    """A process that answers each line with a line."""
+
+    def __init__(self, *command: str, **options: Any) -> None:
+        super().__init__(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options
+        )
+        self.name = " ".join(command)
+
+    def ask(self, line: str) -> str:
+        """The answer to a line. RuntimeError where the process has ended instead."""
+        print(line, file=self.stdin, flush=True)
+        answer = self.stdout.readline() if self.stdout else ""
+        if not answer:
+            raise RuntimeError(f"{self.name}: ended with {self.wait()}")
+        return answer
+
+
+def by_turns(measures: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
+    """What each of them finds, one after the other: they meet the machine in the same mood."""
+    found: dict[str, list[float]] = {name: [] for name in measures}
+    for _ in range(rounds):
+        for name, measure in measures.items():
+            found[name].append(measure())
+    return found
 
 
 class Master(NamedTuple):
@@ -119,12 +145,13 @@ def report(title: str, times: dict[str, list[float]]) -> None:
     mood.
     """
     ours = times[REFERENCE]
-    head(title, "best", "median", "worst", "times ours", "best / our best", "recorded")
+    print(f"\n| {title} | best | median | worst | times ours | best / our best | recorded |")
+    print("|---" * 7 + "|", flush=True)
     for name, chunks in times.items():
         ratio = statistics.median(t / own for t, own in zip(chunks, ours, strict=True))
-        costs = [f"{cost:.2f} us" for cost in spread(chunks)]
-        best = f"{min(chunks) / min(ours):.1f}"
-        row(name, *costs, f"{ratio:.1f}", best, MASTERS[name].recorded)
+        costs = [f"{of(chunks):.2f} us" for of in (min, statistics.median, max)]
+        cells = name, *costs, f"{ratio:.1f}", f"{min(chunks) / min(ours):.1f}"
+        print("|", " | ".join([*cells, MASTERS[name].recorded]), "|", flush=True)
 
 
 def main() -> None:

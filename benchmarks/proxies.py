@@ -9,6 +9,7 @@ long.
 """
 
 import random
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -27,7 +28,7 @@ from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.interface.interface import Value
 from grasp_cosim.system.parts import Realtime
 
-from benchmarks.harness import by_turns, spread
+from benchmarks.masters import by_turns
 
 STEPS = 2000
 ROUNDS = 5
@@ -74,7 +75,7 @@ def compare(direct: System, there: System, where: str) -> None:
 
     found = by_turns({"direct": lambda: run(direct), "behind a proxy": lambda: run(there)}, ROUNDS)
     for name, times in found.items():
-        best, median, _ = spread(times)
+        best, median = min(times), statistics.median(times)
         print(f"macro step, {where} {name}: {best:.1f} us best, {median:.1f}")
 
 
@@ -137,7 +138,7 @@ def kills(system: System, folder: Path) -> None:
                 while session["controller.proxy.state"] != 3 and session.step():
                     pass
                 took.append(1e3 * (time.perf_counter() - start))
-    _, median, worst = spread(took)
+    median, worst = statistics.median(took), max(took)
     print(
         f"{KILLS} peers killed: failsafe after {median:.1f} ms (median), {worst:.1f} ms (worst), "
         f"declared {1e3 * TIMEOUT * (TOLERATED + 1):.0f} ms beside what the steps compute"
