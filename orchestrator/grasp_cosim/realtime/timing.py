@@ -52,7 +52,14 @@ class Histogram(NamedTuple):
     counts: tuple[int, ...]
 
 
-PLAIN = {"factor": float, "period": float, "overrun": str, "steps": int, "real_time_factor": float}
+def _texts(found: Any) -> tuple[str, ...]:
+    return tuple(map(str, found))
+
+
+PLAIN: Mapping[str, Any] = {
+    "factor": float, "period": float, "overrun": str, "granted": _texts, "refused": _texts,
+    "steps": int, "real_time_factor": float,
+}  # fmt: skip
 """The fields of a Timing that run.json has as they are."""
 
 SPREAD_KEYS = ("median", "p99", "p99.9", "worst", "worst_at")
@@ -87,18 +94,13 @@ class Timing:
         """Return the timing as run.json has it."""
         return {
             **{key: getattr(self, key) for key in PLAIN},
-            "granted": list(self.granted),
-            "refused": list(self.refused),
             "overruns": {
                 "count": self.overruns,
                 "culprits": dict(self.culprits),
                 "listed": [o._asdict() for o in self.listed],
             },
             "parts": {n: dict(zip(SPREAD_KEYS, p, strict=True)) for n, p in self.parts.items()},
-            "histograms": {
-                name: {key: list(values) for key, values in h._asdict().items()}
-                for name, h in self.histograms.items()
-            },
+            "histograms": {name: h._asdict() for name, h in self.histograms.items()},
         }
 
     @classmethod
@@ -108,8 +110,6 @@ class Timing:
             overruns, parts, bars = (found[key] for key in ("overruns", "parts", "histograms"))
             return cls(
                 **{key: kind(found[key]) for key, kind in PLAIN.items()},
-                granted=tuple(map(str, found["granted"])),
-                refused=tuple(map(str, found["refused"])),
                 overruns=int(overruns["count"]),
                 listed=tuple(
                     Overrun(*(kind(o[key]) for key, kind in Overrun.__annotations__.items()))

@@ -102,7 +102,7 @@ def read_csv(
         with path.open(encoding="utf-8", newline="") as file:
             rows = csv.reader(file, strict=True)
             names = [*map(from_cell, next(rows, []))] or ["nothing"]
-            cells = next(rows, [])
+            cells = next(filter(None, rows), [])
         if torn:
             count = path.read_bytes().count(b"\n") - 1
         if names[0] != "time":

@@ -24,8 +24,6 @@ Rows = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 Columns = tuple[npt.NDArray[np.float64], Mapping[str, npt.NDArray[Any]]]
 """Time in s, and columns by name."""
 
-FLOAT = np.dtype(np.float64).itemsize
-
 
 @contextmanager
 def writing(path: Path, failure: type[Exception] = SimulationError) -> Iterator[None]:
@@ -74,7 +72,7 @@ class MemoryListener:
         try:
             self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
             own = self._paced and signals
-            buffer = memory(FLOAT * len(signals) * rows) if own else None
+            buffer = memory(8 * len(signals) * rows) if own else None
             self._table = np.ndarray(shape, np.float64, buffer)
         except (MemoryError, ValueError, OverflowError, OSError):  # more bytes than there can be
             raise InputError(
@@ -117,27 +115,23 @@ class EveryRow:
         self._names, self._rows, self.lost = names, 0, ""
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
-        """Open the file, in which a column comes after the other."""
+        """Open the file, in which a row comes after the other."""
         self._experiment = experiment
-        self._chosen = [(i, s) for i, s in enumerate(signals) if s.name in self._names]
+        self._places = [i for i, s in enumerate(signals) if s.name in self._names]
+        self._signals = [signals[i] for i in self._places]
         self._file = TemporaryFile(prefix="grasp_rows_", buffering=0)  # noqa: SIM115 - open as long as this
         finalize(self, self._file.close)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Write the columns of these rows, each to its place."""
-        if self.lost:
-            return
-        columns = self._experiment.times(steps), *(rows[:, i] for i, _ in self._chosen)
+        """Write what these rows have of the signals."""
+        left = memoryview(b"" if self.lost else rows[:, self._places].tobytes())
         try:
-            for place, column in enumerate(columns):
-                self._file.seek(self._place(place, int(steps[0])))
-                left = memoryview(column.tobytes())
-                while left:
-                    left = left[self._file.write(left) :]
+            while left:
+                left = left[self._file.write(left) :]
         except OSError as error:
             self.lost = unwritable(Path(gettempdir()), error)
             self._file.truncate(0)
-        self._rows = int(steps[-1]) + 1
+        self._rows += len(steps)
 
     def end(self, complete: bool) -> None:
         """The file goes with the last name of it."""
@@ -147,14 +141,13 @@ class EveryRow:
 
         Reals are mapped from the file, in memory only as far as they are looked at.
         """
-        signals = enumerate(self._chosen, 1)
-        return self._column(0), {s.name: typed(s, self._column(k)) for k, (_, s) in signals}
-
-    def _column(self, place: int) -> npt.NDArray[np.float64]:
-        return np.memmap(self._file, np.float64, "r", self._place(place, 0), (self._rows,))
-
-    def _place(self, column: int, row: int) -> int:
-        return FLOAT * (column * (self._experiment.total_steps + 1) + row)
+        shape = self._rows, len(self._places)
+        table = (
+            np.memmap(self._file, np.float64, "r", shape=shape) if all(shape) else np.empty(shape)
+        )
+        found = zip(self._signals, table.T, strict=True)
+        times = self._experiment.times(np.arange(self._rows))
+        return times, {s.name: typed(s, column) for s, column in found}
 
 
 def typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:

@@ -137,9 +137,6 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             raise UnknownNameError(name, tuple(self.signals), "signal")
         return self.signals[name]
 
-    def __contains__(self, name: object) -> bool:
-        return name in self.signals
-
     def __repr__(self) -> str:
         """The system, its settings, metrics and signals in five lines."""
         lines = map(on_one_line, self._in_words())
