@@ -17,7 +17,7 @@ from grasp_cosim.recording import arrow
 from grasp_cosim.recording import csv as csv_module
 from grasp_cosim.recording.arrow import ArrowListener, read_arrow
 from grasp_cosim.recording.csv import CsvListener, read_csv
-from grasp_cosim.recording.mdf import PIECE, MdfListener, read_mdf
+from grasp_cosim.recording.mdf import MdfListener, read_mdf
 from grasp_cosim.system.settings import settings
 from hypothesis import given
 from hypothesis import strategies as st
@@ -103,9 +103,9 @@ def test_the_file_takes_its_name_at_the_end_if_it_has_rows(tmp_path, form, compl
     assert list(path.parent.iterdir()) == []
     one.begin(EXPERIMENT, SIGNALS)
     one.block(np.arange(10), rows(10))
-    (part,) = path.parent.iterdir()
-    assert part != path
+    assert not path.exists()
     if form == "csv":
+        (part,) = path.parent.iterdir()
         assert len(part.read_text().splitlines()) == 11  # nothing waits in memory
     one.end(complete)
     assert list(path.parent.iterdir()) == [path]
@@ -127,7 +127,7 @@ def test_arrow_has_units_descriptions_and_types(tmp_path):
 @pytest.mark.parametrize("complete", [True, False])
 def test_mdf_has_units_descriptions_texts_and_the_settings(grasp, tmp_path, complete):
     asammdf = pytest.importorskip("asammdf")
-    texts, count = Texts(), 2 * PIECE + 1
+    texts, count = Texts(), 20_001
     red, blue = map(texts.number, ("red", "blü"))
     signals = (*SIGNALS, Signal("a.s", None, "String", texts=texts))
     table = np.column_stack((rows(count), np.resize([red, blue], count)))

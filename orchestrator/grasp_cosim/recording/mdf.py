@@ -1,4 +1,4 @@
-"""ASAM MDF 4 by asammdf (the optional extra `mdf`): written while a run goes on, and read."""
+"""ASAM MDF 4 by asammdf (the optional extra `mdf`): written when a run has ended, and read."""
 
 import json
 import logging
@@ -23,9 +23,6 @@ TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.uint8, "String":
 TRANSPOSED_DEFLATE: Final = 2
 """The compression of the file; a column's values stand together, so that they compress well."""
 
-PIECE = 8192
-"""Rows handed to asammdf at once: it keeps a few hundred bytes about each piece."""
-
 
 def check_mdf() -> None:
     """InputError without asammdf."""
@@ -37,9 +34,8 @@ class MdfListener:
 
     A String is recorded as the numbers of its texts, which its channel has as a conversion, so that
     readers show them. The header has the settings of the run: all of them as JSON in its comment,
-    and the main ones as properties, with "complete" besides. asammdf keeps the rows in a compressed
-    temporary file beside path; the file at path is made from it when the run ends, in whatever way.
-    There is no file where nothing was recorded.
+    and the main ones as properties, with "complete" besides. The rows are kept until the run ends,
+    in whatever way. There is no file where nothing was recorded.
     """
 
     def __init__(self, path: str | Path, place: Path | None = None) -> None:
@@ -49,67 +45,51 @@ class MdfListener:
         self._place = place or self._path
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
-        """Describe the channels; InputError where there are none or the folder is not writable."""
-        from asammdf import MDF
-        from asammdf import Signal as Channel
-
+        """InputError where there are no signals, or no such folder can be made."""
         if not signals:
             raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
-        self._experiment, self._signals, none = experiment, signals, np.empty(0)
-        self._batch = Batch()
-        folder = self._path.parent
+        self._experiment, self._signals, self._batch = experiment, signals, Batch()
         with writing(self._path, InputError):
-            folder.mkdir(parents=True, exist_ok=True)
-            # the first version with compressed blocks; every tool of today reads it
-            self._mdf = MDF(version="4.10", temporary_folder=str(folder))
-        channels = [
-            Channel(none.astype(TYPES[s.kind]), none, s.unit or "", s.name, comment=s.description)
-            for s in signals
-        ]
-        self._mdf.append(channels, comment="", common_timebase=True)
+            self._path.parent.mkdir(parents=True, exist_ok=True)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Take the rows; SimulationError where they cannot be written."""
+        """Keep the rows."""
         self._batch.add(steps, rows)
-        if self._batch.count >= PIECE:
-            self._flush()
 
     def end(self, complete: bool) -> None:
         """Make the file; SimulationError where that fails, and there is none."""
-        # also of close(), which writes what is still in a buffer
-        with writing(self._path), closing(self._mdf):
-            if self._batch.count:
-                self._flush()
-            if self._mdf.groups[0].channel_group.cycles_nr:
-                self._describe(complete)
-                with in_one_piece(self._place) as part, part.open("wb+") as file:
-                    self._mdf.save(file, compression=TRANSPOSED_DEFLATE)
+        from asammdf import MDF
+        from asammdf import Signal as Channel
 
-    def _describe(self, complete: bool) -> None:
-        """Write the header's comment, in the XML that MDF 4 asks for, and the texts of Strings."""
-        from asammdf.blocks.conversion_utils import from_dict
+        if not self._batch.count:
+            return
+        steps, rows = self._batch.take()
+        times, channels = self._experiment.times(steps), []
+        for signal, column in zip(self._signals, rows.T, strict=True):
+            shown: dict[str, Any] = {}
+            for number, text in enumerate(signal.texts.listed):
+                shown |= {f"val_{number}": number, f"text_{number}": text}
+            own, unit = column.astype(TYPES[signal.kind]), signal.unit or ""
+            channels.append(
+                Channel(own, times, unit, signal.name, shown or None, signal.description)
+            )
+        # the first version with compressed blocks; every tool of today reads it
+        folder = str(self._path.parent)
+        with writing(self._path), closing(MDF(version="4.10", temporary_folder=folder)) as mdf:
+            mdf.append(channels, comment="", common_timebase=True)
+            mdf.header.comment = self._described(complete)
+            with in_one_piece(self._place) as part, part.open("wb+") as file:
+                mdf.save(file, compression=TRANSPOSED_DEFLATE)
 
+    def _described(self, complete: bool) -> str:
+        """The header's comment, in the XML that MDF 4 asks for."""
         root, settings = ElementTree.Element("HDcomment"), self._experiment.settings
         ElementTree.SubElement(root, "TX").text = json.dumps(settings)
         properties = ElementTree.SubElement(root, "common_properties")
         for name, value in {**settings, "complete": complete}.items():
             if not isinstance(value, dict | list):
                 ElementTree.SubElement(properties, "e", name=name).text = json.dumps(value)
-        self._mdf.header.comment = ElementTree.tostring(root, encoding="unicode")
-        channels: Any = self._mdf.groups[0].channels[1:]  # the first is time
-        for channel, signal in zip(channels, self._signals, strict=True):
-            if signal.kind == "String":
-                table: dict[str, Any] = {}
-                for number, text in enumerate(signal.texts.listed):
-                    table |= {f"val_{number}": number, f"text_{number}": text}
-                channel.conversion = from_dict(table)
-
-    def _flush(self) -> None:
-        steps, rows = self._batch.take()
-        pairs = zip(rows.T, self._signals, strict=True)
-        own = (column.astype(TYPES[signal.kind]) for column, signal in pairs)
-        with writing(self._path):
-            self._mdf.extend(0, [(c, None) for c in (self._experiment.times(steps), *own)])
+        return ElementTree.tostring(root, encoding="unicode")
 
 
 def read_mdf(
