@@ -90,7 +90,7 @@ class Pacer:
 
         InputError as of Realtime.period() and Meter, and where the CPU is not there.
         """
-        last = max(os.cpu_count() or 1, *(cpu + 1 for cpu in cpus())) - 1
+        last = max((os.cpu_count() or 1) - 1, *cpus(), 0)
         if realtime.cpu is not None and realtime.cpu > last:
             raise InputError(f"cpu = {realtime.cpu}: no such CPU here; must be from 0 to {last}")
         period = realtime.period(system.step_ns)
@@ -137,9 +137,8 @@ class Pacer:
         """The same as calling it, in compiled code that nobody else has to wait for; None where
         that is not possible in a run of so many steps.
         """
-        if self._now is not time.monotonic_ns or not HAS_CLOCK:
-            return None
-        if self._period[0] * steps >= 2**62 or self._period[1] >= 2**62:
+        fits = max(self._period[0] * steps, self._period[1]) < 2**62
+        if not fits or not HAS_CLOCK or self._now is not time.monotonic_ns:
             return None
         state = ctypes.addressof(self._state)
         return Native(PACE, 0, state, data=self._values.ctypes.data)
@@ -228,7 +227,7 @@ class Pacer:
         return int(self._state.base) + since * self._period[0] // self._period[1]
 
 
-LIMIT = "needs {}, or a limit that is high enough ({} in /etc/security/limits.conf)"
+LIMIT = "needs {}, or a limit that is high enough (ulimit {} in /etc/security/limits.conf)"
 
 THROTTLE = Path("/proc/sys/kernel/sched_rt_runtime_us")
 """The part of a second for threads of a real-time priority, in us; -1 where Linux has no limit."""
@@ -251,17 +250,15 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
     """
     found = Privileges()
     thread, cpu, priority = threading.get_native_id(), realtime.cpu, realtime.priority
-    wanted: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
+    asked: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
     if cpu is not None:
-        remedy = f"must be one of {choices(cpus())}"
-        wanted.append((f"CPU {cpu}", partial(pin, thread, cpu), remedy))
+        asked += [(f"CPU {cpu}", partial(pin, thread, cpu), f"must be one of {choices(cpus())}")]
     if realtime.lock_memory:
-        remedy = LIMIT.format("CAP_IPC_LOCK", "ulimit -l, memlock")
-        wanted.append(("memory locked", lock_memory, remedy))
+        asked += [("memory locked", lock_memory, LIMIT.format("CAP_IPC_LOCK", "-l, memlock"))]
     if priority is not None:
-        remedy = LIMIT.format("CAP_SYS_NICE", "ulimit -r, rtprio")
         first = partial(put_first, thread, priority)
-        wanted.append((f"SCHED_FIFO, priority {priority}", first, remedy))
+        remedy = LIMIT.format("CAP_SYS_NICE", "-r, rtprio")
+        asked += [(f"SCHED_FIFO, priority {priority}", first, remedy)]
     with ExitStack() as stack:
         gc.collect()  # now, and then not before the end: it would take too long on the way
         gc.freeze()
@@ -269,7 +266,7 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
         if gc.isenabled():
             stack.callback(gc.enable)
         gc.disable()
-        for name, ask, remedy in wanted:
+        for name, ask, remedy in asked:
             try:
                 stack.callback(ask())
             except NotPossible:

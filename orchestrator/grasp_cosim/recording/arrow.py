@@ -85,17 +85,14 @@ class ArrowListener:
 def read_arrow(path: Path) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:
     """The time and the columns by name, of a file that was cut off those of its whole batches.
 
-    Strings are objects. InputError without pyarrow, or where the file is missing or damaged.
+    InputError without pyarrow, or where the file is missing or damaged.
     """
     arrow = pyarrow()
     try:
         with path.open("rb") as file:
-            try:
-                table = arrow.ipc.open_file(file).read_all()
-            except arrow.ArrowInvalid:
-                file.seek(MAGIC)
-                stream = arrow.ipc.open_stream(file)
-                table = arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
+            file.seek(MAGIC)
+            stream = arrow.ipc.open_stream(file)
+            table = arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
         columns = {
             name: column.to_numpy() for name, column in zip(table.column_names, table, strict=True)
         }

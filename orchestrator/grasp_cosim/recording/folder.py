@@ -113,12 +113,11 @@ class RunFolder:
         steps, rows = self._waiting.popleft()
         if count < len(steps):
             self._waiting.appendleft((steps[count:], rows[count:]))
-        done = min(count, len(steps))
-        self._write(steps[:done], rows[:done])
-        end = time.perf_counter_ns()
+        self._write(steps[:count], rows[:count])
+        took = time.perf_counter_ns() - start
         # one that was held up by something else does not count for much
-        self._row_ns = min(1.5 * self._row_ns, (end - start) / done)
-        self._at_last_ns = end + (end - start) / SHARE
+        self._row_ns = min(1.5 * self._row_ns, took / min(count, len(steps)))
+        self._at_last_ns = start + took + took / SHARE
         return True
 
     def end(self, complete: bool) -> None:

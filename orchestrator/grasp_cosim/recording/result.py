@@ -344,13 +344,13 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             listener.begin(Experiment.of(self.settings), signals)
             stack.callback(listener.end, self.complete)
             for first in range(0, len(self.time), PIECE):
-                piece = slice(first, first + PIECE)
-                rows = np.empty((len(self.time[piece]), len(signals)))
+                steps = self._steps[first : first + PIECE]
+                rows = np.empty((len(steps), len(signals)))
                 for i, (signal, column) in enumerate(zip(signals, self.values(), strict=True)):
-                    values = column[piece]
+                    values = column[first : first + PIECE]
                     text = signal.kind == "String"
                     rows[:, i] = [*map(signal.texts.number, values)] if text else values
-                listener.block(self._steps[piece], rows)
+                listener.block(steps, rows)
 
 
 def _in_words(metric: Metric, value: Any) -> str:
