@@ -94,13 +94,18 @@ class Timing:
         """Return the timing as run.json has it."""
         return {
             **{key: getattr(self, key) for key in PLAIN},
+            "granted": list(self.granted),
+            "refused": list(self.refused),
             "overruns": {
                 "count": self.overruns,
                 "culprits": dict(self.culprits),
                 "listed": [o._asdict() for o in self.listed],
             },
             "parts": {n: dict(zip(SPREAD_KEYS, p, strict=True)) for n, p in self.parts.items()},
-            "histograms": {name: h._asdict() for name, h in self.histograms.items()},
+            "histograms": {
+                name: {"edges": list(h.edges), "counts": list(h.counts)}
+                for name, h in self.histograms.items()
+            },
         }
 
     @classmethod
