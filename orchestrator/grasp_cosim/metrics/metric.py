@@ -172,13 +172,9 @@ class Metric:
             return self
         element = arrays[0].replace("*", "{}").format
         missing = next(j for j in count(1) if resolved(element(j), roles) not in names)
-        return self.with_elements(max(1, missing - 1))
-
-    def with_elements(self, many: int) -> Metric:
-        """The metric of arrays of so many elements."""
 
         def each(text: str) -> list[str]:
-            there = range(1, many + 1) if "*" in text else (1,)
+            there = range(1, max(2, missing)) if "*" in text else (1,)
             return [text.replace("*", str(j)) for j in there]
 
         needs: Collection[str] = [name for need in self.needs for name in each(need)]
@@ -197,17 +193,17 @@ class Metric:
             return _from_text, (*self.origin, self.name)
         of_group = metrics_of([self.group]) if self.group in groups() else ()
         if any(self.function is m.function for m in of_group):
-            return _of_group, (self.group, self.name, len(self.entries))
+            return _of_group, (self.group, self.name, self.needs, self.entries)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
             return resolve_name, (f"{module}:{name}",)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-def _of_group(group: str, name: str, many: int) -> Metric:
-    """The metric of that name of a group of ours, with so many entries, in another process."""
+def _of_group(group: str, name: str, needs: Any, entries: tuple[str, ...]) -> Metric:
+    """The metric of that name of a group of ours, in another process."""
     found = next(m for m in metrics_of([group]) if m.name == name)
-    return found if len(found.entries) == many else found.with_elements(many)
+    return replace(found, needs=needs, entries=entries)
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
@@ -329,8 +325,8 @@ def _place(function: Function, error: Exception) -> str:
 
 def _lines(error: BaseException, file: str) -> list[int]:
     """The lines of a file through which an error came, the one that raised it last."""
-    frames = traceback.walk_tb(error.__traceback__)
-    return [line for frame, line in frames if frame.f_code.co_filename == file]
+    frames = traceback.extract_tb(error.__traceback__)
+    return [frame.lineno or 0 for frame in frames if frame.filename == file]
 
 
 def _said(error: BaseException) -> str:

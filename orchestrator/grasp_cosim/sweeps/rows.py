@@ -17,7 +17,7 @@ from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
 from ..system.parts import Port
 from ..system.structure import parameter_in_si
-from ..system.toml import plain
+from ..system.toml import place_of, plain
 
 Row = Mapping[str, Value]
 
@@ -147,9 +147,5 @@ def _converted(value: Value, change: Any) -> Value:
 
 def _port(system: System, place: str) -> Port | None:
     """The variable of a place, if it is the place of a value of one."""
-    name, _, variable = place.removeprefix("components.").partition(".")
-    if place.startswith("components."):
-        section, _, variable = variable.partition(".")
-        variable = variable if section == "values" else ""
-    known = any(c.name == name for c in system.components)
-    return Port(name, variable) if known and variable else None
+    entries = place_of([c.name for c in system.components], place, f"sweep: {place}")
+    return Port(entries[1], entries[3]) if entries[2:3] == ("values",) else None

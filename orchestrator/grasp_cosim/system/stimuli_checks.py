@@ -77,12 +77,7 @@ def stimuli_remarks(system: Structure) -> list[str]:
     """A line on what drives which inputs."""
     if system.input is None:
         return []
-    named: dict[str, list[Port]] = {}
-    for port in driven(system):
-        variable = system.component(port.component, "").interface.by_name[port.variable]
-        way = "linear" if is_linear(system.input, variable) else "held"
-        named.setdefault(way, []).append(port)
-    listed = "; ".join(f"{choices(ports, 6)} ({way})" for way, ports in named.items())
+    listed = f"{choices(driven(system), 6)} ({system.input.interpolation})"
     return [f"{system.input.file} drives {listed}, each step by the values at its beginning"]
 
 

@@ -252,7 +252,7 @@ def as_file(system: Structure, settings: Mapping[str, Any], place: Place) -> dic
             of = [(c.name, v) for c in system.components for v in c.interface.of(*SETTABLE)]
             near = nearest(key, entries + [f"{name}.{v.name}" for name, v in of])
             raise InputError(f"{place(key)}: no place in a system file; {near}")
-        *tables, name = _place(names, key, place(key))
+        *tables, name = place_of(names, key, place(key))
         table = root
         for entry in tables:
             table = table.setdefault(entry, {})
@@ -263,7 +263,7 @@ def as_file(system: Structure, settings: Mapping[str, Any], place: Place) -> dic
     return root
 
 
-def _place(names: Collection[str], key: str, said: str) -> tuple[str, ...]:
+def place_of(names: Collection[str], key: str, said: str) -> tuple[str, ...]:
     """The entries of the tables that lead to a place; COMPONENT.VARIABLE is short for a value."""
     section, _, rest = key.partition(".")
     if section in names:

@@ -42,16 +42,11 @@ def by_element(
         if source is None and target is None:
             made.append(connection)
             continue
-        place = f"{name}: connection '{connection}'"
         if source is None or target is None or source.shape != target.shape:
-            has = []
-            for port, array, causality in zip(ends, found, ("output", "input"), strict=True):
-                v = None if array else _end(components, port, causality, place)
-                what = shape_text(array.shape) if array else v and v.shape and v.nature
-                has.append(f"{port} is {what or 'no array'}")
+            has = [shape_text(array.shape) if array else "no array" for array in found]
             raise InputError(
-                f"{place}: {' and '.join(has)}; must have equal shapes, or be of elements, like "
-                "u[1]"
+                f"{name}: connection '{connection}': {ends[0]} is {has[0]} and {ends[1]} is "
+                f"{has[1]}; must have equal shapes, or be of elements, like u[1]"
             )
         for start, end in zip(source.names, target.names, strict=True):
             first, last = Port(ends[0].component, start), Port(ends[1].component, end)
