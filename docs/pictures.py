@@ -24,7 +24,7 @@ from grasp_cosim.grasp.presets import with_case
 from grasp_cosim.grasp.published.compared import compared
 from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
-from grasp_cosim.hand.pictures import draw_hand as draw_three_fingers
+from grasp_cosim.hand.view import draw_hand as draw_three_fingers
 from grasp_cosim.recording.folder import load_run
 from grasp_cosim.report.caption import Caption, about
 from grasp_cosim.report.diagram import Link, diagram_svg

@@ -250,5 +250,3 @@ def test_a_remark_is_made_once_and_before_a_failure(two):
     assert remark == REMARK
     assert failure.startswith("grasp-cosim: second: second.fmu returned error at t = 0.3 s")
     assert "(inputs: u_Float64 = 45, " in failure
-    few = "two.toml: the whole run is 2 steps of 0.5 s, and values are passed on only between steps"
-    assert few in two("--step", "0.5")[2]

@@ -8,7 +8,7 @@ import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.system.parts import Port
 from grasp_cosim.system.stimuli import read_stimuli
-from grasp_cosim.system.stimuli_checks import samples_of
+from grasp_cosim.system.validity import samples_of
 from hypothesis import given
 from hypothesis import strategies as st
 from support.native_fmus import needs_gcc

@@ -1,21 +1,123 @@
-"""How the result of a hand is shown: fingers on rays around the object, from above."""
+"""How the result of a hand is shown: its picture, and fingers on rays around the object."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
+import numpy.typing as npt
+
+from ..grasp.metrics import fingers_of
 from ..grasp.presets import case_of, words_of
 from ..grasp.scene import scene_of_fingers
 from ..metrics.metric import resolved
 from ..recording.result import Result, View
+from ..report.caption import caption
 from ..report.page import Scene
+from ..report.plot import BLUE, GREY, RED, drawn, finish, headed, kept, new_figure, one_legend
 from .metrics import directions, is_disc, is_hand
-from .pictures import draw_hand
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SEEN = (
     "The hand is seen from above; the object is drawn from face to face, where the gaps say it is"
 )
+
+
+COLORS = (BLUE, RED, "#2e8b57", "#8e44ad", "#b9770e", "#117a8b", "#5d4037", "#6c757d")
+DASHES = ("-", "--", "-.", ":", (0, (6, 1)), (0, (1, 1)), (0, (8, 2, 1, 2)), (0, (4, 4)))
+"""Of the fingers, from the first on; the dashes tell them apart in grey."""
+
+OBJECT = "#cfcfc8"
+
+Points = npt.NDArray[np.complex128]
+"""In the plane, x + i·y."""
+
+
+def draw_hand(run: Result, path: Path | None = None) -> Figure:
+    """Gaps, contact forces and closing speeds by finger; beside them the hand at the end.
+
+    With a `path` the figure is written there, see report.plot.save().
+    """
+    figure = new_figure(11.0, 7.5)
+    grid = figure.add_gridspec(3, 2, width_ratios=[1.3, 1.0])
+    rows = [figure.add_subplot(grid[i, 0]) for i in range(3)]
+    signals = run.by_role
+    for axes, name, factor, label in zip(
+        rows,
+        ("gap", "contact_force", "velocity"),
+        (1e3, 1.0, -1e3),
+        ("gap to the object in mm", "contact force in N", "closing speed in mm/s"),
+        strict=True,
+    ):
+        axes.sharex(rows[-1])
+        for i, k in enumerate(fingers_of(signals)):
+            line = drawn(run.time, factor * signals[f"plant.{name}[{k}]"])
+            axes.plot(*line, linestyle=DASHES[i], color=COLORS[i], label=f"finger {k}")
+        finish(axes, label, legend=False)
+    rows[-1].set_xlabel("time in s")
+    _from_above(figure.add_subplot(grid[:, 1]), run)
+    one_legend(figure)
+    headed(figure, caption(run))
+    return kept(figure, path)
+
+
+def _from_above(axes: Axes, run: Result) -> None:
+    """The fingers on their rays, the object and the contact forces in the last row, in mm."""
+    signals = run.by_role
+    e = np.exp(1j * np.asarray(directions(signals)))
+    fingers = fingers_of(signals)
+    tips, gaps, forces = (
+        np.array([signals[f"plant.{name}[{k}]"][-1] for k in fingers])
+        for name in ("position", "gap", "contact_force")
+    )
+    far = 1e3 * float(np.abs(tips).max())
+    faces = 1e3 * (tips - gaps) * e
+    centre = 1e3 * complex(*(signals[f"plant.object_position[{i}]"][-1] for i in (1, 2)))
+    turned = np.exp(1j * signals["plant.object_angle"][-1])
+    if is_disc(signals):
+        around = centre + abs(faces[0] - centre) * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
+    else:
+        around = _prism(faces, e * turned, far)
+    axes.fill(around.real, around.imag, color=OBJECT, label="object")
+    axes.plot(centre.real, centre.imag, "+", color=GREY)
+    for i, k in enumerate(fingers):
+        tip, back, end = (1e3 * tips[i] * e[i] + out * far * e[i] for out in (0.0, 0.7, 1.0))
+        axes.plot([0.0, end.real], [0.0, end.imag], color="#dddddd", lw=0.8)
+        ends = ([tip.real, back.real], [tip.imag, back.imag])
+        axes.plot(*ends, color=COLORS[i], lw=11.0, solid_capstyle="butt")
+        said = f"{k}: {forces[i]:.2f} N"
+        axes.text(end.real, end.imag, said, ha="center", va="center", fontsize=8)
+        if forces[i] > 0.0:
+            to = tip - 0.6 * far * np.sqrt(forces[i] / forces.max()) * e[i]
+            arrow = {"arrowstyle": "-|>", "color": "#1d2023", "lw": 1.5}
+            axes.annotate("", (to.real, to.imag), (tip.real, tip.imag), arrowprops=arrow)
+    axes.set_aspect("equal")
+    axes.set_xlim(-2.3 * far, 2.3 * far)
+    axes.set_ylim(-2.3 * far, 2.3 * far)
+    title = f"seen from above at {run.time[-1]:g} s; arrows: forces on the object"
+    axes.set_title(title, fontsize=10)
+    axes.set_xlabel("x in mm")
+    finish(axes, "y in mm", legend=False)
+
+
+def _prism(faces: Points, normals: Points, far: float) -> Points:
+    """The corners of what faces through these points leave of a large square."""
+    corners: Points = np.array([1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j], np.complex128) * 1.9 * far
+    for face, normal in zip(faces, normals, strict=True):
+        outside = ((corners - face) * np.conj(normal)).real
+        left: list[complex] = []
+        following = np.roll(corners, -1), np.roll(outside, -1)
+        for a, va, b, vb in zip(corners, outside, *following, strict=True):
+            left += [a] if va <= 0.0 else []
+            left += [a + (b - a) * va / (va - vb)] if (va < 0.0) != (vb < 0.0) else []
+        corners = np.array(left, np.complex128)
+    return corners
 
 
 def hand_scene(result: Result) -> Scene | None:

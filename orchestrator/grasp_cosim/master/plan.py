@@ -20,8 +20,7 @@ from ..interface.interface import Interface, Variable
 from ..realtime.pacer import Pacer
 from ..system.description import System
 from ..system.parts import NANOSECONDS, Connection, Port
-from ..system.stimuli_checks import driven
-from ..system.validity import transforms
+from ..system.validity import driven, transforms
 from .loop import CALL, COPY, DRIVE, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 from .scenario import Drive, Scenario
 

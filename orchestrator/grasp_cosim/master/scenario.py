@@ -24,7 +24,7 @@ from ..system.description import System
 from ..system.faults import FAULTS, INITIAL, Act, Draws
 from ..system.parts import Condition, Event, Fault, Port, first_step, literal, seconds
 from ..system.scenario import check_setting
-from ..system.stimuli_checks import driven, is_linear, samples_of
+from ..system.validity import driven, is_linear, samples_of
 
 FaultFunction = Callable[[float, int], float]
 """Changes a value passed at a step number."""

@@ -15,7 +15,6 @@ from .parts import Component
 from .scenario import check_scenario
 from .settings import made_of
 from .stimuli import Stimuli, read_stimuli
-from .stimuli_checks import check_stimuli
 from .structure import Structure, experiment
 from .toml import SECTIONS, as_file, read_toml, sections, with_entries
 from .validity import (
@@ -25,6 +24,7 @@ from .validity import (
     check_components,
     check_connections,
     check_steps,
+    check_stimuli,
 )
 
 ARCHIVE = ".ssp"

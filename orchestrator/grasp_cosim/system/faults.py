@@ -154,7 +154,7 @@ def _each(change: Callable[[float, Parameters, Draws, int], float]) -> Start:
 
 @dataclass(frozen=True, slots=True)
 class FaultKind:
-    """One kind of fault."""
+    """One kind of fault; check() is of parameters in their ranges, by each other and the step."""
 
     start: Start
     parameters: Mapping[str, Range | None]
@@ -162,10 +162,7 @@ class FaultKind:
     discrete: bool = False
     """True if it makes sense for an Integer or a Boolean."""
     random: bool = False
-    """True if it has a seed."""
     check: Callable[[str, Parameters, int], None] = lambda *_: None
-    """InputError, at a place, where parameters in their ranges do not suit each other or the step.
-    """
 
 
 FINITE = Range("a finite number")

@@ -282,21 +282,20 @@ class Initialisation:
 
 @dataclass(frozen=True, slots=True)
 class Realtime:
-    """How a run keeps to the clock; InputError where a value is none of those given here."""
+    """How a run keeps to the clock.
+
+    factor is the speed relative to real time. overrun is what follows on a step that ends after the
+    next one should have begun: "catch-up" keeps to the schedule, late steps are done without
+    waiting; "continue" shifts it by the delay; "stop" ends the run with a SimulationError. priority
+    is that of SCHED_FIFO, 1 to 99, cpu the number of the one to stay on, both None for as it is.
+    lock_memory keeps the process from being swapped out.
+    """
 
     factor: float = 1.0
-    """Speed relative to real time, > 0."""
     overrun: Overrun = "catch-up"
-    """Treatment of a step that ends after the next one should have begun: "catch-up" keeps to the
-    schedule, late steps are done without waiting; "continue" shifts the schedule by the delay;
-    "stop" ends the run with a SimulationError.
-    """
     priority: int | None = None
-    """Priority of SCHED_FIFO, 1 to 99; None leaves the scheduling as it is."""
     cpu: int | None = None
-    """The number of the CPU to stay on; None leaves it to the operating system."""
     lock_memory: bool = False
-    """Keep the memory of the process from being swapped out."""
 
     def __post_init__(self) -> None:
         factor = self.factor

@@ -37,8 +37,8 @@ from .parts import (
     in_nanoseconds,
     seconds,
 )
-from .stimuli_checks import driven
 from .structure import Structure
+from .validity import driven
 
 _CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s'"]+)""")
 

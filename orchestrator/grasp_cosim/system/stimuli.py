@@ -103,7 +103,7 @@ def read_stimuli(
     """The stimuli of a CSV file; place says where the interpolation comes from.
 
     InputError where there is none, or at the first cell that is not as it must be, but for what
-    depends on the variables: see stimuli_checks.py.
+    depends on the variables: see validity.py.
     """
     path = Path(path)
     chosen: Interpolation = choice(place, interpolation, INTERPOLATIONS)

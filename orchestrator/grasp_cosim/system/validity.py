@@ -1,28 +1,28 @@
 """Checks of a system before it is run: every input has one source, every port exists.
 
-A connection between whole arrays becomes one for each element.
+A connection between whole arrays becomes one for each element. Stimuli drive inputs without another
+source, with values that these take.
 """
 
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..base.checks import known, number
-from ..base.errors import InputError, choices
-from ..base.text import counted
-from ..interface.expansion import shape_text
-from ..interface.interface import SUPPORTED, Variable, limits
-from ..interface.obstacles import KINDS
-from ..interface.units import conversion
-from .parts import NANOSECONDS, Component, Connection, Port, component_of, seconds
-from .stimuli_checks import check_stimuli, driven, stimuli_remarks
-from .structure import Structure
+from si_units import known_unit
 
-FEW = 10
-"""Steps; a run of fewer is remarked on."""
+from ..base.checks import exact, known, number
+from ..base.errors import InputError, choices
+from ..interface.expansion import shape_text
+from ..interface.interface import SUPPORTED, Interface, Value, Variable, limits
+from ..interface.obstacles import KINDS
+from ..interface.units import IDENTITY, Conversion, conversion
+from .parts import Component, Connection, Port, component_of, seconds
+from .stimuli import Column, Stimuli
+from .structure import Structure, unit_of
 
 
 def as_written(system: Structure) -> tuple[Connection, ...]:
@@ -124,10 +124,10 @@ def check_arrays(system: Structure) -> None:
     fed, stimuli = _fed(system), driven(system)
     for c in system.components:
         given = {*c.values, *(p.variable for p in stimuli if p.component == c.name)}
-        for name, array in c.interface.arrays.items():
-            silent = [n for n in array.names if c.interface.by_name[n].start is None]
+        for name, whole in c.interface.arrays.items():
+            silent = [n for n in whole.names if c.interface.by_name[n].start is None]
             missing = [n for n in silent if n not in given and n not in fed[c.name]]
-            if missing and not given.isdisjoint(array.names):
+            if missing and not given.isdisjoint(whole.names):
                 raise InputError(
                     f"{system.name}: {c.name}.{name}: no value for {choices(missing, 6)}, "
                     "and no start value for this size; must be given, too"
@@ -268,10 +268,6 @@ def _of_components(system: Structure) -> Iterator[str]:
                 f"{c.name}: several variables of {c.fmu.name} are called {choices(names)}: they "
                 "are left alone"
             )
-        for name, unit in c.units.items():
-            if (v := c.declared.sample(name)) and v.unit not in (None, unit):
-                port = Port(c.name, name)
-                yield f"{port} is declared in {v.unit}, but named in {unit}: taken to be in that"
 
 
 def _of_connections(system: Structure) -> Iterator[str]:
@@ -298,21 +294,119 @@ def _of_the_rest(system: Structure) -> Iterator[str]:
                 left = "keeps its start value" if v.causality == "input" else "not recorded"
                 yield f"{Port(c.name, v.name)} is of type {v.nature}: {left}"
         free: list[str] = []
-        for name, array in c.interface.arrays.items():
-            without = [n for n in array.names if n not in fed[c.name] and n not in c.values]
+        for name, whole in c.interface.arrays.items():
+            without = [n for n in whole.names if n not in fed[c.name] and n not in c.values]
             if without and c.interface.by_name[without[0]].causality == "input":
-                free += [name] if len(without) == len(array.names) else without
+                free += [name] if len(without) == len(whole.names) else without
         if free:
             yield f"{c.name}: no source for {choices(free, 6)}: kept as the FMU starts with"
-    yield from stimuli_remarks(system)
-    if system.connections and system.total_steps < FEW:
+    if system.input:
+        way = system.input.interpolation
         yield (
-            f"{system.name}: the whole run is {counted(system.total_steps, 'step')} of "
-            f"{system.step_ns / NANOSECONDS:g} s, and values are passed on only between steps; "
-            "take a shorter --step"
+            f"{system.input.file} drives {choices(driven(system), 6)} ({way}), each step by the "
+            "values at its beginning"
         )
     if not system.recorded:
         yield (
             f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
             "Boolean or String"
         )
+
+
+def driven(system: Structure) -> tuple[Port, ...]:
+    """The inputs that stimuli drive, in the order of their columns."""
+    if system.input is None:
+        return ()
+    there = {(c.name, v.name) for c in system.components for v in c.interface.of("input")}
+    ports = system.input.columns
+    return tuple(p for p in ports if not system.input.partial or (p.component, p.variable) in there)
+
+
+def check_stimuli(system: Structure, whole: bool = False) -> None:
+    """InputError at the first column that does not fit an input, or has one with another source.
+
+    A value is no source: the column goes before it. whole says that all columns count, also where
+    FMUs may yet be swapped.
+    """
+    stimuli = system.input
+    sources = {c.target: f"a connection, from {c.source}" for c in system.connections}
+    for event in system.events:
+        sources |= dict.fromkeys(event.set, "an event")
+    for port in stimuli.columns if stimuli and whole else driven(system):
+        assert stimuli is not None  # noqa: S101 - it drives
+        place = stimuli.place(port)
+        interface = system.component(port.component, place).interface
+        inputs = [Port(port.component, v.name) for v in interface.of("input")]
+        known(f"{place}: no input", str(port), [*map(str, inputs)], see=interface.listing)
+        variable = interface.by_name[port.variable]
+        if not variable.is_number:
+            raise InputError(
+                f"{place}: is of type {variable.nature}; must be a Real, Integer, Boolean or "
+                "Enumeration to be driven"
+            )
+        if port in sources:
+            raise InputError(
+                f"{place}: {port} has two sources, {stimuli.file} and {sources[port]}; must have "
+                "one"
+            )
+        _check_samples(stimuli, port, interface)
+
+
+def samples_of(system: Structure, port: Port) -> array[float]:
+    """The samples of an input that is driven, in its unit."""
+    assert system.input is not None  # noqa: S101 - it drives
+    column = system.input.columns[port]
+    interface = system.component(port.component, str(port)).interface
+    if column.texts:
+        values = [float(_value(system.input, port, interface, r)) for r in column.distinct]
+        return array("d", (values[int(i)] for i in column.samples))
+    change = _conversion(system.input.place(port), interface, port, column)
+    same = change == IDENTITY
+    return array("d", column.samples if same else (change(x) for x in column.samples))
+
+
+def is_linear(stimuli: Stimuli, variable: Variable) -> bool:
+    """True if the values of an input change between two rows."""
+    continuous = variable.kind == "Real" and variable.variability == "continuous"
+    return stimuli.interpolation == "linear" and continuous
+
+
+def _check_samples(stimuli: Stimuli, port: Port, interface: Interface) -> None:
+    """InputError at a sample that is not of the type and range of its input."""
+    column, variable = stimuli.columns[port], interface.by_name[port.variable]
+    place = stimuli.place(port)
+    if column.unit is not None and variable.kind != "Real":
+        raise InputError(f"{place} [{column.unit}]: is of type {variable.type}; must have no unit")
+    _conversion(place, interface, port, column)
+    numbers = variable.kind == "Real" and not column.texts
+    for row in column.extremes if numbers else column.distinct:
+        value = _value(stimuli, port, interface, row)
+        exact(stimuli.place(port, row), value, column.text(row))
+
+
+def _value(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Value:
+    """The sample of a row as a value of its input; InputError where it is none."""
+    column = stimuli.columns[port]
+    change = _conversion(stimuli.place(port), interface, port, column)
+    value: Value = column.text(row)
+    if change != IDENTITY and not column.texts:
+        value = change(column.samples[row])
+    return interface.parse(stimuli.place(port, row), port.variable, value, text=True)
+
+
+def _conversion(place: str, interface: Interface, port: Port, column: Column) -> Conversion:
+    """The conversion of a column into the unit of its input; InputError where there is none."""
+    variable = interface.by_name[port.variable]
+    if column.unit is None or variable.unit in (None, column.unit):
+        return IDENTITY
+    given = interface.units.get(column.unit) or known_unit(column.unit)
+    if given and variable.relative:
+        given = given.without_offset
+    own = unit_of(interface, variable)
+    found = conversion(given, own) if given and own else None
+    if found is None:
+        raise InputError(
+            f"{place} [{column.unit}]: cannot be converted into {variable.unit}; must be a unit "
+            "of that quantity"
+        )
+    return found
