@@ -1,10 +1,10 @@
 """What inspect says of an FMU: of ours and of hand-written ones of FMI 1.0, 2.0 and 3.0."""
 
 import json
-import zipfile
 
 import pytest
 from grasp_cosim.inspection.inspection import as_text, inspect_fmu
+from ssp.hand_made import described
 
 FMI_1 = """<?xml version="1.0" encoding="ISO-8859-1"?>
 <fmiModelDescription fmiVersion="1.0" modelName="Drive" modelIdentifier="drive" guid="{1}"
@@ -106,13 +106,9 @@ def archive(tmp_path):
     """Writes an FMU of a modelDescription.xml and further, empty files."""
 
     def write(xml, *files):
-        path = tmp_path / "some.fmu"
         encoding = "latin-1" if "ISO-8859-1" in xml else "utf-8"
-        with zipfile.ZipFile(path, "w") as file:
-            file.writestr("modelDescription.xml", xml.encode(encoding))
-            for name in files:
-                file.writestr(name, "")
-        return path
+        empty = dict.fromkeys(files, "")
+        return described(tmp_path / "some.fmu", xml.encode(encoding), **empty)
 
     return write
 

@@ -4,7 +4,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import zipfile
 from pathlib import Path
 from shlex import quote
 
@@ -12,6 +11,7 @@ import fmpy
 import pytest
 from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.loading import Finding, unpack
+from ssp.hand_made import described, entries_of, zipped
 from support import native_fmus
 from support.marks import slow
 
@@ -52,12 +52,8 @@ def stock(tmp_path_factory):
 
 def altered(fmu, target, changes):
     """A copy of an FMU in which the given files are replaced, added, or left out (None)."""
-    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(target, "w") as copy:
-        files = {name: source.read(name) for name in source.namelist()}
-        for name, data in {**files, **changes}.items():
-            if data is not None:
-                copy.writestr(name, data)
-    return target
+    files = entries_of(fmu) | changes
+    return zipped(target, {name: data for name, data in files.items() if data is not None})
 
 
 @pytest.fixture
@@ -117,9 +113,7 @@ BOTH = '<ModelExchange modelIdentifier="M"/><CoSimulation modelIdentifier="N"/>'
     ],
 )
 def test_kinds(kinds, status, text, fix, tmp_path):
-    with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION.format(kinds=kinds))
-    fmu = unpack(tmp_path / "n.fmu", tmp_path)
+    fmu = unpack(described(tmp_path / "n.fmu", DESCRIPTION.format(kinds=kinds)), tmp_path)
     found = loading.description(fmu)
     assert (found[0], found[2], fmu.binary.stem == "N") == (status, fix, bool(kinds))
     assert text in found[1]
@@ -256,11 +250,9 @@ def test_a_native_fmu_without_a_library(tmp_path):
         (tmp_path / f"{name}.c").write_text(code)
         command = ["gcc", "-shared", "-fPIC", "-o", f"{name}.so", f"{name}.c", *options]
         subprocess.run(command, cwd=tmp_path, check=True)
-    with zipfile.ZipFile(tmp_path / "n.fmu", "w") as archive:
-        kinds = '<CoSimulation modelIdentifier="N"/>'
-        archive.writestr("modelDescription.xml", DESCRIPTION.format(kinds=kinds))
-        archive.write(tmp_path / "n.so", "binaries/linux64/N.so")
-    found = examined(tmp_path / "n.fmu")
+    text = DESCRIPTION.format(kinds='<CoSimulation modelIdentifier="N"/>')
+    files = {"binaries/linux64/N.so": (tmp_path / "n.so").read_bytes()}
+    found = examined(described(tmp_path / "n.fmu", text, **files))
     assert found["libraries"].text == "not found: liblost.so"
     assert found["trial"].text.startswith(
         "does not instantiate: Failed to load shared library binaries/linux64/N.so. liblost.so: "

@@ -17,6 +17,7 @@ from grasp_cosim.interface.read import describe, read_interface
 from grasp_cosim.ssp.to_archive import write_ssp
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
+from ssp.hand_made import described
 from support.marks import examples
 
 HEAD = '<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">'
@@ -27,13 +28,7 @@ PLAIN = f"{HEAD}<ModelVariables/>{TAIL}"
 @pytest.fixture
 def write(tmp_path):
     """Writes an FMU of a description."""
-
-    def fmu(description):
-        with zipfile.ZipFile(tmp_path / "x.fmu", "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("modelDescription.xml", description)
-        return tmp_path / "x.fmu"
-
-    return fmu
+    return lambda description: described(tmp_path / "x.fmu", description)
 
 
 def refused(path, *words):
@@ -80,12 +75,12 @@ def variable(attributes, type_="Real"):
     return f"<ScalarVariable {attributes}><{type_}/></ScalarVariable>"
 
 
-def described(*variables):
+def declared(*variables):
     return f"{HEAD}<ModelVariables>{''.join(variables)}</ModelVariables>{TAIL}"
 
 
-def described_3(*variables):
-    return described(*variables).replace('"2.0"', '"3.0"').replace("guid", "instantiationToken")
+def declared_3(*variables):
+    return declared(*variables).replace('"2.0"', '"3.0"').replace("guid", "instantiationToken")
 
 
 def nested(depth):
@@ -104,21 +99,21 @@ REFUSED = [
     (UTF_16.encode("utf-16"), ENTITY),
     *(
         (
-            described(variable(f'name="a" valueReference="{r}"')),
+            declared(variable(f'name="a" valueReference="{r}"')),
             f"variable 'a': valueReference = '{r}': must be a whole number from 0 to",
         )
         for r in REFERENCES
     ),
-    (described(variable('name="a"')), "variable 'a': valueReference = missing"),
+    (declared(variable('name="a"')), "variable 'a': valueReference = missing"),
     *(
-        (described(variable(f'name="a{c}b" valueReference="1"')), "must have no control characters")
+        (declared(variable(f'name="a{c}b" valueReference="1"')), "must have no control characters")
         for c in ("&#10;", "\x7f", "\x9b", "\u2028")
     ),
     (
-        described(variable(f'name="{"x" * 2001}" valueReference="1"')),
+        declared(variable(f'name="{"x" * 2001}" valueReference="1"')),
         f"2001 characters; must have at most {read.LONGEST_NAME}",
     ),
-    (described_3(*SAME), "variables 'a' and 'b' have the valueReference 7 both; must be unique"),
+    (declared_3(*SAME), "variables 'a' and 'b' have the valueReference 7 both; must be unique"),
 ]
 
 
@@ -131,8 +126,8 @@ def test_a_description_that_is_refused(write, description, message):
     ("description", "names"),
     [
         (nested(document.DEEPEST), []),
-        (described(variable(f'name="a" valueReference="{2**32 - 1}"')), ["a"]),
-        (described(variable('name="Größe.圧力[1]" valueReference="1"')), ["Größe.圧力[1]"]),
+        (declared(variable(f'name="a" valueReference="{2**32 - 1}"')), ["a"]),
+        (declared(variable('name="Größe.圧力[1]" valueReference="1"')), ["Größe.圧力[1]"]),
         (PLAIN.replace('"m"', '"Größe-1.0 b"'), []),  # the name of its binary
     ],
 )
@@ -144,7 +139,7 @@ def test_a_description_that_is_taken(write, description, names):
 def test_an_alias_of_a_name_that_is_taken(write, alias):
     """A dependency on it would be on one of them, unsaid on which."""
     x = f'<Float64 name="x" valueReference="0"><Alias name="{alias}"/></Float64>'
-    found = read_interface(write(described_3(x, '<Float64 name="y" valueReference="1"/>')))
+    found = read_interface(write(declared_3(x, '<Float64 name="y" valueReference="1"/>')))
     assert found.ambiguous == (alias,)
     assert alias not in found.by_name
 
@@ -156,14 +151,14 @@ def test_more_elements_than_an_fmu_has(write, monkeypatch):
 
 
 def two(one, other, type_="Real"):
-    return described(
+    return declared(
         variable(f'name="a" valueReference="7" causality="{one}"'),
         variable(f'name="b" valueReference="7" causality="{other}"', type_),
     )
 
 
 def start(type_, text):
-    return described_3(f'<{type_} name="a" valueReference="7" causality="input" start="{text}"/>')
+    return declared_3(f'<{type_} name="a" valueReference="7" causality="input" start="{text}"/>')
 
 
 BOTH = "the valueReference 7 both; one of them at most may be set"

@@ -1,7 +1,6 @@
 """The reader against FMPy's, and what it takes although a master does not."""
 
 import math
-import zipfile
 from tempfile import gettempdir
 
 import fmpy
@@ -9,6 +8,7 @@ import pytest
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.interface.obstacles import of_loading
 from grasp_cosim.interface.read import describe, read_interface
+from ssp.hand_made import described, zipped
 from support.native_fmus import build, build_model, needs_gcc
 
 FMI_2 = """<fmiModelDescription fmiVersion="2.0" modelName="M" guid="{1}">
@@ -49,13 +49,7 @@ OURS = (
 @pytest.fixture
 def write(tmp_path):
     """Writes an FMU of a description."""
-
-    def fmu(description):
-        with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
-            archive.writestr("modelDescription.xml", description)
-        return tmp_path / "x.fmu"
-
-    return fmu
+    return lambda description: described(tmp_path / "x.fmu", description)
 
 
 def number(text, absent):
@@ -206,8 +200,7 @@ def test_a_file_is_read_once_until_it_changes(write):
 
 @pytest.mark.parametrize("name", ["top/modelDescription.xml", "ModelDescription.xml"])
 def test_a_description_in_another_place_is_named(tmp_path, name):
-    with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
-        archive.writestr(name, FMI_2)
+    zipped(tmp_path / "x.fmu", {name: FMI_2})
     with pytest.raises(InputError, match=rf"must be there, and called so: there is {name}$"):
         describe(tmp_path / "x.fmu")
 

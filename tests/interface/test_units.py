@@ -1,7 +1,6 @@
 """Conversion between units, and what an FMU defines."""
 
 import math
-import zipfile
 
 import pytest
 from grasp_cosim import InputError, System
@@ -12,6 +11,7 @@ from grasp_cosim.system.validity import connection_transform
 from hypothesis import given
 from hypothesis import strategies as st
 from si_units import BASE, Unit, known_unit
+from ssp.hand_made import described
 
 exponents = st.tuples(*[st.integers(-4, 4)] * len(BASE))
 factors = st.floats(1e-9, 1e9) | st.floats(-1e9, -1e-9)
@@ -83,9 +83,8 @@ RISE = 'declaredType="Rise" start="0"'
 
 def from_y_to_u(folder, y, u):
     """Factor and offset of a connection between variables with these attributes."""
-    with zipfile.ZipFile(folder / "t.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION.format(y=y, u=u))
-    components = Component("a", folder / "t.fmu", {"u": 0.0}), Component("b", folder / "t.fmu", {})
+    path = described(folder / "t.fmu", DESCRIPTION.format(y=y, u=u))
+    components = Component("a", path, {"u": 0.0}), Component("b", path, {})
     connection = Connection(Port("a", "y"), Port("b", "u"))
     return connection_transform(
         System("t", components, (connection,), 1, 1, "sequential"), connection
@@ -115,10 +114,7 @@ LAZY = """<fmiModelDescription fmiVersion="2.0" modelName="lazy" guid="1">
     ("name", "defined"), [("mm", False), ("N", False), ("rad", True), ("%", True), ("cubit", True)]
 )
 def test_a_definition_without_a_dimension_is_none_of_a_unit_that_has_one(tmp_path, name, defined):
-    path = tmp_path / "lazy.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", LAZY.format(name=name))
-    interface = read_interface(path)
+    interface = read_interface(described(tmp_path / "lazy.fmu", LAZY.format(name=name)))
     assert (name in interface.units) is defined
     found = interface.unit(interface.by_name["y"])
     assert found == (Unit(name, (0,) * len(BASE)) if defined else known_unit(name))

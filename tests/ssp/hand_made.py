@@ -174,24 +174,33 @@ def structure(
 
 def archive(folder, ssd, fmus, files=None):
     """The archive hand.ssp in a folder: its SSD, FMUs by name, further files by entry."""
-    path = folder / "hand.ssp"
-    with zipfile.ZipFile(path, "w") as file:
-        file.writestr("SystemStructure.ssd", ssd)
-        for name, description in fmus.items():
-            inner = folder / "inner.zip"
-            with zipfile.ZipFile(inner, "w") as packed:
-                packed.writestr(zipfile.ZipInfo("modelDescription.xml"), description)
-            file.write(inner, f"resources/{name}.fmu")
-        for entry, content in (files or {}).items():
-            file.writestr(entry, content)
-    return path
+    entries = {"SystemStructure.ssd": ssd}
+    for name, description in fmus.items():
+        inner = described(folder / "inner.zip", description)
+        entries[f"resources/{name}.fmu"] = inner.read_bytes()
+    return zipped(folder / "hand.ssp", {**entries, **(files or {})})
 
 
 def changed(path, edit):
     """Rewrite an archive with its SystemStructure.ssd edited."""
-    with zipfile.ZipFile(path) as file:
-        entries = {name: file.read(name) for name in file.namelist()}
-    entries["SystemStructure.ssd"] = edit(entries["SystemStructure.ssd"])
+    entries = entries_of(path)
+    zipped(path, entries | {"SystemStructure.ssd": edit(entries["SystemStructure.ssd"])})
+
+
+def described(path, description, **files):
+    """An FMU that is a description, and further files."""
+    return zipped(path, {"modelDescription.xml": description, **files})
+
+
+def zipped(path, entries):
+    """A zip file of entries by name, the same at any time."""
     with zipfile.ZipFile(path, "w") as file:
-        for name, data in entries.items():
-            file.writestr(name, data)
+        for name, content in entries.items():
+            file.writestr(zipfile.ZipInfo(name), content)
+    return path
+
+
+def entries_of(path):
+    """The contents of a zip file by name."""
+    with zipfile.ZipFile(path) as file:
+        return {name: file.read(name) for name in file.namelist()}

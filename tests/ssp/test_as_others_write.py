@@ -1,6 +1,5 @@
 """Forms of archives and documents in circulation, which mean the same as those by the book."""
 
-import zipfile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,10 +15,12 @@ from ssp.hand_made import (
     bind,
     component,
     connect,
+    entries_of,
     fmu,
     parameter_set,
     structure,
     system,
+    zipped,
 )
 from support.marks import examples
 
@@ -40,12 +41,7 @@ def of_bytes(text):
 
 def rewritten(path, edit):
     """The archive loaded with its entries edited, names and content."""
-    with zipfile.ZipFile(path) as file:
-        entries = dict(edit(name, file.read(name)) for name in file.namelist())
-    with zipfile.ZipFile(path, "w") as file:
-        for name, data in entries.items():
-            file.writestr(name, data)
-    return System.load(path)
+    return System.load(zipped(path, dict(edit(*entry) for entry in entries_of(path).items())))
 
 
 def other_prefixes(text):
@@ -130,7 +126,6 @@ def test_sources_in_folders_and_above_are_of_the_archive(tmp_path):
     parts = component("a", source="fmus/x y.fmu") + component("b", source="c.fmu")
     files = {"fmus/x y.fmu": "", "c.fmu": ""}
     path = archive(tmp_path, structure(system("top", parts)), {"a": FMU}, files)
-    with zipfile.ZipFile(path) as file:
-        data = file.read("resources/a.fmu")
+    data = entries_of(path)["resources/a.fmu"]
     loaded = rewritten(path, lambda name, old: (name, data if name in files else old))
     assert [c.fmu.name for c in loaded.components] == ["x y.fmu", "c.fmu"]

@@ -1,7 +1,6 @@
 """What a system is made of archives of others, as a whole: values, connections, times, notes."""
 
 import re
-import zipfile
 from types import SimpleNamespace
 
 import pytest
@@ -19,6 +18,7 @@ from ssp.hand_made import (
     component,
     connect,
     connector_list,
+    described,
     fmu,
     linear,
     mapping,
@@ -49,7 +49,7 @@ PACKAGE, DEFINITION = "application/x-ssp-package", "application/x-ssp-definition
 A_TO_B = connect("a/y", "b/u")
 
 
-def described(loaded):
+def told(loaded):
     """All that a run takes of a system, and what was said."""
     times = f"{loaded.step_ns} ns from {loaded.start_ns} to {loaded.stop_ns}, {loaded.scheme}"
     parts = [
@@ -460,7 +460,7 @@ def test_what_is_made_of_an_archive(name, tmp_path, snapshot):
     ssd, fmus, files, step = CASES[name]
     if "resources/sub.ssp" in ssd:
         files = {"resources/sub.ssp": packed(tmp_path, INNER)}
-    assert described(System.load(archive(tmp_path, ssd, fmus, files), step=step)) == snapshot
+    assert told(System.load(archive(tmp_path, ssd, fmus, files), step=step)) == snapshot
 
 
 def test_a_set_in_the_fmu_of_the_component(tmp_path):
@@ -468,11 +468,9 @@ def test_a_set_in_the_fmu_of_the_component(tmp_path):
         '<ssd:ParameterBinding source="resources/own.ssv" sourceBase="component">'
         '<ssd:ParameterMapping source="resources/map.ssm"/></ssd:ParameterBinding>'
     )
-    with zipfile.ZipFile(tmp_path / "inner.zip", "w") as file:
-        file.writestr("modelDescription.xml", FMU)
-        file.writestr("resources/own.ssv", parameter_set("L Real 250.0 mm"))
+    own = {"resources/own.ssv": parameter_set("L Real 250.0 mm")}
     files = {
-        "resources/a.fmu": (tmp_path / "inner.zip").read_bytes(),
+        "resources/a.fmu": described(tmp_path / "inner.zip", FMU, **own).read_bytes(),
         "resources/map.ssm": mapping(("L", "length", "")),
     }
     top = system("top", component("a", "input u", binding))

@@ -27,6 +27,8 @@ from ssp.hand_made import (
     bind,
     component,
     connect,
+    described,
+    entries_of,
     fmu,
     parameter_set,
     structure,
@@ -114,9 +116,7 @@ def hand(folder, *connections, rename=False):
         "parameter String label none",
         "parameter Real plain 1.0",
     )
-    path = folder / "hand.fmu"
-    with zipfile.ZipFile(path, "w") as file:
-        file.writestr("modelDescription.xml", fmu(*variables))
+    path = described(folder / "hand.fmu", fmu(*variables))
     names = {"in put": "u", "out": "y", "text": "label"} if rename else {}
     label = "text" if rename else "label"
     values = {
@@ -205,25 +205,21 @@ def test_fmus_of_the_same_name_do_not_collide(grasp, tmp_path):
 
 def test_one_name_for_two_units_is_written_for_the_first_only(tmp_path):
     original = hand(tmp_path)
-    path = tmp_path / "feet.fmu"
     description = fmu("output Real y - mm", "input Real u 0.0 mm").replace(b'"0.001"', b'"0.3048"')
-    with zipfile.ZipFile(path, "w") as file:
-        file.writestr("modelDescription.xml", description)
+    path = described(tmp_path / "feet.fmu", description)
     other = Component("c", path, {"u": 1.0})
     mixed = replace(original, components=(*original.components, other))
     assert round_trip(mixed, tmp_path) == mixed
 
 
 def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path):
-    path = tmp_path / "wide.fmu"
     description = b"""<fmiModelDescription fmiVersion="3.0" modelName="w" instantiationToken="{}">
       <CoSimulation modelIdentifier="w"/><ModelVariables><Int64 name="n" valueReference="1"
       causality="parameter" variability="fixed" start="1"/><Binary name="b" valueReference="2"
       causality="output"/></ModelVariables><ModelStructure><Output valueReference="2"/>
       </ModelStructure>
       </fmiModelDescription>"""
-    with zipfile.ZipFile(path, "w") as file:
-        file.writestr("modelDescription.xml", description)
+    path = described(tmp_path / "wide.fmu", description)
     parts = (Component("c", path, {"n": 2**31}),)
     wide = System("wide.toml", parts, (), 1_000_000, 1_000_000_000, "sequential")
     with pytest.raises(InputError, match=r"c\.n = 2147483648: must fit into 32 bits"):
@@ -236,7 +232,6 @@ def test_a_whole_number_that_ssp_does_not_hold_is_refused(tmp_path):
 
 def filters(folder):
     """An FMU of FMI 3.0 with arrays of n = 2 elements or more, in m, and a matrix."""
-    path = folder / "filters.fmu"
     description = b"""<fmiModelDescription fmiVersion="3.0" modelName="f" instantiationToken="{}">
       <CoSimulation modelIdentifier="f"/><UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit>
       </UnitDefinitions><ModelVariables>
@@ -250,9 +245,7 @@ def filters(folder):
       <Dimension start="2"/><Dimension start="2"/></Float64>
       </ModelVariables><ModelStructure><Output valueReference="3"/></ModelStructure>
       </fmiModelDescription>"""
-    with zipfile.ZipFile(path, "w") as file:
-        file.writestr("modelDescription.xml", description)
-    return path
+    return described(folder / "filters.fmu", description)
 
 
 def test_arrays_of_a_given_size_come_back(tmp_path):
@@ -282,15 +275,12 @@ def test_arrays_of_a_given_size_come_back(tmp_path):
     notes = write_ssp(whole, tmp_path / "f.ssp").notes
     said = "SSP 1.0 has no arrays: in, out, A by elements, which other tools do not know"
     assert f"a: {said}" in notes
-    with zipfile.ZipFile(tmp_path / "again.ssp") as file:
-        text = file.read("SystemStructure.ssd").decode()
+    text = entries_of(tmp_path / "again.ssp")["SystemStructure.ssd"].decode()
     assert 'startConnector="Outs[3]" endElement="b" endConnector="Ins[3]"' in text
 
 
 def test_an_archive_of_others_says_how_many_elements_there_are(tmp_path):
-    inner = filters(tmp_path)
-    with zipfile.ZipFile(inner) as file:
-        description = file.read("modelDescription.xml")
+    description = entries_of(filters(tmp_path))["modelDescription.xml"]
     given = bind(parameter_set("n Integer 4; Ins[4] Real 2.5", units=""))
     parts = component("a", "output Outs[4] Real m") + component(
         "b", "input Ins[3]; input Ins[4]", given

@@ -12,7 +12,6 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from threading import Lock
 from urllib.parse import unquote, urlsplit
 
 from one_piece import in_one_piece
@@ -24,7 +23,6 @@ from ..interface.document import check_size
 STRUCTURE = "SystemStructure.ssd"
 RESOURCES = "resources/"
 _MODE = 0o644 << 16
-_extracting = Lock()
 
 
 class Notes:
@@ -56,8 +54,6 @@ class Archive:
     def __init__(self, path: Path, notes: Notes, place: str = "", needs: str = STRUCTURE) -> None:
         self.place = place or path.name
         said = place or str(path)
-        if path.is_dir():
-            raise InputError(f"{said}: is a folder; must be an .ssp file")
         try:
             with zipfile.ZipFile(path) as file:
                 names = file.namelist()
@@ -105,10 +101,9 @@ class Archive:
         """The entry as a file, until the process ends."""
         data = self.read(entry)
         path = Path(_folder().name) / hashlib.sha256(data).hexdigest() / posixpath.basename(entry)
-        with _extracting:
-            if not path.exists():
-                with in_one_piece(path) as part:
-                    part.write_bytes(data)
+        if not path.exists():
+            with in_one_piece(path) as part:
+                part.write_bytes(data)
         return path
 
 
