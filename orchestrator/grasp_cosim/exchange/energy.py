@@ -129,13 +129,7 @@ class ExchangeEnergy:
         taken in the units of the component that moves.
         """
         self.signals = tuple(bond.signal for bond in bonds)
-        self._ledgers = [
-            (
-                [i for i, bond in enumerate(bonds) if bond.period == period],
-                _Ledger([b for b in bonds if b.period == period], column, transforms),
-            )
-            for period in dict.fromkeys(bond.period for bond in bonds)
-        ]
+        self._ledgers = [_Ledger(bond, column, transforms) for bond in bonds]
         self._rows = 0
 
     def __call__(self, rows: Floats) -> Floats:
@@ -143,68 +137,59 @@ class ExchangeEnergy:
         energies = np.empty((len(self.signals), len(rows)))
         # The master reports values that are not finite; they are none of this function's concern.
         with np.errstate(invalid="ignore", over="ignore"):
-            for places, ledger in self._ledgers:
-                energies[places] = ledger.add(self._rows, rows)
+            for place, ledger in enumerate(self._ledgers):
+                energies[place] = ledger.add(self._rows, rows)
         self._rows += len(rows)
         return energies.T
 
 
 class _Ledger:
-    """The sums of some bonds of the same period, up to the last row; a line for each."""
+    """The sum of a bond up to the last row."""
 
     def __init__(
         self,
-        bonds: Sequence[Bond],
+        bond: Bond,
         column: Mapping[Port, int],
         transforms: Mapping[Port, tuple[float, float]],
     ) -> None:
-        self._period, self._count = bonds[0].period, len(bonds)
-        self._scale = np.array([[bond.scale] for bond in bonds])
-        self._mover = [column[b.force] for b in bonds] + [column[b.position] for b in bonds]
-        self._answerer = [column[b.source] for b in bonds]
-        self._answerer += [column[b.seen or b.position] for b in bonds]
-        of_force = [transforms.get(bond.force, IDENTITY) for bond in bonds]
-        of_seen = [transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY for bond in bonds]
-        self._plain = {*of_force, *of_seen} == {IDENTITY}
-        self._of_force, self._of_seen = np.array([of_force, of_seen]).transpose(0, 2, 1)[..., None]
-        self._moved = self._answered = np.empty((2 * len(bonds), 0))
-        self._total = np.zeros((len(bonds), 1))
+        self._period, self._scale = bond.period, bond.scale
+        self._mover = [column[bond.force], column[bond.position]]
+        self._answerer = [column[bond.source], column[bond.seen or bond.position]]
+        self._of_force = transforms.get(bond.force, IDENTITY)
+        self._of_seen = transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY
+        self._moved = self._answered = np.empty((2, 0))
+        self._total = np.zeros(1)
 
     def add(self, first: int, rows: Floats) -> Floats:
-        """The energies at each of the rows, which are those of the steps from first on."""
-        n = self._count
-        earned = np.zeros((n, len(rows)))
-        moved = _joined(self._moved, rows[:, self._mover].T)
-        held, position = moved[:n], moved[n:]
-        _add_last(earned, held[:, 1:] * (position[:, 1:] - position[:, :-1]))
+        """The energy at each of the rows, which are those of the steps from first on."""
+        earned = np.zeros(len(rows))
+        held, position = moved = _joined(self._moved, rows[:, self._mover].T)
+        _add_last(earned, held[1:] * np.diff(position))
         # A source with a step of its own answers for what it saw at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
-        answered = _joined(self._answered, self._in_units(rows[ends, self._answerer].T))
-        force, seen = answered[:n], answered[n:]
-        mean = -0.5 * (force[:, 1:] + force[:, :-1])
-        _add_last(earned[:, ends], mean * (seen[:, 1:] - seen[:, :-1]))
+        force, seen = answered = _joined(self._answered, self._in_units(rows[ends, self._answerer]))
+        _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * np.diff(seen))
         self._moved, self._answered = moved[:, -1:], answered[:, -1:]
         # One sum after the other from the carried total on: the same bits for any blocks.
-        total = np.cumsum(_joined(self._total, self._scale * earned), axis=1)
-        self._total = total[:, -1:]
-        return total[:, 1:]
+        total = np.cumsum(np.concatenate((self._total, self._scale * earned)))
+        self._total = total[-1:]
+        return total[1:]
 
     def _in_units(self, answered: Floats) -> Floats:
-        """Forces and positions of the source in the units of the component that moves."""
-        if self._plain:
-            return answered
-        force, seen = answered[: self._count], answered[self._count :]
-        factor, offset = self._of_force
+        """Force and position of the source in the units of the component that moves."""
+        if self._of_force == self._of_seen == IDENTITY:
+            return answered.T
+        (force, seen), (factor, offset) = answered.T, self._of_force
         per_factor, from_offset = self._of_seen
-        return np.concatenate((factor * force + offset, (seen - from_offset) / per_factor))
+        return np.array((factor * force + offset, (seen - from_offset) / per_factor))
 
 
 def _joined(before: Floats, after: Floats) -> Floats:
     """Columns after others, with each row in one piece, which is fast."""
-    shape = len(before), before.shape[1] + after.shape[1]
+    shape = 2, before.shape[1] + after.shape[1]
     return np.concatenate((before, after), axis=1, out=np.empty(shape))
 
 
 def _add_last(sums: Floats, changes: Floats) -> None:
     """Add the changes in place; the first row of a run has none."""
-    sums[:, sums.shape[1] - changes.shape[1] :] += changes
+    sums[len(sums) - len(changes) :] += changes
