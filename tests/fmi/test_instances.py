@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.fmi.fmi2 import CONVENTION, SharedInstance, formatted, logger_type
+from grasp_cosim.fmi.co_simulation import CONVENTION, SharedInstance, formatted, logger_type
 from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
 from grasp_cosim.fmi.process import load
 from grasp_cosim.interface.interface import Variable
@@ -425,7 +425,7 @@ def test_fmpys_own_logger_is_not_used_and_what_it_prints_is_not_seen():
 import sys, types
 sys.modules["fmpy.logging"] = logging = types.ModuleType("fmpy.logging")
 logging.addLoggerProxy = lambda _: print("none such") or print("asked", file=sys.stderr)
-import grasp_cosim.fmi.fmi2
+import grasp_cosim.fmi.co_simulation
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     assert (done.stdout, done.stderr.split()) == (b"", [b"asked"] * 2)  # by FMPy: FMI 1.0 and 2.0

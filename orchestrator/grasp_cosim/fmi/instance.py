@@ -26,13 +26,11 @@ EARLY = 6
 class Instance(Protocol):
     """One instance of a component, in the order of its life."""
 
-    @property
-    def name(self) -> str:
-        """The component's name in the system."""
+    name: str
+    """The component's name in the system."""
 
-    @property
-    def interface(self) -> Interface:
-        """Its declared interface, under the system's names."""
+    interface: Interface
+    """Its declared interface, under the system's names."""
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0

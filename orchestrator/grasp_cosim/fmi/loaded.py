@@ -73,6 +73,9 @@ class LoadedInstance(ABC):
     ENUMERATION: ClassVar[str]
     """The type as which an Enumeration is set and got."""
 
+    SLAVE: ClassVar[type]
+    """FMPy's class."""
+
     def __init__(self, name: str, interface: Interface) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
         self.name = name
@@ -98,6 +101,15 @@ class LoadedInstance(ABC):
     @abstractmethod
     def _instantiate(self, folder: Path) -> Any:
         """FMPy's slave, instantiated from the folder it was extracted to."""
+
+    def _opened(self, folder: Path) -> Any:
+        """FMPy's slave with the library from the folder, not instantiated yet."""
+        return know_signatures(self.SLAVE)(
+            guid=self.interface.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=self._identifier,
+            instanceName=self.name,
+        )
 
     @abstractmethod
     def _read_log(self) -> list[str]:

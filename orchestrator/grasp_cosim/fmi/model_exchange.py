@@ -24,11 +24,10 @@ from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import NANOSECONDS, Solver
+from .co_simulation import Fmi3Instance, FmuInstance, Lenient
 from .cvode import Cvode, CvodeError, Function
-from .fmi2 import FmuInstance
-from .fmi3 import Fmi3Instance, Lenient
 from .instance import DISCARD, EARLY, OK, WARNING
-from .loaded import LoadedInstance, know_signatures
+from .loaded import LoadedInstance
 
 AT_POINT = 1e-10
 """s, a tenth of the unit of time: an event so near to a communication point is at that."""
@@ -366,6 +365,7 @@ class _Model(Lenient, FMU3Model):  # type: ignore[misc]  # FMPy has no types
 class Fmi3Model(ModelInstance, Fmi3Instance):
     """One instance of an FMI 3.0 FMU for model exchange."""
 
+    SLAVE = _Model
     SLOPES = "GetContinuousStateDerivatives"
     NEEDS = (
         "EnterEventMode",
@@ -376,12 +376,7 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
     )
 
     def _instantiate(self, folder: Path) -> FMU3Model:
-        model = know_signatures(_Model)(
-            guid=self.interface.guid,
-            unzipDirectory=str(folder),
-            modelIdentifier=self._identifier,
-            instanceName=self.name,
-        )
+        model = self._opened(folder)
         model.instantiate(loggingOn=True, logMessage=self._log)
         return model
 

@@ -38,8 +38,7 @@ from ..base.scratch import ScratchFolder
 from ..base.system_calls import end_group, listener
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Component, Solver
-from .fmi2 import FmuInstance, SharedInstance
-from .fmi3 import Fmi3Instance
+from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
 from .instance import EARLY, OK, WARNING, Inputs, Instance, dtype
 
 POSIX = os.name == "posix"
