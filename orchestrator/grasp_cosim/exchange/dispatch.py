@@ -11,7 +11,6 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -120,9 +119,9 @@ class Dispatcher:
             sizes = largest(outputs[:good])
         runaway = self._divergence(steps[:good], outputs[:good], sizes)
         if runaway and not self._goes_on:
-            return runaway.row + 1, f'{runaway.text}; or let it go on: diverging = "continue"'
+            return runaway[0] + 1, f'{runaway[1]}; or let it go on: diverging = "continue"'
         if runaway:
-            self.log.append(f"{runaway.text}; the run went on")
+            self.log.append(f"{runaway[1]}; the run went on")
         if good == len(steps):
             return good, ""
         i = int(np.isfinite(outputs[good]).argmin())
@@ -161,13 +160,6 @@ def largest(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return highest
 
 
-class Runaway(NamedTuple):
-    """The row of a block in which a signal ran away, and what is said of it, one line."""
-
-    row: int
-    text: str
-
-
 class Divergence:
     """Looks at every row of a run until the first signal has run away.
 
@@ -188,11 +180,11 @@ class Divergence:
         steps: npt.NDArray[np.int64],
         rows: npt.NDArray[np.float64],
         sizes: npt.NDArray[np.float64],
-    ) -> Runaway | None:
+    ) -> tuple[int, str] | None:
         """The first signal that runs away in a block of finite rows, (len(steps), len(outputs)).
 
-        sizes are largest(rows). None where there is none, and after the first. Blocks of any length
-        come to the same.
+        Its row, and a line that says so. None where there is none, and after the first. sizes are
+        largest(rows). Blocks of any length come to the same.
         """
         if self._over or not rows.size:
             return None
@@ -209,7 +201,7 @@ class Divergence:
         if _grows(self._reached[i]):
             length = decade * self._system.step_ns / NANOSECONDS
             text += f", ten times as much every {length:.2g} s"
-        return Runaway(row, f"{text}; look at the signs and gains, or try a shorter step")
+        return row, f"{text}; look at the signs and gains, or try a shorter step"
 
     def _follow(
         self, i: int, steps: npt.NDArray[np.int64], column: npt.NDArray[np.float64]

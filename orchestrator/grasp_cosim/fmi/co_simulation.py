@@ -39,7 +39,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.fmi3 import _FMU3, FMU3Slave
 
-from ..base.calls import STEP_2, STEP_3, TRANSFER_2, TRANSFER_3, Call, Native
+from ..base.calls import STEP_2, STEP_3, Call, Native
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import c_library
 from ..interface.interface import Interface, Value, Variable
@@ -145,10 +145,6 @@ _callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
 class FmuInstance(LoadedInstance):
     """One instance of an FMI 2.0 FMU, for co-simulation."""
 
-    PREFIX = "fmi2"
-    SHAPE = TRANSFER_2
-    ENUMERATION = "Integer"
-
     SLAVE = FMU2Slave
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
@@ -248,9 +244,6 @@ class _Slave(Lenient, FMU3Slave):  # type: ignore[misc]
 class Fmi3Instance(LoadedInstance):
     """One instance of an FMI 3.0 co-simulation FMU."""
 
-    PREFIX = "fmi3"
-    SHAPE = TRANSFER_3
-    ENUMERATION = "Int64"
     SLAVE = _Slave
 
     def __init__(self, name: str, interface: Interface) -> None:

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 
-from ..base.calls import TRANSFER_3, Call, Native
+from ..base.calls import TRANSFER_2, TRANSFER_3, Call, Native
 from ..base.errors import InputError, SimulationError
 from ..base.files import FULL
 from ..base.scratch import ScratchFolder, without_scratch
@@ -64,15 +64,6 @@ class LoadedInstance(ABC):
     tolerance: float | None = None
     """The relative tolerance of the solver, where the FMU has none of its own."""
 
-    PREFIX: ClassVar[str]
-    """The first letters of its FMI functions."""
-
-    SHAPE: ClassVar[int]
-    """The shape of those that set and get: TRANSFER_2, or TRANSFER_3 with the count at the end."""
-
-    ENUMERATION: ClassVar[str]
-    """The type as which an Enumeration is set and got."""
-
     SLAVE: ClassVar[type]
     """FMPy's class."""
 
@@ -80,6 +71,7 @@ class LoadedInstance(ABC):
         """Extract and instantiate; InputError where the FMU does not load."""
         self.name = name
         self.interface = interface
+        self._major = interface.version[0]
         self._worst = FATAL  # until it is instantiated
         self._keep: list[Any] = []
         self._inputs = Inputs()
@@ -229,7 +221,8 @@ class LoadedInstance(ABC):
         self._keep += [references, data]
         if action == "set":
             self._inputs.bind(variables, data)
-        sizes = [ctypes.c_size_t(size)] if self.SHAPE == TRANSFER_3 else []
+        shape = TRANSFER_3 if self._major == "3" else TRANSFER_2
+        sizes = [ctypes.c_size_t(size)] if shape == TRANSFER_3 else []
         bound, address = self._function(
             action.capitalize() + self._suffix(variables[0].type),
             ctypes.byref(references),
@@ -238,12 +231,14 @@ class LoadedInstance(ABC):
             *sizes,
         )
         instance, first = self._slave.component, ctypes.addressof(references)
-        native = Native(self.SHAPE, address, instance, first, count, place, values=size)
+        native = Native(shape, address, instance, first, count, place, values=size)
         return Call(bound, native, self._python)
 
     def _suffix(self, fmi_type: str) -> str:
         """The end of the names of the functions that set and get an FMI type."""
-        return self.ENUMERATION if fmi_type == "Enumeration" else fmi_type
+        if fmi_type != "Enumeration":
+            return fmi_type
+        return "Int64" if self._major == "3" else "Integer"
 
     def _get(self, variable: Variable) -> Value:
         getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
@@ -317,7 +312,7 @@ class LoadedInstance(ABC):
     def _function(self, name: str, *arguments: Any) -> tuple[Callable[[], int], int]:
         """The bound function for Python, and its address."""
         prototype = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
-        function = prototype((self.PREFIX + name, self._slave.dll))
+        function = prototype((f"fmi{self._major}{name}", self._slave.dll))
         bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
         return bound, ctypes.cast(function, ctypes.c_void_p).value or 0
 

@@ -287,7 +287,7 @@ class ModelInstance(LoadedInstance):
         """A function of the FMU, for its instance; InputError where it has none such."""
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
         try:
-            function = prototype((self.PREFIX + name, self._slave.dll))
+            function = prototype((f"fmi{self._major}{name}", self._slave.dll))
         except AttributeError as error:
             raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from None
         return partial(function, self._slave.component)
