@@ -188,4 +188,4 @@ def test_a_candidate_that_ends_sooner_is_not_qualified(tmp_path):
     values = {"width": 0.5, "last": 5}
     sooner = qualify(system, "stair", Component("stair", fmu, values), isolation="none")
     assert not sooner.qualified
-    assert [c.name for c in sooner.outside] == ["end_of_run"]
+    assert [c.name for c in sooner.metrics if not c.inside] == ["end_of_run"]

@@ -128,12 +128,6 @@ class Dispatcher:
         name, value = self.signals[i].name, outputs[good, i]
         return good + 1, f"{name} = {value} at step {steps[good]}: must be finite"
 
-    def flush(self) -> None:
-        """Hand the last row on, where decimation has left it out."""
-        pending, self.pending = self.pending, None
-        if pending is not None:
-            self._hand_on(*pending)
-
     def spare(self, ns: float) -> bool:
         """Give a listener that puts work off so many ns for it; False if none had any to do."""
         return any(listener.spare(ns) for listener in self._leisurely)
@@ -143,7 +137,9 @@ class Dispatcher:
         with ExitStack() as stack:
             for listener in reversed(self._listeners):
                 stack.callback(listener.end, complete)
-            self.flush()
+            pending, self.pending = self.pending, None
+            if pending is not None:
+                self._hand_on(*pending)
 
     def _hand_on(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         start = time.perf_counter()

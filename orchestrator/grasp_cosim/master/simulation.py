@@ -259,17 +259,8 @@ class Session:
 
         SimulationError, with the result, where a listener does not take it.
         """
-        try:
+        with self._failures():
             self._master.hand_on()
-            if self.complete or self._failed:
-                self._dispatch.flush()
-        except SimulationError as error:
-            self._failed = True
-            error.result = self._result()
-            raise
-        return self._result()
-
-    def _result(self) -> Result:
         master, signals, asked = self._master, self._dispatch.signals, self._privileges
         pacer = self.pacer
         time, columns = self._memory.columns(self._dispatch.pending)
