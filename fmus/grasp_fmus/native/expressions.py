@@ -9,6 +9,7 @@ import builtins
 import inspect
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from functools import cached_property
@@ -16,7 +17,7 @@ from types import FunctionType, ModuleType
 from typing import Any, NoReturn
 
 from . import types
-from .text import Source, identifier, number
+from .text import Source, UntranslatableError, identifier, number
 from .types import (
     BOOLEAN,
     NUMBERS,
@@ -58,6 +59,13 @@ ADVICE: dict[Any, str] = {
     "GeneratorExp": "a generator is only for any, all and tuple",
     "FloorDiv": "// is not in the subset; write floor(a / b)",
     "Mod": "% is not in the subset; write fmod(a, b)",
+    "While": "while is not in the subset, as a step must end; use for ... in range(n) with break",
+    "FunctionDef": "a function in a function is not in the subset; put it into the module",
+    "Try": "try is not in the subset; ask before",
+    "Global": "global is not in the subset; what is to be kept belongs into State",
+    "Match": "match is not in the subset; use if and elif",
+    "Raise": "raise is only for __post_init__; a step whose outputs are not finite is refused",
+    "ImportFrom": "import in a function is not in the subset; put it at the top of the module",
     sum: "sum: its rounding depends on the version of Python; write a + b, or a loop",
     math.fsum: "math.fsum is not in the subset; write a + b, or a loop",
     math.hypot: "math.hypot is CPython's own; write sqrt(x * x + y * y)",
@@ -81,16 +89,16 @@ class Expressions:
         """The parameters and variables that have a value here."""
         self.locals: set[str] = set()
         self.lines: list[str] = []
-        self.indent = 1
+        self._inside: list[Counter[str]] = []
+        """How often names are in the statements of the blocks that are open."""
         self._used: set[str] = set()
 
     def refuse(self, node: Any, reason: str) -> NoReturn:
         """End with a reason, and the line of a node."""
         raise self.source.error(node, reason)
 
-    def say(self, line: str) -> None:
-        """Add a line."""
-        self.lines.append(f"{'    ' * self.indent}{line}")
+    def _say(self, line: str) -> None:
+        self.lines.append(f"{'    ' * (1 + len(self._inside))}{line}")
 
     def fresh(self, name: str, own: bool = False) -> str:
         """A name for a variable of C: the block's own, or one for what C cannot say at once."""
@@ -104,18 +112,17 @@ class Expressions:
     def simple(self, value: Value, name: str = "value") -> Value:
         """The value where it may stand several times: what is more than a name gets a variable."""
         if value.items is not None and isinstance(value.type, Tuple):
-            return self.display([self.simple(item, name) for item in value.items], value.type)
+            return self._display([self.simple(item, name) for item in value.items], value.type)
         if isinstance(value.type, Group) or _PATH.fullmatch(value.text):
             return value
-        return self.copied(value, name)
+        return self._copied(value, name)
 
-    def copied(self, value: Value, name: str) -> Value:
-        """The value in a variable of its own."""
+    def _copied(self, value: Value, name: str) -> Value:
         variable = self.fresh(name)
-        self.say(f"{self.program.c(value.type, self.names)} {variable} = {value.text};")
+        self._say(f"{self.program.c(value.type, self.names)} {variable} = {value.text};")
         return Value(variable, value.type)
 
-    def at(self, value: Value, level: int) -> str:
+    def _at(self, value: Value, level: int) -> str:
         """The text of a value where an operator of this level takes it."""
         return value.text if value.level >= level else f"({value.text})"
 
@@ -141,65 +148,66 @@ class Expressions:
         if isinstance(node, ast.Attribute):
             names = vars(self.known(node.value))
         if isinstance(kind, Scalar) and (isinstance(found, IntEnum) or not name.isupper()):
-            return self.number_of(found)
+            return self._number_of(found)
         return Value(self.program.constant(dict(names), name, found), kind)
 
-    def number_of(self, value: Any) -> Value:
-        """A number of Python."""
+    def _number_of(self, value: Any) -> Value:
         if isinstance(value, bool):
             return Value(str(int(value)), BOOLEAN)
         text = number(value)
         kind = REAL if isinstance(value, float) else WHOLE
         return Value(text, kind, SIGN if text[0] == "-" else WORD)
 
-    def value(self, node: ast.expr) -> Value:
-        """An expression."""
+    def _value(self, node: ast.expr) -> Value:
         found = self.known(node)
         if found is not _UNKNOWN:
             return self.constant(node, found)
-        translate = getattr(self, f"_{type(node).__name__.lower()}", self._other)
-        made: Value = translate(node)
+        translate = getattr(self, f"_on_{type(node).__name__.lower()}", self._other)
+        try:
+            made: Value = translate(node)
+        except UntranslatableError:
+            raise
+        except (TypeError, ValueError, LookupError) as error:
+            self.refuse(node, f"{ast.unparse(node)}: {error}")
         return made
 
-    def _other(self, node: ast.expr, kind: Any = None) -> NoReturn:
-        kind = kind or type(node).__name__
-        self.refuse(node, ADVICE.get(kind, f"{ast.unparse(node)}: is not in the subset"))
+    def _other(self, node: ast.AST, kind: Any = None) -> NoReturn:
+        text = ast.unparse(node).partition("\n")[0]
+        self.refuse(node, ADVICE.get(kind or type(node).__name__, f"{text}: is not in the subset"))
 
-    def number(self, node: ast.expr) -> Value:
-        """An expression that must be a number."""
-        return self._as_number(self.value(node), node)
+    def _number(self, node: ast.expr) -> Value:
+        return self._as_number(self._value(node), node)
 
     def _as_number(self, value: Value, node: ast.AST) -> Value:
         if not isinstance(value.type, Scalar):
             self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a number")
         return value._replace(type=WHOLE) if value.type == BOOLEAN else value
 
-    def condition(self, node: ast.expr) -> Value:
-        """An expression as a condition."""
-        value = self.value(node)
+    def _condition(self, node: ast.expr) -> Value:
+        value = self._value(node)
         if value.type in NUMBERS:
-            return Value(f"{self.at(value, SUM)} != 0.0", BOOLEAN, EQUAL)
+            return Value(f"{self._at(value, SUM)} != 0.0", BOOLEAN, EQUAL)
         if value.type != BOOLEAN:
             self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a condition")
         return value
 
-    def _constant(self, node: ast.Constant) -> Value:
+    def _on_constant(self, node: ast.Constant) -> Value:
         if not isinstance(node.value, int | float):
             self.refuse(node, f"{ast.unparse(node)}: must be a number")
         if isinstance(node.value, int) and abs(node.value) > 2**53:
             self.refuse(node, f"{node.value}: an int must be at most 2**53; write {node.value}.0")
-        return self.number_of(node.value)
+        return self._number_of(node.value)
 
-    def _name(self, node: ast.Name) -> Value:
+    def _on_name(self, node: ast.Name) -> Value:
         if node.id not in self.bound:
             self.refuse(node, f"{node.id} may have no value here; give it one before")
         return self.bound[node.id]
 
-    def _binop(self, node: ast.BinOp) -> Value:
-        left, right = self.value(node.left), self.value(node.right)
+    def _on_binop(self, node: ast.BinOp) -> Value:
+        left, right = self._value(node.left), self._value(node.right)
         if isinstance(left.type, Tuple) and isinstance(node.op, ast.Mult):
-            items = [self.simple(item) for item in self.items(left, node.left)]
-            return self.display(items * self._index(node.right))
+            items = [self.simple(item) for item in self._items(left, node.left)]
+            return self._display(items * self._index(node.right))
         a, b = self._as_number(left, node.left), self._as_number(right, node.right)
         if isinstance(node.op, ast.Pow):
             if a.type == b.type == WHOLE:
@@ -208,77 +216,75 @@ class Expressions:
         if type(node.op) not in OPERATORS:
             self._other(node, type(node.op).__name__)
         symbol, level = OPERATORS[type(node.op)]
-        text = f"{self.at(a, level)} {symbol} {self.at(b, level + 1)}"
+        text = f"{self._at(a, level)} {symbol} {self._at(b, level + 1)}"
         if a.type == b.type == WHOLE and symbol != "/":  # the zero of an int has no sign
             return Value(f"({text} + 0.0)" if symbol == "*" else text, WHOLE, level)
         return Value(text, REAL, level)
 
-    def _unaryop(self, node: ast.UnaryOp) -> Value:
+    def _on_unaryop(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
-            return Value(f"!{self.at(self.condition(node.operand), SIGN)}", BOOLEAN, SIGN)
-        value = self.number(node.operand)
+            return Value(f"!{self._at(self._condition(node.operand), SIGN)}", BOOLEAN, SIGN)
+        value = self._number(node.operand)
         if isinstance(node.op, ast.UAdd):
             return value
         if not isinstance(node.op, ast.USub):
             self.refuse(node, f"{ast.unparse(node)}: bits are not in the subset")
         if value.type == WHOLE and not value.text[0].isdigit():
-            return Value(f"0.0 - {self.at(value, PRODUCT)}", WHOLE, SUM)
-        inner = self.at(value, SIGN)
+            return Value(f"0.0 - {self._at(value, PRODUCT)}", WHOLE, SUM)
+        inner = self._at(value, SIGN)
         return Value(f"-({inner})" if inner[0] == "-" else f"-{inner}", value.type, SIGN)
 
-    def _boolop(self, node: ast.BoolOp) -> Value:
+    def _on_boolop(self, node: ast.BoolOp) -> Value:
         symbol, level = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
-        return self._all([self.condition(item) for item in node.values], symbol, level)
+        return self._all([self._condition(item) for item in node.values], symbol, level)
 
     def _all(self, values: Sequence[Value], symbol: str, level: int) -> Value:
         if len(values) == 1:
             return values[0]
-        return Value(f" {symbol} ".join(self.at(v, EQUAL) for v in values), BOOLEAN, level)
+        return Value(f" {symbol} ".join(self._at(v, EQUAL) for v in values), BOOLEAN, level)
 
-    def _compare(self, node: ast.Compare) -> Value:
-        values = [self.number(item) for item in (node.left, *node.comparators)]
+    def _on_compare(self, node: ast.Compare) -> Value:
+        values = [self._number(item) for item in (node.left, *node.comparators)]
         values[1:-1] = [self.simple(v) for v in values[1:-1]]
         found = []
         for a, op, b in zip(values, node.ops, values[1:], strict=False):
             if type(op) not in COMPARISONS:
                 self.refuse(node, f"{ast.unparse(node)}: is not in the subset; compare numbers")
             symbol, level = COMPARISONS[type(op)]
-            found.append(Value(f"{self.at(a, SUM)} {symbol} {self.at(b, SUM)}", BOOLEAN, level))
+            found.append(Value(f"{self._at(a, SUM)} {symbol} {self._at(b, SUM)}", BOOLEAN, level))
         return self._all(found, "&&", AND)
 
-    def _ifexp(self, node: ast.IfExp) -> Value:
-        test = self.at(self.condition(node.test), OR)
-        a, b = self.value(node.body), self.value(node.orelse)
-        kind = self.common(a.type, b.type, node)
-        return Value(f"{test} ? {self.at(a, OR)} : {self.at(b, CHOICE)}", kind, CHOICE)
+    def _on_ifexp(self, node: ast.IfExp) -> Value:
+        test = self._at(self._condition(node.test), OR)
+        a, b = self._value(node.body), self._value(node.orelse)
+        kind = self._common(a.type, b.type, node)
+        return Value(f"{test} ? {self._at(a, OR)} : {self._at(b, CHOICE)}", kind, CHOICE)
 
-    def common(self, a: Type, b: Type, node: ast.AST) -> Type:
+    def _common(self, a: Type, b: Type, node: ast.AST) -> Type:
         """The type of what may be of either; refused where there is none."""
         if a != b:
             self.refuse(node, f"{ast.unparse(node)} is {said(a)} or {said(b)}: must be one of them")
         return a
 
-    def display(self, items: Sequence[Value], kind: Type | None = None) -> Value:
-        """A tuple, or a NamedTuple, of these items."""
+    def _display(self, items: Sequence[Value], kind: Type | None = None) -> Value:
         t = kind or Tuple(tuple(item.type for item in items))
         if any(isinstance(item.type, Group) for item in items):
             return Value("", t, WORD, tuple(items))
         braces = self.program.braces(t, [item.text for item in items])
         return Value(f"({self.program.c(t, self.names)}){braces}", t, WORD, tuple(items))
 
-    def _tuple(self, node: ast.Tuple) -> Value:
-        return self.display(self.starred(node.elts))
+    def _on_tuple(self, node: ast.Tuple) -> Value:
+        return self._display(self._starred(node.elts))
 
-    def starred(self, nodes: Sequence[ast.expr]) -> list[Value]:
+    def _starred(self, nodes: Sequence[ast.expr]) -> list[Value]:
         """Expressions, with all items of those that have a star."""
         found: list[Value] = []
         for node in nodes:
             star = isinstance(node, ast.Starred)
-            found += self.items(self.value(node.value), node) if star else [self.value(node)]  # type: ignore[attr-defined]
+            found += self._items(self._value(node.value), node) if star else [self._value(node)]  # type: ignore[attr-defined]
         return found
 
-    def items(self, value: Value, node: ast.AST) -> list[Value]:
-        """The items of a tuple."""
+    def _items(self, value: Value, node: ast.AST) -> list[Value]:
         if not isinstance(value.type, Tuple | Record):
             self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a tuple")
         if value.items is not None:
@@ -290,12 +296,12 @@ class Expressions:
             members = [member[1:].replace(".", "->", 1) for member in members]
         return [*map(Value, members, kinds)]
 
-    def _subscript(self, node: ast.Subscript) -> Value:
-        items = self.items(self.value(node.value), node.value)
+    def _on_subscript(self, node: ast.Subscript) -> Value:
+        items = self._items(self._value(node.value), node.value)
         if isinstance(node.slice, ast.Slice):
             first = self._index(node.slice.lower) if node.slice.lower else 0
             last = self._index(node.slice.upper) if node.slice.upper else len(items)
-            return self.display(items[first:last])
+            return self._display(items[first:last])
         place = self._index(node.slice)
         if not -len(items) <= place < len(items):
             self.refuse(node, f"{ast.unparse(node)}: there are {len(items)} items")
@@ -310,8 +316,8 @@ class Expressions:
             self.refuse(node, f"[{ast.unparse(node)}]: an index must be a constant")
         return place
 
-    def _attribute(self, node: ast.Attribute) -> Value:
-        return self.field(self.value(node.value), node.attr, node)
+    def _on_attribute(self, node: ast.Attribute) -> Value:
+        return self.field(self._value(node.value), node.attr, node)
 
     def field(self, value: Value, name: str, node: ast.AST) -> Value:
         """An attribute of a NamedTuple or of parameters: a field, or a property."""
@@ -320,7 +326,7 @@ class Expressions:
             self.refuse(node, f"{ast.unparse(node)}: {said(t)} has no {name}")
         if name in types.fields(t):
             if isinstance(t, Record):
-                return self.items(value, node)[[*types.fields(t)].index(name)]
+                return self._items(value, node)[[*types.fields(t)].index(name)]
             kind = types.fields(t)[name]
             address = "&" if isinstance(kind, Group) else ""
             return Value(f"{address}{self._arrow(value)}{identifier(name)}", kind)
@@ -331,13 +337,13 @@ class Expressions:
             return Value(self._arrow(value) + identifier(name), self.program.kept[name].returns)
         if isinstance(found, property | cached_property):
             getter = found.fget if isinstance(found, property) else found.func
-            return self.call(getter, [value], {}, node)
+            return self._call(getter, [value], {}, node)
         return self.refuse(node, f"{ast.unparse(node)}: {t.cls.__name__} has no {name}")
 
     def _arrow(self, value: Value) -> str:
         return f"{value.text[1:]}." if value.text[0] == "&" else f"{value.text}->"
 
-    def _call(self, node: ast.Call) -> Value:
+    def _on_call(self, node: ast.Call) -> Value:
         function = self.known(node.func)
         function = getattr(function, "__wrapped__", function)  # an lru_cache only saves time
         if isinstance(node.func, ast.Attribute) and function is _UNKNOWN:
@@ -349,24 +355,23 @@ class Expressions:
         if function in (min, max, abs, float, len) or function in TO_WHOLE:
             return self._builtin(node, function)
         if function in FUNCTIONS:
-            given = [self.number(a).text for a in node.args]
+            given = [self._number(a).text for a in node.args]
             if len(given) != (2 if function in OF_TWO else 1):
                 self.refuse(node, f"{ast.unparse(node)}: has another number of arguments in C")
             return Value(f"{FUNCTIONS[function]}({', '.join(given)})", REAL)
         if function in ADVICE:
             self._other(node, function)
-        arguments = self.starred(node.args)
-        named = {k.arg: self.value(k.value) for k in node.keywords if k.arg}
+        arguments = self._starred(node.args)
+        named = {k.arg: self._value(k.value) for k in node.keywords if k.arg}
         if types.is_record(function):
             return self._record(node, function, arguments, named)
         if not isinstance(function, FunctionType):
             self._other(node.func)
-        return self.call(function, arguments, named, node)
+        return self._call(function, arguments, named, node)
 
-    def call(
+    def _call(
         self, function: Any, given: Sequence[Value], named: Mapping[str, Value], node: ast.AST
     ) -> Value:
-        """A call of a function, with its defaults."""
         arguments = self._matched(inspect.signature(function), given, named, node)
         made = self.translate(function, [a.type for a in arguments])
         texts = [a.text for a in arguments]
@@ -380,47 +385,44 @@ class Expressions:
     ) -> list[Value]:
         if any(p.kind != p.POSITIONAL_OR_KEYWORD for p in signature.parameters.values()):
             self.refuse(node, "*args, **kwargs and keywords alone are not in the subset")
-        try:
-            bound = signature.bind(*given, **named)
-        except TypeError as error:
-            self.refuse(node, f"{ast.unparse(node)}: {error}")
+        bound = signature.bind(*given, **named)
         bound.apply_defaults()
-        return [v if isinstance(v, Value) else self.number_of(v) for v in bound.arguments.values()]
+        return [v if isinstance(v, Value) else self._number_of(v) for v in bound.arguments.values()]
 
     def _record(self, node: ast.AST, cls: Any, given: Sequence[Value], named: Any) -> Value:
         found = self._matched(inspect.signature(cls), given, named, node)
         t = Record(cls)
         for value, kind in zip(found, types.parts(t), strict=True):
-            self.common(value.type, kind, node)
-        return self.display(found, t)
+            self._common(value.type, kind, node)
+        return self._display(found, t)
 
     def _method(self, node: ast.Call, of: ast.Attribute) -> Value:
         table = self.known(of.value)
         if isinstance(table, Mapping) and of.attr == "get":
-            key, default = (self.number(a) for a in node.args)
+            key, default = (self._number(a) for a in node.args)
             at = self.simple(key).text
             text = "".join(f"{at} == {number(k)} ? {number(v)} : " for k, v in table.items())
-            return Value(text + self.at(default, CHOICE), default.type, CHOICE)
-        value = self.value(of.value)
+            return Value(text + self._at(default, CHOICE), default.type, CHOICE)
+        value = self._value(of.value)
         if of.attr != "_replace" or not isinstance(value.type, Record):
             said = f"{ast.unparse(of)}: is not in the subset"
             self.refuse(node, f"{said}; use a function of the module")
-        new = [(identifier(str(k.arg)), self.value(k.value).text) for k in node.keywords]
-        copy = self.copied(value, "changed")
+        new = [(identifier(str(k.arg)), self._value(k.value).text) for k in node.keywords]
+        copy = self._copied(value, "changed")
         for name, text in new:
-            self.say(f"{copy.text}.{name} = {text};")
+            self._say(f"{copy.text}.{name} = {text};")
         return copy
 
     def _builtin(self, node: ast.Call, function: Any) -> Value:
-        given = self.starred(node.args)
+        given = self._starred(node.args)
         if len(given) == 1 and isinstance(given[0].type, Tuple):
-            given = self.items(given[0], node)
+            given = self._items(given[0], node)
             if function is len:
-                return self.number_of(len(given))
+                return self._number_of(len(given))
         value, *others = [self._as_number(a, node) for a in given]
         if function in (min, max):
             for other in others:
-                kind = self.common(value.type, other.type, node)
+                kind = self._common(value.type, other.type, node)
                 name = "smaller" if function is min else "larger"
                 value = Value(f"{name}({value.text}, {other.text})", kind)
             return value
@@ -433,7 +435,7 @@ class Expressions:
     def _over_items(self, node: ast.Call, function: Any) -> Value:
         over = node.args[0] if node.args else node
         if not isinstance(over, ast.GeneratorExp):
-            return self.display(self.items(self.value(over), over))
+            return self._display(self._items(self._value(over), over))
         loop = over.generators[0]
         if len(over.generators) > 1 or loop.ifs:
             self.refuse(over, "a generator must have one for, and no if")
@@ -442,23 +444,30 @@ class Expressions:
         for row in self._rows(loop.iter):
             self._bind(loop.target, row)
             if function is tuple:
-                found.append(self.simple(self.value(over.elt), "item"))
+                found.append(self.simple(self._value(over.elt), "item"))
             else:
-                found.append(self.condition(over.elt))
+                found.append(self._condition(over.elt))
         self.bound, self.locals = before, hidden
         if function is tuple:
-            return self.display(found)
+            return self._display(found)
         return self._all(found, *(("||", OR) if function is any else ("&&", AND)))
 
     def _rows(self, node: ast.expr) -> list[Value]:
         if isinstance(node, ast.Call) and self.known(node.func) is zip:
-            columns = [self.items(self.value(a), a) for a in node.args]
-            return [self.display(row) for row in zip(*columns, strict=True)]
-        return self.items(self.value(node), node)
+            columns = [self._items(self._value(a), a) for a in node.args]
+            return [self._display(row) for row in zip(*columns, strict=False)]
+        return self._items(self._value(node), node)
+
+    def _pairs(self, target: ast.expr, value: Value) -> list[tuple[str, Value]]:
+        if isinstance(target, ast.Name):
+            return [(target.id, value)]
+        if not isinstance(target, ast.Tuple):
+            self.refuse(target, f"{ast.unparse(target)}: must be a variable, or several")
+        items = self._items(value, target)
+        if len(items) != len(target.elts):
+            self.refuse(target, f"{ast.unparse(target)}: there are {len(items)} items")
+        return [pair for t, v in zip(target.elts, items, strict=True) for pair in self._pairs(t, v)]
 
     def _bind(self, target: ast.expr, value: Value) -> None:
-        if isinstance(target, ast.Tuple):
-            for name, item in zip(target.elts, self.items(value, target), strict=True):
-                self._bind(name, item)
-        elif isinstance(target, ast.Name):
-            self.bound[target.id] = self.simple(value, target.id)
+        for name, item in self._pairs(target, value):
+            self.bound[name] = self.simple(item, name)

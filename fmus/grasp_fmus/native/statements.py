@@ -3,23 +3,13 @@
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, cast
 
 from .expressions import SIGN, WORD, Expressions
 from .text import comment, string, wrapped
 from .types import REAL, WHOLE, Function, Group, Program, Record, Type, Value, said, size
-
-ADVICE = {
-    "While": "while is not in the subset, as a step must end; use for ... in range(n) with break",
-    "FunctionDef": "a function in a function is not in the subset; put it into the module",
-    "Try": "try is not in the subset; ask before",
-    "Global": "global is not in the subset; what is to be kept belongs into State",
-    "Match": "match is not in the subset; use if and elif",
-    "Raise": "raise is only for __post_init__; a step whose outputs are not finite is refused",
-    "ImportFrom": "import in a function is not in the subset; put it at the top of the module",
-}
 
 LARGE = 30
 """A NamedTuple of more numbers goes by its address, unless the function changes it."""
@@ -37,8 +27,6 @@ class Body(Expressions):
         self.by_address: tuple[bool, ...] = ()
         self.locals = {*_names(self.node, ast.Store), *(a.arg for a in self.node.args.args)}
         self._uses = Counter(_names(self.node))
-        self._inside: list[Counter[str]] = []
-        """How often names are in the statements of the blocks that are open."""
         self._late: dict[str, list[str]] = {}
         """Variables that are declared at the top, as more than one block uses them, by type."""
         self._variables: dict[str, Value] = {}
@@ -76,33 +64,23 @@ class Body(Expressions):
     def block(self, body: Sequence[ast.stmt], inner: bool = False) -> None:
         """The statements of a block, with the comments before and behind them."""
         if inner:
-            self.indent += 1
             self._inside.append(Counter(n for s in body for n in _names(s)))
         end = body[0].lineno if body else 0
         for statement in body:
             for line in range(end, statement.lineno):
                 self._remark(line, alone=True)
-            self.statement(statement)
+            getattr(self, f"_on_{type(statement).__name__.lower()}", self._other)(statement)
             self._remark(statement.lineno, alone=False)
             end = statement.lineno + 1
         if inner:
-            self.indent -= 1
             self._inside.pop()
 
     def _remark(self, line: int, alone: bool) -> None:
         text, own_line = self.source.comments.get(line, ("", alone))
         if text and alone and own_line:
-            self.say(comment(text))
+            self._say(comment(text))
         elif text and self.lines and not (alone or own_line):
             self.lines[-1] += f"  {comment(text)}"
-
-    def statement(self, node: ast.stmt) -> None:
-        """One statement."""
-        kind = type(node).__name__
-        translate: Callable[[Any], None] | None = getattr(self, f"_on_{kind.lower()}", None)
-        if translate is None:
-            self.refuse(node, ADVICE.get(kind, f"{kind.lower()} is not in the subset"))
-        translate(node)
 
     def _on_expr(self, node: ast.Expr) -> None:
         if not isinstance(node.value, ast.Constant):
@@ -113,27 +91,27 @@ class Body(Expressions):
 
     def _on_break(self, node: ast.Break | ast.Continue) -> None:
         self._exits[-1].append({*self.bound})
-        self.say(f"{type(node).__name__.lower()};")
+        self._say(f"{type(node).__name__.lower()};")
 
     _on_continue = _on_break
 
     def _on_return(self, node: ast.Return) -> None:
         if node.value is None:
             self.refuse(node, f"{self.node.name}: must return a value")
-        value = self.value(node.value)
-        self.returns = self.common(self.returns or value.type, value.type, node)
-        self.say(f"return {value.text};")
+        value = self._value(node.value)
+        self.returns = self._common(self.returns or value.type, value.type, node)
+        self._say(f"return {value.text};")
 
     def _on_annassign(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
-            self.assign(node.target, self.value(node.value), node)
+            self._assign(node.target, self._value(node.value), node)
 
     def _on_assign(self, node: ast.Assign) -> None:
-        value = self.value(node.value)
+        value = self._value(node.value)
         if len(node.targets) > 1:
             value = self.simple(value)
         for target in node.targets:
-            self.assign(target, value, node)
+            self._assign(target, value, node)
 
     def _on_augassign(self, node: ast.AugAssign) -> None:
         target = node.target
@@ -141,69 +119,51 @@ class Body(Expressions):
             self.refuse(node, f"{ast.unparse(target)}: must be a variable")
         read = ast.copy_location(ast.Name(target.id, ast.Load()), node)
         operation = ast.copy_location(ast.BinOp(read, node.op, node.value), node)
-        self.assign(target, self.value(operation), node)
+        self._assign(target, self._value(operation), node)
 
-    def assign(self, target: ast.expr, value: Value, node: ast.AST) -> None:
-        """Give a value to a variable, or its items to several."""
+    def _assign(self, target: ast.expr, value: Value, node: ast.AST) -> None:
         pairs = [(name, v) for name, v in self._pairs(target, value) if name != "_"]
         for i, (name, _) in enumerate(pairs):
             old = self.bound.get(name)
             for j in range(i + 1, len(pairs)):
                 later, v = pairs[j]
                 if old and re.search(rf"(?<![\w.]){old.text}\b", v.text.replace("->", ".")):
-                    pairs[j] = later, self.copied(v, f"new_{later}")
+                    pairs[j] = later, self._copied(v, f"new_{later}")
         for name, v in pairs:
             self._store(name, v, node)
-
-    def _pairs(self, target: ast.expr, value: Value) -> list[tuple[str, Value]]:
-        if isinstance(target, ast.Name):
-            return [(target.id, value)]
-        if not isinstance(target, ast.Tuple):
-            self.refuse(target, f"{ast.unparse(target)}: must be a variable, or several")
-        items = self.items(value, target)
-        if len(items) != len(target.elts):
-            self.refuse(target, f"{ast.unparse(target)}: there are {len(items)} items")
-        return [pair for t, v in zip(target.elts, items, strict=True) for pair in self._pairs(t, v)]
 
     def _store(self, name: str, value: Value, node: ast.AST) -> None:
         if value.text == "" or isinstance(value.type, Group):  # parameters stay where they are
             self.bound[name] = value
             return
         old = self._variables.get(name) or self.bound.get(name)
-        if old is None:
-            self._declare(name, value)
-            return
-        if value.type not in (old.type, WHOLE if old.type == REAL else old.type):
+        if old and value.type not in (old.type, WHOLE if old.type == REAL else old.type):
             kinds = f"{said(old.type)}, then {said(value.type)}"
             self.refuse(node, f"{name} is {kinds}; use another name, or write 0.0 for 0")
-        self.bound[name] = self._variables[name] = old
-        self.say(f"{old.text} = {value.text};")
-
-    def _declare(self, name: str, value: Value) -> None:
-        """Declare a variable where it is first used, or at the top, where other blocks use it."""
-        c_name, kind = self.fresh(name, own=True), self.program.c(value.type, self.names)
-        self.bound[name] = self._variables[name] = Value(c_name, value.type)
-        if self._inside and self._inside[-1][name] < self._uses[name]:
-            # A compiler does not see that a loop runs, which _go_on() has made sure of
+        stored = old or Value(self.fresh(name, own=True), value.type)
+        self.bound[name] = self._variables[name] = stored
+        begin, kind = "", self.program.c(value.type, self.names)
+        if not old and self._inside and self._inside[-1][name] < self._uses[name]:
+            # Other blocks use it, too. A compiler does not see that a loop runs: see _go_on()
             start = {"double": " = 0.0", "int": " = 0"}.get(kind, " = {0}")
-            self._late.setdefault(kind, []).append(c_name + start * bool(self._exits))
-            self.say(f"{c_name} = {value.text};")
-        else:
-            self.say(f"{kind} {c_name} = {value.text};")
+            self._late.setdefault(kind, []).append(stored.text + start * bool(self._exits))
+        elif not old:
+            begin = f"{kind} "
+        self._say(f"{begin}{stored.text} = {value.text};")
 
     def _on_if(self, node: ast.If) -> None:
-        branches, rest = [(self.condition(node.test).text, node.body)], node.orelse
+        branches, rest = [(self._condition(node.test).text, node.body)], node.orelse
         while len(rest) == 1 and isinstance(rest[0], ast.If):
-            branches.append((self.condition(rest[0].test).text, rest[0].body))
+            branches.append((self._condition(rest[0].test).text, rest[0].body))
             rest = rest[0].orelse
         before, after = dict(self.bound), [] if rest else [{*self.bound}]
         for i, (test, body) in enumerate([*branches, *([("", rest)] if rest else [])]):
             head = f"if ({test}) {{" if test else "{"
-            self.say(f"}} else {head}" if i else head)
+            self._say(f"}} else {head}" if i else head)
             self.bound = dict(before)
             self.block(body, inner=True)
             after += [] if _leaves(body) else [{*self.bound}]
-        self.say("}")
+        self._say("}")
         self._go_on(before, after)
 
     def _go_on(self, before: dict[str, Value], ways: list[set[str]]) -> None:
@@ -224,9 +184,9 @@ class Body(Expressions):
             self.refuse(node, f"{ast.unparse(call)}: must be range(n) or range(first, n)")
         if name in self.bound and name != "_":
             self.refuse(node, f"{name}: is a variable already; use another name")
-        first, last = (["0"] + [self.number(a).text for a in call.args])[-2:]
+        first, last = (["0"] + [self._number(a).text for a in call.args])[-2:]
         if changed & {*_names(call)} or not re.fullmatch(r"[\w.>-]+", last):
-            last = self.copied(Value(last, WHOLE), "count").text
+            last = self._copied(Value(last, WHOLE), "count").text
         counter = self.fresh("i" if name == "_" else name)
         constant = isinstance(call.args[-1], ast.Constant) and name == "_"
         self._late.setdefault("int" if constant else "double", []).append(counter)
@@ -234,17 +194,15 @@ class Body(Expressions):
         if name != "_":
             self.bound[name] = Value(counter, WHOLE)
         last = last.removesuffix(".0") if constant else last
-        self.say(f"for ({counter} = {first}; {counter} < {last}; {counter}++) {{")
+        self._say(f"for ({counter} = {first}; {counter} < {last}; {counter}++) {{")
         self._exits.append([])
         self.block(node.body, inner=True)
-        self.say("}")
+        self._say("}")
         ways = self._exits.pop() + ([] if _leaves(node.body) else [{*self.bound} - {name}])
-        runs = len(call.args) == 1 and self._fixed(call.args[0]) > 0
+        count = call.args[0]
+        fixed = count.value if isinstance(count, ast.Constant) else self.known(count)
+        runs = len(call.args) == 1 and isinstance(fixed, int) and fixed > 0
         self._go_on(before, ways if runs and ways else [{*before}])
-
-    def _fixed(self, node: ast.expr) -> int:
-        found = node.value if isinstance(node, ast.Constant) else self.known(node)
-        return found if isinstance(found, int) else 0
 
     def _on_each(self, node: ast.For, changed: set[str]) -> None:
         """A loop over a tuple, or zip() of tuples, item by item."""
@@ -267,7 +225,7 @@ class Check(Body):
         self.block(self.node.body)
         if not any("text_put(" in line for line in self.lines):
             return ""
-        self.say("return 1;")
+        self._say("return 1;")
         heads = [f"const {self.program.c(types[0], self.names)} *p", "Text *why"]
         return self._text(name, heads, "int")
 
@@ -281,29 +239,29 @@ class Check(Body):
             self.refuse(node, f"{ast.unparse(node)}: has no effect; leave it out")
 
     def _on_return(self, node: ast.Return) -> None:
-        self.say("return 1;")
+        self._say("return 1;")
 
     def _on_raise(self, node: ast.Raise) -> None:
         reason = node.exc.args[0] if isinstance(node.exc, ast.Call) and node.exc.args else None
         parts = reason.values if isinstance(reason, ast.JoinedStr) else [reason]
         for part in parts:
             if isinstance(part, ast.Constant):
-                self.say(f"text_put(why, {string(str(part.value))});")
+                self._say(f"text_put(why, {string(str(part.value))});")
             elif isinstance(part, ast.FormattedValue):
                 self._put(part)
             else:
                 self.refuse(node, 'raise: must be ValueError("..."), or of an f-string')
-        self.say("return 0;")
+        self._say("return 0;")
 
     def _put(self, part: ast.FormattedValue) -> None:
-        value, spec = self.number(part.value).text, ""
+        value, spec = self._number(part.value).text, ""
         if isinstance(part.format_spec, ast.JoinedStr):
             spec = ast.literal_eval(part.format_spec.values[0])
         digits = re.fullmatch(r"(?:\.(\d+))?g", spec)
         if digits:
-            self.say(f"text_general(why, {value}, {digits[1] or 6});")
+            self._say(f"text_general(why, {value}, {digits[1] or 6});")
         elif not spec:
-            self.say(f"text_number(why, {value});")
+            self._say(f"text_number(why, {value});")
         else:
             self.refuse(part, f"{{...:{spec}}}: must be {{x}}, {{x!r}}, {{x:g}} or {{x:.3g}}")
 
