@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import fields as dataclass_fields
+from dataclasses import is_dataclass
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -13,11 +14,9 @@ from .text import UntranslatableError, comment, identifier, number, string, wrap
 from .types import (
     BOOLEAN,
     REAL,
+    SCALARS,
     Function,
-    Group,
     Program,
-    Record,
-    Scalar,
     Type,
     fields,
     parts,
@@ -49,11 +48,11 @@ def translated(name: str, block: Any, file: Path | None = None) -> str:
 
 
 def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
-    p, u = program.params, Record(block.Inputs)
+    p, u = block.Params, block.Inputs
     first = _part(program, block, "initial_state", [p, u])
     x = first.returns
     step = _part(program, block, "step", [p, x, u, REAL], x)
-    evaluate = _part(program, block, "outputs", [p, x, u], Record(block.Outputs))
+    evaluate = _part(program, block, "outputs", [p, x, u], block.Outputs)
     checks = [*_checks(program, block.Params, "p")]
     scalars = [*_scalars(program, x, "x->")]
     described = declared(block)
@@ -150,15 +149,15 @@ def _conversions(program: Program, described: list[Field]) -> Iterator[str]:
 def _checks(program: Program, cls: type[Any], path: str) -> Iterator[str]:
     """What says no where parameters do not go together: what is inside comes before."""
     for f in dataclass_fields(cls):
-        kind = fields(Group(cls))[f.name]
-        if isinstance(kind, Group):
+        kind = fields(cls)[f.name]
+        if is_dataclass(kind):
             arrow = "->" if path == "p" else "."
-            yield from _checks(program, kind.cls, f"{path}{arrow}{identifier(f.name)}")
+            yield from _checks(program, kind, f"{path}{arrow}{identifier(f.name)}")
     for owner in reversed(cls.__mro__):
         check = owner.__dict__.get("__post_init__")
         if isinstance(check, FunctionType) and check.__module__ != "block_variables":
             name = program.unique(check.__module__, f"{owner.__name__}_check", (check, cls))
-            text = Check(program, check).definition(name, [Group(cls)])
+            text = Check(program, check).definition(name, [cls])
             if text:
                 program.bodies.append(text)
                 of = path if path == "p" else f"&{path}"
@@ -167,7 +166,7 @@ def _checks(program: Program, cls: type[Any], path: str) -> Iterator[str]:
 
 def _scalars(program: Program, t: Type, path: str) -> Iterator[tuple[str, Type]]:
     """The numbers in a state, in the order of declaration."""
-    if isinstance(t, Scalar):
+    if t in SCALARS:
         yield "*x" if path == "x->" else path, t
     for i, kind in enumerate(parts(t)):
         yield from _scalars(program, kind, (path + program.member(t, i)).replace("->.", "->"))

@@ -11,24 +11,21 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import is_dataclass
 from enum import IntEnum
 from functools import cached_property
-from types import FunctionType, ModuleType
+from types import FunctionType, GenericAlias, ModuleType
 from typing import Any, NoReturn
 
 from . import types
 from .text import Source, UntranslatableError, identifier, number
 from .types import (
     BOOLEAN,
-    NUMBERS,
     REAL,
+    SCALARS,
     WHOLE,
     Function,
-    Group,
     Program,
-    Record,
-    Scalar,
-    Tuple,
     Type,
     Value,
     said,
@@ -111,9 +108,9 @@ class Expressions:
 
     def simple(self, value: Value, name: str = "value") -> Value:
         """The value where it may stand several times: what is more than a name gets a variable."""
-        if value.items is not None and isinstance(value.type, Tuple):
+        if value.items is not None and isinstance(value.type, GenericAlias):
             return self._display([self.simple(item, name) for item in value.items], value.type)
-        if isinstance(value.type, Group) or _PATH.fullmatch(value.text):
+        if is_dataclass(value.type) or _PATH.fullmatch(value.text):
             return value
         return self._copied(value, name)
 
@@ -142,12 +139,12 @@ class Expressions:
     def constant(self, node: ast.expr, found: Any) -> Value:
         """A constant of a module; a number that has a name in capitals keeps it."""
         kind = types.of_value(found)
-        if kind is None or isinstance(kind, Group):
+        if kind is None or is_dataclass(kind):
             self.refuse(node, f"{ast.unparse(node)}: {type(found).__name__} is not in the subset")
         names, name = self.names, getattr(node, "attr", getattr(node, "id", ""))
         if isinstance(node, ast.Attribute):
             names = vars(self.known(node.value))
-        if isinstance(kind, Scalar) and (isinstance(found, IntEnum) or not name.isupper()):
+        if kind in SCALARS and (isinstance(found, IntEnum) or not name.isupper()):
             return self._number_of(found)
         return Value(self.program.constant(dict(names), name, found), kind)
 
@@ -179,13 +176,13 @@ class Expressions:
         return self._as_number(self._value(node), node)
 
     def _as_number(self, value: Value, node: ast.AST) -> Value:
-        if not isinstance(value.type, Scalar):
+        if value.type not in SCALARS:
             self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a number")
         return value._replace(type=WHOLE) if value.type == BOOLEAN else value
 
     def _condition(self, node: ast.expr) -> Value:
         value = self._value(node)
-        if value.type in NUMBERS:
+        if value.type in (REAL, WHOLE):
             return Value(f"{self._at(value, SUM)} != 0.0", BOOLEAN, EQUAL)
         if value.type != BOOLEAN:
             self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a condition")
@@ -205,7 +202,7 @@ class Expressions:
 
     def _on_binop(self, node: ast.BinOp) -> Value:
         left, right = self._value(node.left), self._value(node.right)
-        if isinstance(left.type, Tuple) and isinstance(node.op, ast.Mult):
+        if isinstance(left.type, GenericAlias) and isinstance(node.op, ast.Mult):
             items = [self.simple(item) for item in self._items(left, node.left)]
             return self._display(items * self._index(node.right))
         a, b = self._as_number(left, node.left), self._as_number(right, node.right)
@@ -267,8 +264,8 @@ class Expressions:
         return a
 
     def _display(self, items: Sequence[Value], kind: Type | None = None) -> Value:
-        t = kind or Tuple(tuple(item.type for item in items))
-        if any(isinstance(item.type, Group) for item in items):
+        t = kind or GenericAlias(tuple, tuple(item.type for item in items))
+        if any(is_dataclass(item.type) for item in items):
             return Value("", t, WORD, tuple(items))
         braces = self.program.braces(t, [item.text for item in items])
         return Value(f"({self.program.c(t, self.names)}){braces}", t, WORD, tuple(items))
@@ -285,7 +282,7 @@ class Expressions:
         return found
 
     def _items(self, value: Value, node: ast.AST) -> list[Value]:
-        if not isinstance(value.type, Tuple | Record):
+        if not isinstance(value.type, GenericAlias) and not types.is_record(value.type):
             self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a tuple")
         if value.items is not None:
             return list(value.items)
@@ -322,15 +319,16 @@ class Expressions:
     def field(self, value: Value, name: str, node: ast.AST) -> Value:
         """An attribute of a NamedTuple or of parameters: a field, or a property."""
         t = value.type
-        if isinstance(t, Scalar | Tuple):
+        if t in SCALARS or isinstance(t, GenericAlias):
             self.refuse(node, f"{ast.unparse(node)}: {said(t)} has no {name}")
-        if name in types.fields(t):
-            if isinstance(t, Record):
-                return self._items(value, node)[[*types.fields(t)].index(name)]
-            kind = types.fields(t)[name]
-            address = "&" if isinstance(kind, Group) else ""
+        known = types.fields(t)
+        if name in known:
+            if types.is_record(t):
+                return self._items(value, node)[[*known].index(name)]
+            kind = known[name]
+            address = "&" if is_dataclass(kind) else ""
             return Value(f"{address}{self._arrow(value)}{identifier(name)}", kind)
-        found = inspect.getattr_static(t.cls, name, None)
+        found = inspect.getattr_static(t, name, None)
         if isinstance(found, cached_property) and t == self.program.params:
             if name not in self.program.kept:
                 self.program.kept[name] = self.translate(found.func, [t])
@@ -338,7 +336,7 @@ class Expressions:
         if isinstance(found, property | cached_property):
             getter = found.fget if isinstance(found, property) else found.func
             return self._call(getter, [value], {}, node)
-        return self.refuse(node, f"{ast.unparse(node)}: {t.cls.__name__} has no {name}")
+        return self.refuse(node, f"{ast.unparse(node)}: {t.__name__} has no {name}")
 
     def _arrow(self, value: Value) -> str:
         return f"{value.text[1:]}." if value.text[0] == "&" else f"{value.text}->"
@@ -391,10 +389,9 @@ class Expressions:
 
     def _record(self, node: ast.AST, cls: Any, given: Sequence[Value], named: Any) -> Value:
         found = self._matched(inspect.signature(cls), given, named, node)
-        t = Record(cls)
-        for value, kind in zip(found, types.parts(t), strict=True):
+        for value, kind in zip(found, types.parts(cls), strict=True):
             self._common(value.type, kind, node)
-        return self._display(found, t)
+        return self._display(found, cls)
 
     def _method(self, node: ast.Call, of: ast.Attribute) -> Value:
         table = self.known(of.value)
@@ -404,7 +401,7 @@ class Expressions:
             text = "".join(f"{at} == {number(k)} ? {number(v)} : " for k, v in table.items())
             return Value(text + self._at(default, CHOICE), default.type, CHOICE)
         value = self._value(of.value)
-        if of.attr != "_replace" or not isinstance(value.type, Record):
+        if of.attr != "_replace" or not types.is_record(value.type):
             said = f"{ast.unparse(of)}: is not in the subset"
             self.refuse(node, f"{said}; use a function of the module")
         new = [(identifier(str(k.arg)), self._value(k.value).text) for k in node.keywords]
@@ -415,7 +412,7 @@ class Expressions:
 
     def _builtin(self, node: ast.Call, function: Any) -> Value:
         given = self._starred(node.args)
-        if len(given) == 1 and isinstance(given[0].type, Tuple):
+        if len(given) == 1 and isinstance(given[0].type, GenericAlias):
             given = self._items(given[0], node)
             if function is len:
                 return self._number_of(len(given))

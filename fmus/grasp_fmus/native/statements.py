@@ -4,12 +4,13 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import is_dataclass
 from functools import partial
 from typing import Any, cast
 
 from .expressions import SIGN, WORD, Expressions
 from .text import comment, string, wrapped
-from .types import REAL, WHOLE, Function, Group, Program, Record, Type, Value, said, size
+from .types import REAL, WHOLE, Function, Program, Type, Value, is_record, said, size
 
 LARGE = 30
 """A NamedTuple of more numbers goes by its address, unless the function changes it."""
@@ -40,11 +41,11 @@ class Body(Expressions):
         changed = {*_names(self.node, ast.Store)}
         for argument, kind in zip(given.args, types, strict=True):
             c_name, is_copy = self.fresh(argument.arg, own=True), argument.arg in changed
-            large = isinstance(kind, Record) and size(kind) > LARGE and not is_copy
+            large = is_record(kind) and size(kind) > LARGE and not is_copy
             self.by_address += (large,)
             text, level = (f"*{c_name}", SIGN) if large else (c_name, WORD)
             self.bound[argument.arg] = Value(text, kind, level)
-            star = "const {} *{}" if isinstance(kind, Group) or large else "{} {}"
+            star = "const {} *{}" if is_dataclass(kind) or large else "{} {}"
             heads.append(star.format(self.program.c(kind, self.names), c_name))
         self.block(self.node.body)
         if not _leaves(self.node.body, ast.Return):
@@ -133,7 +134,7 @@ class Body(Expressions):
             self._store(name, v, node)
 
     def _store(self, name: str, value: Value, node: ast.AST) -> None:
-        if value.text == "" or isinstance(value.type, Group):  # parameters stay where they are
+        if value.text == "" or is_dataclass(value.type):  # parameters stay where they are
             self.bound[name] = value
             return
         old = self._variables.get(name) or self.bound.get(name)

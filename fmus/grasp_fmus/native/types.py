@@ -3,47 +3,22 @@
 import re
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, is_dataclass
+from dataclasses import is_dataclass
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
+from types import GenericAlias
 from typing import Annotated, Any, NamedTuple, cast, get_args, get_origin, get_type_hints
 
 from .text import Source, comment, identifier, number, wrapped
 
+Type = type[Any] | GenericAlias
+"""The types of Python: float, int, bool, tuple[...], a NamedTuple, or a dataclass of parameters.
 
-@dataclass(frozen=True)
-class Scalar:
-    """A number or a truth value, by its name in Python."""
+The last is in C behind a pointer.
+"""
 
-    name: str
-
-
-@dataclass(frozen=True)
-class Tuple:
-    """A tuple of fixed length."""
-
-    items: "tuple[Type, ...]"
-
-
-@dataclass(frozen=True)
-class Record:
-    """A NamedTuple."""
-
-    cls: type[Any]
-
-
-@dataclass(frozen=True)
-class Group:
-    """Parameters: a frozen dataclass, in C behind a pointer."""
-
-    cls: type[Any]
-
-
-Type = Scalar | Tuple | Record | Group
-
-REAL, WHOLE, BOOLEAN = Scalar("float"), Scalar("int"), Scalar("bool")
-NUMBERS = REAL, WHOLE
+REAL, WHOLE, BOOLEAN = SCALARS = float, int, bool
 
 
 class Value(NamedTuple):
@@ -61,15 +36,9 @@ def of_hint(hint: Any) -> Type | None:
         return of_hint(get_args(hint)[0])
     if get_origin(hint) is tuple:
         return _tuple_of(map(of_hint, get_args(hint)))
-    if not isinstance(hint, type):
-        return None
-    if issubclass(hint, IntEnum):
+    if isinstance(hint, type) and issubclass(hint, IntEnum):
         return WHOLE
-    if hint in (float, int, bool):
-        return Scalar(hint.__name__)
-    if is_record(hint):
-        return Record(hint)
-    return Group(hint) if is_dataclass(hint) else None
+    return hint if hint in SCALARS or is_record(hint) or is_dataclass(hint) else None
 
 
 def of_value(value: Any) -> Type | None:
@@ -79,7 +48,7 @@ def of_value(value: Any) -> Type | None:
 
 def _tuple_of(items: Iterable[Type | None]) -> Type | None:
     known = [*items]
-    return Tuple(tuple(i for i in known if i)) if all(known) else None
+    return GenericAlias(tuple, tuple(known)) if all(known) else None
 
 
 def is_record(cls: Any) -> bool:
@@ -87,23 +56,22 @@ def is_record(cls: Any) -> bool:
     return isinstance(cls, type) and issubclass(cls, tuple) and hasattr(cls, "_fields")
 
 
-@cache
-def fields(t: Record | Group) -> dict[str, Type]:
+def fields(t: Any) -> dict[str, Type]:
     """The fields of a class with their types; TypeError for one that C cannot have."""
     found = {}
-    for name, hint in get_type_hints(t.cls, include_extras=True).items():
+    for name, hint in get_type_hints(t, include_extras=True).items():
         kind = of_hint(hint)
         if kind is None:
-            raise TypeError(f"{t.cls.__name__}.{name}: must be a number, a tuple or a NamedTuple")
+            raise TypeError(f"{t.__name__}.{name}: must be a number, a tuple or a NamedTuple")
         found[name] = kind
     return found
 
 
 def parts(t: Type) -> tuple[Type, ...]:
     """The types of what a tuple is made of; empty for a number."""
-    if isinstance(t, Tuple):
-        return t.items
-    return tuple(fields(t).values()) if isinstance(t, Record) else ()
+    if isinstance(t, GenericAlias):
+        return t.__args__
+    return tuple(fields(t).values()) if is_record(t) else ()
 
 
 def size(t: Type) -> int:
@@ -113,16 +81,15 @@ def size(t: Type) -> int:
 
 def plain(t: Type) -> Type:
     """The type as C has it: a whole number is a double."""
-    if isinstance(t, Tuple):
-        return Tuple(tuple(plain(item) for item in t.items))
+    if isinstance(t, GenericAlias):
+        return GenericAlias(tuple, tuple(map(plain, t.__args__)))
     return REAL if t == WHOLE else t
 
 
 def said(t: Type) -> str:
     """A type in words."""
-    if isinstance(t, Tuple):
-        return f"tuple[{', '.join(map(said, t.items))}]"
-    return t.name if isinstance(t, Scalar) else t.cls.__name__
+    name = f"tuple[{', '.join(map(said, parts(t)))}]"
+    return name if isinstance(t, GenericAlias) else t.__name__
 
 
 class Function(NamedTuple):
@@ -138,7 +105,7 @@ class Program:
     """The definitions of one block; `file` is the source of a block of one's own."""
 
     def __init__(self, params: type[Any], file: Path | None = None) -> None:
-        self.params, self.file = Group(params), file
+        self.params, self.file = params, file
         self._source = cache(Source)
         self.functions: dict[Any, Function | None] = {}
         """By code and the types of the arguments; None while it is being translated."""
@@ -169,27 +136,26 @@ class Program:
     def c(self, t: Type, near: dict[str, Any] | None = None) -> str:
         """A type in C; `near` are the names of the module that asks, one of which a tuple gets."""
         t = plain(t)
-        if isinstance(t, Scalar):
+        if t in SCALARS:
             return "int" if t == BOOLEAN else "double"
         if t not in self._structs:
             self._structs[t] = self._struct_name(t, near or {})
         return self._structs[t]
 
     def _struct_name(self, t: Type, near: dict[str, Any]) -> str:
-        if not isinstance(t, Tuple):
-            cls = t.cls  # type: ignore[union-attr]  # no Scalar
-            return self.unique(cls.__module__, cls.__name__, t)
+        if not isinstance(t, GenericAlias):
+            return self.unique(t.__module__, t.__name__, t)
         modules = [near, *(vars(m) for m in near.values() if type(m) is type(sys))]
         for names in modules:
             for name, hint in names.items():
                 if name[0] != "_" and get_origin(hint) is tuple and of_hint(hint) == t:
                     return self.unique(names["__name__"], name, t)
-        return self.unique("Tuple", str(len(t.items)), t)
+        return self.unique("Tuple", str(len(parts(t))), t)
 
     def member(self, t: Type, i: int) -> str:
         """How an item of a tuple is reached: .at[0], .at_0 or .name."""
-        if isinstance(t, Record):
-            return f".{identifier(t.cls._fields[i])}"
+        if is_record(t):
+            return f".{identifier(t._fields[i])}"
         return f".at[{i}]" if alike(t) else f".at_{i}"
 
     def braces(self, t: Type, items: list[str]) -> str:
@@ -207,9 +173,9 @@ class Program:
 
     def _define(self, t: Type, done: dict[Type, str]) -> None:
         t = plain(t)
-        if isinstance(t, Scalar) or t in done:
+        if t in SCALARS or t in done:
             return
-        lines = [] if isinstance(t, Tuple) else [comment(t.cls.__doc__ or t.cls.__name__)]
+        lines = [] if isinstance(t, GenericAlias) else [comment(t.__doc__ or t.__name__)]
         lines.append("typedef struct {")
         for name, kind, meaning in self._members(t):
             self._define(kind, done)
@@ -218,9 +184,9 @@ class Program:
         done[t] = "\n".join([*lines, f"}} {self.c(t)};", ""])
 
     def _members(self, t: Type) -> Iterator[tuple[str, Type, str]]:
-        if isinstance(t, Record | Group):
+        if isinstance(t, type):
             for name, kind in fields(t).items():
-                yield identifier(name), kind, self._meaning(t.cls, name)
+                yield identifier(name), kind, self._meaning(t, name)
         elif alike(t):
             yield f"at[{len(parts(t))}]", parts(t)[0], ""
         else:
@@ -255,4 +221,4 @@ class Program:
 
 def alike(t: Type) -> bool:
     """Return True for a tuple whose items have one type in C: they are an array."""
-    return isinstance(t, Tuple) and len({plain(item) for item in t.items}) == 1
+    return isinstance(t, GenericAlias) and len({plain(item) for item in t.__args__}) == 1

@@ -83,7 +83,7 @@ EXPRESSIONS = {
 BODIES = {
     "while a > 0.0:\n    a = a - 1.0\nreturn a": (1, "use for ... in range(n) with break"),
     "try:\n    return 1.0 / a\nexcept ZeroDivisionError:\n    return 0.0": (1, "try is not in"),
-    "assert a > 0.0\nreturn a": (1, "assert is not in the subset"),
+    "assert a > 0.0\nreturn a": (1, "assert a > 0.0: is not in the subset"),
     "global COUNT\nreturn a": (1, "belongs into State"),
     "def inner() -> float:\n    return a\nreturn inner()": (1, "put it into the module"),
     "from math import sin\nreturn a": (1, "put it at the top of the module"),
