@@ -15,7 +15,7 @@ from pathlib import Path
 from select import select
 
 import pytest
-from grasp_cosim.hil.driven import MOST_LOST
+from grasp_cosim.hil.served import MOST_LOST
 from grasp_fmus import link
 from grasp_fmus.contract import declared, unpacker
 from grasp_fmus.contract import variables as variables_of

@@ -13,9 +13,8 @@ from contextlib import ExitStack
 import pytest
 from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.hil.driven import DrivenFmu
 from grasp_cosim.hil.proxy import exchanged, link_signature
-from grasp_cosim.hil.served import BACKLOG, ServedFmu, Server, Service
+from grasp_cosim.hil.served import BACKLOG, DrivenFmu, ServedFmu, Server, Service
 from grasp_cosim.interface.read import read_interface
 from grasp_fmus.link import STEP as STEP_REQUEST
 from grasp_fmus.link import TOO_LONG

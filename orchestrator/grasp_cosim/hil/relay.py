@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple
 
 from ..base.checks import number, whole
 from ..base.errors import InputError
@@ -30,16 +30,15 @@ from .sockets import Address, EventLoop, connected, is_loopback, received, resol
 Direction = Literal["request", "reply"]
 """From a client to the peer, and from the peer back."""
 
-DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+DIRECTIONS: tuple[Direction, ...] = ("request", "reply")
 
 LONGEST = 1e6
 """s, longest time of any kind: eleven days."""
 
-MOST_CLIENTS = 16
-"""Clients remembered; a further one takes the place of the one that was silent for longest."""
-
-ANY = "0.0.0.0"  # noqa: S104  compared with, not listened on
-"""Stands for all addresses of this machine."""
+MOST_CLIENTS, MOST_HELD = 16, 4096
+"""Clients remembered; a further one takes the place of the one that was silent for longest. And
+the datagrams under way at once.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +80,13 @@ class Outage:
     by: Literal["requests", "s"] = "requests"
 
     def __post_init__(self) -> None:
-        text = f"outage from {self.start!r} until {self.until!r} {self.by}"
-        lowest = 1 if self.by == "requests" else 0
+        text, lowest = f"outage from {self.start!r} until {self.until!r} {self.by}", 0
+        if self.by == "requests":
+            lowest = 1
+            if self.start % 1 or self.until % 1:
+                raise InputError(f"{text}: must be whole numbers")
         if not lowest <= self.start < self.until < math.inf:
             raise InputError(f"{text}: must begin at {lowest} or later, and end after that")
-        if self.by == "requests" and not (self.start % 1 == 0 == self.until % 1):
-            raise InputError(f"{text}: must be whole numbers")
 
     @classmethod
     def read(cls, given: str) -> "Outage":
@@ -109,35 +109,25 @@ class Passage(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """Both directions, the outages, the seed, and how many datagrams may be under way at once.
-
-    InputError where seed is no whole number from 0 on, or capacity none from 1 on.
-    """
+    """Both directions, the outages, and the seed; InputError where that is no number from 0 on."""
 
     conditions: Mapping[Direction, Conditions] = field(
         default_factory=lambda: dict.fromkeys(DIRECTIONS, Conditions())
     )
     outages: tuple[Outage, ...] = ()
     seed: int = 0
-    capacity: int = 4096
 
     def __post_init__(self) -> None:
-        for name, least in (("seed", 0), ("capacity", 1)):
-            whole(name, getattr(self, name), least, must=f"a whole number, at least {least}")
+        whole("seed", self.seed, 0, must="a whole number, at least 0")
 
     def fate(self, direction: Direction, number: int) -> tuple[Passage, ...]:
         """Return the ways through of the datagram of a number, 1, 2, ...: none where it is lost.
 
         Two are the datagram and its copy. Outages are not in it.
         """
-        conditions = self.conditions[direction]
-        u = _uniforms(self.seed, direction, number)
-        if u[0] < conditions.loss:
-            return ()
-        first = _passage(conditions, u[1], u[2])
-        if u[3] < conditions.duplicate:
-            return first, _passage(conditions, u[4], u[5])
-        return (first,)
+        conditions, u = self.conditions[direction], _uniforms(self.seed, direction, number)
+        ways = [_passage(conditions, u[1], u[2]), _passage(conditions, u[4], u[5])]
+        return () if u[0] < conditions.loss else tuple(ways[: 1 + (u[3] < conditions.duplicate)])
 
 
 def _passage(conditions: Conditions, position: float, chance: float) -> Passage:
@@ -159,22 +149,22 @@ def _uniforms(seed: int, direction: Direction, number: int) -> list[float]:
 
 @dataclass(slots=True)
 class Counters:
-    """One direction, exact at any time: received + duplicated = delivered + dropped + held."""
+    """One direction, exact at any time: received + duplicated = delivered + dropped + held.
+
+    Copies are delivered, too; reordered is what is delivered after a later one, lost or in an
+    outage what does not get through, overflow what finds MOST_HELD under way, unsent what this
+    machine refuses to send, held what is still under way.
+    """
 
     received: int = 0
     delivered: int = 0
-    """Copies included."""
     duplicated: int = 0
     reordered: int = 0
-    """Delivered after a datagram that had arrived later."""
     lost: int = 0
     outage: int = 0
     overflow: int = 0
-    """There was no room: network.capacity datagrams were under way."""
     unsent: int = 0
-    """This machine refused to send it."""
     held: int = 0
-    """Still under way."""
 
     @property
     def dropped(self) -> int:
@@ -183,16 +173,16 @@ class Counters:
 
 
 class Entry(NamedTuple):
-    """The decision on a datagram, or on its copy, when it arrived."""
+    """The decision on a datagram of a number in its direction, or on its copy 1, as it arrived.
+
+    The delay is in s, None where it does not get through.
+    """
 
     direction: Direction
     number: int
-    """1, 2, 3, ... in its direction."""
     copy: int
-    """0, of a copy 1."""
     fate: Literal["passed", "held back", "lost", "outage", "overflow"]
     delay: float | None
-    """In s; None where it does not get through."""
 
 
 Log = Callable[[Entry], object]
@@ -222,11 +212,8 @@ class Traffic:
         self._begin = now if self._begin is None else self._begin
         counters = self._counters[direction]
         counters.received += 1
-        number = counters.received
-        since = {
-            "requests": self._counters["request"].received,
-            "s": (now - self._begin) / NANOSECONDS,
-        }
+        number, requests = counters.received, self._counters["request"].received
+        since = {"requests": requests, "s": (now - self._begin) / NANOSECONDS}
         if any(o.start <= since[o.by] < o.until for o in self._network.outages):
             counters.outage += 1
             self._log(Entry(direction, number, 0, "outage", None))
@@ -237,13 +224,13 @@ class Traffic:
             self._log(Entry(direction, number, 0, "lost", None))
         counters.duplicated += len(passages) > 1
         for copy, (delay_ns, held_back) in enumerate(passages):
-            if len(self._held) >= self._network.capacity:
+            if len(self._held) >= MOST_HELD:
                 counters.overflow += 1
                 self._log(Entry(direction, number, copy, "overflow", None))
                 continue
             counters.held += 1
-            arrival = next(self._arrivals)
-            heapq.heappush(self._held, (now + delay_ns, arrival, direction, number, send))
+            due = (now + delay_ns, next(self._arrivals), direction, number, send)
+            heapq.heappush(self._held, due)
             fate: Literal["held back", "passed"] = "held back" if held_back else "passed"
             self._log(Entry(direction, number, copy, fate, delay_ns / NANOSECONDS))
 
@@ -290,7 +277,8 @@ class Relay(EventLoop):
         with connected(self.peer) as probe:
             source, to = probe.getsockname()[0], probe.getpeername()
         here = to[0] == source or is_loopback(to)
-        if here and to[1] == port and host in (ANY, to[0]):  # it would send to itself for ever
+        everywhere = "0.0.0.0"  # noqa: S104  compared with, not listened on
+        if here and to[1] == port and host in (everywhere, to[0]):  # it would send to itself
             raise InputError(f"{text(self.peer)}: is the relay itself; must be the peer")
         super().__init__((host, port), self._traffic.next_due, self._traffic.send_due)
         self._stack.callback(lambda: [*map(self._forget, [*self._clients])])
@@ -319,26 +307,21 @@ class Relay(EventLoop):
     def _request(self) -> None:
         """Take one request, so that no client keeps others waiting."""
         if found := received(self.port_socket):
-            data, address = found
-            send = partial(_sent, self._towards_peer(address), data)
+            data, client = found
+            towards_peer = self._clients.pop(client, None)
+            if towards_peer is None:
+                if len(self._clients) == MOST_CLIENTS:
+                    self._forget(next(iter(self._clients)))
+                towards_peer = connected(self.peer)
+                self.register(towards_peer, partial(self._reply, towards_peer, client))
+            self._clients[client] = towards_peer  # the one heard last
+            send = partial(_sent, towards_peer, data)
             self._traffic.receive("request", send, time.monotonic_ns())
 
     def _reply(self, towards_peer: socket.socket, client: Address) -> None:
         if found := received(towards_peer):
             send = partial(_sent, self.port_socket, found[0], client)
             self._traffic.receive("reply", send, time.monotonic_ns())
-
-    def _towards_peer(self, client: Address) -> socket.socket:
-        """The socket of a client, new where it is; it becomes the one heard last."""
-        if client in self._clients:
-            found = self._clients.pop(client)
-        else:
-            if len(self._clients) == MOST_CLIENTS:
-                self._forget(next(iter(self._clients)))
-            found = connected(self.peer)
-            self.register(found, lambda: self._reply(found, client))
-        self._clients[client] = found
-        return found
 
     def _forget(self, client: Address) -> None:
         towards_peer = self._clients.pop(client)
