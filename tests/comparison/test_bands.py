@@ -104,17 +104,13 @@ def test_a_file_is_read(tmp_path):
     ("text", "message"),
     [
         ("signal = {}", r"bands.toml: unknown entry 'signal'; did you mean signals"),
-        ("signals = 3", r"\[signals\]: 3: must be a table"),
         ('signals = { "*" = 0.1 }', r"\[signals\]: '\*' = 0.1: must be a table with one of"),
         ('signals = { "*" = {} }', r"must be a table with one of absolute, relative"),
         ('signals = { a = { abs = 1 } }', r"'a': unknown entry 'abs'; did you mean absolute"),
         ("metrics = { a = { time = 1 } }", r"unknown entry 'time'; valid: absolute, relative$"),
         ('signals = { a = { absolute = -1 } }', r"absolute = -1: must be a number of at least"),
-        ('signals = { a = { absolute = nan } }', r"absolute = nan: must be a number"),
         ('signals = { a = { time = inf } }', r"time = inf: must be a number of at least 0$"),
-        ('signals = { a = { time = true } }', r"time = True: must be a number"),
         ('signals = { a = { time = "1" } }', r"time = '1': must be a number"),
-        ("signals = {", r"bands.toml: not readable as TOML: "),
     ],
 )  # fmt: skip
 def test_a_wrong_file_is_one_line(tmp_path, text, message):

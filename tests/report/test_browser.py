@@ -82,44 +82,22 @@ def test_wheel_drag_and_double_click_change_the_time_in_view(html, tmp_path):
 @pytest.mark.parametrize("size", [(360, 800), (1900, 1000)])
 @pytest.mark.parametrize("kind", ["run", "comparison"])
 def test_nothing_sticks_out_of_a_narrow_or_wide_window(size, kind, tmp_path):
-    run = replace(grasp_run(), timing=paced(steps=50))
+    run = replace(grasp_run(), timing=paced(steps=2000))
     scene = run.view.scene(run)
     html = page_html(run, scene=scene) if kind == "run" else comparison_html(compare(run, run))
     act = """
       const scrolls = [...document.querySelectorAll(".cards, .cards td")].map((e) => e.scrollWidth);
-      return [document.documentElement.scrollWidth, innerWidth, Math.max(0, ...scrolls)];
+      const chart = document.querySelector(".chart svg")?.getBoundingClientRect();
+      const widths = [document.documentElement.scrollWidth, innerWidth, Math.max(0, ...scrolls)];
+      return [...widths, chart?.width, chart?.width / chart?.height];
     """
-    width, inner, table = in_browser(html, act, tmp_path, size=size)
+    width, inner, table, chart, ratio = in_browser(html, act, tmp_path, size=size)
     assert inner == size[0]
     assert width <= inner
     assert table <= inner - 28  # with the margins of the page
-
-
-@pytest.mark.parametrize("width", [420, 1101, 1900])
-def test_the_chart_of_a_paced_run_fits(width, tmp_path):
-    """It takes the width of the page, on a narrow one it scrolls; the page's own rules are kept."""
-    html = page_html(replace(grasp_run(), timing=paced(steps=2000)))
-    act = """
-      const box = (element) => element.getBoundingClientRect(), root = document.documentElement;
-      const chart = document.querySelector(".chart"), svg = chart.querySelector("svg");
-      const shown = [...svg.querySelectorAll("use, path")].filter((e) => !e.closest("defs"));
-      const [a, b] = [box(chart), box(svg)];
-      return {
-        beyond: root.scrollWidth - innerWidth, width: b.width, ratio: b.width / b.height,
-        inside: a.left <= b.left && b.right <= a.right && a.top <= b.top && b.bottom <= a.bottom,
-        shown: shown.length, card: getComputedStyle(chart).backgroundColor,
-        joins: getComputedStyle(document.querySelector(".diagram .line")).strokeLinejoin,
-      };
-    """
-    found = in_browser(html, act, tmp_path, size=(width, 1200), dark=True)
-    assert found["beyond"] <= 0
-    assert found["inside"]
-    assert found["ratio"] == pytest.approx(12.0 / 8.6, rel=0.01)
-    assert found["width"] >= min(width - 100, 1100)
-    assert found["width"] >= 840
-    assert found["shown"] > 100
-    assert found["card"] == "rgb(255, 255, 255)"
-    assert found["joins"] == "miter"
+    if kind == "run":  # on a narrow page the chart scrolls
+        assert chart >= 840
+        assert ratio == pytest.approx(12.0 / 8.6, rel=0.01)
 
 
 def test_any_system_has_traces(tmp_path):
@@ -128,12 +106,6 @@ def test_any_system_has_traces(tmp_path):
     (panel,), title, italic = in_browser(html, act, tmp_path)
     assert (panel["title"], title, italic) == ("y", "<i>", 0)
     assert sum(panel["colors"].values()) > 500
-
-
-def test_a_single_recorded_point_is_drawn(tmp_path):
-    html = page_html(ring_run(["a"], rows=1))
-    (panel,) = in_browser(html, CANVASES + "return panels();", tmp_path)
-    assert panel["low"] == panel["high"] == 0.0
 
 
 def test_an_error_in_the_page_is_not_silent(html, tmp_path):
@@ -170,18 +142,6 @@ def test_finger_2_is_dashed_and_presses_with_a_positive_force(tmp_path):
     assert force["last"] == [3.4, 3.4]
     for panel in panels[:3]:
         assert panel["looks"] == ["--finger1,0", "--finger2,1"]
-
-
-def test_so_it_is_in_a_comparison(tmp_path):
-    run = grasp_run()
-    name = "plant.contact_force[2]"
-    weaker = replace(run, signals={**run.signals, name: 0.5 * run.signals[name]})
-    html = comparison_html(compare(run, weaker))
-    act = f"await choose(['{name}']); await frame(); {PANELS}"
-    force, apart = in_browser(html, act, tmp_path)
-    assert force["names"] == [f"A −{name}", f"B −{name}"]
-    assert force["last"] == [3.4, 1.7]
-    assert apart["last"][0] == pytest.approx(1.7)
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -265,13 +225,6 @@ def test_the_csv_of_the_page_is_that_of_the_run(tmp_path):
     np.testing.assert_array_equal(again.time, run.time)
     for signal, column in signals.items():
         np.testing.assert_array_equal(again[signal], column)
-
-
-def test_a_thinned_page_says_so_in_the_name_of_its_csv(tmp_path):
-    run = ring_run(["a", "b"], rows=5000)
-    ((name, _, data),) = saved(page_html(run, limit=300), ["#csv"], tmp_path)
-    assert name == "signals_thinned.csv"
-    assert data.count(b"\n") < 110
 
 
 def test_each_panel_and_the_scene_are_saved_with_what_they_show(tmp_path):

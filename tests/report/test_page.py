@@ -193,18 +193,6 @@ def test_a_long_comparison_is_thinned_and_hostile_notes_stay_text():
     assert "<script>alert(1)" not in whole
 
 
-def test_a_scene_has_its_section_scripts_and_style():
-    html = page_html(grasp_run(), scene=SCENE)
-    page = Elements(html)
-    sections = [a["id"] for tag, a in page.found if tag == "section" and a]
-    assert sections == ["scene", "traces", "metrics", "connections", "settings"]
-    assert SCENE.style in html
-    assert (
-        html.index("function connect()") > html.index(SCENE.scripts) > html.index("function show")
-    )
-    assert json.loads(page.texts["page"])["scene"] == SCENE.state
-
-
 def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_path):
     run = grasp_run()
     assert caption(run).title == "grasp, case 2, GraspController"
