@@ -102,106 +102,104 @@ def use_of(system: System, name: str) -> Use:
 def interface_differences(
     original: Interface, candidate: Interface, use: Use, given: Mapping[str, Value]
 ) -> list[Difference]:
-    """All differences of variables and capabilities, in the order of the original's variables.
+    """All differences, in the order of the original's variables, then those of capabilities.
 
     Both are under the system's names. given are values, in the candidate's unit, for variables
     that only the candidate has.
     """
-    ours, theirs = original.by_name, candidate.by_name
     found: list[Difference] = []
-    for variable in original.of(*COMPARED):
-        if variable.name in theirs:
-            change = original.conversion(variable.name, candidate)
-            for severity, kind, text, was, now in _changed(
-                variable, theirs[variable.name], use, change
-            ):
-                found.append(Difference(severity, kind, variable.name, text, was, now))
+    for old in original.of(*COMPARED):
+        if new := candidate.by_name.get(old.name):
+            found += _changed(old, new, use, original.conversion(old.name, candidate))
         else:
-            found.append(_missing(variable, use, candidate))
+            found.append(_missing(old, use, candidate))
+    ours = original.by_name
     found += [_extra(v, use, given) for v in candidate.of(*COMPARED) if v.name not in ours]
-    return found + list(capability_differences(original, candidate, use.step))
+    found += capability_differences(original, candidate, use.step)
+    for new in candidate.of("output"):
+        if (old_one := ours.get(new.name)) and old_one.causality == "output":
+            found += _feedthrough(old_one, new, original, candidate, use)
+    return found
 
 
 def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
     name, causality = old.name, old.causality
+    severity: Severity = "warns" if causality == "output" else "notes"
+    text = f"{causality} is missing"
     if name in use.values and name not in use.stated:
-        text = f"{causality} is set to {literal(use.values[name])} in the system, but missing"
-        return Difference("warns", "missing", name, f"{text}: left out")
-    if use.uses(name):
-        alike = [v.name for v in candidate.of(causality)]
+        value = literal(use.values[name])
+        severity = "warns"
+        text = f"{causality} is set to {value} in the system, but missing: left out"
+    elif use.uses(name):
+        severity = "blocks"
         how = "connected" if name in use.connected else "set" if name in use.values else "used"
-        found = nearest(name, alike, candidate.listing)
+        alike = nearest(name, [v.name for v in candidate.of(causality)], candidate.listing)
         text = (
             f"{causality} is {how} in the system, but missing; if it has another name: "
-            f"--set components.COMPONENT.rename.{name}=NAME; {found}"
+            f"--set components.COMPONENT.rename.{name}=NAME; {alike}"
         )
-        return Difference("blocks", "missing", name, text)
-    severity: Severity = "warns" if causality == "output" else "notes"
-    return Difference(severity, "missing", name, f"{causality} is missing")
+    return Difference(severity, "missing", name, text)
 
 
 def _extra(new: Variable, use: Use, given: Mapping[str, Value]) -> Difference:
-    name, causality = new.name, new.causality
-    if causality == "input" and not new.supported:
-        return Difference("notes", "extra", name, "new input that keeps its start value")
-    if causality == "input" and name not in given:
+    name, text = new.name, f"new {new.causality}"
+    if new.causality == "input" and not new.supported:
+        text = "new input that keeps its start value"
+    elif new.causality == "input" and name not in given:
         text = f"new input without a source; give it a value: --set '{use.component}.{name}=VALUE'"
         return Difference("blocks", "extra", name, text)
-    return Difference("notes", "extra", name, f"new {causality}")
+    return Difference("notes", "extra", name, text)
 
 
-Found = tuple[Severity, Kind, str, Any, Any]
-"""A Difference without the name of its variable."""
-
-
-def _changed(old: Variable, new: Variable, use: Use, change: Conversion | None) -> Iterator[Found]:
+def _changed(
+    old: Variable, new: Variable, use: Use, change: Conversion | None
+) -> Iterator[Difference]:
     """Of a variable that both have; change is from the old unit to the new, None for no way."""
-    serious: Severity = "blocks" if use.uses(old.name) else "warns"
-    if old.kind != new.kind:
-        yield serious, "type", f"is {new.type}, must be {old.type}", old.type, new.type
-        return
-    if old.shape != new.shape:
-        was, now = list(old.shape), list(new.shape)
-        yield serious, "type", f"has dimensions {now}, must have {was}", was, now
+    name = old.name
+    serious: Severity = "blocks" if use.uses(name) else "warns"
+    if (old.kind, old.shape) != (new.kind, new.shape):
+        was, now = (f"{v.type}{f' of {list(v.shape)}' if v.shape else ''}" for v in (old, new))
+        yield Difference(serious, "type", name, f"is {now}, must be {was}", was, now)
         return
     if new.type == "Float32" != old.type:
-        yield "warns", "type", "is Float32: 7 digits instead of 16", old.type, new.type
+        text = "is Float32: 7 digits instead of 16"
+        yield Difference("warns", "type", name, text, old.type, new.type)
     if old.causality != new.causality:
-        yield _causality(old, new, use)
+        severity, text = _causality(old, new, use)
+        yield Difference(severity, "causality", name, text, old.causality, new.causality)
     elif old.variability != new.variability:
-        yield _variability(old, new, use)
+        severity = "notes" if old.settable and old.causality != "input" else "warns"
+        text = f"is {new.variability} instead of {old.variability}"
+        if name in use.tuned and new.variability in ("fixed", "constant"):
+            severity = "blocks"
+            text = f"is {new.variability}, but an event sets it; must be {old.variability}"
+        yield Difference(severity, "variability", name, text, old.variability, new.variability)
     if old.unit != new.unit:
         severity, text = _unit(old, new, use, change)
-        yield severity, "unit", text, old.unit, new.unit
+        yield Difference(severity, "unit", name, text, old.unit, new.unit)
     if change is not None and old.kind in ("Real", "Integer"):
         yield from _range(old, new, use, change)
     if old.items and new.items and old.items != new.items:  # the system gives and takes numbers
         moved = [item for item in old.items if new.items.get(item) != old.items[item]]
         text = f"has other items; not as before: {choices(moved)}"
-        yield serious if moved else "notes", "items", text, old.items, new.items
-    if old.settable and new.settable and old.name not in use.values:
-        first, start = old.start_value, new.start_value
-        if not _same(first, start, change):
-            units = [f" {v.unit}" if v.unit else "" for v in (new, old)]
-            text = f"starts with {_shown(start)}{units[0]} instead of {_shown(first)}{units[1]}"
-            yield "notes" if old.name in use.connected else "warns", "start", text, first, start
+        severity = serious if moved else "notes"
+        yield Difference(severity, "items", name, text, old.items, new.items)
+    first, start = old.start_value, new.start_value
+    both = old.settable and new.settable and name not in use.values
+    if both and not _same(first, start, change):
+        units = [f" {v.unit}" if v.unit else "" for v in (new, old)]
+        text = f"starts with {_shown(start)}{units[0]} instead of {_shown(first)}{units[1]}"
+        severity = "notes" if name in use.connected else "warns"
+        yield Difference(severity, "start", name, text, first, start)
 
 
-def _causality(old: Variable, new: Variable, use: Use) -> Found:
+def _causality(old: Variable, new: Variable, use: Use) -> tuple[Severity, str]:
     name, was, now = old.name, old.causality, new.causality
     lonely = now == "input" and name not in use.connected and name not in use.values
     value_only = old.settable and new.settable and name not in use.connected
     severity: Severity = "blocks" if lonely or (use.uses(name) and not value_only) else "warns"
     more = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
-    return severity, "causality", f"is {_a(now)}, must be {_a(was)}{more}", was, now
-
-
-def _variability(old: Variable, new: Variable, use: Use) -> Found:
-    was, now = old.variability, new.variability
-    if old.name in use.tuned and now in ("fixed", "constant"):
-        return "blocks", "variability", f"is {now}, but an event sets it; must be {was}", was, now
-    severity: Severity = "notes" if old.settable and old.causality != "input" else "warns"
-    return severity, "variability", f"is {now} instead of {was}", was, now
+    return severity, f"is {_a(now)}, must be {_a(was)}{more}"
 
 
 def _unit(
@@ -225,7 +223,7 @@ def _unit(
     return "warns", f"{said}: converted"
 
 
-def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterator[Found]:
+def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterator[Difference]:
     """Of what the original takes or gives, that which the candidate does not declare valid."""
     unit, was, now = f" {new.unit}" if new.unit else "", change(old.low), change(old.high)
     declared = [old.minimum, old.maximum], [new.minimum, new.maximum]
@@ -233,10 +231,11 @@ def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterat
     valid = f"{new.low:g} to {new.high:g}{unit}"
     if not new.low <= value <= new.high:
         text = f"value {value:.9g}{unit} is set in the system; must be {valid}"
-        yield "blocks", "range", text, *declared
+        yield Difference("blocks", "range", old.name, text, *declared)
     elif _less(was, new.low) or _less(new.high, now):
         text = f"takes {valid} instead of {was:g} to {now:g}{unit}"
-        yield "notes" if old.causality == "output" else "warns", "range", text, *declared
+        severity: Severity = "notes" if old.causality == "output" else "warns"
+        yield Difference(severity, "range", old.name, text, *declared)
 
 
 def capability_differences(
@@ -289,34 +288,29 @@ def _a(noun: str) -> str:
     return f"an {noun}" if noun[0] in "aeio" else f"a {noun}"
 
 
-def feedthrough_differences(
-    original: Interface, candidate: Interface, use: Use
+def _feedthrough(
+    old: Variable, new: Variable, original: Interface, candidate: Interface, use: Use
 ) -> Iterator[Difference]:
-    """Of outputs that depend directly on other inputs than those of the original.
+    """An output that depends directly on other inputs than that of the original.
 
     What is connected may so be part of an algebraic loop, which is solved or refused in the run.
     """
-    for new in candidate.of("output"):
-        old = original.by_name.get(new.name)
-        if old is None or old.causality != "output":
-            continue
-        before, now = _needs(old, original), _needs(new, candidate)
-        added = [i for i in now if i not in before]
-        gone = [i for i in before if i not in now]
-        severity: Severity = "notes"
-        if added:
-            text = f"depends directly on {choices(added)}"
-            if new.dependencies is None:
-                text = f"may depend directly on {choices(added)}, as it declares no dependencies"
-            if use.connected >= {new.name} and use.connected & set(added):
-                severity, text = "warns", f"{text}: there may be an algebraic loop"
-        elif gone and new.dependencies is not None:
-            late = "a change there shows one step later"
-            text = f"does not depend directly on {choices(gone)}: {late}"
-        else:
-            continue
-        was, is_now = (None if v.dependencies is None else [*v.dependencies] for v in (old, new))
-        yield Difference(severity, "dependency", new.name, text, was, is_now)
+    before, now = _needs(old, original), _needs(new, candidate)
+    added, gone = ([i for i in a if i not in b] for a, b in ((now, before), (before, now)))
+    severity: Severity = "notes"
+    if added:
+        text = f"depends directly on {choices(added)}"
+        if new.dependencies is None:
+            text = f"may depend directly on {choices(added)}, as it declares no dependencies"
+        if new.name in use.connected and use.connected & set(added):
+            severity, text = "warns", f"{text}: there may be an algebraic loop"
+    elif gone and new.dependencies is not None:
+        late = "a change there shows one step later"
+        text = f"does not depend directly on {choices(gone)}: {late}"
+    else:
+        return
+    declared = (None if v.dependencies is None else [*v.dependencies] for v in (old, new))
+    yield Difference(severity, "dependency", new.name, text, *declared)
 
 
 def _needs(variable: Variable, interface: Interface) -> Sequence[str]:

@@ -24,14 +24,13 @@ from ..recording.result import Result
 from ..system.changes import converted, replaced
 from ..system.description import System
 from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Connection, Isolation
-from ..system.structure import SCHEMES, output_units
+from ..system.structure import SCHEMES, unit_of
 from ..system.validity import connection_transform, transforms
 from .bands import SHARE, Bands, Compared, plain
 from .compare import FEWEST_STEPS, Comparison, judge
 from .interface_difference import (
     SEVERITIES,
     Difference,
-    feedthrough_differences,
     interface_differences,
     use_of,
 )
@@ -238,10 +237,7 @@ def prepare_swap(
     common = {key: value for key, value in values.items() if key not in extra}
     system = system.with_settings(common, "--set ".__add__)
     use = use_of(system, component)
-    differences = [
-        *interface_differences(ours, theirs, use, own),
-        *feedthrough_differences(ours, theirs, use),
-    ]
+    differences = interface_differences(ours, theirs, use, own)
     swapped = None
     if not any(d.severity == "blocks" for d in differences):
         given = {n: v for n, v in use.values.items() if n in theirs.by_name}
@@ -256,12 +252,12 @@ def prepare_swap(
         except InputError as error:
             differences.append(Difference("blocks", "system", component, str(error)))
     differences.sort(key=lambda d: SEVERITIES.index(d.severity))
-    back = {
-        f"{component}.{v.name}": theirs.conversion(v.name, ours)
-        for v in ours.of("output")
-        if v.name in theirs.by_name
-    }
-    back |= _between(swapped, system, component) if swapped else {}
+    back = {}
+    for v in ours.of("output"):
+        if new := theirs.by_name.get(v.name):
+            start, end = unit_of(theirs, new), unit_of(ours, v)
+            both = conversion(start, end) if start and end else theirs.conversion(v.name, ours)
+            back[f"{component}.{v.name}"] = both
     nominals = {
         f"{c.name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
         for c in system.components
@@ -283,15 +279,12 @@ def component_of(found: System, name: str, system: System) -> Component:
     for c in found.connections:
         if not any(port.component == name and port in connected for port in (c.source, c.target)):
             continue
-        place, same = f"{found.name}: {c}", there.get((c.source, c.target))
-        if same and (same.factor, same.offset) != (None, None):
-            factor, offset = same.factor or 1.0, same.offset or 0.0
-        else:
-            factor, offset = connection_transform(found, Connection(c.source, c.target))
+        here = there.get((c.source, c.target), Connection(c.source, c.target))
+        factor, offset = connection_transform(found, here)
         own = passed[c.target]
         if not (isclose(own[0], factor) and isclose(own[1], offset)):
             raise InputError(
-                f"{place}: has factor = {own[0]:g}, offset = {own[1]:g}, which the connections of "
+                f"{found.name}: {c}: has factor = {own[0]:g}, offset = {own[1]:g}, which the connections of "
                 f"{system.name}, on which the candidate runs, do not have; must be units of its "
                 f"component instead, in [components.{name}] or --set"
             )
@@ -304,13 +297,3 @@ def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface
         for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
             entry = f"rename: {new!r} = {name!r}"
             known(f"{entry}: the original has no variable", called, ours.by_name, see=ours.listing)
-
-
-def _between(source: System, target: System, name: str) -> dict[str, Conversion | None]:
-    """The conversions of the outputs of a component whose units both systems tell."""
-    ends = output_units(source), output_units(target)
-    return {
-        str(port): conversion(start, end)
-        for port in ends[0].keys() & ends[1].keys()
-        if port.component == name and (start := ends[0][port]) and (end := ends[1][port])
-    }

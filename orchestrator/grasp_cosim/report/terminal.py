@@ -5,6 +5,7 @@ from typing import Any
 from ..base.text import counted, fixed, significant
 from ..realtime.timing import Timing
 from ..recording.result import Result
+from .timing import kept
 
 
 def as_json(result: Result) -> dict[str, Any]:
@@ -56,18 +57,7 @@ def timing_lines(timing: Timing) -> list[str]:
             if (part := parts.get(name))
         ),
     ]
-    if not timing.overruns:
-        return [*lines, "overruns              none: every step ended within its period"]
-    blamed = ", ".join(f"{name} {count}" for name, count in timing.culprits.items())
-    causes = [o for o in timing.listed if o.culprit != "backlog"] or timing.listed
-    worst = max(causes, key=lambda o: o.took)
-    what = "it began late by" if worst.culprit == "start" else f"{worst.culprit} took"
-    lines += [
-        f"overruns              {timing.overruns} of {timing.steps} steps; because of: {blamed}",
-        f"  e.g.                at t = {worst.time:.6g} s {_ms(worst.late)} ms late: "
-        f"{what} {_ms(worst.took)} ms",
-    ]
-    return [*lines, *_advice(timing)]
+    return [*lines, kept(timing), *(_advice(timing) if timing.overruns else ())]
 
 
 def _advice(timing: Timing) -> list[str]:
