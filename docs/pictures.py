@@ -26,9 +26,9 @@ from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.view import draw_hand as draw_three_fingers
 from grasp_cosim.recording.folder import load_run
-from grasp_cosim.report.caption import Caption, about
 from grasp_cosim.report.diagram import Link, diagram_svg
 from grasp_cosim.report.plot import headed, save
+from grasp_cosim.report.tables import Caption, about
 from hand import hand_svg, three_svg
 
 HERE = Path(__file__).parent

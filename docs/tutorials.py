@@ -24,7 +24,6 @@ from grasp_cosim.grasp.metrics import CLOSING, FINGERS
 from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
 from grasp_cosim.recording.folder import load_run
 from grasp_cosim.recording.result import Result
-from grasp_cosim.report.caption import Caption, about
 from grasp_cosim.report.plot import (
     BLUE,
     DASHES,
@@ -37,6 +36,7 @@ from grasp_cosim.report.plot import (
     one_legend,
     save,
 )
+from grasp_cosim.report.tables import Caption, about
 
 HERE = Path(__file__).parent
 

@@ -13,8 +13,8 @@ from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.page import comparison_html
 from grasp_cosim.metrics.metric import Metric
 from grasp_cosim.recording.folder import load_run
-from grasp_cosim.report.caption import about, caption, changes
 from grasp_cosim.report.page import Scene, Zoom, page_html
+from grasp_cosim.report.tables import about, caption, changes
 from report.runs import grasp_run, paced, ring_run, write_run
 from report.test_embed import unpacked
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from grasp_cosim.realtime.timing import Histogram, Overrun, Spread, Timing
 from grasp_cosim.report import timing as drawn
-from grasp_cosim.report.caption import Caption
 from grasp_cosim.report.plot import RED
+from grasp_cosim.report.tables import Caption
 from grasp_cosim.report.terminal import timing_lines
 from grasp_cosim.report.timing import decades, duration, kept, looks, tail, timing_html
 from matplotlib.colors import same_color

@@ -14,10 +14,20 @@ import numpy.typing as npt
 from ..base.files import write_text
 from ..base.text import counted, grouped
 from ..metrics.metric import Metric
-from ..report.caption import Caption, about, caption, changes
 from ..report.embed import LIMIT, Shown, fit
 from ..report.page import Scene, data_html, document, looks, moments, scripts, traces_html
-from ..report.tables import bullets, number, origin_rows, scaled, summary, table
+from ..report.tables import (
+    Caption,
+    about,
+    bullets,
+    caption,
+    changes,
+    number,
+    origin_rows,
+    scaled,
+    summary,
+    table,
+)
 from .bands import Compared
 from .compare import Comparison
 from .qualify import Qualification

@@ -284,9 +284,9 @@ def component_of(found: System, name: str, system: System) -> Component:
         own = passed[c.target]
         if not (isclose(own[0], factor) and isclose(own[1], offset)):
             raise InputError(
-                f"{found.name}: {c}: has factor = {own[0]:g}, offset = {own[1]:g}, which the connections of "
-                f"{system.name}, on which the candidate runs, do not have; must be units of its "
-                f"component instead, in [components.{name}] or --set"
+                f"{found.name}: {c}: has factor = {own[0]:g}, offset = {own[1]:g}, which the "
+                f"connections of {system.name}, on which the candidate runs, do not have; must be "
+                f"units of its component instead, in [components.{name}] or --set"
             )
     return component
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..base.text import fixed
 from ..recording.result import Result
-from ..report.caption import caption
 from ..report.plot import (
     BLUE,
     DASHES,
@@ -23,6 +22,7 @@ from ..report.plot import (
     new_figure,
     one_legend,
 )
+from ..report.tables import caption
 from .metrics import CLOSING, FINGERS, first_contact
 
 if TYPE_CHECKING:

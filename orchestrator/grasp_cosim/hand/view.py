@@ -15,9 +15,9 @@ from ..grasp.presets import case_of, words_of
 from ..grasp.scene import scene_of_fingers
 from ..metrics.metric import resolved
 from ..recording.result import Result, View
-from ..report.caption import caption
 from ..report.page import Scene
 from ..report.plot import BLUE, GREY, RED, drawn, finish, headed, kept, new_figure, one_legend
+from ..report.tables import caption
 from .metrics import directions, is_disc, is_hand
 
 if TYPE_CHECKING:

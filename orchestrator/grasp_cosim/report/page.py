@@ -32,11 +32,10 @@ from ..exchange.listener import Texts
 from ..recording.csv import quoted
 from ..recording.folder import load_run, run_folder
 from ..recording.result import Result
-from .caption import Caption, caption
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter
-from .tables import metrics_table, number, settings_html, summary, svg_button
+from .tables import Caption, caption, metrics_table, number, settings_html, summary, svg_button
 from .timing import TIMING, draw_result, timing_html
 
 LOGGER = logging.getLogger(__name__)

@@ -20,8 +20,8 @@ from ..base.errors import InputError
 from ..base.files import PICTURES
 from ..base.text import in_milli
 from ..recording.result import Result
-from .caption import Caption, caption
 from .embed import fit
+from .tables import Caption, caption
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

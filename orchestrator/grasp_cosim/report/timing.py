@@ -18,9 +18,8 @@ from ..base.errors import InputError, choices
 from ..base.text import grouped
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
-from .caption import Caption, caption
 from .plot import GREY, RED, as_svg, beside, finish, headed, new_figure, save
-from .tables import bullets, number, svg_button, table
+from .tables import Caption, bullets, caption, number, svg_button, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,8 +12,8 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.text import counted
 from ..metrics.metric import Metric
-from ..report.caption import Caption
 from ..report.plot import BLUE, COLORS, STYLES, finish, headed, kept, new_figure
+from ..report.tables import Caption
 from .table import Table
 
 if TYPE_CHECKING:

@@ -8,10 +8,9 @@ from string import Template
 from typing import TYPE_CHECKING, Any
 
 from ...base.text import fixed
-from ...report.caption import about
 from ...report.page import page_style
 from ...report.plot import as_svg, new_figure, one_legend
-from ...report.tables import table
+from ...report.tables import about, table
 from ...system.parts import NANOSECONDS
 from ...system.settings import changed
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
