@@ -57,7 +57,8 @@ def timing_lines(timing: Timing) -> list[str]:
             if (part := parts.get(name))
         ),
     ]
-    return [*lines, kept(timing), *(_advice(timing) if timing.overruns else ())]
+    lines.append(f"{'overruns':22s}{kept(timing)}")
+    return [*lines, *(_advice(timing) if timing.overruns else ())]
 
 
 def _advice(timing: Timing) -> list[str]:
