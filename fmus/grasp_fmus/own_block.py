@@ -65,12 +65,10 @@ def _parsed(file: Path) -> tuple[str, ast.Module]:
     try:
         text = file.read_text("utf-8")
         return text, ast.parse(text.encode(), str(file))
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{file}: byte {error.start}: must be UTF-8") from error
     except (SyntaxError, ValueError) as error:
-        number = getattr(error, "lineno", None)  # there is none for a NUL byte
+        number = getattr(error, "lineno", None)  # there is none for a NUL byte, or none of UTF-8
         line = f" line {number}:" if number else ""
-        raise ValueError(f"{file}:{line} is not Python: {error.args[0]}") from error
+        raise ValueError(f"{file}:{line} is not Python: {getattr(error, 'msg', error)}") from error
 
 
 def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
