@@ -1,14 +1,14 @@
 """Builds the proxy of an FMU: the same variables, in C, which a peer gives values to over UDP."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args, get_type_hints
 
 from si_units import BASE, Unit
 
 from .contract import TYPES, Scalar, Variable
-from .description import ERROR, WARNING, Description, Experiment, Version
+from .description import ERROR, WARNING, Description, Version
 from .link import PORT, LinkVariable, Signature
 
 if TYPE_CHECKING:
@@ -75,28 +75,15 @@ _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
 """Type, unit and description of the outputs proxy.* by their names."""
 
 
-@dataclass(frozen=True)
-class Original:
-    """The FMU whose place a proxy takes; `file` is its name.
-
-    `variables` are its inputs, parameters and outputs that are exchanged, in this order.
-    """
-
-    file: str
-    variables: Sequence[Variable]
-    units: Mapping[str, Unit]
-    experiment: Experiment
-    can_vary_step: bool
-
-
 def build_proxy(
-    target: Path, original: Original, plan: "Plan", settings: Settings = DEFAULTS
+    target: Path, original: Description, plan: "Plan", settings: Settings = DEFAULTS
 ) -> "Built":
     """Build the proxy of an FMU for the platforms of a plan; its parameters start at `settings`.
 
-    A proxy that is there with the same content is left alone. ValueError where the stem of `target`
-    is no identifier of C, a setting is out of its range, or a name is taken; CompilerError where a
-    compiler fails.
+    `original` has the name of the FMU's file, and of its variables the inputs, parameters and
+    outputs that are exchanged, in this order. A proxy that is there with the same content is left
+    alone. ValueError where the stem of `target` is no identifier of C, a setting is out of its
+    range, or a name is taken; CompilerError where a compiler fails.
     """
     from .build import with_binaries  # only here, as below: they take time to load
     from .package import write_members
@@ -107,7 +94,7 @@ def build_proxy(
 
 
 def proxy_members(
-    target: Path, original: Original, fmi: Version = 2, settings: Settings = DEFAULTS
+    target: Path, original: Description, fmi: Version = 2, settings: Settings = DEFAULTS
 ) -> dict[str, bytes]:
     """Return the files of a proxy but for the binaries, by name; ValueError as build_proxy()."""
     from .native.bench_header import wire
@@ -124,7 +111,7 @@ def proxy_members(
     }
     card = _card(description.variables[len(original.variables) :])
     model = Model(description, card, {}, picture=icon("Proxy"))
-    sources = proxy_sources(description.name, original.file, own, HASH, fmi)
+    sources = proxy_sources(description.name, original.name, own, HASH, fmi)
     return with_description(model, sources, fmi)
 
 
@@ -133,21 +120,20 @@ def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) ->
 
     `outputs` are those of the original; `settings` are start values.
     """
-    own = []
-    declared = get_type_hints(Settings, include_extras=True).items()
-    starts: Sequence[Scalar] = settings
-    for (name, hint), start in zip(declared, starts, strict=True):
+
+    def add(name: str, kind: type[Scalar], unit: str, start: Scalar, *about: Any) -> None:
+        own.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", *about))
+
+    own: list[Variable] = []
+    for name, hint in get_type_hints(Settings, include_extras=True).items():
         kind, unit, limits, text = get_args(hint)
-        own.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", limits, text))
+        add(name, kind, unit, getattr(settings, name), limits, text)
     for v in outputs:
         text = f"{v.name} stays as it is while the peer is lost"
-        name = f"proxy.hold.{v.name}"
-        own.append(Variable(name, bool, "parameter", "", False, "fixed", None, text))
+        add(f"hold.{v.name}", bool, "", False, None, text)
     for v in outputs:
         text = f"value of {v.name} while the peer is lost"
-        name = f"proxy.failsafe.{v.name}"
-        safe = Variable(name, v.kind, "parameter", v.unit, v.kind(), "fixed", None, text)
-        own.append(replace(safe, relative=v.relative))
+        add(f"failsafe.{v.name}", v.kind, v.unit, v.kind(), None, text, None, v.relative)
     for name, (kind, unit, text) in _DIAGNOSTICS.items():
         variability = "continuous" if kind is float else "discrete"
         own.append(Variable(f"proxy.{name}", kind, "output", unit, None, variability, None, text))
@@ -160,27 +146,24 @@ def shared_signature(variables: Sequence[Variable]) -> Signature:
     return Signature(tuple(LinkVariable(*v) for v in shared))  # type: ignore[arg-type]  # no String
 
 
-def _description(target: Path, original: Original, settings: Settings) -> Description:
-    name = target.stem
+def _description(target: Path, original: Description, settings: Settings) -> Description:
+    name, file = target.stem, original.name
     if not (name.isascii() and name.isidentifier()) or target.suffix != ".fmu":
-        raise ValueError(
-            f"{target}: must be NAME.fmu, NAME of letters, digits and _, no digit first"
-        )
-    taken = [v.name for v in original.variables if v.name.startswith("proxy.")]
-    if taken:
-        raise ValueError(f"{original.file}: {taken[0]}: proxy. begins the names of a proxy's own")
+        must = "must be NAME.fmu, NAME of letters, digits and _, no digit first"
+        raise ValueError(f"{target}: {must}")
+    if taken := [v.name for v in original.variables if v.name.startswith("proxy.")]:
+        raise ValueError(f"{file}: {taken[0]}: proxy. begins the names of a proxy's own")
     own = own_variables([v for v in original.variables if v.causality == "output"], settings)
     for v in own:
         if v.start is not None:
             v.check(v.start)
-    return Description(
-        name,
-        f"Proxy of {original.file}: a peer has its outputs, over UDP",
-        [*original.variables, *own],
-        {"s": SECOND, **original.units},
-        original.can_vary_step,
+    return replace(
+        original,
+        name=name,
+        summary=f"Proxy of {file}: a peer has its outputs, over UDP",
+        variables=[*original.variables, *own],
+        units={"s": SECOND, **(original.units or {})},
         has_states=False,
-        experiment=original.experiment,
         statuses=(WARNING, ERROR),
     )
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from c_compilers import Compiler, compile_all
 from grasp_fmus.build import compiler_for, job
-from grasp_fmus.description import Experiment
+from grasp_fmus.description import Description
 from grasp_fmus.native.targets import here
 from grasp_fmus.package import write_file
-from grasp_fmus.proxy import Original, proxy_members
+from grasp_fmus.proxy import proxy_members
 
 from .fmi2 import ERROR, OK, Fmu, Instance
 from .scripted_peer import VARIABLES, Clock, ScriptedPeer
@@ -34,7 +34,7 @@ _PYTHON = {"Boolean": bool, "String": bytes.decode}
 
 
 def original():
-    return Original("Original.fmu", VARIABLES, {}, Experiment(), True)
+    return Description("Original.fmu", "", VARIABLES, {})
 
 
 def _sources(members):

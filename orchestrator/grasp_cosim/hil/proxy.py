@@ -115,20 +115,22 @@ def write_proxy(
     """
     from c_compilers import CompilerError  # here, as below, what takes time to load
     from grasp_fmus.build import planned
-    from grasp_fmus.description import Experiment
+    from grasp_fmus.description import Description, Experiment
     from grasp_fmus.native.targets import targets as found
-    from grasp_fmus.proxy import Original, build_proxy
+    from grasp_fmus.proxy import build_proxy
 
     _check_other(fmu, out)
     interface = exchanged(fmu)
     signature, notes = link_signature(interface)
     known = {v.name for v in signature.request}
-    original = Original(
+    times = (None if v is None else float(v) for v in interface.experiment.values())
+    original = Description(
         interface.path.name,
+        "",
         [_variable(interface, interface.by_name[v.name], known) for v in signature.variables],
         interface.units,
-        Experiment(*(None if v is None else float(v) for v in interface.experiment.values())),
         interface.can_vary_step,
+        experiment=Experiment(*times),
     )
     try:
         plan = planned(found(targets), fmi)

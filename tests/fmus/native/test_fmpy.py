@@ -10,8 +10,8 @@ from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
 from grasp_fmus.build import planned
-from grasp_fmus.description import Experiment
-from grasp_fmus.proxy import Original, Settings, build_proxy
+from grasp_fmus.description import Description
+from grasp_fmus.proxy import Settings, build_proxy
 from support.kinds import TRANSLATED
 from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
@@ -85,7 +85,7 @@ def test_fmpy_compiles_the_sources_of_a_proxy(fmi, tmp_path, monkeypatch):
     folder, made = tmp_path / "fmu", tmp_path / "made"
     made.mkdir()
     with ScriptedPeer() as peer:
-        original = Original("Original.fmu", VARIABLES, {}, Experiment(), True)
+        original = Description("Original.fmu", "", VARIABLES, {})
         settings = Settings(port=peer.port, timeout=60.0)
         fmu = build_proxy(tmp_path / "P.fmu", original, planned(fmi=fmi), settings).path
         shutil.unpack_archive(fmu, folder, "zip")
