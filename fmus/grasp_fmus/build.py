@@ -170,9 +170,8 @@ def write_c_only(block: Path | None, out: Path) -> list[Path]:
         with own_model(block) as model:
             return write_c(out, model)
     names = chosen_names([str(block)] if block else [])
-    places = {name: out if block else out / name for name in names}
-    models = {name: shipped_model(name) for name in names}
-    return [path for name in names for path in write_c(places[name], models[name])]
+    places = [(shipped_model(name), out if block else out / name) for name in names]
+    return [path for model, place in places for path in write_c(place, model)]
 
 
 def build_model(model: Model, out: Path, plan: Plan | None = None) -> Built:
@@ -203,10 +202,8 @@ def chosen_names(names: Sequence[str] = ()) -> list[str]:
     """
     for name in names:
         if together(name) is None:
-            valid = (
-                f"must be of {', '.join(SHIPPED)}, one of a hand with a number of fingers from "
-                f"{FEWEST} to {MOST} behind it, or a file NAME.py"
-            )
+            hand = f"one of a hand with a number of fingers from {FEWEST} to {MOST} behind it"
+            valid = f"must be of {', '.join(SHIPPED)}, {hand}, or a file NAME.py"
             raise ValueError(f"{name}: no such block; {valid}")
     return [*names] or [*SHIPPED]
 
@@ -224,8 +221,8 @@ def with_binaries(
     def jobs() -> Iterator[Job]:
         for name, files in fmus:
             complete[name] = files
-            below = {n.partition("sources/")[2]: data for n, data in files.items()}
-            sources = {n: data for n, data in below.items() if n}
+            below = ((n.partition("sources/")[2], data) for n, data in files.items())
+            sources = {n: data for n, data in below if n}
             for target, compiler in plan.compilers.items():
                 yield job(name, sources, target, compiler, networked)
 

@@ -120,20 +120,16 @@ def needed(packages: Sequence[str]) -> str:
 def licences(*distributions: str) -> dict[str, bytes]:
     """Return the licences of installed distributions, ours and others', as files of an FMU.
 
-    FileNotFoundError if one is not installed, or has no licence.
+    FileNotFoundError if one has no licence.
     """
     from importlib import metadata  # takes time to load
 
     found = {}
     for name in distributions:
-        try:
-            text = metadata.distribution(name).read_text("licenses/LICENSE")
-        except metadata.PackageNotFoundError:
-            text = None
+        text = metadata.distribution(name).read_text("licenses/LICENSE")
         if not text:
-            raise FileNotFoundError(
-                f"{name}: no licenses/LICENSE among its metadata; install it with pip"
-            )
+            said = "no licenses/LICENSE among its metadata; install it with pip"
+            raise FileNotFoundError(f"{name}: {said}")
         file = "license" if name == "grasp-cosim" else name
         found[f"documentation/licenses/{file}.txt"] = text.encode()
     return found
