@@ -88,10 +88,9 @@ OTHER = {
 }  # fmt: skip
 """Symbols without a prefix: factor, offset, powers of base units."""
 
-_SIGNS = {
-    "°C": "degC", "°F": "degF", "°": "deg", "Ω": "Ohm", "\u2126": "Ohm", "\u03bc": "µ", "⁻": "-",
-    "¹": "1", "²": "2", "³": "3",
-}  # fmt: skip
+_SIGNS = str.maketrans({
+    "°": "deg", "Ω": "Ohm", "\u2126": "Ohm", "\u03bc": "µ", "⁻": "-", "¹": "1", "²": "2", "³": "3",
+})  # fmt: skip
 """Signs and how the names above have them; two are of the ohm, one is a Greek mu."""
 
 _FACTOR = re.compile(r"(1|-|[^\d\s.*·/^()+-]+)(?:(?<![1-])\^?([+-]?\d))?")
@@ -106,10 +105,7 @@ def known_unit(name: str) -> Unit | None:
     Products, powers and a quotient are as FMI writes them: N.s/m, m/s2, J/(kg.K); or with signs
     like °C and m/s². None where it is no such name.
     """
-    written = name
-    for mark, meant in _SIGNS.items():
-        written = written.replace(mark, meant)
-    parts = _UNIT.fullmatch(written)
+    parts = _UNIT.fullmatch(name.translate(_SIGNS))
     if parts is None:
         return None
     above, single, several = parts.groups()
@@ -123,7 +119,7 @@ def known_unit(name: str) -> Unit | None:
         found = _symbol(text)
         if found is None:
             return None
-        (factor, shift, power_of_ten, base), power = found
+        factor, shift, power_of_ten, base, power = found
         scale *= factor ** (sign * power)
         ten += sign * power * power_of_ten
         offset = shift if len(factors) == 1 and power == 1 else 0.0
@@ -150,7 +146,7 @@ def refusal(name: str) -> str:
     return f"unit {name!r} is not known; {fix}"
 
 
-def _symbol(text: str) -> tuple[tuple[float, float, int, dict[str, int]], int] | None:
+def _symbol(text: str) -> tuple[float, float, int, dict[str, int], int] | None:
     """Factor, offset, power of ten and base units of a symbol like mm, and its power."""
     match = _FACTOR.fullmatch(text)
     if match is None:
@@ -158,10 +154,9 @@ def _symbol(text: str) -> tuple[tuple[float, float, int, dict[str, int]], int] |
     symbol, power = match[1], int(match[2] or 1)
     if symbol in OTHER:
         factor, offset, base = OTHER[symbol]
-        return (factor, offset, 0, base), power
-    for end in _SI:
+        return factor, offset, 0, base, power
+    for end, (ten, base) in _SI.items():
         prefix = symbol.removesuffix(end)
         if symbol.endswith(end) and prefix in PREFIXES:
-            ten, base = _SI[end]
-            return (1.0, 0.0, ten + PREFIXES[prefix], base), power
+            return 1.0, 0.0, ten + PREFIXES[prefix], base, power
     return None
