@@ -76,31 +76,21 @@ def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
     renamed = {text.count("\n", 0, match.start()) + 1 for match in IMPORT.finditer(text)}
     installed = {*sys.stdlib_module_names, *_required(file, tree)}
     for node in ast.walk(tree):
+        packable = False
         if isinstance(node, ast.Import):
             modules = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             modules = ["." * node.level + (node.module or "")]
+            packable = node.col_offset == 0 and node.lineno in renamed
         else:
             continue
-        top_level = isinstance(node, ast.ImportFrom) and node.col_offset == 0
         for module in modules:
             package = module.partition(".")[0]
-            said = f"{file}: line {node.lineno}:"
-            if package in installed:
-                continue
-            if package == "pythonfmu":
-                raise ValueError(
-                    f"{said} is a model of pythonfmu, which builds it itself: "
-                    f"`pythonfmu build -f {file}`; then run it with --swap COMPONENT=FMU"
-                )
-            if package not in PACKAGES:
-                raise ValueError(
-                    f"{said} imports {module}, which would not be in the FMU; "
-                    f"must be of the standard library, of {', '.join(PACKAGES)}, or in REQUIRES"
-                )
-            if not (top_level and node.lineno in renamed):
-                must = "must be imported at the top level, with single spaces, as"
-                raise ValueError(f"{said} {package} {must}: from {package} import ...")
+            if package not in installed and not (packable and package in PACKAGES):
+                form = "at the top level, with single spaces: from PACKAGE import ..."
+                ours = f"or of {', '.join(PACKAGES)}, {form}"
+                must = f"must be of the standard library, in REQUIRES, {ours}"
+                raise ValueError(f"{file}: line {node.lineno}: imports {module}; {must}")
 
 
 def _required(file: Path, tree: ast.Module) -> tuple[str, ...]:
