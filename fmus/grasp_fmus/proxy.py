@@ -19,12 +19,8 @@ PROTOCOL = Path(__file__).parent / "link/README.md"
 
 SECOND = Unit("s", tuple(int(name == "s") for name in BASE))
 
-LONGEST_TEXT = 1023
-"""Bytes that a text of the settings has at most."""
-_MOST = 2**31 - 1
-
-
-_TEXT = (0, LONGEST_TEXT)
+_TEXT = (0, 1023)
+"""Bytes that a text of the settings has."""
 
 
 class Settings(NamedTuple):
@@ -40,7 +36,7 @@ class Settings(NamedTuple):
         "longest wait for an answer in initialisation mode, by the clock",
     ] = 5.0  # fmt: skip
     misses_tolerated: Annotated[
-        int, "", (0, _MOST), "misses in a row before the peer is lost with one more"
+        int, "", (0, 2**31 - 1), "misses in a row before the peer is lost with one more"
     ] = 3
     on_loss: Annotated[
         str, "", _TEXT, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"
