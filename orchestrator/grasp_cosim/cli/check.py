@@ -150,17 +150,13 @@ def _parted(
     values: list[str] = []
     for text in settings:
         place, value = pair("--set", text, "PLACE=VALUE")
-        section, _, rest = place.partition(".")
-        name, _, entry = rest.partition(".")
-        kind, _, key = entry.partition(".")
+        section, name, kind, key = (*place.split(".", 3), "", "", "")[:4]
         if section == "components" and name == component and kind in OF_CANDIDATE:
             of_component[kind][key] = value
         elif section == "components" and kind == "values":
             values.append(f"{name}.{key}={value}")
-        elif section in SECTIONS:
-            of_system.append(text)
         else:
-            values.append(text)
+            (of_system if section in SECTIONS else values).append(text)
     return of_system, of_component, values
 
 

@@ -184,7 +184,5 @@ def _opened(descriptor: int, like: Any) -> Any:
     In place of ASCII it is UTF-8, as click has it, too.
     """
     plain = like is None or lookup(like.encoding).name == "ascii"
-    encoding = "utf-8" if plain else like.encoding
-    errors = "backslashreplace" if plain else like.errors
-    line = like is not None and like.line_buffering
-    return os.fdopen(descriptor, "w", 1 if line else -1, encoding=encoding, errors=errors)
+    how = ("utf-8", "backslashreplace") if plain else (like.encoding, like.errors)
+    return os.fdopen(descriptor, "w", 1 if like and like.line_buffering else -1, *how)

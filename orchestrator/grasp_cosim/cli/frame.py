@@ -7,6 +7,7 @@ import logging
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -125,21 +126,17 @@ def told(level: int) -> Iterator[None]:
             logger.setLevel(was)
 
 
+_flag = partial(click.Option, is_flag=True, expose_value=False)
+
 EVERYWHERE = (
-    click.Option(
-        ["--debug"], is_flag=True, expose_value=False, help="Show the traceback of an error."
-    ),
-    click.Option(
+    _flag(["--debug"], help="Show the traceback of an error."),
+    _flag(
         ["-q", "--quiet"],
-        is_flag=True,
-        expose_value=False,
         callback=_set_quiet,
         help="Print no progress and no notes, only errors, on standard error.",
     ),
-    click.Option(
+    _flag(
         ["-v", "--verbose"],
-        is_flag=True,
-        expose_value=False,
         callback=_set_verbose,
         help="Say which FMUs and engine run, and how long each phase takes.",
     ),

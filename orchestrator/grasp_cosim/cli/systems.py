@@ -11,8 +11,8 @@ import click
 
 from ..base.checks import real
 from ..base.errors import InputError
-from ..base.files import check_file, write_text
-from ..inspection.draft import Draft, alone, replacing, with_paths
+from ..base.files import FMU_FOLDER, check_file, write_text
+from ..inspection.draft import Draft, alone, replacing
 from ..interface.read import read_interface
 from ..system.description import System
 from ..system.toml import to_do
@@ -132,11 +132,9 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
     except ValueError:
         raise InputError(f"--angles {angles!r}: must be numbers in degrees, as 0,90,225") from None
     directions = directions_of(fingers, given)
-    text = hand_text(directions)
-    fmus = built(folder, sized(len(directions))).relative_to(folder)
-    names = set(re.findall(r'^fmu = "(.+)"', text, re.MULTILINE))
+    built(folder, sized(len(directions)))
     note = faint(directions)
-    return with_paths(text, {n: (fmus / n).as_posix() for n in names}), [note] if note else []
+    return _from_below(hand_text(directions)), [note] if note else []
 
 
 def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Draft]]:
@@ -144,11 +142,8 @@ def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Dr
     from ..grasp.presets import SYSTEM, built_in_presets
     from ..grasp.system import built
 
-    fmus = built(folder)
-    built_in = System.load(SYSTEM, fmus)
-    below = fmus.relative_to(folder)
-    paths = {c.fmu.name: (below / c.fmu.name).as_posix() for c in built_in.components}
-    text = with_paths(SYSTEM.read_text("utf-8"), paths)
+    built_in = System.load(SYSTEM, built(folder))
+    text = _from_below(SYSTEM.read_text("utf-8"))
     drafts = {}
     for name, fmu in foreign.items():
         built_in.component(name, f"--as {name}")
@@ -157,6 +152,11 @@ def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Dr
         drafts[name] = replacing(built_in, name, fmu, shown(fmu, folder), preset)
         text = drafts[name].put_into(text)
     return text, drafts
+
+
+def _from_below(text: str) -> str:
+    """The text of a system file with its FMUs in the folder where they are built."""
+    return re.sub(r'^fmu = "', f'fmu = "{FMU_FOLDER.as_posix()}/', text, flags=re.MULTILINE)
 
 
 def _found(draft: Draft) -> dict[str, Any]:

@@ -137,8 +137,7 @@ def _contacts(result: Result) -> list[Contact]:
 
 
 def _firsts(contacts: Sequence[Contact]) -> dict[int, float]:
-    fingers = sorted({int(c["finger"]) for c in contacts})
-    return {j: c["t"] for j in fingers for c in contacts[::-1] if c["finger"] == j}
+    return dict(sorted({int(c["finger"]): c["t"] for c in reversed(contacts)}.items()))
 
 
 def _of_fingers(result: Result, each: Mapping[str, Look]) -> dict[str, Look]:
@@ -158,22 +157,22 @@ def _zooms(contacts: Sequence[Contact]) -> list[Zoom]:
 
 def _html(view: str, named: Mapping[str, Mapping[int, str]], contacts: Sequence[Contact]) -> str:
     """The canvas of the animation, its buttons, and the values at its time."""
-    jumps = "\n".join(
+    jumps = (
         f'<button type="button" class="f{j}" data-at="{max(t - BEFORE, 0.0)!r}">'
         f"Before contact {j}</button>"
         for j, t in _firsts(contacts).items()
     )
     shown = {quantity: head for quantity, head in QUANTITIES.items() if named[quantity]}
-    rows = [
-        f'<tr><td><span class="key{j}">finger {j}</span></td>'
-        + "".join(_cell(head, named[quantity].get(j)) for quantity, head in shown.items())
-        + "</tr>"
-        for j in named["gap"]
-    ]
-    heads = "".join(f'<th class="n">{head}</th>' for head in shown.values())
-    rows_html = "\n".join(rows)
-    texts = {"jumps": jumps, "heads": heads, "rows": rows_html, "view": view}
-    return Template(_text("grasp.html")).substitute(texts)
+    rows = []
+    for j in named["gap"]:
+        cells = (_cell(head, named[quantity].get(j)) for quantity, head in shown.items())
+        rows.append(f'<tr><td><span class="key{j}">finger {j}</span></td>{"".join(cells)}</tr>')
+    return Template(_text("grasp.html")).substitute(
+        jumps="\n".join(jumps),
+        heads="".join(f'<th class="n">{head}</th>' for head in shown.values()),
+        rows="\n".join(rows),
+        view=view,
+    )
 
 
 def _cell(head: str, signal: str | None) -> str:

@@ -45,7 +45,6 @@ stop = {stop}  # s, a whole number of steps
 """
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_FMU = re.compile(r'^(fmu = )"([^"]*)"', re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,11 +229,6 @@ def _experiment(fmus: Collection[Interface]) -> tuple[float, float, float, list[
 def _finite(value: Value | None) -> float:
     """A number of a default experiment; 0 where there is none."""
     return value if isinstance(value, float) and math.isfinite(value) else 0.0
-
-
-def with_paths(text: str, paths: Mapping[str, str]) -> str:
-    """The text of a system file with other paths of FMUs, by the ones in it."""
-    return _FMU.sub(lambda m: m[1] + _quoted(paths.get(m[2], m[2])), text)
 
 
 def _table(heading: str, lines: Iterable[str]) -> str:

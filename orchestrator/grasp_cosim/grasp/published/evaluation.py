@@ -80,17 +80,14 @@ def as_report(evidence: Evidence, source: Source) -> dict[str, Any]:
             }
             for r in evidence.runs.values()
         ],
-        "units": _units(evidence),
+        "units": {
+            **{m.name: m.unit for m in METRICS},
+            **{name: unit for name, unit in UNITS.items() if name not in BOOKKEEPING},
+            **{name: "s" for name, value in evidence.rows[0].items() if isinstance(value, float)},
+            "rms": "s",
+            "condition": "m",
+        },
     }
-
-
-def _units(evidence: Evidence) -> Mapping[str, str | None]:
-    """The unit of each entry of rows, rms and runs."""
-    times = [name for name, value in evidence.rows[0].items() if isinstance(value, float)]
-    known = {**{m.name: m.unit for m in METRICS}, **UNITS}
-    names = next(iter(evidence.runs.values())).metrics
-    own = {n: known[n] for n in names if n in known and n not in BOOKKEEPING}
-    return {**dict.fromkeys([*times, "rms"], "s"), "condition": "m", **own}
 
 
 def verdict(report: Mapping[str, Any]) -> str:
