@@ -1,11 +1,10 @@
-"""What a proxy costs, how evenly it answers, and how soon it notices that its peer is gone.
+"""What a proxy costs, and how soon it notices that its peer is gone.
 
 Prints the cost of a step of the grasp with its plant here and behind a proxy (lockstep, loopback, a
 peer that serves the Python FMU in a process of its own); the same with native FMUs, the controller
-behind a proxy, and its peer in C, then paced at 1 kHz with priority, where the system permits; and
-for 200 peers killed at seeded moments the time until the outputs were at their failsafe values,
-beside what is declared: proxy.timeout for each miss that is tolerated, and one step, which waits as
-long.
+behind a proxy, and its peer in C; and for 200 peers killed at seeded moments the time until the
+outputs were at their failsafe values, beside what is declared: proxy.timeout for each miss that is
+tolerated, and one step, which waits as long.
 """
 
 import random
@@ -15,18 +14,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
 from grasp_cosim import System, cli, simulate
-from grasp_cosim.base.system_calls import pin, put_first
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.interface.interface import Value
-from grasp_cosim.system.parts import Realtime
 
 from benchmarks.masters import by_turns
 
@@ -34,7 +30,6 @@ STEPS = 2000
 ROUNDS = 5
 KILLS = 200
 TOLERATED, TIMEOUT = 3, 0.02
-PRIORITY = 80
 TARGET = Path(__file__).parent.parent / "docs/controller_target.c"
 
 
@@ -87,7 +82,7 @@ def cost(system: System, folder: Path) -> None:
 
 
 def native_cost(folder: Path) -> None:
-    """Print the same in C, with the controller there, and how even the steps are at 1 kHz."""
+    """Print the same in C, with the controller there."""
     fmus, code, target = folder / "native", folder / "c", folder / "target"
     header = code / "grasp_controller.h"
     _made("build", "--native", "--out", fmus)
@@ -103,15 +98,7 @@ def native_cost(folder: Path) -> None:
         port = int((process.stdout or sys.stdin).readline().split()[-1])
         there = there.with_values({"controller.proxy.port": port})
         compare(system, there, "controller, all native,")
-        with suppress(OSError):  # both on one processor: a call to another one takes its time
-            pin(process.pid, 0)
-            put_first(process.pid, PRIORITY + 5)
-        paced = Realtime(priority=PRIORITY, cpu=0, lock_memory=True)
-        result = simulate(there, step=1e-3, stop=20.0, realtime=paced)
         process.kill()
-    trips = 1e6 * result["controller.proxy.round_trip_time"][1:]
-    said = "p50 {:.0f} us, p99 {:.0f} us, p99.9 {:.0f} us, worst {:.0f} us".format
-    print("round trip at 1 kHz:", said(*np.quantile(trips, (0.5, 0.99, 0.999, 1.0))))
 
 
 def kills(system: System, folder: Path) -> None:

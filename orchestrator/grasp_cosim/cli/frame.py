@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 NEGATIVE, WRONG, FAILED, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 """Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C, SIGTERM."""
 
-LONGEST = 2000
-"""Characters of a message; of a longer one, without --debug, the middle is left out."""
-
 PATH = click.Path(path_type=Path)
 """The type of an option or argument that is a path."""
 
@@ -148,7 +145,5 @@ def fail(message: str, code: int, debug: bool = False) -> int:
     """Print the message as one line on standard error; return the exit code."""
     if debug:
         traceback.print_exc()
-    elif len(message) > LONGEST:
-        message = f"{message[: LONGEST // 2]} [...] {message[-LONGEST // 2 :]}"
     click.echo(on_one_line(f"grasp-cosim: {message}"), err=True)
     return code

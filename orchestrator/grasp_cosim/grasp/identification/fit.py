@@ -37,10 +37,7 @@ NEGLIGIBLE = 1e-6
 
 
 class Parameter(NamedTuple):
-    """What is fitted, within its bounds; scale is what a considerable change of it is.
-
-    neutral is the value at which it does nothing, None where there is no such value.
-    """
+    """What is fitted, within its bounds; scale is what a considerable change of it is."""
 
     name: str
     unit: str
@@ -48,7 +45,6 @@ class Parameter(NamedTuple):
     low: float
     high: float
     scale: float
-    neutral: float | None
 
 
 class Estimate(NamedTuple):
@@ -83,7 +79,7 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
     """
     from scipy.optimize import least_squares
 
-    start, low, high, scale = np.array([p[2:6] for p in parameters]).T
+    start, low, high, scale = np.array([p[2:] for p in parameters]).T
 
     def jacobian(x: Vector) -> Vector:
         steps = np.where(x + STEP * scale > high, -STEP, STEP) * scale
@@ -124,11 +120,7 @@ def _estimate(p: Parameter, value: float, bound: int, width: float) -> Estimate:
         return Estimate(p.name, p.unit, at, None, f"at its {side} bound, held there")
     if not np.isfinite(width):
         return Estimate(p.name, p.unit, value, None, "the data do not determine it")
-    interval = value - width, value + width
-    remark = ""
-    if p.neutral is not None and interval[0] <= p.neutral <= interval[1]:
-        remark = f"cannot be told from {p.neutral:g}, where it does nothing"
-    return Estimate(p.name, p.unit, value, interval, remark)
+    return Estimate(p.name, p.unit, value, (value - width, value + width), "")
 
 
 def _half_widths(jacobian: Vector, residuals: Vector) -> Vector:

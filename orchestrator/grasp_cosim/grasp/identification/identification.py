@@ -55,13 +55,11 @@ def _each(name: str, *values: Any) -> list[Parameter]:
 
 
 GROUPS = {
-    "coulomb": _each("coulomb", "N", 1.0, 0.0, 10.0, 1.0, 0.0),
-    "static": _each("static", "N", 1.5, 0.0, 10.0, 1.0, None),
-    "viscous": _each("viscous", "N.s/m", 10.0, 0.0, 1000.0, 10.0, 0.0),
-    "stribeck": [
-        Parameter(f"{FRICTION}stribeck_velocity", "m/s", 0.05, 1e-4, 1.0, 0.01, None),
-    ],
-    "ratio": [Parameter(RATIO, "1", 1.0, 0.2, 5.0, 0.1, 1.0)],
+    "coulomb": _each("coulomb", "N", 1.0, 0.0, 10.0, 1.0),
+    "static": _each("static", "N", 1.5, 0.0, 10.0, 1.0),
+    "viscous": _each("viscous", "N.s/m", 10.0, 0.0, 1000.0, 10.0),
+    "stribeck": [Parameter(f"{FRICTION}stribeck_velocity", "m/s", 0.05, 1e-4, 1.0, 0.01)],
+    "ratio": [Parameter(RATIO, "1", 1.0, 0.2, 5.0, 0.1)],
 }
 """What can be fitted by name: a parameter for each finger, or one for both."""
 
