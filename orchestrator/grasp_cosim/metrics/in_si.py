@@ -53,7 +53,7 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
                 raise InputError(
                     f"{system.name}: {name} is in {unit.name if unit else repr(declared)}"
                     f"{undefined}; {purpose} must know its unit, one like {wanted}: "
-                    f"{naming(component, [variable])}"
+                    f"{naming(component, variable)}"
                 )
     free = any(not m.expects for m in asked)
     silent = [n for n, v in recorded.items() if v.kind == "Real" and v.unit is None]

@@ -25,7 +25,6 @@ MOST = 100_000
 """Runs of a sweep at most."""
 
 FORM = "PLACE=START:END:COUNT or PLACE=VALUE,VALUE,..."
-_EXPERIMENT = {"experiment.step": "s", "experiment.stop": "s"}
 
 
 def grid(varied: Mapping[str, Iterable[Value]]) -> list[dict[str, Value]]:
@@ -102,7 +101,7 @@ def read_rows(path: Path) -> list[dict[str, Value]]:
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
     """The rows in the units of the system's FMUs; InputError where the first one does not fit."""
     back: dict[str, Any] = {}
-    for place in dict.fromkeys(place for row in rows for place in row):
+    for place in {place for row in rows for place in row}:
         port = _port(system, place)
         to_si = parameter_in_si(system, place, port) if port else IDENTITY
         back[place] = IDENTITY if to_si == IDENTITY else to_si.back
@@ -113,15 +112,15 @@ def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
 
 def unit_of(system: System, place: str) -> str | None:
     """The SI unit in which the values of a place are; None where they have none."""
-    if place in _EXPERIMENT:
-        return _EXPERIMENT[place]
     port = _port(system, place)
-    interface = port and system.component(port.component, place).interface
-    variable = interface and port and interface.by_name.get(port.variable)
-    if not interface or not variable:
-        return None
-    unit = interface.unit(variable)
-    return variable.unit if unit is None or unit.si else unit.base
+    if port is None:
+        return "s" if place in ("experiment.step", "experiment.stop") else None
+    interface = system.component(port.component, place).interface
+    variable = interface.by_name.get(port.variable)
+    unit = interface.unit(variable) if variable else None
+    if unit and not unit.si:
+        return unit.base
+    return variable.unit if variable else None
 
 
 def _column(where: str, title: str) -> tuple[str, Conversion]:

@@ -78,7 +78,15 @@ def sweep(
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
     recorded = {str(port) for port in system.recorded}
     own = chosen(metrics, system.metrics, recorded, system.roles)
-    asked = _measured(system, own, recorded)
+    check_portable(own)
+    every = metrics_of(system.metrics, own)
+    in_si(system, every)
+    asked, missing = available(every, recorded, system.roles)
+    if not asked:
+        because = f" ({'; '.join(missing)})" if missing else ""
+        raise InputError(
+            f"{system.name}: has no metric{because}; name a file of yours by --metrics"
+        )
     units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in found for p in row)}
     task = Task(system.natively(native), own)
     given = settings_of(task.system, found)
@@ -98,20 +106,6 @@ def sweep(
         if file:
             table.write(file)
     return table
-
-
-def _measured(system: System, own: tuple[Metric, ...], recorded: set[str]) -> list[Metric]:
-    """The metrics that the system permits; InputError if there is none, or a unit is wrong."""
-    check_portable(own)
-    asked = metrics_of(system.metrics, own)
-    in_si(system, asked)
-    there, missing = available(asked, recorded, system.roles)
-    if not there:
-        because = f" ({'; '.join(missing)})" if missing else ""
-        raise InputError(
-            f"{system.name}: has no metric{because}; name a file of yours by --metrics"
-        )
-    return there
 
 
 # ------------------------------------------------------------------------- a run

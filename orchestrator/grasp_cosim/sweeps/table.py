@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -119,10 +119,10 @@ class Table:
             (self._write_parquet if path.suffix == ".parquet" else self._write_csv)(part)
 
     def _write_csv(self, path: Path) -> None:
-        units = {name: unit for name, unit in self.units.items() if unit}
+        units = {name: f" [{unit}]" for name, unit in self.units.items() if unit}
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(f"{n} [{units[n]}]" if n in units else n for n in self.columns)
+            writer.writerow(name + units.get(name, "") for name in self.columns)
             for row in zip(*self.columns.values(), strict=True):
                 writer.writerow(_cell(value) for value in row)
 
@@ -150,10 +150,8 @@ def made(
     columns |= {place: [row.get(place) for row in rows] for place in varied}
     columns |= {name: [o.metrics.get(name) for o in outcomes] for name in measured}
     columns["error"] = [o.error for o in outcomes]
-    of_metrics = {c: m.unit for m in metrics for c in (m.name, *m.columns)}
-    found = {
-        name: of_metrics.get(name, of_metrics.get(name.partition("[")[0])) for name in measured
-    }
+    of_metrics = {m.name: m.unit for m in metrics}
+    found = {name: of_metrics.get(name.partition("[")[0]) for name in measured}
     return Table(columns, varied, measured, {**units, **found}, tuple(metrics))
 
 
@@ -189,8 +187,7 @@ def _array(arrow: Any, name: str, column: Sequence[Any]) -> Any:
     return arrow.array(numbers, type=arrow.float64())
 
 
-@dataclass(frozen=True, slots=True)
-class Convergence:
+class Convergence(NamedTuple):
     """How far a metric is from that of the finest step, for each of the coarser `steps` in s.
 
     They are in its SI unit. order is that of the three finest steps; None where they show none.
@@ -249,7 +246,7 @@ def as_json(table: Table) -> dict[str, Any]:
         "errors": {str(i): text for i, text in table.errors.items()},
         "varied": list(table.varied),
         "metrics": table.summary(),
-        "convergence": {name: asdict(c) for name, c in study.items()},
+        "convergence": {name: c._asdict() for name, c in study.items()},
         "units": dict(table.units),
     }
 

@@ -17,7 +17,6 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..base.errors import InputError
@@ -167,38 +166,36 @@ class FaultKind:
 
 FINITE = Range("a finite number")
 
-FAULTS: Mapping[str, FaultKind] = MappingProxyType(
-    {
-        "stuck": FaultKind(_stuck, {"value": None}, discrete=True),
-        "dropout": FaultKind(
-            _dropout,
-            {"probability": Range("a number from 0 to 1", 0.0, 1.0)},
-            discrete=True,
-            random=True,
-        ),
-        "bias": FaultKind(_each(lambda x, p, *_: x + p["value"]), {"value": FINITE}),
-        "noise": FaultKind(
-            _each(lambda x, p, draws, k: x + p["standard_deviation"] * draws.normal(k)),
-            {"standard_deviation": Range("a finite number of at least 0", 0.0)},
-            random=True,
-        ),
-        "delay": FaultKind(
-            _delay,
-            {"time": Range(f"a number from 0 to {LONGEST:g}", 0.0, LONGEST)},
-            discrete=True,
-            check=_check_delay,
-        ),
-        "saturation": FaultKind(
-            _each(lambda x, p, *_: min(max(x, p.get("low", x)), p.get("high", math.inf))),
-            dict.fromkeys(("low", "high"), FINITE._replace(needed=False)),
-            check=_check_saturation,
-        ),
-        "quantisation": FaultKind(
-            _each(lambda x, p, *_: _rounded(x, p["step"])),
-            {"step": Range("a finite number above 0", 0.0, above=True)},
-        ),
-    }
-)
+FAULTS: Mapping[str, FaultKind] = {
+    "stuck": FaultKind(_stuck, {"value": None}, discrete=True),
+    "dropout": FaultKind(
+        _dropout,
+        {"probability": Range("a number from 0 to 1", 0.0, 1.0)},
+        discrete=True,
+        random=True,
+    ),
+    "bias": FaultKind(_each(lambda x, p, *_: x + p["value"]), {"value": FINITE}),
+    "noise": FaultKind(
+        _each(lambda x, p, draws, k: x + p["standard_deviation"] * draws.normal(k)),
+        {"standard_deviation": Range("a finite number of at least 0", 0.0)},
+        random=True,
+    ),
+    "delay": FaultKind(
+        _delay,
+        {"time": Range(f"a number from 0 to {LONGEST:g}", 0.0, LONGEST)},
+        discrete=True,
+        check=_check_delay,
+    ),
+    "saturation": FaultKind(
+        _each(lambda x, p, *_: min(max(x, p.get("low", x)), p.get("high", math.inf))),
+        dict.fromkeys(("low", "high"), FINITE._replace(needed=False)),
+        check=_check_saturation,
+    ),
+    "quantisation": FaultKind(
+        _each(lambda x, p, *_: _rounded(x, p["step"])),
+        {"step": Range("a finite number above 0", 0.0, above=True)},
+    ),
+}
 """The kinds of faults by name."""
 
 RANDOM = tuple(name for name, kind in FAULTS.items() if kind.random)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import cached_property
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..base.checks import choice, number, whole
-from ..base.errors import InputError, nearest
+from ..base.errors import InputError
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value
 from ..interface.obstacles import of_binary
@@ -166,16 +166,6 @@ class Component:
         names = {own: name for name, own in self.rename.items()}
         lengths = {own: self.values.get(names.get(own, own)) for own in interface.sized_by}
         return expanded(interface, lengths)
-
-
-def component_of(components: Sequence[Component], name: str, place: object) -> Component:
-    """The component of that name; place says who asks, for the error message."""
-    for component in components:
-        if component.name == name:
-            return component
-    raise InputError(
-        f"{place}: no component {name!r}; {nearest(name, [c.name for c in components])}"
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 Units are named by a component's `units`, else declared by its FMU. What has neither is in SI.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, get_args
 from si_units import Unit
 
 from ..base.checks import choice
-from ..base.errors import InputError
+from ..base.errors import InputError, nearest
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion
 from .parts import (
@@ -23,7 +23,6 @@ from .parts import (
     Initialisation,
     Port,
     Realtime,
-    component_of,
     in_nanoseconds,
 )
 from .stimuli import Stimuli
@@ -108,7 +107,11 @@ class Structure:
 
     def component(self, name: str, place: object) -> Component:
         """The component of that name; place says who asks, for the error message."""
-        return component_of(self.components, name, place)
+        for component in self.components:
+            if component.name == name:
+                return component
+        names = [c.name for c in self.components]
+        raise InputError(f"{place}: no component {name!r}; {nearest(name, names)}")
 
 
 def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[str, Any]:
@@ -149,12 +152,11 @@ def parameter_in_si(system: Structure, place: str, port: Port) -> Conversion:
     if variable and variable.kind == "Real" and variable.unit:
         raise InputError(
             f"{place}: {port} is in {variable.unit!r}: cannot be told in SI units; must be named: "
-            f"{naming(port.component, [port.variable])}"
+            f"{naming(port.component, port.variable)}"
         )
     return IDENTITY
 
 
-def naming(component: str, variables: Iterable[str]) -> str:
-    """The entry of a system file in which the units of variables are to be named."""
-    entries = ", ".join(f'"{name}" = "..."' for name in variables)
-    return f"[components.{component}] units = {{ {entries} }}"
+def naming(component: str, variable: str) -> str:
+    """The entry of a system file in which the unit of a variable is to be named."""
+    return f'[components.{component}] units = {{ "{variable}" = "..." }}'

@@ -20,7 +20,7 @@ from ..interface.expansion import shape_text
 from ..interface.interface import SUPPORTED, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion, conversion
-from .parts import Component, Connection, Port, component_of, seconds
+from .parts import Component, Connection, Port, seconds
 from .stimuli import Column, Stimuli
 from .structure import Structure, unit_of
 
@@ -54,9 +54,9 @@ def by_element(
     return tuple(made)
 
 
-def _end(components: Sequence[Component], port: Port, causality: str, place: str) -> Variable:
+def _end(system: Structure, port: Port, causality: str, place: str) -> Variable:
     """The variable at an end of a connection; InputError where there is none."""
-    interface = component_of(components, port.component, place).interface
+    interface = system.component(port.component, place).interface
     found = interface.by_name.get(port.variable)
     if found is None or found.causality != causality:
         valid = [v.name for v in interface.of(causality)]
@@ -150,7 +150,7 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     """
     place = _place(system, connection)
     source, target = (
-        _end(system.components, port, causality, place)
+        _end(system, port, causality, place)
         for port, causality in ((connection.source, "output"), (connection.target, "input"))
     )
     _check_types(system, place, (connection.source, source), (connection.target, target))
@@ -274,7 +274,7 @@ def _of_connections(system: Structure) -> Iterator[str]:
     """Remarks on connections that round values, or that lack a unit at one end."""
     for named, connection in {c.whole or c: c for c in system.connections}.items():
         ends = ((connection.source, "output"), (connection.target, "input"))
-        source, target = (_end(system.components, port, what, "") for port, what in ends)
+        source, target = (_end(system, port, what, "") for port, what in ends)
         if target.type == "Float32" and source.type in ("Real", "Float64"):
             yield f"{named}: from {source.type} to Float32, rounded to 7 digits"
         if target.kind == "Real" and connection.factor is None and connection.offset is None:
