@@ -54,16 +54,13 @@ def by_element(
     return tuple(made)
 
 
-def _end(system: Structure, port: Port, causality: str, place: str) -> Variable:
-    """The variable at an end of a connection; InputError where there is none."""
+def _end(system: Structure, port: Port, causality: str, place: str) -> tuple[Interface, Variable]:
+    """The interface and the variable at an end of a connection; InputError where there is none."""
     interface = system.component(port.component, place).interface
-    found = interface.by_name.get(port.variable)
-    if found is None or found.causality != causality:
-        valid = [v.name for v in interface.of(causality)]
-        known(f"{place}: {port.component} has no {causality}", port.variable, valid,
-              see=interface.listing)  # fmt: skip
-    assert found is not None  # noqa: S101 - it is known
-    return found
+    valid = {v.name: v for v in interface.of(causality)}
+    said = f"{place}: {port.component} has no {causality}"
+    known(said, port.variable, valid, see=interface.listing)
+    return interface, valid[port.variable]
 
 
 def check_components(system: Structure) -> None:
@@ -76,9 +73,8 @@ def check_components(system: Structure) -> None:
             other = first.setdefault(interface.path, name)
             if other != name:
                 raise InputError(
-                    f"{system.name}: {name} and {other} are both {interface.path.name}, "
-                    'of which a process can have one only; must have isolation = "process" but '
-                    "for one"
+                    f"{system.name}: {name} and {other} are both {interface.path.name}, which a "
+                    'process can have once; must have isolation = "process" but for one'
                 )
         if component.solver and fmu.exchange is None:
             raise InputError(
@@ -149,25 +145,21 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     where an end does not exist, and where values cannot be passed from one end to the other.
     """
     place = _place(system, connection)
-    source, target = (
-        _end(system, port, causality, place)
-        for port, causality in ((connection.source, "output"), (connection.target, "input"))
-    )
-    _check_types(system, place, (connection.source, source), (connection.target, target))
+    one, source = _end(system, connection.source, "output", place)
+    other, target = _end(system, connection.target, "input", place)
+    ranges = limits(source.type, one.version), limits(target.type, other.version)
+    _check_types(place, connection, (source, target), ranges)
     if connection.factor is not None or connection.offset is not None:
         return _declared(place, connection, target)
     given, taken = source.unit, target.unit
     if given is None or taken is None or given == taken:
         return 1.0, 0.0
-    units = [
-        system.component(port.component, place).interface.unit(variable)
-        for port, variable in ((connection.source, source), (connection.target, target))
-    ]
-    found = conversion(units[0], units[1]) if units[0] and units[1] else None
+    start, end = one.unit(source), other.unit(target)
+    found = conversion(start, end) if start and end else None
     if found and (source.relative == target.relative or not found.offset):
         return found.factor, 0.0 if target.relative else found.offset
     why = "which cannot be converted" if found is None else "and only one of them is a difference"
-    if None in units:
+    if not (start and end):
         why = "which their FMUs do not define in SI units"
     raise InputError(
         f"{place}: {connection.source} is in {given} and {connection.target} in {taken}, {why}; "
@@ -186,20 +178,19 @@ def _place(system: Structure, connection: Connection) -> str:
 
 
 def _check_types(
-    system: Structure, place: str, source: tuple[Port, Variable], target: tuple[Port, Variable]
+    place: str,
+    connection: Connection,
+    ends: tuple[Variable, Variable],
+    ranges: tuple[tuple[float, float], tuple[float, float]],
 ) -> None:
     """InputError where the target's type does not hold what the source puts out."""
-    ranges = []
-    for port, variable in (source, target):
-        if not variable.supported:
+    for port, v in zip((connection.source, connection.target), ends, strict=True):
+        if not v.supported:
             raise InputError(
-                f"{place}: {port} is of type {variable.nature}, which is not supported; "
-                f"must be {choices(SUPPORTED)}"
+                f"{place}: {port} is of type {v.nature}, which is not supported; must be "
+                f"{choices(SUPPORTED)}"
             )
-        version = system.component(port.component, place).interface.version
-        ranges.append(limits(variable.type, version))
-    given, taken = source[1], target[1]
-    (least, most), (low, high) = ranges
+    (given, taken), ((least, most), (low, high)) = ends, ranges
     fits, must = True, ""
     if (given.kind, taken.kind) == ("Integer", "Real"):
         fits = taken.type != "Float32" or -(2**24) <= least <= most <= 2**24
@@ -210,7 +201,8 @@ def _check_types(
         fits, must = low <= least <= most <= high, f"a type that holds {least} to {most}"
     if not fits:
         raise InputError(
-            f"{place}: {source[0]} is {given.type} and {target[0]} is {taken.type}; must be {must}"
+            f"{place}: {connection.source} is {given.type} and {connection.target} is "
+            f"{taken.type}; must be {must}"
         )
 
 
@@ -253,10 +245,11 @@ def check_steps(system: Structure) -> None:
 
 def remarks(system: Structure) -> tuple[str, ...]:
     """Remarks on a system that is valid, a line each."""
-    return (*_of_components(system), *_of_connections(system), *_of_the_rest(system))
+    return (*_of_connections(system), *_of_components(system))
 
 
 def _of_components(system: Structure) -> Iterator[str]:
+    fed = _fed(system)
     for c in system.components:
         if solver := c.integrated:
             yield (
@@ -268,27 +261,6 @@ def _of_components(system: Structure) -> Iterator[str]:
                 f"{c.name}: several variables of {c.fmu.name} are called {choices(names)}: they "
                 "are left alone"
             )
-
-
-def _of_connections(system: Structure) -> Iterator[str]:
-    """Remarks on connections that round values, or that lack a unit at one end."""
-    for named, connection in {c.whole or c: c for c in system.connections}.items():
-        ends = ((connection.source, "output"), (connection.target, "input"))
-        source, target = (_end(system, port, what, "") for port, what in ends)
-        if target.type == "Float32" and source.type in ("Real", "Float64"):
-            yield f"{named}: from {source.type} to Float32, rounded to 7 digits"
-        if target.kind == "Real" and connection.factor is None and connection.offset is None:
-            missing = [
-                p for p, v in ((named.source, source), (named.target, target)) if v.unit is None
-            ]
-            if len(missing) == 1:
-                unit = source.unit or target.unit
-                yield f"{named}: {missing[0]} has no unit, taken to be in {unit}"
-
-
-def _of_the_rest(system: Structure) -> Iterator[str]:
-    fed = _fed(system)
-    for c in system.components:
         for v in c.interface.of("input", "output"):
             if not v.supported:
                 left = "keeps its start value" if v.causality == "input" else "not recorded"
@@ -300,17 +272,29 @@ def _of_the_rest(system: Structure) -> Iterator[str]:
                 free += [name] if len(without) == len(whole.names) else without
         if free:
             yield f"{c.name}: no source for {choices(free, 6)}: kept as the FMU starts with"
-    if system.input:
-        way = system.input.interpolation
-        yield (
-            f"{system.input.file} drives {choices(driven(system), 6)} ({way}), each step by the "
-            "values at its beginning"
-        )
     if not system.recorded:
         yield (
             f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
             "Boolean or String"
         )
+
+
+def _of_connections(system: Structure) -> Iterator[str]:
+    """Remarks on connections that round values, or lack a unit at one end; and on stimuli."""
+    for named, connection in {c.whole or c: c for c in system.connections}.items():
+        _, source = _end(system, connection.source, "output", "")
+        _, target = _end(system, connection.target, "input", "")
+        if target.type == "Float32" and source.type in ("Real", "Float64"):
+            yield f"{named}: from {source.type} to Float32, rounded to 7 digits"
+        if target.kind == "Real" and connection.factor is None and connection.offset is None:
+            ends = ((named.source, source.unit), (named.target, target.unit))
+            missing = [port for port, unit in ends if unit is None]
+            if len(missing) == 1:
+                unit = source.unit or target.unit
+                yield f"{named}: {missing[0]} has no unit, taken to be in {unit}"
+    if system.input:
+        listed = f"{choices(driven(system), 6)} ({system.input.interpolation})"
+        yield f"{system.input.file} drives {listed}, each step by the values at its beginning"
 
 
 def driven(system: Structure) -> tuple[Port, ...]:
@@ -329,27 +313,27 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
     FMUs may yet be swapped.
     """
     stimuli = system.input
+    if stimuli is None:
+        return
     sources = {c.target: f"a connection, from {c.source}" for c in system.connections}
     for event in system.events:
         sources |= dict.fromkeys(event.set, "an event")
-    for port in stimuli.columns if stimuli and whole else driven(system):
-        assert stimuli is not None  # noqa: S101 - it drives
-        place = stimuli.place(port)
+    for port in stimuli.columns if whole else driven(system):
+        place, column = stimuli.place(port), stimuli.columns[port]
         interface = system.component(port.component, place).interface
-        inputs = [Port(port.component, v.name) for v in interface.of("input")]
-        known(f"{place}: no input", str(port), [*map(str, inputs)], see=interface.listing)
-        variable = interface.by_name[port.variable]
-        if not variable.is_number:
-            raise InputError(
-                f"{place}: is of type {variable.nature}; must be a Real, Integer, Boolean or "
-                "Enumeration to be driven"
-            )
+        inputs = [str(Port(port.component, v.name)) for v in interface.of("input")]
+        known(f"{place}: no input", str(port), inputs, see=interface.listing)
+        v = interface.by_name[port.variable]
+        if not v.is_number or (column.unit is not None and v.kind != "Real"):
+            must = "have no unit" if v.is_number else "be a Real, Integer, Boolean or Enumeration"
+            raise InputError(f"{place}: is of type {v.nature}; must {must}")
         if port in sources:
-            raise InputError(
-                f"{place}: {port} has two sources, {stimuli.file} and {sources[port]}; must have "
-                "one"
-            )
-        _check_samples(stimuli, port, interface)
+            two = f"{stimuli.file} and {sources[port]}"
+            raise InputError(f"{place}: {port} has two sources, {two}; must have one")
+        numbers = v.kind == "Real" and not column.texts
+        for row in column.extremes if numbers else column.distinct:
+            value = _value(stimuli, port, interface, row)
+            exact(stimuli.place(port, row), value, column.text(row))
 
 
 def samples_of(system: Structure, port: Port) -> array[float]:
@@ -369,19 +353,6 @@ def is_linear(stimuli: Stimuli, variable: Variable) -> bool:
     """True if the values of an input change between two rows."""
     continuous = variable.kind == "Real" and variable.variability == "continuous"
     return stimuli.interpolation == "linear" and continuous
-
-
-def _check_samples(stimuli: Stimuli, port: Port, interface: Interface) -> None:
-    """InputError at a sample that is not of the type and range of its input."""
-    column, variable = stimuli.columns[port], interface.by_name[port.variable]
-    place = stimuli.place(port)
-    if column.unit is not None and variable.kind != "Real":
-        raise InputError(f"{place} [{column.unit}]: is of type {variable.type}; must have no unit")
-    _conversion(place, interface, port, column)
-    numbers = variable.kind == "Real" and not column.texts
-    for row in column.extremes if numbers else column.distinct:
-        value = _value(stimuli, port, interface, row)
-        exact(stimuli.place(port, row), value, column.text(row))
 
 
 def _value(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Value:
