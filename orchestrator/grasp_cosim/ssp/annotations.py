@@ -57,18 +57,6 @@ _TOP: tuple[tuple[str, ...], ...] = (("ssd:DefaultExperiment",), ("ssd:System",)
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
-    """The steps that other tools' annotations name in ns; base_ns is 0 where there is none.
-
-    said tells whose it is, own_ns are those of components with a step of their own, by name.
-    """
-
-    base_ns: int = 0
-    said: str = ""
-    own_ns: Mapping[str, int] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
 class Beside:
     """The attributes of a component that SSP has no form for; earlier ones lack the last two."""
 
@@ -95,16 +83,6 @@ class Extras:
     input: Stimuli | None = None
     realtime: Realtime = Realtime()
     metrics: tuple[str, ...] = ()
-
-
-def no_extras(components: Iterable[str], steps: Steps) -> Extras:
-    """The extras of an archive without our annotation; steps are those of other tools.
-
-    Who names a step means that all components take it at once.
-    """
-    beside = {name: Beside({}, steps.own_ns.get(name), "none") for name in components}
-    scheme: Scheme = "jacobi" if steps.base_ns else "sequential"
-    return Extras(steps.base_ns, scheme, beside, Initialisation(), (), ())
 
 
 def extras_of(system: System) -> Extras:
@@ -186,24 +164,27 @@ def _typed(kind: Any, value: Any) -> Any:
     return value
 
 
-def read_steps(file: str, root: Any, given_ns: int | None) -> Steps:
-    """The steps that an archive names for other tools; a given one goes before them.
+def read_foreign(
+    file: str, root: Any, components: Iterable[str], given_ns: int | None
+) -> tuple[Extras, str]:
+    """The extras of an archive without our annotation, and who names its step in another.
 
-    InputError where they contradict each other.
+    Who names a step means that all components take it at once; without one it is 0, and nobody.
+    InputError where the annotations contradict each other, and no step is given.
     """
     found: dict[int, str] = {}
     for step, place in _named(file, root):
         found.setdefault(step, place)
-    if not found:
-        return Steps()
     if len(found) > 1 and given_ns is None:
         listed = choices(f"{step / NANOSECONDS:g} s" for step in found)
         raise InputError(
             f"{file}: its annotations name several steps, {listed}; give one: "
             "--set experiment.step=..."
         )
-    base, said = next(iter(found.items()))
-    return Steps(base, said, _hints(file, root, given_ns or base))
+    base, said = next(iter(found.items()), (0, ""))
+    own = _hints(file, root, given_ns or base) if base else {}
+    beside = {name: Beside({}, own.get(name), "none") for name in components}
+    return Extras(base, "jacobi" if base else "sequential", beside, Initialisation(), (), ()), said
 
 
 def _named(file: str, root: Any) -> Iterator[tuple[int, str]]:

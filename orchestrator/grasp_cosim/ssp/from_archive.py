@@ -29,7 +29,7 @@ from ..system.parts import (
     in_nanoseconds,
 )
 from ..system.stimuli import Stimuli
-from .annotations import FOREIGN, TYPE, Beside, Extras, Steps, no_extras, read_extras, read_steps
+from .annotations import FOREIGN, TYPE, Beside, Extras, read_extras, read_foreign
 from .archive import STRUCTURE, Archive, Notes
 from .connectors import Carried, Connectors, Part
 from .document import at, child, children, open_structure, qualified, same
@@ -70,8 +70,9 @@ def read_ssp(
     names = component_names(file, parts)
     annotated = _annotated(file, root, names.values())
     given_ns = None if step is None else in_nanoseconds("step", step)
-    steps = Steps() if annotated else read_steps(file, root, given_ns)
-    extras = annotated or no_extras(names.values(), steps)
+    extras, by = annotated, ""
+    if extras is None:
+        extras, by = read_foreign(file, root, names.values(), given_ns)
     called = {
         at: _called(file, names[at], part, extras.components[names[at]])
         for at, part in _sized(systems, parts, notes).items()
@@ -86,12 +87,14 @@ def read_ssp(
     if annotated is None:
         components = flow_order(components, connections)
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
-    if steps.base_ns:
-        decided.append(f"scheme = {extras.scheme}, as meant by {steps.said}")
+    if by:
+        decided.append(f"scheme = {extras.scheme}, as meant by {by}")
     start_ns, stop_ns = _times(file, root, parts.values(), stop, decided)
-    step_ns = given_ns or (annotated.step_ns if annotated else 0)
-    step_ns = step_ns or _step_time(file, parts.values(), stop_ns - start_ns, steps, decided)
-    used = {TYPE, *FOREIGN} if annotated or steps.base_ns else {TYPE}
+    if by and not given_ns:
+        decided.append(f"step = {extras.step_ns / NANOSECONDS:g} s, by {by}")
+    step_ns = given_ns or extras.step_ns
+    step_ns = step_ns or _shortest_step(file, parts.values(), stop_ns - start_ns, decided)
+    used = {TYPE, *FOREIGN} if annotated or by else {TYPE}
     other_names = {".".join(path): name for path, name in names.items()}
     said = [f"component {n} is called {name} here" for n, name in other_names.items() if n != name]
     return System(
@@ -308,13 +311,8 @@ def _times(
     return start_ns, in_nanoseconds(f"{file}: stop time of its FMUs", stop)
 
 
-def _step_time(
-    file: str, parts: Iterable[Part], span_ns: int, steps: Steps, notes: list[str]
-) -> int:
-    """The step in ns: another tool's, or the FMUs' smallest that divides the span."""
-    if steps.base_ns:
-        notes.append(f"step = {steps.base_ns / NANOSECONDS:g} s, by {steps.said}")
-        return steps.base_ns
+def _shortest_step(file: str, parts: Iterable[Part], span_ns: int, notes: list[str]) -> int:
+    """The smallest step in ns that the FMUs name and that divides the span."""
     declared = sorted({part.interface.step for part in parts if part.interface.step})
     for step in declared:
         step_ns = round(step * NANOSECONDS) if 0.0 < step * NANOSECONDS <= span_ns else 0
