@@ -86,10 +86,7 @@ class Pacer:
         halted: Callable[[], bool] = lambda: False,
         clock: Clock | None = None,
     ) -> None:
-        """Ask halted while it waits; it says whether the run was interrupted.
-
-        InputError as of Realtime.period() and Meter, and where the CPU is not there.
-        """
+        """InputError as of Realtime.period() and Meter, and where there is no such CPU."""
         last = max((os.cpu_count() or 1) - 1, *cpus(), 0)
         if realtime.cpu is not None and realtime.cpu > last:
             raise InputError(f"cpu = {realtime.cpu}: no such CPU here; must be from 0 to {last}")
@@ -113,10 +110,7 @@ class Pacer:
         self.bind(np.zeros(self.width), lambda _: None)
 
     def bind(self, values: npt.NDArray[np.float64], hand_on: Callable[[int], None]) -> None:
-        """Have it write into these values, width of them.
-
-        hand_on hands on the rows of the steps before one. It is called while there is time to wait.
-        """
+        """Have it write into these values, and hand on the rows before a step while it waits."""
         self._values, self._hand_on = values, hand_on
         self._head: Any = memoryview(values[:HEAD])  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
@@ -134,9 +128,7 @@ class Pacer:
         return Call(python, Native(CLOCK, 0, 0, size=origin, data=data.ctypes.data))
 
     def native(self, steps: int) -> Native | None:
-        """The same as calling it, in compiled code that nobody else has to wait for; None where
-        that is not possible in a run of so many steps.
-        """
+        """The same as calling it, in compiled code; None where so many steps do not allow that."""
         fits = max(self._period[0] * steps, self._period[1]) < 2**62
         if not fits or not HAS_CLOCK or self._now is not time.monotonic_ns:
             return None
@@ -144,10 +136,7 @@ class Pacer:
         return Native(PACE, 0, state, data=self._values.ctypes.data)
 
     def __call__(self, step: int) -> None:
-        """Wait for the beginning of a step.
-
-        HaltError where the run is interrupted meanwhile, OverrunError where it stops at an overrun.
-        """
+        """Wait for the beginning of a step; HaltError, OverrunError where the run ends there."""
         self._use_the_wait(step)
         state, head, origin = self._state, self._head, self._state.origin
         now = self._arrive(step)
@@ -170,10 +159,7 @@ class Pacer:
         head[DUE], head[BEGIN] = due, now
 
     def finish(self, step: int, now: int | None = None) -> None:
-        """The last step has just ended, or at `now`, where another step would begin.
-
-        OverrunError as above.
-        """
+        """The last step has just ended, or did at `now`; OverrunError where it stops at that."""
         self.meter.end(self._arrive(step, now), self._state.late)
 
     def overrun(self) -> OverrunError:
@@ -182,10 +168,7 @@ class Pacer:
         return OverrunError()
 
     def record(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
-        """Take steps that were done: the numbers they lead to, and what was written of each.
-
-        Hands their rows on, which counts as recording.
-        """
+        """Take the rows of steps, by the numbers they lead to; handing them on is recording."""
         self._taken = int(steps[-1])
         start = self._now()
         try:
@@ -196,10 +179,7 @@ class Pacer:
             self.meter.recorded(self._taken - 1, self._recording)
 
     def _use_the_wait(self, step: int) -> None:
-        """Do what has to be done some time, where it is not likely to make the step late.
-
-        It is expected to take half as long again as it did the last time.
-        """
+        """Do what has to be done some time, if half as long again as last time is left for it."""
         waiting = step - self._taken
         if self._state.base_step < 0 or (waiting < SOME and self.spare is None):
             return

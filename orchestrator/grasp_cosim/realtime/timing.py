@@ -23,10 +23,7 @@ from ..system.parts import NANOSECONDS, Realtime
 
 
 class Overrun(NamedTuple):
-    """A step that ended late: its number, the time it began at, by how much, what caused it.
-
-    took is the wall time of what caused it.
-    """
+    """A step that ended late: its number, when it began, by how much, what caused it and took."""
 
     step: int
     time: float
@@ -186,10 +183,7 @@ class Meter:
         self._recordings = array("q"), array("q")
 
     def add(self, steps: Steps, rows: Table) -> None:
-        """Take the rows (HEAD, then the ends of the segments) of the steps of these numbers.
-
-        A step counts from when it is known what comes after it.
-        """
+        """Take the rows of these steps; one counts when it is known what comes after it."""
         if not self._rows:
             self._first = int(steps[0])
         self._file.write(rows.tobytes())
@@ -264,7 +258,7 @@ class Meter:
         return float(count * self._system.step_ns / (end - first[DUE]))
 
     def _judged(self) -> tuple[Steps, Table, Table, dict[str, Table]]:
-        """The steps that count, their rows, by how much each was late, and what each part took."""
+        """The steps that count, their rows, by how much each was late, and what the parts took."""
         table, count, owners = self._table(), self._count, np.array(self.segments)
         after, rows = table[1:, :DUE], table[:count]
         if self._after is not None:

@@ -143,10 +143,7 @@ class RunFolder:
         self._broken = False
 
     def _take_the_folder(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
-        """Remove the older run, its data last, and begin ours; a kill leaves one of them or none.
-
-        Without run.json there is no run in the folder.
-        """
+        """Remove the older run and begin ours; a kill leaves one of them, or no run.json."""
         settings = self._folder / SETTINGS
         try:
             self._folder.mkdir(parents=True, exist_ok=True)

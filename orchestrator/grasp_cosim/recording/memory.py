@@ -54,10 +54,9 @@ class Batch:
 
 
 class MemoryListener:
-    """Copies the rows into one table, which has room for the whole run from the start.
+    """Copies the rows, each n-th of a run, into a table with room for the whole run from the start.
 
-    every is the decimation of the run, from 1 on; paced says that it is to be in real time. Only
-    what is filled of the table takes up memory.
+    Only what is filled of it takes up memory.
     """
 
     def __init__(self, every: int = 1, paced: bool = False) -> None:
@@ -105,10 +104,9 @@ class MemoryListener:
 
 
 class EveryRow:
-    """Keeps signals of these names at every step, where fewer are recorded, in a temporary file.
+    """Keeps signals at every step of a thinned run, for its metrics, in a temporary file.
 
-    A metric of a thinned run would be one of other moments. `lost` says why they are not kept any
-    more, as on a full disk: the run goes on.
+    `lost` says why they are not kept any more, as on a full disk: the run goes on.
     """
 
     def __init__(self, names: Collection[str]) -> None:
@@ -137,10 +135,7 @@ class EveryRow:
         """The file goes with the last name of it."""
 
     def columns(self) -> Columns:
-        """All communication points in s so far, and the columns by name.
-
-        Reals are mapped from the file, in memory only as far as they are looked at.
-        """
+        """All communication points in s so far, and the columns, mapped from the file."""
         shape = self._rows, len(self._places)
         table = (
             np.memmap(self._file, np.float64, "r", shape=shape) if all(shape) else np.empty(shape)

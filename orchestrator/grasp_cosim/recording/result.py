@@ -197,8 +197,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def metrics(self) -> Mapping[str, Any]:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
-        InputError where the function of a metric fails; KeyError, with the nearest names, where
-        there is none of that name.
+        InputError where the function of one fails; KeyError, with the nearest names, if not there.
         """
         self.measured.check()
         return self._figures
@@ -274,10 +273,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return replace(self, origin={**self.origin, "title": title}) if title else self
 
     def to_pandas(self) -> pd.DataFrame:
-        """The signals as a DataFrame, by time in s; its `attrs` have the units, by column.
-
-        InputError without pandas.
-        """
+        """A DataFrame by time in s, the units in its `attrs`; InputError without pandas."""
         module = extra_module("pandas", "it makes the table", "pandas")
         index = module.Index(self.time, name="time")
         frame: pd.DataFrame = module.DataFrame(dict(self.signals), index=index)
@@ -285,9 +281,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return frame
 
     def to_xarray(self) -> xr.Dataset:
-        """The signals as a Dataset over time in s, each with its `units`, and its description as
-        `long_name`. InputError without xarray.
-        """
+        """A Dataset over time in s, with `units`, `long_name`; InputError without xarray."""
         module = extra_module("xarray", "it makes the data set", "xarray")
         data: xr.Dataset = module.Dataset(attrs=self._about)
         data["time"] = "time", self.time, {"units": "s", "long_name": "time"}
@@ -328,9 +322,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def _steps(self) -> npt.NDArray[np.int64]:
         """The numbers of the recorded communication points, shape (rows,)."""
         since = self.time - self.settings.get("start", 0.0)
-        step_ns = round(self.settings["step"] * NANOSECONDS)
-        steps: npt.NDArray[np.int64] = np.rint(since * (NANOSECONDS / step_ns)).astype(np.int64)
-        return steps
+        per_s = NANOSECONDS / round(self.settings["step"] * NANOSECONDS)
+        return np.asarray(np.rint(since * per_s), np.int64)
 
     def _play(self, path: str | Path, make: Callable[[Path, Path], Listener]) -> None:
         """Have a listener hear the recorded run again, which writes a file in a place."""
