@@ -22,7 +22,7 @@ from grasp_cosim import InputError, Realtime, SimulationError, simulate
 from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.master.master import CHUNK, Master
 from grasp_cosim.master.plan import Planner
-from grasp_cosim.realtime.pacer import SOME, SPIN_NS, Clock, Pacer, privileges
+from grasp_cosim.realtime.pacer import SOME, SPIN_NS, Pacer, privileges
 from grasp_cosim.recording.memory import MemoryListener
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -47,7 +47,7 @@ class Fake:
     def __init__(self):
         self.time, self.sleeps, self.oversleep = 123_456_789, [], 0
         self.on_sleep = lambda: None
-        self.clock = Clock(self.now, self.sleep)
+        self.clock = self.now, self.sleep
 
     def now(self):
         self.time += TICK
@@ -366,7 +366,7 @@ def test_ctrl_c_does_not_wait_for_the_next_step(tmp_path, monkeypatch, engine):
     mock, fake = Mock(tmp_path, "a", lambda u, t: t), Fake()
     fake.on_sleep = lambda: os.kill(os.getpid(), signal.SIGINT)
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
-    monkeypatch.setattr("grasp_cosim.realtime.pacer.Clock", lambda: fake.clock)
+    monkeypatch.setattr("grasp_cosim.realtime.pacer.CLOCK_OF_THE_SYSTEM", fake.clock)
     result = simulate(make_system([mock], [], 10), engine=engine, realtime=Realtime(factor=1e-4))
     assert len(fake.sleeps) == 1
     assert not result.complete

@@ -15,7 +15,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -69,11 +69,8 @@ class _State(ctypes.Structure):
     ]
 
 
-class Clock(NamedTuple):
-    """A monotonic clock in ns, and a sleep of a time in s by it."""
-
-    now: Callable[[], int] = time.monotonic_ns
-    sleep: Callable[[float], None] = time.sleep
+CLOCK_OF_THE_SYSTEM = time.monotonic_ns, time.sleep
+"""A monotonic clock in ns, and a sleep of a time in s by it."""
 
 
 class Pacer:
@@ -84,7 +81,7 @@ class Pacer:
         system: System,
         realtime: Realtime,
         halted: Callable[[], bool] = lambda: False,
-        clock: Clock | None = None,
+        clock: tuple[Callable[[], int], Callable[[float], None]] | None = None,
     ) -> None:
         """InputError as of Realtime.period() and Meter, and where there is no such CPU."""
         last = max((os.cpu_count() or 1) - 1, *cpus(), 0)
@@ -99,7 +96,7 @@ class Pacer:
         self.halted = halted
         self.spare: Callable[[float], bool] | None = None
         """Does something that may wait within so many ns; False if there is nothing to do."""
-        self._now, self._sleep = clock or Clock()
+        self._now, self._sleep = clock or CLOCK_OF_THE_SYSTEM
         self._period = period.as_integer_ratio()
         self._state = _State(
             self._now(), 0, -1, *self._period, min(SPIN_NS, int(MOST_SPIN * period)), 0,

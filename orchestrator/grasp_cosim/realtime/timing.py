@@ -176,6 +176,7 @@ class Meter:
         Jacobi scheme all components take their inputs before the first one steps."""
         self._system, self._realtime, self._period = system, realtime, float(period)
         self._names = (*components, EXCHANGE)
+        self._every = {name: system.period(name) for name in components}
         self._file = TemporaryFile(prefix="grasp_times_")  # noqa: SIM115 - open as long as this
         finalize(self, self._file.close)
         self._first = self._rows = self._overruns = self._worst = 0
@@ -285,7 +286,7 @@ class Meter:
         # and then a backlog is no reason. A slow component takes no time in most steps.
         usual = {BACKLOG: np.inf}
         if np.median(parts[STEP]) <= self._period:
-            always = (name for name in self._names if self._every(name) == 1)
+            always = (name for name in self._names if self._every.get(name, 1) == 1)
             usual = {name: np.median(parts[name]) for name in (START, *always, BETWEEN)}
         ready = np.maximum(rows[:, DUE], rows[:, ARRIVED])
         names = (START, BACKLOG, *self._names, BETWEEN, RECORDING)
@@ -303,12 +304,10 @@ class Meter:
         """The places of the steps in which a part happened: a slow component runs in some only."""
         if name == RECORDING:
             return np.flatnonzero(times)
-        turn, last = steps % self._every(name), self._every(name) - 1
+        every = self._every.get(name, 1)
+        turn, last = steps % every, every - 1
         first = 0 if self._system.scheme == "jacobi" else last
         return np.flatnonzero((turn == last) | (turn == first))
-
-    def _every(self, name: str) -> int:
-        return self._system.period(name) if name in self._names[:-1] else 1
 
     def _spread(self, times: Table, steps: Steps) -> Spread:
         worst = times.argmax()

@@ -213,35 +213,29 @@ def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
 
 # ------------------------------------------------------------------ read back
 
-NUMBER, MAYBE = (int, float), (int, float, type(None))
-NEEDED: Mapping[str, Any] = {
-    "system": str, "scheme": str, "step": NUMBER, "stop": NUMBER, "initialisation": dict,
-    "components": dict, "connections": list, "events": list, "faults": list,
-}  # fmt: skip
-MADE: Mapping[str, Any] = {
-    **NEEDED, "roles": dict, "input": dict, "changed": dict, "metrics": list, "diverging": str,
-    "start": NUMBER,
-}  # fmt: skip
-"""Entries of run.json that say how the run was made, of which some are needed, and their types."""
+ENTRIES: Mapping[str, tuple[Any, str, str]] = {
+    "a string": (str, "system scheme", "diverging title date"),
+    "a number": ((int, float), "step stop", "start"),
+    "a number or null": ((int, float, type(None)), "wall_time", ""),
+    "true or false": (bool, "complete", ""),
+    "a list": (list, "connections events faults log", "metrics command"),
+    "a JSON object": (
+        dict,
+        "initialisation components rejections units",
+        "roles input changed versions fmus types descriptions metric_units to_si",
+    ),
+}
+"""What entries of run.json must be besides metrics: those that are needed, and others."""
 
-ORIGIN: Mapping[str, Any] = {
-    "title": str, "date": str, "versions": dict, "fmus": dict, "command": list,
-}  # fmt: skip
-"""Entries that say when it was made, and with what."""
+MADE = (
+    "system", "scheme", "step", "stop", "initialisation", "components", "connections", "events",
+    "faults", "roles", "input", "changed", "metrics", "diverging", "start",
+)  # fmt: skip
+"""Those that say how the run was made."""
 
-ALSO_NEEDED: Mapping[str, Any] = {
-    "wall_time": MAYBE, "complete": bool, "log": list, "rejections": dict, "units": dict,
-}  # fmt: skip
-ENTRIES: Mapping[str, Any] = {
-    **MADE, **ALSO_NEEDED, **ORIGIN, "types": dict, "descriptions": dict, "metric_units": dict,
-    "to_si": dict,
-}  # fmt: skip
-"""All entries besides metrics."""
+ORIGIN = ("title", "date", "versions", "fmus", "command")
+"""Those that say when it was made, and with what."""
 
-WORDS = {
-    str: "a string", NUMBER: "a number", MAYBE: "a number or null", bool: "true or false",
-    list: "a list", dict: "a JSON object",
-}  # fmt: skip
 TEXT = "str"
 TYPES = ("float64", "int32", "int64", "bool", TEXT)
 """The element types of recorded columns, the last that of Strings."""
@@ -365,13 +359,14 @@ def _settings(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: is damaged, not JSON in UTF-8: {error}") from error
     if not isinstance(settings, dict):
         raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
-    for key, kind in ENTRIES.items():
-        there, value = key in settings, settings.get(key)
-        wrong = not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)
-        if (there and wrong) or (not there and key in (*NEEDED, *ALSO_NEEDED)):
-            said = f"{key} = {value!r}" if there else f"no entry {key!r}"
-            must = f"{WORDS[kind]}, as `grasp-cosim run --out` writes it"
-            raise InputError(f"{path}: {said}; must be {must}")
+    for must, (kind, needed, others) in ENTRIES.items():
+        for key in (*needed.split(), *others.split()):
+            there, value = key in settings, settings.get(key)
+            right = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
+            if not (right if there else key in others.split()):
+                said = f"{key} = {value!r}" if there else f"no entry {key!r}"
+                must = f"{must}, as `grasp-cosim run --out` writes it"
+                raise InputError(f"{path}: {said}; must be {must}")
     return settings
 
 
