@@ -168,23 +168,28 @@ def test_what_grows_evenly_trips_at_six_decades(rate):
     assert 6.0 <= np.log10(curve[watch(curve)[0]]) < 7.5
 
 
-def test_the_scale_is_the_nominal_or_the_first_value():
-    curve = 10.0 ** (K / 500.0)  # up to 1e8
-    assert watch(curve) is not None
-    assert watch(curve, nominal=1e4) is None
-    assert watch(1e4 * curve, nominal=1.0) is not None  # from 1e4: to be 1e10, and it is 1e12
-    assert watch(1e-3 * curve) is None
-    assert watch(1e-3 * curve, nominal=1e-3) is not None
+GROWN = 10.0 ** (K / 500.0)
+"""Up to 1e8."""
 
 
-def test_large_values_from_the_start_do_not_trip():
-    assert watch(np.full(ROWS, 6e23)) is None
-    assert watch(np.where(K < 100, 0.0, 6e23)) is None
-    assert watch(np.where(K < 100, 1.0, 1e14)) is None
-
-
-def test_only_reals_count():
-    assert watch(10.0 ** (K / 100.0), kind="Integer") is None
+@pytest.mark.parametrize(
+    ("curve", "options", "trips"),
+    [
+        (GROWN, {}, True),
+        (GROWN, {"nominal": 1e4}, False),
+        (1e4 * GROWN, {"nominal": 1.0}, True),  # from 1e4: to be 1e10, and it is 1e12
+        (1e-3 * GROWN, {}, False),
+        (1e-3 * GROWN, {"nominal": 1e-3}, True),
+        (GROWN**5, {"kind": "Integer"}, False),
+        (np.full(ROWS, 6e23), {}, False),
+        (np.where(K < 100, 0.0, 6e23), {}, False),
+        (np.where(K < 100, 1.0, 1e14), {}, False),
+    ],
+)
+def test_the_scale_is_the_nominal_or_the_first_value_and_a_jump_does_not_trip(
+    curve, options, trips
+):
+    assert (watch(curve, **options) is not None) == trips
 
 
 @given(st.integers(1, 300), st.integers(1, 300))
