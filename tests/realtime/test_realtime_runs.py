@@ -44,7 +44,7 @@ def test_a_paced_run_has_the_same_bits_and_a_timing(grasp, engine, scheme):
     assert (timing.steps, timing.factor, timing.period) == (1000, 1e4, 1e-7)
     assert list(timing.parts) == [*PARTS, "recording"]
     assert all(0.0 <= p.median <= p.p99 <= p.p999 <= p.worst for p in timing.parts.values())
-    assert timing.parts["plant"].median > 0.0
+    assert min(timing.parts[name].median for name in ("plant", "exchange")) > 0.0
     assert timing.overruns == 1000 == sum(timing.culprits.values())
     assert 0.0 < timing.real_time_factor < 1e4
 
