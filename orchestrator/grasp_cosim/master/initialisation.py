@@ -7,7 +7,6 @@ it is entered by, and the values of the inputs that were cut are found by Newton
 from collections.abc import Callable, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from itertools import groupby
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -36,36 +35,24 @@ ADVICE = (
 )
 
 
-class Order(NamedTuple):
-    """The ports in an order in which each is known when it is needed.
+def order_ports(system: System) -> tuple[Sequence[Port], Sequence[Sequence[Port]]]:
+    """The order in which values are passed on in initialisation mode, and the loops in it.
 
-    cuts are the inputs at which loops were cut, loops the paths of port names, first = last.
-    """
-
-    ports: Sequence[Port]
-    cuts: Sequence[Port]
-    loops: Sequence[Sequence[Port]]
-
-
-def order_ports(system: System) -> Order:
-    """The order in which values are passed on in initialisation mode.
-
-    An output depends on the inputs that its FMU declares for the initialisation, or else in
-    general, or else on all.
+    Each port is known when it is needed. An output depends on the inputs that its FMU declares for
+    the initialisation, or else in general, or else on all. A loop is the path of its ports from the
+    input at which it was cut, first = last.
     """
     graph = _graph(system)
     inputs = {connection.target for connection in system.connections}
-    cuts: list[Port] = []
     loops: list[tuple[Port, ...]] = []
     while True:
         try:
-            return Order(tuple(TopologicalSorter(graph).static_order()), cuts, loops)
+            return tuple(TopologicalSorter(graph).static_order()), loops
         except CycleError as error:
             path = error.args[1]
             entry = next(port for port in path if port in inputs)
             at = path.index(entry)
             loops.append((*path[at:-1], *path[: at + 1]))
-            cuts.append(entry)
             graph[entry] = []
 
 
@@ -99,7 +86,10 @@ class Propagation:
         faults: Mapping[Port, Callable[[float, int], float]],
     ) -> None:
         self.system = system
-        self.order = system.once(order_ports)
+        self._ports, loops = system.once(order_ports)
+        self._cuts = [loop[0] for loop in loops]
+        paths = "; ".join(" -> ".join(map(str, path)) for path in loops)
+        self._loops = f"{system.name}: algebraic loop at t = 0: {paths}"
         self.values: dict[Port, Value] = {}
         self._instances = {instance.name: instance for instance in instances}
         self._connections = {connection.target: connection for connection in system.connections}
@@ -111,16 +101,16 @@ class Propagation:
 
         InputError where a loop does not converge, or where loops are to be refused.
         """
-        order, choice = self.order, self.system.initialisation
-        if order.loops and choice.loops == "refuse":
-            raise InputError(f"{_described(self.system, order.loops)}; {ADVICE}")
-        if not order.cuts:
+        cuts, choice = self._cuts, self.system.initialisation
+        if not cuts:
             self._pass_on({})
             return self._check_dependencies()
-        for port in order.cuts:
+        if choice.loops == "refuse":
+            raise InputError(f"{self._loops}; {ADVICE}")
+        for port in cuts:
             if self._kind(port) != "Real":
                 raise InputError(
-                    f"{_described(self.system, order.loops)}, and {port} is {self._kind(port)}: "
+                    f"{self._loops}, and {port} is {self._kind(port)}: "
                     f"only loops of Real values can be iterated; {ADVICE}"
                 )
         count, residual = self._solve(choice)
@@ -128,17 +118,16 @@ class Propagation:
         solution = f"solved in {counted(count, 'iteration')}"
         if not count:
             solution = "its start values solve it and are kept"
-        loops = "algebraic loop" if len(order.loops) == 1 else f"{len(order.loops)} algebraic loops"
+        loops = "algebraic loop" if len(cuts) == 1 else f"{len(cuts)} algebraic loops"
         line = (
-            f"{loops} at t = 0 through {choices(order.cuts, NAMED)}: {solution}, to a relative "
-            f"residual of {residual:.1e}"
+            f"{loops} at t = 0 through {choices(cuts, NAMED)}: {solution}, to a relative residual "
+            f"of {residual:.1e}"
         )
         return [line, *self._check_dependencies()]
 
     def _solve(self, choice: Initialisation) -> tuple[int, float]:
         """Newton's method for the inputs that were cut; iterations and relative residual."""
-        cuts = self.order.cuts
-        at = [(self._instances[port.component], self._variable(port)) for port in cuts]
+        at = [(self._instances[port.component], self._variable(port)) for port in self._cuts]
         x = np.array([float(instance.get([variable])[0]) for instance, variable in at])
         nominal = np.array([variable.nominal for _, variable in at])
         for count in range(1, choice.iterations + 1):
@@ -154,8 +143,8 @@ class Propagation:
             except np.linalg.LinAlgError:
                 break
         raise InputError(
-            f"{_described(self.system, self.order.loops)}: does not converge to a relative "
-            f"residual of {choice.tolerance:g} in {choice.iterations} iterations; {ADVICE}"
+            f"{self._loops}: does not converge to a relative residual of {choice.tolerance:g} in "
+            f"{choice.iterations} iterations; {ADVICE}"
         )
 
     def _slope(self, x: Floats, g: Floats, nominal: Floats) -> Floats:
@@ -169,12 +158,12 @@ class Propagation:
 
     def _evaluate(self, x: Floats) -> Floats:
         """Return the values that come back at the cuts when `x` is put in there."""
-        cuts = self.order.cuts
-        self._pass_on(dict(zip(cuts, x.tolist(), strict=True)))
-        return np.array([self._arriving(self._connections[port]) for port in cuts], np.float64)
+        self._pass_on(dict(zip(self._cuts, x.tolist(), strict=True)))
+        arriving = [self._arriving(self._connections[port]) for port in self._cuts]
+        return np.array(arriving, np.float64)
 
     def _pass_on(self, given: Mapping[Port, Value]) -> None:
-        for (component, arriving), group in groupby(self.order.ports, self._end):
+        for (component, arriving), group in groupby(self._ports, self._end):
             instance, ports = self._instances[component], list(group)
             variables = [self._variable(port) for port in ports]
             if arriving:
@@ -210,10 +199,10 @@ class Propagation:
         Outputs that nothing is connected to may change each time they are read, like the time of
         day.
         """
-        given = {port: self.values[port] for port in self.order.cuts}
+        given = {port: self.values[port] for port in self._cuts}
         sources = {connection.source for connection in self._connections.values()}
         found: list[Port] = []
-        for _ in range(len(self.order.ports) + 1):
+        for _ in range(len(self._ports) + 1):
             before = dict(self.values)
             self._pass_on(given)
             moved = [
@@ -240,8 +229,3 @@ class Propagation:
 
     def _kind(self, port: Port) -> str:
         return self._variable(port).kind
-
-
-def _described(system: System, loops: Sequence[Sequence[Port]]) -> str:
-    paths = "; ".join(" -> ".join(map(str, path)) for path in loops)
-    return f"{system.name}: algebraic loop at t = 0: {paths}"
