@@ -22,7 +22,7 @@ from copy import copy
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -56,53 +56,43 @@ _LONG = re.compile(rb"%[^A-Za-z%]*L")
 """A long double, which has registers of its own kind, or none."""
 
 
-class _Convention(NamedTuple):
-    """How a processor passes arguments."""
-
-    words: int
-    """Registers for whole numbers and addresses; there are eight for doubles."""
-    va_list: Callable[[int, int], bytes]
-    """By the addresses of what was in registers and, behind it, of what was on the stack."""
-
-
-_CONVENTIONS: Mapping[str, _Convention] = {
-    "x86_64": _Convention(6, lambda words, stack: struct.pack("IIPP", 40, 48, stack, words)),
-    "aarch64": _Convention(
-        8, lambda words, stack: struct.pack("PPPii", stack, words + 64, stack, -24, -128)
-    ),
+_CONVENTIONS: Mapping[str, tuple[int, Callable[[int, int], bytes]]] = {
+    "x86_64": (6, lambda words, stack: struct.pack("IIPP", 40, 48, stack, words)),
+    "aarch64": (8, lambda words, stack: struct.pack("PPPii", stack, words + 64, stack, -24, -128)),
 }
-"""Of the ABIs of System V and Arm for Linux."""
+"""Of the ABIs of System V and Arm for Linux.
+
+The registers for whole numbers and addresses; there are eight for doubles. The va_list by the
+addresses of what was in registers and, behind it, of what was on the stack.
+"""
 
 CONVENTION = _CONVENTIONS.get(platform.machine()) if sys.platform == "linux" else None
 
 
-def logger_type(convention: _Convention | None = CONVENTION) -> Any:
+def logger_type() -> Any:
     """The type of a logger: a function of the five named arguments, and of all that may follow."""
-    if convention is None:
+    if CONVENTION is None:
         return ctypes.CFUNCTYPE(None, *_NAMED)
-    words = [c_size_t] * (convention.words - len(_NAMED))
+    words = [c_size_t] * (CONVENTION[0] - len(_NAMED))
     return ctypes.CFUNCTYPE(None, *_NAMED, *words, *[c_double] * 8, *[c_size_t] * _STACKED)
 
 
-def formatted(
-    form: bytes, passed: Sequence[float], convention: _Convention | None = CONVENTION
-) -> bytes:
+def formatted(form: bytes, passed: Sequence[float]) -> bytes:
     """The format with the arguments that a logger was passed behind it.
 
     As it comes where this processor is none of those above, where one of them is a long double, or
     where there are too many.
     """
-    if convention is None or not 0 < form.count(b"%") + form.count(b"*") <= _STACKED:
+    places = form.count(b"%") + form.count(b"*")
+    if CONVENTION is None or not 0 < places <= _STACKED or _LONG.search(form):
         return form
-    if _LONG.search(form):
-        return form
-    named = len(_NAMED)
-    layout = f"={8 * named}x{convention.words - named}Q{'d8x' * 8}{_STACKED}Q"
+    (registers, va_list), named = CONVENTION, len(_NAMED)
+    layout = f"={8 * named}x{registers - named}Q{'d8x' * 8}{_STACKED}Q"
     area = ctypes.create_string_buffer(struct.pack(layout, *passed))
     words = ctypes.addressof(area)
 
     def printed(text: Any, size: int) -> int:
-        read = convention.va_list(words, words + 8 * convention.words + 128)
+        read = va_list(words, words + 8 * registers + 128)
         return int(_vsnprintf()(text, size, form, ctypes.create_string_buffer(read)))
 
     size = printed(None, 0)

@@ -80,10 +80,11 @@ class Master:
         self._receive = receive
         self.meanwhile: Callable[[], None] = lambda: None
         """Called while the loop of a run in real time goes on without Python's lock."""
-        slots, values, texts = self.slots, self.values, self.texts
-        self.plan = Planner(
-            system, instances, slots, values, self.scenario, texts, self._drives, pacer
-        ).plan()
+        by_name, values = {i.name: i for i in instances}, self.values
+        planner = Planner(
+            system, by_name, self.slots, values, self.scenario, self.texts, self._drives, pacer
+        )
+        self.plan = planner.plan()
         self._pacer = pacer
         self._loop = made = make_loop(self.plan, engine, None if pacer else self.total_steps)
         self._alone = made if pacer and isinstance(made, CompiledLoop) and made.alone else None

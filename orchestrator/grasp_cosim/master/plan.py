@@ -6,7 +6,7 @@ buffer of their type beside the vector. Of a String output the vector has, at it
 its text in a table of those seen so far; a connection between Strings is a call.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -73,36 +73,28 @@ def slots_of(system: System) -> dict[Port, int]:
     return {port: slot for slot, port in enumerate(ports)}
 
 
+@dataclass(eq=False)
 class Planner:
-    """Makes the plan of a system: collects its parts in the order of execution."""
+    """Makes the plan of a system: collects its parts in the order of execution.
 
-    def __init__(
-        self,
-        system: System,
-        instances: Sequence[Instance],
-        slots: Mapping[Port, int],
-        values: npt.NDArray[np.float64],
-        scenario: Scenario,
-        texts: Mapping[Port, Texts],
-        drives: Mapping[Port, Drive],
-        pacer: Pacer | None = None,
-    ) -> None:
-        """Over the given vector of values; slots are those of slots_of(), texts by String output.
+    Over the given vector of values; slots are those of slots_of(), texts by String output. The
+    scenario is asked at the start of each macro step, after the pacer of a run in real time.
+    """
 
-        The scenario is asked at the start of each macro step, after the pacer of a run in real
-        time.
-        """
-        self.system = system
-        self.instances = {instance.name: instance for instance in instances}
-        self.slots = slots
-        self.scenario = scenario
-        self.texts = texts
-        self.drives = drives
-        self.pacer = pacer
+    system: System
+    instances: Mapping[str, Instance]
+    slots: Mapping[Port, int]
+    values: npt.NDArray[np.float64]
+    scenario: Scenario
+    texts: Mapping[Port, Texts]
+    drives: Mapping[Port, Drive]
+    pacer: Pacer | None = None
+
+    def __post_init__(self) -> None:
         self.stamps = 0
-        self.transforms = system.once(transforms)
-        self.made = Plan(values, np.zeros(2))
-        self.view: Any = memoryview(values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
+        self.transforms = self.system.once(transforms)
+        self.made = Plan(self.values, np.zeros(2))
+        self.view: Any = memoryview(self.values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
     def plan(self) -> Plan:
         """The program of a macro step in the scheme of the system, and what it works on."""
