@@ -23,40 +23,27 @@ Returns 0, less where that failed, or more where it might not fail for a shorter
 _BDF, _ONE_STEP, _ROOT_RETURN = 2, 2, 2
 _PASSED = CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _SAID = CFUNCTYPE(None, c_int, c_char_p, c_char_p, c_char_p, c_int, c_void_p, c_void_p)
+_CORE, _CVODE = libraries.sundials_core, libraries.sundials_cvode
 
 
-def _bound(library: Any, name: str, kinds: Sequence[Any], result: Any = c_int) -> Any:
+def _bound(library: Any, name: str, kinds: Sequence[Any], result: Any = c_void_p) -> Any:
     return CFUNCTYPE(result, *kinds)((name, library))
 
 
-def _of_cvode(name: str, *kinds: Any) -> Any:
-    return _bound(libraries.sundials_cvode, name, [c_void_p, *kinds])
+_new_vector = _bound(libraries.sundials_nvecserial, "N_VNew_Serial", [c_int64, c_void_p])
+_data_of = _bound(_CORE, "N_VGetArrayPointer", [c_void_p])
+_new_matrix = _bound(
+    libraries.sundials_sunmatrixdense, "SUNDenseMatrix", [c_int64, c_int64, c_void_p]
+)
+_new_linear = _bound(libraries.sundials_sunlinsoldense, "SUNLinSol_Dense", [c_void_p] * 3)
+_create = _bound(_CVODE, "CVodeCreate", [c_int, c_void_p])
+_set_stop = _bound(_CVODE, "CVodeSetStopTime", [c_void_p, c_double], c_int)
+_step = _bound(_CVODE, "CVode", [c_void_p, c_double, c_void_p, c_void_p, c_int], c_int)
 
 
-_core, _serial = libraries.sundials_core, libraries.sundials_nvecserial
-_dense, _linear = libraries.sundials_sunmatrixdense, libraries.sundials_sunlinsoldense
-_new_context = _bound(_core, "SUNContext_Create", [c_int, c_void_p])
-_be_silent = _bound(_core, "SUNContext_ClearErrHandlers", [c_void_p])
-_tell = _bound(_core, "SUNContext_PushErrHandler", [c_void_p, _SAID, c_void_p])
-_free_context = _bound(_core, "SUNContext_Free", [c_void_p])
-_new_vector = _bound(_serial, "N_VNew_Serial", [c_int64, c_void_p], c_void_p)
-_data_of = _bound(_core, "N_VGetArrayPointer", [c_void_p], c_void_p)
-_free_vector = _bound(_core, "N_VDestroy", [c_void_p], None)
-_new_matrix = _bound(_dense, "SUNDenseMatrix", [c_int64, c_int64, c_void_p], c_void_p)
-_free_matrix = _bound(_core, "SUNMatDestroy", [c_void_p], None)
-_new_linear = _bound(_linear, "SUNLinSol_Dense", [c_void_p] * 3, c_void_p)
-_free_linear = _bound(_core, "SUNLinSolFree", [c_void_p])
-_create = _bound(libraries.sundials_cvode, "CVodeCreate", [c_int, c_void_p], c_void_p)
-_init = _of_cvode("CVodeInit", _PASSED, c_double, c_void_p)
-_init_again = _of_cvode("CVodeReInit", c_double, c_void_p)
-_set_tolerances = _of_cvode("CVodeSVtolerances", c_double, c_void_p)
-_set_roots = _of_cvode("CVodeRootInit", c_int, _PASSED)
-_set_linear = _of_cvode("CVodeSetLinearSolver", c_void_p, c_void_p)
-_set_longest = _of_cvode("CVodeSetMaxStep", c_double)
-_set_stop = _of_cvode("CVodeSetStopTime", c_double)
-_no_warning = _of_cvode("CVodeSetNoInactiveRootWarn")
-_step = _of_cvode("CVode", c_double, c_void_p, c_void_p, c_int)
-_free = _bound(libraries.sundials_cvode, "CVodeFree", [c_void_p], None)
+def _done(library: Any, name: str, *arguments: Any) -> None:
+    """Call a function that returns a status; by its name, as FMPy's of that name has types."""
+    _check(library[name](*arguments))
 
 
 class CvodeError(Exception):
@@ -73,33 +60,32 @@ class Cvode:
         self._chosen = chosen
         self._error: BaseException | None = None
         self._said = ""
-        context = c_void_p()
-        _check(_new_context(0, byref(context)))
-        self._context = context
-        self._x, self._smallest = (_new_vector(states, context) for _ in range(2))
+        self._context = context = c_void_p()
+        _done(_CORE, "SUNContext_Create", 0, byref(context))
+        self._x, self._smallest = (c_void_p(_new_vector(states, context)) for _ in range(2))
         self.x: npt.NDArray[np.float64] = _view(self._x, states)
         """The states now."""
-        self._matrix = _new_matrix(states, states, context)
-        self._linear = _new_linear(self._x, self._matrix, context)
-        self._memory = c_void_p(_create(_BDF, context))
+        self._matrix = c_void_p(_new_matrix(states, states, context))
+        self._linear = c_void_p(_new_linear(self._x, self._matrix, context))
+        self._memory = memory = c_void_p(_create(_BDF, context))
         self._passed = _PASSED(self._guarded(slopes)), _PASSED(self._guarded(crossings, True))
         self._listening = _SAID(self._hear)
-        _be_silent(context)
-        _tell(context, self._listening, None)
+        _done(_CORE, "SUNContext_ClearErrHandlers", context)
+        _done(_CORE, "SUNContext_PushErrHandler", context, self._listening, None)
         self.x[:] = 0.0
-        _check(_init(self._memory, self._passed[0], 0.0, self._x))
+        _done(_CVODE, "CVodeInit", memory, self._passed[0], c_double(0.0), self._x)
         self._tolerate(np.ones(states))
         if indicators:
-            _check(_set_roots(self._memory, indicators, self._passed[1]))
-        _check(_set_linear(self._memory, self._linear, self._matrix))
-        _check(_set_longest(self._memory, chosen.maximum_step or 0.0))
-        _check(_no_warning(self._memory))
+            _done(_CVODE, "CVodeRootInit", memory, indicators, self._passed[1])
+        _done(_CVODE, "CVodeSetLinearSolver", memory, self._linear, self._matrix)
+        _done(_CVODE, "CVodeSetMaxStep", memory, c_double(chosen.maximum_step or 0.0))
+        _done(_CVODE, "CVodeSetNoInactiveRootWarn", memory)
 
     def restart(self, time: float, nominals: npt.NDArray[np.float64] | None = None) -> None:
         """Begin anew at a time, in s, with the states in x; with nominals where these are new."""
         if nominals is not None:
             self._tolerate(nominals)
-        _check(_init_again(self._memory, time, self._x))
+        _done(_CVODE, "CVodeReInit", self._memory, c_double(time), self._x)
 
     def step(self, stop: float) -> tuple[float, bool]:
         """Go on by one step, at most to `stop`, in s; the time, and if an indicator changed there.
@@ -118,19 +104,19 @@ class Cvode:
 
     def close(self) -> None:
         """Free all of it."""
-        _free(byref(self._memory))
-        _free_linear(self._linear)
-        _free_matrix(self._matrix)
+        _CVODE["CVodeFree"](byref(self._memory))
+        _CORE["SUNLinSolFree"](self._linear)
+        _CORE["SUNMatDestroy"](self._matrix)
         for vector in (self._x, self._smallest):
-            _free_vector(vector)
-        _free_context(byref(self._context))
+            _CORE["N_VDestroy"](vector)
+        _CORE["SUNContext_Free"](byref(self._context))
         del self._passed, self._listening  # they refer to this
 
     def _tolerate(self, nominals: npt.NDArray[np.float64]) -> None:
         relative, absolute = self._chosen.relative_tolerance, self._chosen.absolute_tolerance
         share = relative / 100.0 if absolute is None else absolute
         _view(self._smallest, len(nominals))[:] = share * nominals
-        _check(_set_tolerances(self._memory, relative, self._smallest))
+        _done(_CVODE, "CVodeSVtolerances", self._memory, c_double(relative), self._smallest)
 
     def _guarded(self, function: Function, roots: bool = False) -> Callable[..., int]:
         """For CVode: what it raises waits until CVode has returned."""
@@ -148,7 +134,7 @@ class Cvode:
         self._said = " ".join((text or b"").decode(errors="replace").split())
 
 
-def _view(vector: int, size: int) -> npt.NDArray[np.float64]:
+def _view(vector: c_void_p, size: int) -> npt.NDArray[np.float64]:
     return np.ctypeslib.as_array((c_double * size).from_address(_data_of(vector)))
 
 
