@@ -92,12 +92,7 @@ class Outputs(NamedTuple):
             depends_initially_on={"intensity[j]"},
         ),
     ]
-    hold: Annotated[
-        float,
-        Output(
-            "h, from 0 while approaching to 1 in a grasp", unit="1", nominal=1.0, depends_on=set()
-        ),
-    ]
+    hold: holding.Hold
 
 
 def initial_state(p: Params, u: Inputs) -> State:

@@ -6,7 +6,12 @@ P: mean force with which they press         h = P^2/(P^2 + P_0^2) · w_0^2/(w_0^
 from dataclasses import dataclass
 from typing import Annotated
 
-from block_variables import Group, Parameter
+from block_variables import Group, Output, Parameter
+
+Hold = Annotated[
+    float,
+    Output("h, from 0 while approaching to 1 in a grasp", unit="1", nominal=1.0, depends_on=set()),
+]
 
 
 @dataclass(frozen=True, slots=True)
