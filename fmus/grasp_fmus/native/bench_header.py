@@ -8,6 +8,7 @@ proxy: datagrams, values and keys. Protocol: link/README.md
 import re
 import struct
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from itertools import chain, count
 from pathlib import Path
 from string import Template
@@ -32,22 +33,13 @@ _MEANINGS: dict[Causality, str] = {
 }
 
 
-class Member(NamedTuple):
-    """A variable in C: its identifier, and where it begins in a body, in bytes."""
-
-    variable: LinkVariable
-    identifier: str
-    offset: int
-
-
 class Group(NamedTuple):
-    """The variables of a causality; the body that holds them alone has `size` bytes."""
+    """The variables of a causality, with their identifiers in C."""
 
     prefix: str
     causality: Causality
     struct: str
-    members: list[Member]
-    size: int
+    members: list[tuple[LinkVariable, str]]
 
 
 def bench_header(
@@ -67,7 +59,8 @@ def bench_header(
     """
     check_size(signature)
     prefix = c_prefix(name)
-    groups = [Group(prefix, c, f"{prefix}_{c}s", *members(signature, c)) for c in ORDER]
+    groups = [Group(prefix, c, f"{prefix}_{c}s", members(signature, c)) for c in ORDER]
+    sizes = {f"{group.causality}s_size": 8 * len(group.members) for group in groups}
     pairs = [*((g, _CHECK) for g in groups), *zip(groups, (_UNPACK, _UNPACK, _PACK), strict=True)]
     return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
         title=comment(name),
@@ -75,8 +68,8 @@ def bench_header(
         wire=wire(prefix, signature),
         packing="\n".join(_function(group, *texts) for group, texts in pairs),
         too_long=TOO_LONG,
-        answer_size=link.HEAD.size + link.TAG_SIZE + max(groups[-1].size, LARGEST_REASON),
-        **{f"{group.causality}s_size": group.size for group in groups},
+        answer_size=link.HEAD.size + link.TAG_SIZE + max(sizes["outputs_size"], LARGEST_REASON),
+        **sizes,
     )
 
 
@@ -120,55 +113,46 @@ def structs(
     descriptions: Mapping[str, str],
 ) -> str:
     """Return the structs of groups in C, those that are set with a macro of their start values."""
-    lines = []
+    made = []
     for group in groups:
-        lines.append(_struct(group, meanings[group.causality], descriptions))
+        lines = []
+        for v, name in group.members:
+            said = descriptions.get(v.name, "").replace("·", ".")
+            text = comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
+            lines.append(f"    {f'{_TYPES[v.kind]} {name};':<40} /* {text} */")
+        head = f"/* {meanings[group.causality]} */\ntypedef struct {{"
+        none = f"    uint8_t none; /* the model has no {group.causality}s */"
+        made += [head, *(lines or [none]), f"}} {group.struct};", ""]
         if group.causality != "output":
-            lines.append(_defaults(group, starts))
-    return "\n".join(lines)
+            values = [_literal(v, starts.get(v.name, _ZEROS[v.kind])) for v, _ in group.members]
+            padded = [f"{value}," for value in values[:-1]] + values[-1:]
+            pairs = zip(padded, group.members, strict=True)
+            lines = [f"    {value:<40} /* {comment(v.name)} */ \\" for value, (v, _) in pairs]
+            head = f"#define {group.struct.upper()}_DEFAULTS {{ \\"
+            made += [head, *(lines or ["    0 \\"]), "}", ""]
+    return "\n".join(made)
 
 
-def members(signature: Signature, causality: Causality) -> tuple[list[Member], int]:
-    """Return the variables of a causality in C, and the size in bytes of a body with them."""
-    found: list[Member] = []
+def members(signature: Signature, causality: Causality) -> list[tuple[LinkVariable, str]]:
+    """Return the variables of a causality, with their identifiers in C."""
+    found = []
     taken = set(WORDS)
     for variable in signature.of(causality):
         wanted = _identifier(variable.name, "v")
         endings = chain(["_"] if wanted in WORDS else [""], (f"_{i}" for i in count(2)))
         identifier = next(n for n in (f"{wanted}{ending}" for ending in endings) if n not in taken)
         taken.add(identifier)
-        found.append(Member(variable, identifier, 8 * len(found)))
-    return found, 8 * len(found)
-
-
-def _struct(group: Group, meaning: str, descriptions: Mapping[str, str]) -> str:
-    lines = []
-    for v, identifier, _ in group.members:
-        said = descriptions.get(v.name, "").replace("·", ".")
-        text = comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
-        lines.append(f"    {f'{_TYPES[v.kind]} {identifier};':<40} /* {text} */")
-    head = f"/* {meaning} */\ntypedef struct {{"
-    none = f"    uint8_t none; /* the model has no {group.causality}s */"
-    return _lines(head, lines, none, f"}} {group.struct};")
-
-
-def _defaults(group: Group, starts: Mapping[str, Value]) -> str:
-    values = [_literal(v, starts.get(v.name, _ZEROS[v.kind])) for v, _, _ in group.members]
-    padded = [f"{value}," for value in values[:-1]] + values[-1:]
-    names = [comment(v.name) for v, _, _ in group.members]
-    lines = [f"    {v:<40} /* {name} */ \\" for v, name in zip(padded, names, strict=True)]
-    return _lines(f"#define {group.struct.upper()}_DEFAULTS {{ \\", lines, "    0 \\", "}")
+        found.append((variable, identifier))
+    return found
 
 
 def _literal(v: LinkVariable, value: Value) -> str:
-    try:
+    packed = None
+    with suppress(struct.error, OverflowError):
         packed = Codec([v]).unpack(Codec([v]).pack(value))
-    except (struct.error, OverflowError):
-        packed = None
     if packed is None:
-        raise ValueError(
-            f"{v.name} = {value!r}, its start: must be a finite value of kind {v.kind}"
-        )
+        must = f"must be a finite value of kind {v.kind}"
+        raise ValueError(f"{v.name} = {value!r}, its start: {must}")
     [start] = packed
     if isinstance(start, bool):
         return str(start).lower()
@@ -194,18 +178,22 @@ _PACK = (
 
 
 def _function(group: Group, head: str, line: str, unused: str, end: str = "}") -> str:
-    """Return a function with a line for each member; `unused` where there is none."""
-    lines = [
-        line.format(prefix=group.prefix, kind=v.kind.lower(), name=name, at=at, text=string(v.name))
-        for v, name, at in group.members
-    ]
     begin = f"static inline {head.format_map(group._asdict())}\n{{"
-    return _lines(begin, lines, f"    {unused}", end)
+    return "\n".join([begin, *lines_of(group, line, unused), end, ""])
 
 
-def _lines(head: str, lines: list[str], none: str, end: str) -> str:
-    """Return a definition, with `none` where there are no lines in it."""
-    return "\n".join([head, *(lines or [none]), end, ""])
+def lines_of(group: Group, line: str, unused: str, first: int = 0) -> list[str]:
+    """Return a line for each variable; `unused` where there is none.
+
+    In it `at` is where the variable begins in a body, in bytes, `i` its place, counted from first.
+    """
+    found = []
+    for i, (v, name) in enumerate(group.members):
+        kind, text = v.kind.lower(), string(v.name)
+        number, truth = (" ? 1.0 : 0.0", " != 0.0") if v.kind == "Boolean" else ("", "")
+        known = {"prefix": group.prefix, "kind": kind, "name": name, "text": text, "at": 8 * i}
+        found.append(line.format(**known, i=first + i, number=number, truth=truth))
+    return found or [f"    {unused}"]
 
 
 def comment(text: str) -> str:

@@ -15,7 +15,7 @@ from c_compilers import BITS, LIBM
 from ..contract import Scalar
 from ..link import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file
-from .bench_header import Group, Member, comment, members, structs
+from .bench_header import Group, comment, lines_of, members, structs
 from .blocks import translated
 
 FOLDER = Path(__file__).parent
@@ -44,9 +44,16 @@ def c_only(model: Model) -> dict[str, bytes]:
     helpers = {file: (FOLDER / "c" / file).read_text("utf-8") for file in HELPERS}
     links = (LinkVariable(v.name, _KINDS[v.kind], v.causality, v.unit or None) for v in variables)
     signature = Signature(tuple(links))
-    groups = [Group(name, c, f"{name}_{c.title()}s", *members(signature, c)) for c in ORDER]
-    places = {v.name: i for i, v in enumerate(variables)}
-    inputs, parameters, outputs = ([*group.members] for group in groups)
+    groups = [Group(name, c, f"{name}_{c.title()}s", members(signature, c)) for c in ORDER]
+    inputs, parameters, outputs = groups
+    first = len(variables) - len(parameters.members)
+    lines = {
+        "get_inputs": lines_of(inputs, "    v[{i}] = u->{name}{number};", "(void)u, (void)v;"),
+        "get_parameters": lines_of(
+            parameters, "    v[{i}] = p->{name}{number};", "(void)p, (void)v;", first
+        ),
+        "put_outputs": lines_of(outputs, "    y->{name} = v[{i}]{truth};", "(void)v, (void)y;"),
+    }
     libm = called_of_libm(block)
     flags = (*BITS, *(f"-fno-builtin-{f}" for f in libm if f in LIBM))
     starts: dict[str, Value] = {v.name: v.start for v in variables if v.start is not None}
@@ -56,12 +63,10 @@ def c_only(model: Model) -> dict[str, bytes]:
         "libm": ", ".join(libm) or "nothing",
         "structs": structs(groups, _MEANINGS, starts, {v.name: v.description for v in variables}),
         "state_size": str(max(1, int(re.findall(r"N_STATE = (\d+)", block)[0]))),
-        "get_inputs": _body([_got(m, "u", places) for m in inputs], "u, (void)v"),
-        "get_parameters": _body([_got(m, "p", places) for m in parameters], "p, (void)v"),
-        "put_outputs": _body([_put(m, i) for i, m in enumerate(outputs)], "v, (void)y"),
+        **{function: "\n".join(body) for function, body in lines.items()},
         "command": f"cc {' '.join(flags)} -o {name} main.c {name}.c -lm",
-        "format": " %.17g" * len(outputs),
-        "arguments": "".join(f", (double)y->{m.identifier}" for m in outputs),
+        "format": " %.17g" * len(outputs.members),
+        "arguments": "".join(f", (double)y->{member}" for _, member in outputs.members),
     }
     files = {f"{name}.h": "c_only.h.in", f"{name}.c": "c_only.c.in", "main.c": "c_only_main.c.in"}
     written = {file: _filled(FOLDER / template, texts) for file, template in files.items()}
@@ -81,21 +86,6 @@ def called_of_libm(block: str) -> list[str]:
     called = {*re.findall(r"\w+(?=\()", re.sub(r"/\*.*?\*/", "", block, flags=re.DOTALL))}
     exact = {name for name, as_called in EXACT.items() if as_called in called}
     return sorted(exact | (called & {*LIBM}))
-
-
-def _got(m: Member, struct: str, places: Mapping[str, int]) -> str:
-    value = f"{struct}->{m.identifier}"
-    value = f"{value} ? 1.0 : 0.0" if m.variable.kind == "Boolean" else value
-    return f"v[{places[m.variable.name]}] = {value};"
-
-
-def _put(m: Member, place: int) -> str:
-    return f"y->{m.identifier} = v[{place}]{' != 0.0' if m.variable.kind == 'Boolean' else ''};"
-
-
-def _body(lines: list[str], unused: str) -> str:
-    """Return the lines of a function; of one without any, those of its arguments."""
-    return "\n".join(f"    {line}" for line in lines or [f"(void){unused};"])
 
 
 def _filled(template: Path, texts: Mapping[str, str]) -> str:

@@ -362,7 +362,10 @@ class Expressions:
         arguments = self._starred(node.args)
         named = {k.arg: self._value(k.value) for k in node.keywords if k.arg}
         if types.is_record(function):
-            return self._record(node, function, arguments, named)
+            found = self._matched(function, arguments, named, node)
+            for value, kind in zip(found, types.parts(function), strict=True):
+                self._common(value.type, kind, node)
+            return self._display(found, function)
         if not isinstance(function, FunctionType):
             self._other(node.func)
         return self._call(function, arguments, named, node)
@@ -370,7 +373,7 @@ class Expressions:
     def _call(
         self, function: Any, given: Sequence[Value], named: Mapping[str, Value], node: ast.AST
     ) -> Value:
-        arguments = self._matched(inspect.signature(function), given, named, node)
+        arguments = self._matched(function, given, named, node)
         made = self.translate(function, [a.type for a in arguments])
         texts = [a.text for a in arguments]
         for i in (i for i, by_address in enumerate(made.by_address) if by_address):
@@ -378,20 +381,13 @@ class Expressions:
             texts[i] = text[1:] if text[0] == "*" else f"&{text}"
         return Value(f"{made.name}({', '.join(texts)})", made.returns)
 
-    def _matched(
-        self, signature: inspect.Signature, given: Any, named: Any, node: ast.AST
-    ) -> list[Value]:
+    def _matched(self, function: Any, given: Any, named: Any, node: ast.AST) -> list[Value]:
+        signature = inspect.signature(function)
         if any(p.kind != p.POSITIONAL_OR_KEYWORD for p in signature.parameters.values()):
             self.refuse(node, "*args, **kwargs and keywords alone are not in the subset")
         bound = signature.bind(*given, **named)
         bound.apply_defaults()
         return [v if isinstance(v, Value) else self._number_of(v) for v in bound.arguments.values()]
-
-    def _record(self, node: ast.AST, cls: Any, given: Sequence[Value], named: Any) -> Value:
-        found = self._matched(inspect.signature(cls), given, named, node)
-        for value, kind in zip(found, types.parts(cls), strict=True):
-            self._common(value.type, kind, node)
-        return self._display(found, cls)
 
     def _method(self, node: ast.Call, of: ast.Attribute) -> Value:
         table = self.known(of.value)

@@ -24,13 +24,13 @@ class Target(NamedTuple):
         return {"windows": ".dll", "darwin": ".dylib"}.get(self.tuple.partition("-")[2], ".so")
 
 
-LINUX_X86 = Target("x86_64-linux", "linux64", "x86_64-linux-gnu.2.17")
-LINUX_ARM = Target("aarch64-linux", "linux64", "aarch64-linux-gnu.2.17")
-WINDOWS = Target("x86_64-windows", "win64", "x86_64-windows-gnu")
-MAC_X86 = Target("x86_64-darwin", "darwin64", "x86_64-macos")
-MAC_ARM = Target("aarch64-darwin", "darwin64", "aarch64-macos")
-
-KNOWN = (LINUX_X86, WINDOWS, LINUX_ARM, MAC_X86, MAC_ARM)
+LINUX_X86, WINDOWS, LINUX_ARM, MAC_X86, MAC_ARM = KNOWN = (
+    Target("x86_64-linux", "linux64", "x86_64-linux-gnu.2.17"),
+    Target("x86_64-windows", "win64", "x86_64-windows-gnu"),
+    Target("aarch64-linux", "linux64", "aarch64-linux-gnu.2.17"),
+    Target("x86_64-darwin", "darwin64", "x86_64-macos"),
+    Target("aarch64-darwin", "darwin64", "aarch64-macos"),
+)
 
 NAMES: dict[str, tuple[Target, ...]] = {
     "linux64": (LINUX_X86,),
