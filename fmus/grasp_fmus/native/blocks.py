@@ -11,17 +11,7 @@ from typing import Any
 from ..contract import Field, declared, longest_step, variables
 from .statements import Check, translated_function
 from .text import UntranslatableError, comment, identifier, number, string, wrapped
-from .types import (
-    BOOLEAN,
-    REAL,
-    SCALARS,
-    Function,
-    Program,
-    Type,
-    fields,
-    parts,
-    said,
-)
+from .types import BOOLEAN, REAL, SCALARS, Function, Program, Type, fields, parts, said
 
 HEAD = """\
 {title}

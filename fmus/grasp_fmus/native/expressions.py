@@ -19,17 +19,7 @@ from typing import Any, NoReturn
 
 from . import types
 from .text import Source, UntranslatableError, identifier, number
-from .types import (
-    BOOLEAN,
-    REAL,
-    SCALARS,
-    WHOLE,
-    Function,
-    Program,
-    Type,
-    Value,
-    said,
-)
+from .types import BOOLEAN, REAL, SCALARS, WHOLE, Function, Program, Type, Value, said
 
 CHOICE, OR, AND, EQUAL, LESS, SUM, PRODUCT, SIGN, WORD = range(1, 10)
 """How tightly operators bind in C; WORD is what needs no parentheses."""
@@ -314,10 +304,8 @@ class Expressions:
         return place
 
     def _on_attribute(self, node: ast.Attribute) -> Value:
-        return self.field(self._value(node.value), node.attr, node)
-
-    def field(self, value: Value, name: str, node: ast.AST) -> Value:
-        """An attribute of a NamedTuple or of parameters: a field, or a property."""
+        """Of a NamedTuple or of parameters: a field, or a property."""
+        value, name = self._value(node.value), node.attr
         t = value.type
         if t in SCALARS or isinstance(t, GenericAlias):
             self.refuse(node, f"{ast.unparse(node)}: {said(t)} has no {name}")

@@ -14,12 +14,6 @@ from .text import string
 C = Path(__file__).with_name("c")
 OF_BLOCK = ("arithmetic.h", "block_slave.h")
 OF_PROXY = ("sockets.h", "client.h", "channel.h", "proxy_slave.h")
-HEADERS = {
-    2: ("fmi2TypesPlatform.h", "fmi2FunctionTypes.h", "fmi2Functions.h"),
-    3: ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h"),
-}
-"""Of the FMI standard, by its version."""
-
 ICONS = {2: "model.png", 3: "terminalsAndIcons/icon.png"}
 
 _MAIN = """\
@@ -106,7 +100,7 @@ def _sources(
     included = "\n".join(f'#include "{file}"' for file in own)
     more = {"name": name, "fmi": fmi, "guid": guid, "slave": kind[-1], "included": included}
     files = [C / file for file in ("variable.h", "slave.h", *kind, f"fmi{fmi}.h")]
-    files += [C / "headers" / file for file in HEADERS[fmi]]
+    files += sorted((C / "headers").glob(f"fmi{fmi}*.h"))  # of the FMI standard
     return {
         f"{name}.c": Template(_MAIN).substitute(texts, **more).encode(),
         **{file: text.encode() for file, text in own.items()},

@@ -255,16 +255,13 @@ class Check(Body):
         self._say("return 0;")
 
     def _put(self, part: ast.FormattedValue) -> None:
-        value, spec = self._number(part.value).text, ""
-        if isinstance(part.format_spec, ast.JoinedStr):
-            spec = ast.literal_eval(part.format_spec.values[0])
-        digits = re.fullmatch(r"(?:\.(\d+))?g", spec)
-        if digits:
-            self._say(f"text_general(why, {value}, {digits[1] or 6});")
-        elif not spec:
-            self._say(f"text_number(why, {value});")
-        else:
-            self.refuse(part, f"{{...:{spec}}}: must be {{x}}, {{x!r}}, {{x:g}} or {{x:.3g}}")
+        value, spec = self._number(part.value).text, part.format_spec
+        text = ast.literal_eval(spec.values[0]) if isinstance(spec, ast.JoinedStr) else ""
+        digits = re.fullmatch(r"(?:\.(\d+))?g", text)
+        if text and not digits:
+            self.refuse(part, f"{{...:{text}}}: must be {{x}}, {{x!r}}, {{x:g}} or {{x:.3g}}")
+        call = f"general(why, {value}, {digits[1] or 6})" if digits else f"number(why, {value})"
+        self._say(f"text_{call};")
 
 
 def translated_function(program: Program, function: Any, types: Sequence[Type]) -> Function:

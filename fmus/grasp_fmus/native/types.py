@@ -139,18 +139,17 @@ class Program:
         if t in SCALARS:
             return "int" if t == BOOLEAN else "double"
         if t not in self._structs:
-            self._structs[t] = self._struct_name(t, near or {})
+            self._structs[t] = self.unique(*self._name_of(t, near or {}), t)
         return self._structs[t]
 
-    def _struct_name(self, t: Type, near: dict[str, Any]) -> str:
+    def _name_of(self, t: Type, near: dict[str, Any]) -> tuple[str, str]:
         if not isinstance(t, GenericAlias):
-            return self.unique(t.__module__, t.__name__, t)
-        modules = [near, *(vars(m) for m in near.values() if type(m) is type(sys))]
-        for names in modules:
+            return t.__module__, t.__name__
+        for names in [near, *(vars(m) for m in near.values() if type(m) is type(sys))]:
             for name, hint in names.items():
                 if name[0] != "_" and get_origin(hint) is tuple and of_hint(hint) == t:
-                    return self.unique(names["__name__"], name, t)
-        return self.unique("Tuple", str(len(parts(t))), t)
+                    return names["__name__"], name
+        return "Tuple", str(len(parts(t)))
 
     def member(self, t: Type, i: int) -> str:
         """How an item of a tuple is reached: .at[0], .at_0 or .name."""
