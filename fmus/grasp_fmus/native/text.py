@@ -89,11 +89,8 @@ class Source:
     @cached_property
     def functions(self) -> dict[int, ast.FunctionDef]:
         """Each function by the line that its code object begins at."""
-        found = {}
-        for node in ast.walk(self.tree):
-            if isinstance(node, ast.FunctionDef):
-                found[min([node.lineno, *(d.lineno for d in node.decorator_list)])] = node
-        return found
+        found = (n for n in ast.walk(self.tree) if isinstance(n, ast.FunctionDef))
+        return {min([n.lineno, *(d.lineno for d in n.decorator_list)]): n for n in found}
 
     @cached_property
     def comments(self) -> dict[int, tuple[str, bool]]:
