@@ -164,7 +164,7 @@ def test_what_a_system_file_says(tmp_path):
         ("{ relative_tolerance = 0 }", "relative_tolerance = 0: must be a number from 1e-13 to 0"),
         ("{ relative_tolerance = '1' }", "relative_tolerance = '1': must be a number from"),
         ("{ absolute_tolerance = 0.0 }", "absolute_tolerance = 0.0: must be a number greater than"),
-        ("{ maximum_step = -1.0 }", "maximum_step = -1.0 s: must be a number greater than 0"),
+        ("{ maximum_step = -1.0 }", "maximum_step = -1.0: must be a number greater than 0"),
     ],
 )
 def test_a_mistake_is_one_line(tmp_path, solver, message):

@@ -16,7 +16,7 @@ from ..report import terminal
 from ..report.timing import draw_result
 from ..sweeps.pictures import draw_sweep
 from ..sweeps.rows import as_rows, grid, varied
-from ..sweeps.sweep import cluster, kept_runs
+from ..sweeps.sweep import cluster
 from ..sweeps.sweep import sweep as run_sweep
 from ..sweeps.table import as_json as in_json
 from ..sweeps.table import as_text, check_format
@@ -220,8 +220,8 @@ def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: 
                 progress=not is_quiet(),
             )
     except KeyboardInterrupt:
-        kept = f"{kept_runs(out)} of {len(rows)} runs are kept beside {out}"
-        return fail(f"interrupted; {kept}, the same command goes on", INTERRUPTED)
+        said = f"interrupted; finished runs are kept beside {out}, the same command goes on"
+        return fail(said, INTERRUPTED)
     if plot:
         picture = out.with_suffix(".png")
         with waiting("drawing"):

@@ -1,16 +1,8 @@
 """A metric: a function of recorded signals, with a name, a unit and a description.
 
-    from grasp_cosim import metric
-
-    @metric("rise_time", unit="s", description="from 10 % to 90 % of the settled contact force")
-    def rise_time(run):
-        force = abs(run["plant.contact_force[1]"])
-        ...
-        return t_90 - t_10
-
-`run` is a Signals: names begin with a role or a component, and values are in SI base units,
-whatever the FMUs have them in. The function returns a number, True or
-False, None where the moment never comes, or a list of these, one per finger for instance.
+The function gets a Signals: names begin with a role or a component, and values are in SI base
+units. It returns a number, True or False, None where the moment never comes, or a list of these,
+one per finger for instance. An example: docs/guide.md.
 """
 
 from __future__ import annotations

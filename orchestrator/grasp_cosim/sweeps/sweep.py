@@ -308,11 +308,5 @@ def _identity(task: Task, rows: Sequence[Row]) -> str:
     return _hash_of(json.dumps(decisive, sort_keys=True).encode(), *contents)
 
 
-def kept_runs(out: Path) -> int:
-    """The number of runs that are kept of a sweep that was ended before all were done."""
-    path = _beside(out)
-    return max(path.read_bytes().count(b"\n") - 1, 0) if path.exists() else 0
-
-
 def _beside(table: Path) -> Path:
     return table.with_name(f"{table.name}.rows")

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import cached_property
-from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -82,12 +81,10 @@ class Solver:
     def __post_init__(self) -> None:
         must = f"a number from {FINEST:g} to {COARSEST:g}"
         number("relative_tolerance", self.relative_tolerance, FINEST, COARSEST, must=must)
-        if self.absolute_tolerance is not None:
-            must = "a number greater than 0, at most 1"
-            number("absolute_tolerance", self.absolute_tolerance, 0.0, 1.0, above=True, must=must)
-        if self.maximum_step is not None:
-            must = "a number greater than 0"
-            number("maximum_step", self.maximum_step, 0.0, above=True, must=must, unit="s")
+        for name, high in (("absolute_tolerance", 1.0), ("maximum_step", LONGEST)):
+            if (value := getattr(self, name)) is not None:
+                must = f"a number greater than 0, at most {high:g}"
+                number(name, value, 0.0, high, above=True, must=must)
 
 
 @dataclass(frozen=True)
@@ -288,9 +285,7 @@ class Realtime:
     lock_memory: bool = False
 
     def __post_init__(self) -> None:
-        factor = self.factor
-        if isinstance(factor, bool) or not isinstance(factor, Real) or not 0 < factor < math.inf:
-            raise InputError(f"factor = {factor!r}: must be a finite number > 0")
+        number("factor", self.factor, 0.0, above=True, must="a finite number > 0")
         choice("overrun", self.overrun, OVERRUNS)
         if self.priority is not None:
             whole("priority", self.priority, 1, 99, must="a whole number from 1 to 99")

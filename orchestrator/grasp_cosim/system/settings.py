@@ -28,27 +28,22 @@ def settings(system: Structure) -> dict[str, Any]:
         **({"diverging": system.diverging} if system.diverging != "stop" else {}),
         "initialisation": asdict(system.initialisation),
         "components": {
-            component.name: {
-                "fmu": component.fmu.name,
-                "values": dict(component.values),
-                "step": None if component.step_ns is None else component.step_ns / NANOSECONDS,
-                "isolation": component.isolation,
-                "rename": dict(component.rename),
-                "units": dict(component.units),
-                **({"solver": asdict(solver)} if (solver := component.integrated) else {}),
+            c.name: {
+                "fmu": c.fmu.name,
+                "values": dict(c.values),
+                "step": None if c.step_ns is None else c.step_ns / NANOSECONDS,
+                "isolation": c.isolation,
+                "rename": dict(c.rename),
+                "units": dict(c.units),
+                **({"solver": asdict(solver)} if (solver := c.integrated) else {}),
             }
-            for component in system.components
+            for c in system.components
         },
         "metrics": list(system.metrics),
         "roles": dict(system.roles),
         "connections": [
-            {
-                "from": str(connection.source),
-                "to": str(connection.target),
-                "factor": connection.factor,
-                "offset": connection.offset,
-            }
-            for connection in system.connections
+            {"from": str(c.source), "to": str(c.target), "factor": c.factor, "offset": c.offset}
+            for c in system.connections
         ],
         "events": [event_entry(e) for e in system.events],
         "faults": [fault_entry(f) for f in system.faults],
