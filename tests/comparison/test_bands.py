@@ -192,11 +192,11 @@ def test_the_tube_holds_the_curve_between_samples_too(values, shift, held):
     """Anywhere within the shift of any time the curve is in the tube of that time."""
     whole = sampled(values, held)
     at = np.linspace(0.0, whole.time[-1], 37)
-    allowed = tube(whole, at, shift)
+    low, high = tube(whole, at, shift)
     for fraction in (-1.0, -0.3, 0.0, 0.7, 1.0):
         taken = whole.at(at + fraction * shift)
-        assert (allowed.low <= taken + 1e-6).all()
-        assert (taken <= allowed.high + 1e-6).all()
+        assert (low <= taken + 1e-6).all()
+        assert (taken <= high + 1e-6).all()
 
 
 def test_an_impact_that_comes_a_step_later_is_no_deviation_but_a_higher_one_is():

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from html import escape
 from math import isfinite
 from pathlib import Path
@@ -13,7 +14,6 @@ import numpy.typing as npt
 
 from ..base.files import write_text
 from ..base.text import counted, grouped
-from ..metrics.metric import Metric
 from ..report.embed import LIMIT, Shown, fit
 from ..report.page import Scene, data_html, document, looks, moments, scripts, traces_html
 from ..report.tables import (
@@ -28,7 +28,7 @@ from ..report.tables import (
     summary,
     table,
 )
-from .bands import Compared
+from .bands import Compared, plain
 from .compare import Comparison
 from .qualify import Qualification
 from .side import Side
@@ -51,12 +51,12 @@ AROUND = 0.02
 Columns = Mapping[str, npt.NDArray[Any]]
 
 
-def write_comparison(c: Comparison, path: Path, limit: int = LIMIT) -> None:
-    """Write the page of a comparison; of more than `limit` values the signals are thinned."""
-    write_text(path, comparison_html(c, limit))
+def write_comparison(c: Comparison, path: Path) -> None:
+    """Write the page of a comparison."""
+    write_text(path, comparison_html(c))
 
 
-def write_qualification(q: Qualification, path: Path, limit: int = LIMIT) -> bool:
+def write_qualification(q: Qualification, path: Path) -> bool:
     """Write the page of a qualification, as of a comparison; False where there were no two runs.
 
     A page that was there before is gone then.
@@ -67,12 +67,12 @@ def write_qualification(q: Qualification, path: Path, limit: int = LIMIT) -> boo
         return False
     said = [*difference_lines(q.swap.differences), *notes(c)]
     text = f"{qualification_verdict(q)}: {reason(q)}"
-    write_text(path, _html(c, limit, text, q.qualified, said))
+    write_text(path, _html(c, LIMIT, text, q.qualified, said))
     return True
 
 
 def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
-    """Return the page of a comparison as text, see write_comparison."""
+    """Return the page as text; of more than `limit` values the signals are thinned."""
     return _html(c, limit, verdict(c), c.alike, [*absent_lines(c), *notes(c)])
 
 
@@ -118,9 +118,9 @@ def _drawn(
     yield "b", second.at(time)
     yield "apart", np.interp(time, apart.time, apart.values)
     if isfinite(s.band.width):
-        around = tube(first, time, s.band.time)
-        yield "low", around.low - s.band.width
-        yield "high", around.high + s.band.width
+        low, high = tube(first, time, s.band.time)
+        yield "low", low - s.band.width
+        yield "high", high + s.band.width
 
 
 def _state(
@@ -192,66 +192,44 @@ def _row(what: str, cells: Iterable[str]) -> str:
 
 
 def _metrics(c: Comparison) -> str:
-    """The metrics of both side by side, in the order in which they are worked out."""
-    rows = [
-        _metric(metric, m)
-        for metric in c.asked
-        for m in sorted(c.metrics, key=lambda m: m.name)
-        if m.name.partition("[")[0] == metric.name
-    ]
-    if not rows:
-        return "<p>There are no metrics that both have.</p>"
-    first, second = c.names
-    return table(_heads(first, second, f"{second} − {first}", "", "band"), rows)
-
-
-def _heads(*heads: str) -> str:
-    """The heads of columns of numbers, after one of names."""
-    return "<th></th>" + "".join(f'<th class="n">{head}</th>' for head in heads)
-
-
-def _metric(metric: Metric, m: Compared) -> str:
-    entry = m.name.removeprefix(metric.name)
-    title = metric.column_title(m.name) if m.name in metric.columns else f"{metric.title}{entry}"
-    there = m.original is not None and m.candidate is not None
-    apart = (m.candidate or 0.0) - (m.original or 0.0) if there else None
-    first, second, difference, band = (
-        f'<td class="n">{escape(scaled(v, metric.factor))}</td>'
-        for v in (m.original, m.candidate, apart, m.band.width)
-    )
-    return f"{_name(title, metric.display_unit)}{first}{second}{difference}{_verdict(m)}{band}"
-
-
-def _name(name: str, unit: str | None) -> str:
-    return f"<td>{escape(name)}{f' in {escape(unit)}' if unit else ''}</td>"
+    """The metrics, in the order in which they are worked out."""
+    rows = []
+    for metric in c.asked:
+        for m in sorted(c.metrics, key=lambda m: m.name):
+            if plain(m.name) == metric.name:
+                known, entry = m.name in metric.columns, m.name.removeprefix(metric.name)
+                title = metric.column_title(m.name) if known else f"{metric.title}{entry}"
+                shown = partial(scaled, factor=metric.factor)
+                rows.append(_compared(c, m, title, metric.display_unit, shown))
+    return table(_heads(c), rows) if rows else "<p>There are no metrics that both have.</p>"
 
 
 def _signals(c: Comparison) -> str:
-    """The signals, the worst first; a button goes to the worst moment."""
-    rows = [
-        f'{_name(s.name, s.unit)}{_verdict(s)}<td class="n">{_moment(c, s)}</td>'
-        + "".join(
-            f'<td class="n">{escape(number(v, 4))}</td>'
-            for v in (s.deviation, s.band.width, s.original, s.candidate)
+    shown = partial(number, digits=4)
+    return table(_heads(c), [_compared(c, s, s.name, s.unit, shown) for s in c.signals])
+
+
+def _heads(c: Comparison) -> str:
+    heads = ("", "at", "deviation", "band", *c.names)
+    return "<th></th>" + "".join(f'<th class="n">{head}</th>' for head in heads)
+
+
+def _compared(
+    c: Comparison, one: Compared, title: str, unit: str | None, shown: Callable[[Any], str]
+) -> str:
+    """A row: how many widths of its band it is off; a button goes to the worst moment."""
+    said, at = "inside", ""
+    if not isfinite(one.deviation):
+        said = "one has none"
+    elif not one.inside:
+        said = f"{one.ratio:.3g} × band" if isfinite(one.ratio) else "differ"
+    if one.time is not None:
+        begin, end = (one.time + by * (AROUND * (c.end - c.begin) or 1e-3) for by in (-1.0, 1.0))
+        at = (
+            f'<button type="button" data-show="{escape(one.name)}" data-from="{begin!r}" '
+            f'data-to="{end!r}">{number(one.time)} s</button>'
         )
-        for s in c.signals
-    ]
-    return table(_heads("", "at", "deviation", "band", *c.names), rows)
-
-
-def _moment(c: Comparison, s: Compared) -> str:
-    time, around = s.time or 0.0, AROUND * (c.end - c.begin) or 1e-3
-    return (
-        f'<button type="button" data-show="{escape(s.name)}" data-from="{time - around!r}" '
-        f'data-to="{time + around!r}">{number(time)} s</button>'
-    )
-
-
-def _verdict(compared: Compared) -> str:
-    """How many widths of its band it is off, and if that is in the band."""
-    if compared.inside:
-        return '<td class="n">inside</td>'
-    if not isfinite(compared.deviation):
-        return '<td class="n warn">one has none</td>'
-    times = f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "differ"
-    return f'<td class="n warn">{times}</td>'
+    values = map(shown, (one.deviation, one.band.width, one.original, one.candidate))
+    cells = "".join(f'<td class="n">{cell}</td>' for cell in (at, *map(escape, values)))
+    warn, of_unit = "" if one.inside else " warn", f" in {escape(unit)}" if unit else ""
+    return f'<td>{escape(title)}{of_unit}</td><td class="n{warn}">{said}</td>{cells}'

@@ -45,13 +45,6 @@ class Curve(NamedTuple):
         )
 
 
-class Tube(NamedTuple):
-    """The least and the largest value of a curve within a shift of each time."""
-
-    low: Array
-    high: Array
-
-
 class Deviation(NamedTuple):
     """How far apart two curves are at each time in s, at least 0.
 
@@ -65,8 +58,8 @@ class Deviation(NamedTuple):
     candidate: Array
 
 
-def tube(around: Curve, time: Array, shift: float) -> Tube:
-    """The tube around a curve: what it takes from time - shift to time + shift, both in s."""
+def tube(around: Curve, time: Array, shift: float) -> tuple[Array, Array]:
+    """The least and the largest value of a curve from time - shift to time + shift, both in s."""
     around = around.continued(shift)
     edges = around.at(time - shift), around.at(time + shift)
     low, high = np.minimum(*edges), np.maximum(*edges)
@@ -75,7 +68,7 @@ def tube(around: Curve, time: Array, shift: float) -> Tube:
     some = last > first
     low[some] = np.minimum(low[some], _least(around.values, first[some], last[some]))
     high[some] = np.maximum(high[some], -_least(-around.values, first[some], last[some]))
-    return Tube(low, high)
+    return low, high
 
 
 def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
@@ -86,8 +79,8 @@ def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
     time = np.union1d(reference.time, candidate.time)
     ours, theirs = reference.at(time), candidate.at(time)
     around_ours, around_theirs = (tube(c, time, shift) for c in (reference, candidate))
-    near_theirs = np.clip(theirs, around_ours.low, around_ours.high)
-    near_ours = np.clip(ours, around_theirs.low, around_theirs.high)
+    near_theirs = np.clip(theirs, *around_ours)
+    near_ours = np.clip(ours, *around_theirs)
     theirs_out, ours_out = np.abs(theirs - near_theirs), np.abs(ours - near_ours)
     first = theirs_out >= ours_out
     return Deviation(

@@ -220,11 +220,15 @@ def timing_html(timing: Timing, end: float) -> str:
 
     Without matplotlib a line says that the chart needs it.
     """
-    kind = "warn" if timing.overruns else "sum"
+    kind, rate = "warn" if timing.overruns else "sum", number(timing.real_time_factor)
+    pace = (
+        f"{rate} times as fast as real time, asked for {number(timing.factor)}",
+        f"after an overrun: {timing.overrun}",
+    )
     return (
         f'<p class="{kind}">{escape(kept(timing))}</p>{_chart(timing, end)}'
         f'<div class="paced"><div><h3>Parts of a step</h3>{_parts(timing)}</div>'
-        f"<div><h3>Pace</h3>{_pace(timing)}"
+        f"<div>{bullets('Pace', pace, '')}"
         f"{bullets('Granted by the machine', timing.granted, 'Nothing.')}"
         f"{bullets('Refused by the machine', timing.refused, 'Nothing.')}</div></div>"
         f"{_listed(timing)}"
@@ -241,18 +245,6 @@ def _chart(timing: Timing, end: float) -> str:
         f'<div class="scroll"><div class="chart" role="img" aria-label="{text}">{svg}</div></div>'
         f"{svg_button('.chart svg', 'timing')}"
     )
-
-
-def _pace(timing: Timing) -> str:
-    rows = {
-        "period": duration(timing.period),
-        "factor asked for": number(timing.factor),
-        "times as fast as real time": number(timing.real_time_factor),
-        "after an overrun": timing.overrun,
-        "steps": grouped(timing.steps),
-        "overruns": grouped(timing.overruns),
-    }
-    return table("", (f"<td>{name}</td><td>{escape(text)}</td>" for name, text in rows.items()))
 
 
 def _parts(timing: Timing) -> str:
