@@ -79,7 +79,7 @@ def relayed(net, arriving):
         while (due := traffic.next_due()) is not None and due <= end:
             at.append(due)
             traffic.send_due(due)
-            for c in traffic.snapshot().values():
+            for c in traffic.counters.values():
                 assert c.received + c.duplicated == c.delivered + c.dropped + c.held
 
     at = []
@@ -94,7 +94,7 @@ def relayed(net, arriving):
 
         traffic.receive(direction, send, now)
     send_until(math.inf)
-    return sent, log, traffic.snapshot()
+    return sent, log, traffic.counters
 
 
 def expected(net, arriving, most):

@@ -220,7 +220,6 @@ def _asked(side: Side, part: Side, more: Sequence[Metric]) -> tuple[Metric, ...]
 def _only(
     ours: Collection[str], theirs: Collection[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What only one has, in the order of each."""
     return tuple(n for n in ours if n not in theirs), tuple(n for n in theirs if n not in ours)
 
 

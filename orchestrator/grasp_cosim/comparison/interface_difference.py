@@ -272,7 +272,6 @@ def _less(a: float, b: float) -> bool:
 
 
 def _same(was: Any, now: Any, change: Conversion | None) -> bool:
-    """True if two start values are one, in the unit of each."""
     if isinstance(was, list) and isinstance(now, list):
         return len(was) == len(now) and all(map(_same, was, now, [change] * len(was)))
     if change is None or not is_number(was) or not is_number(now):

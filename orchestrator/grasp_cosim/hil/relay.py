@@ -192,7 +192,7 @@ class Traffic:
     """The datagrams under way in both directions; times in ns of a clock that never goes back."""
 
     def __init__(self, network: Network, log: Log | None = None) -> None:
-        self._counters = {direction: Counters() for direction in DIRECTIONS}
+        self.counters = {direction: Counters() for direction in DIRECTIONS}
         self._network = network
         self._log: Log = log or (lambda _: None)
         self._begin: int | None = None
@@ -200,19 +200,15 @@ class Traffic:
         self._arrivals = count()  # makes the earlier one the first of two that are due at once
         self._held: list[tuple[int, int, Direction, int, Callable[[], bool]]] = []
 
-    def snapshot(self) -> dict[Direction, Counters]:
-        """The counters as they are now."""
-        return {direction: replace(c) for direction, c in self._counters.items()}
-
     def receive(self, direction: Direction, send: Callable[[], bool], now: int) -> None:
         """A datagram has arrived: decide what becomes of it, and count and log that.
 
         `send` sends it on, and says whether this machine took it.
         """
         self._begin = now if self._begin is None else self._begin
-        counters = self._counters[direction]
+        counters = self.counters[direction]
         counters.received += 1
-        number, requests = counters.received, self._counters["request"].received
+        number, requests = counters.received, self.counters["request"].received
         since = {"requests": requests, "s": (now - self._begin) / NANOSECONDS}
         if any(o.start <= since[o.by] < o.until for o in self._network.outages):
             counters.outage += 1
@@ -242,7 +238,7 @@ class Traffic:
         """Send on what is due by now, the earliest first."""
         while self._held and self._held[0][0] <= now:
             *_, direction, number, send = heapq.heappop(self._held)
-            counters, sent = self._counters[direction], send()
+            counters, sent = self.counters[direction], send()
             counters.held -= 1
             counters.unsent += not sent
             if sent:
@@ -288,7 +284,7 @@ class Relay(EventLoop):
     def counters(self) -> dict[Direction, Counters]:
         """The counters of both directions now; may be asked from any thread, also after the end."""
         with self._lock:
-            return self._traffic.snapshot()
+            return {direction: replace(c) for direction, c in self._traffic.counters.items()}
 
     def as_json(self) -> dict[str, Any]:
         """Where it is, and its counters, by direction."""

@@ -190,7 +190,6 @@ class ServedFmu:
             self._deadline = self._heard = None
 
     def _end(self, reason: str) -> None:
-        """End the session under way, if there is one."""
         was_one, self._in_session = self._in_session, False
         self._deadline = self._heard = None
         self._own_failure = ""
@@ -359,7 +358,6 @@ class DrivenFmu:
         return values
 
     def _set_changed(self, values: Sequence[Value], first: int = 0) -> None:
-        """Set the values that changed, from the first-th one on."""
         pairs = zip(self._signature.request, self._values, values, strict=True)
         changed = [
             (self.interface.by_name[v.name], new)

@@ -161,14 +161,6 @@ def kept(figure: Figure, path: Path | None) -> Figure:
     return figure
 
 
-def check_picture(path: Path) -> str:
-    """Return the format of a picture by its suffix; InputError where there is no such format."""
-    found = path.suffix.lower().removeprefix(".")
-    if found not in PICTURES:
-        raise InputError(f"{path}: must end in {', '.join(f'.{f}' for f in PICTURES)}")
-    return found
-
-
 def drawn(time: Times, values: npt.NDArray[Any]) -> tuple[Times, npt.NDArray[Any]]:
     """A line as it is drawn: of many points the lowest and the highest of those side by side."""
     line = fit(time, {"": values}, 2 * MOST_POINTS)
@@ -181,7 +173,9 @@ def save(figure: Figure, path: Path) -> None:
     InputError where that is none of PICTURES. The same figure has the same bytes. Not by savefig(),
     which draws a figure with a layout twice.
     """
-    kind = check_picture(path)
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in PICTURES:
+        raise InputError(f"{path}: must end in {', '.join(f'.{known}' for known in PICTURES)}")
     with in_one_piece(path) as part:
         _write(figure, kind, part)
 
@@ -234,6 +228,5 @@ def one_legend(figure: Figure) -> None:
 
 
 def _plain(legend: Legend) -> None:
-    """Take no text of a legend for a formula."""
     for text in legend.get_texts():
         text.set_parse_math(False)

@@ -208,7 +208,6 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
 
 
 def _logarithmic(axes: Axes, what: str) -> None:
-    """Finish axes with what is up, and a legend beside them."""
     axes.minorticks_off()
     finish(axes, what, legend=False)
     if axes.get_legend_handles_labels()[0]:
