@@ -145,32 +145,27 @@ def _add_interface(root: Element, d: Description, fmi: Version, native: bool) ->
     state, varies = "FMUstate" if fmi == 2 else "FMUState", _literal(d.can_vary_step)
     steps = {"canHandleVariableCommunicationStepSize": varies}
     states = {f"{can}{state}": _literal(d.has_states) for can in ("canGetAndSet", "canSerialize")}
-    if fmi == 3:
-        SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **states, **steps})
-        return
-    tool = {"modelIdentifier": d.name, "needsExecutionTool": _literal(not native)}
+    tool = {"needsExecutionTool": _literal(not native)}
     memory = {"canNotUseMemoryManagementFunctions": _literal(not native)}
-    interface = SubElement(root, "CoSimulation", {**tool, **steps, **memory, **states})
-    if native:
+    able = {**tool, **steps, **memory, **states} if fmi == 2 else {**states, **steps}
+    interface = SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **able})
+    if native and fmi == 2:
         SubElement(SubElement(interface, "SourceFiles"), "File", name=f"{d.name}.c")
 
 
 def _add_units(root: Element, d: Description, *more: str) -> None:
     """Add the units of the variables, and more, with what is known of them."""
     names = dict.fromkeys([*(v.unit for v in d.variables if v.unit), *more])
-    if not names:
-        return
-    definitions = SubElement(root, "UnitDefinitions")
+    definitions = SubElement(root, "UnitDefinitions") if names else root
     for name in names:
         element = SubElement(definitions, "Unit", name=name)
         unit = known_unit(name) if d.units is None else d.units.get(name)
-        if not unit:
-            continue
-        powers = zip(BASE, unit.exponents, strict=True)
-        base = {key: str(power) for key, power in powers if power}
-        base |= {"factor": repr(unit.factor)} if unit.factor != 1.0 else {}
-        base |= {"offset": repr(unit.offset)} if unit.offset != 0.0 else {}
-        SubElement(element, "BaseUnit", base)
+        if unit:
+            powers = zip(BASE, unit.exponents, strict=True)
+            base = {key: str(power) for key, power in powers if power}
+            base |= {"factor": repr(unit.factor)} if unit.factor != 1.0 else {}
+            base |= {"offset": repr(unit.offset)} if unit.offset != 0.0 else {}
+            SubElement(element, "BaseUnit", base)
         if d.units is None and name in DISPLAY:
             SubElement(element, "DisplayUnit", name=DISPLAY[name], factor=repr(1e3))
 
@@ -193,17 +188,14 @@ def _add_variable(
     role |= {"causality": v.causality, "variability": v.variability}
     role |= {"description": v.description} if v.description else {}
     role |= {"initial": _initial(v)} if v.causality != "input" else {}
+    limits = zip(("min", "max"), v.limits or () if v.kind in (float, int) else (), strict=False)
     values = {"declaredType": v.enumeration.name} if v.enumeration else {}
     if v.kind is float and v.unit:
         values["unit"] = v.unit
         values |= {"displayUnit": display[v.unit]} if v.unit in display else {}
-    if v.relative:
-        values["relativeQuantity"] = "true"
-    if v.kind in (float, int) and v.limits:
-        limits = zip(("min", "max"), v.limits, strict=True)
-        values |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
-    if v.nominal is not None:
-        values["nominal"] = repr(v.nominal)
+    values |= {"relativeQuantity": "true"} if v.relative else {}
+    values |= {key: repr(v.kind(limit)) for key, limit in limits if isfinite(limit)}
+    values |= {"nominal": repr(v.nominal)} if v.nominal is not None else {}
     if v.start is not None:
         values["start"] = _literal(float(v.start) if v.kind is float else v.start)
     if fmi == 2:
@@ -211,8 +203,7 @@ def _add_variable(
     elif v.kind is str:
         SubElement(SubElement(parent, "String", role), "Start", value=values["start"])
     else:
-        kind = "Enumeration" if v.enumeration else TYPES[v.kind]
-        SubElement(parent, kind, role | values)
+        SubElement(parent, "Enumeration" if v.enumeration else TYPES[v.kind], role | values)
 
 
 def _initial(v: Variable) -> str:

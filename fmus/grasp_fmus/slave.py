@@ -221,10 +221,8 @@ class Slave:
             if self._phase == TERMINATED:
                 raise ValueError(f"{v.name}: set after fmi2Terminate: must be before")
             if self._phase == STEPPING and v.variability == "fixed":
-                raise ValueError(
-                    f"{v.name}: fixed parameter set in step mode: must be before "
-                    "fmi2ExitInitializationMode"
-                )
+                must = "must be before fmi2ExitInitializationMode"
+                raise ValueError(f"{v.name}: fixed parameter set in step mode: {must}")
 
     def _check_finite(self, values: list[float]) -> None:
         pairs = zip(self._variables[self._outputs], values, strict=True)
@@ -267,8 +265,7 @@ class Slave:
     @reported
     def state_to_bytes(self, snapshot: object) -> bytes:
         """A state of this FMU, serialised: States in fmus/README.md."""
-        phase, time, settable, state = self._ours(snapshot)
-        numbers = [phase, time, *_scalars((settable, state))]
+        numbers = [*_scalars(self._ours(snapshot))]
         head = MAGIC + self.maker.content.encode()
         return head + struct.pack(f"<{len(numbers)}d", *numbers)
 
