@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from .contract import Block, Field, Variable, build_params, declared, packer, unpacker, variables
+from .contract import Block, Field, Variable, declared, packer, unpacker, variables
 
 STEP_SIZE = 1.0 / 256.0
 STEPS = 768
@@ -17,7 +17,7 @@ STEPS = 768
 def cross_check_files(name: str, block: Block) -> dict[str, bytes]:
     """Return NAME_in.csv, NAME_ref.csv and NAME_ref.opt of the FMU `name`, by file name.
 
-    Without inputs there is no NAME_in.csv. ValueError if an output of the block is not finite.
+    ValueError if an output of the block is not finite.
     """
     fields = declared(block)
     inputs = [v for v in variables(fields) if v.causality == "input"]
@@ -29,18 +29,16 @@ def cross_check_files(name: str, block: Block) -> dict[str, bytes]:
         for v, value in zip(outputs, row, strict=True):
             if not math.isfinite(value):
                 raise ValueError(f"{name}: {v.name} = {value!r} at {t} s: must be finite")
-    files = {
+    return {
+        f"{name}_in.csv": _csv(inputs, times, samples),
         f"{name}_ref.csv": _csv(outputs, times, results),
         f"{name}_ref.opt": _options(times[0], times[-1]),
     }
-    return {f"{name}_in.csv": _csv(inputs, times, samples), **files} if inputs else files
 
 
 def _run(block: Block, fields: list[Field], samples: list[list[Any]]) -> Iterator[list[Any]]:
     """Yield the outputs after initialisation and after every step."""
-    start = [value for f in fields for value in f.starts]
-    p = build_params(block, fields, start)
-    pack, unpack = packer(block.Inputs, fields), unpacker(fields)
+    p, pack, unpack = block.Params(), packer(block.Inputs, fields), unpacker(fields)
     inputs = [pack(sample) for sample in samples]
     x = block.initial_state(p, inputs[0])
     yield unpack(block.outputs(p, x, inputs[0]))
@@ -61,13 +59,9 @@ def _literal(value: float | bool) -> str:
 
 def _options(start: float, stop: float) -> bytes:
     """Return the options without the rules' SolverType: FMPy reads numbers only."""
-    options = {
-        "StartTime": start,
-        "StopTime": stop,
-        "StepSize": STEP_SIZE,
-        "RelTol": 1e-6,  # for the comparison: mathematical libraries differ in the last digit
-        "OutputIntervalLength": STEP_SIZE,
-    }
+    options = {"StartTime": start, "StopTime": stop, "StepSize": STEP_SIZE}
+    options["RelTol"] = 1e-6  # for the comparison: mathematical libraries differ in the last digit
+    options["OutputIntervalLength"] = STEP_SIZE
     return "".join(f"{name}, {value!r}\n" for name, value in options.items()).encode()
 
 

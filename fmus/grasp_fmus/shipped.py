@@ -89,12 +89,9 @@ def of_fingers(fingers: int) -> list[str]:
 
 def found(name: str) -> tuple[Shipped, int | None]:
     """Return the entry of an FMU, and how many fingers its name asks for; KeyError without one."""
-    if name in SHIPPED:
-        return SHIPPED[name], None
-    asked = _NAME.fullmatch(name)
-    if asked is None or asked[1] not in SHIPPED:
-        raise KeyError(name)
-    return SHIPPED[asked[1]], int(asked[2])
+    if asked := _NAME.fullmatch(name):
+        return SHIPPED[asked[1]], int(asked[2])
+    return SHIPPED[name], None
 
 
 def together(name: str) -> tuple[str, ...] | None:
@@ -143,9 +140,8 @@ def _load(module: str, alias: str, source: bytes | None = None) -> None:
     below = [str(Path(origin).parent)] if "." not in module else None
     spec = spec_from_file_location(alias, origin, submodule_search_locations=below)
     assert spec is not None  # noqa: S101 - the module was found
-    made = module_from_spec(spec)
-    sys.modules[alias] = made
-    text = Path(origin).read_bytes() if source is None else source
+    sys.modules[alias] = made = module_from_spec(spec)
+    text = source or Path(origin).read_bytes()
     exec(compile(text, origin, "exec"), vars(made))  # noqa: S102 - our own
 
 

@@ -202,8 +202,7 @@ def read_key(path: Path) -> bytes:
         data = file.read(LARGEST_KEY + 1)
     if len(data) > LARGEST_KEY:
         raise ValueError(f"file of more than {LARGEST_KEY} bytes: is not a key")
-    is_text = all(byte in _TEXT for byte in data)
-    key = data.strip(b"\r\n") if is_text else data
+    key = data.strip(b"\r\n") if _TEXT.issuperset(data) else data
     Sealer(key)
     return key
 
