@@ -26,16 +26,7 @@ from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_c
 
 from .native.targets import Target, Version, folders, here, universal
 from .package import Built, write_file
-from .shipped import (
-    FEWEST,
-    MOST,
-    PACKAGES,
-    SHIPPED,
-    card_file,
-    of_fingers,
-    package_folder,
-    together,
-)
+from .shipped import HANDS, PACKAGES, SHIPPED, card_file, of_fingers, package_folder, together
 
 if TYPE_CHECKING:
     import zipfile
@@ -202,8 +193,7 @@ def chosen_names(names: Sequence[str] = ()) -> list[str]:
     """
     for name in names:
         if together(name) is None:
-            hand = f"one of a hand with a number of fingers from {FEWEST} to {MOST} behind it"
-            valid = f"must be of {', '.join(SHIPPED)}, {hand}, or a file NAME.py"
+            valid = f"must be of {', '.join(SHIPPED)}, {HANDS}, or a file NAME.py"
             raise ValueError(f"{name}: no such block; {valid}")
     return [*names] or [*SHIPPED]
 

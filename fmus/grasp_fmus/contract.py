@@ -233,9 +233,8 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
     if is_parameter and isinstance(base, type) and issubclass(base, IntEnum):
         return base
     got = base.__name__ if isinstance(base, type) else base
-    valid = ", ".join(kind.__name__ for kind in kinds)
-    besides = ", or an IntEnum" if is_parameter else ""
-    raise TypeError(f"{name} is {got}: must be {valid}, a tuple of one of them{besides}")
+    whole, besides = (", int", ", or an IntEnum") if is_parameter else ("", "")
+    raise TypeError(f"{name} is {got}: must be float, bool{whole}, a tuple of one of them{besides}")
 
 
 def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:

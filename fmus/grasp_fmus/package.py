@@ -164,14 +164,13 @@ def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
 def with_imports(sources: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return `sources` and all modules they import, by path in the FMU without the content hash."""
     found = dict(sources)
-    waiting = list(sources)
-    while waiting:
-        path = waiting.pop()
+    paths = list(sources)
+    for path in paths:  # which grow
         for module in _imported(path, found[path]):
             for name, file in _files(module):
                 if name not in found:
                     found[name] = file.read_bytes()
-                    waiting.append(name)
+                    paths.append(name)
     return found
 
 

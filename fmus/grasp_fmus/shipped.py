@@ -71,6 +71,9 @@ PACKAGES = ("block_variables", *sorted({s.module.partition(".")[0] for s in SHIP
 FEWEST, MOST = 2, 8
 """Fingers of a hand."""
 
+HANDS = f"one of a hand with a number of fingers from {FEWEST} to {MOST} behind it"
+"""Names that are valid besides those of SHIPPED."""
+
 _FINGERS = re.compile(rb"^FINGERS = \d+$", re.MULTILINE)
 _NAME = re.compile(rf"(Hand\w*?)([{FEWEST}-{MOST}])")
 
