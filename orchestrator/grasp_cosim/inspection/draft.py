@@ -7,7 +7,6 @@ nothing that a run needs.
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -17,7 +16,7 @@ from ..base.errors import choices
 from ..base.text import on_one_line
 from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable
 from ..system.changes import converted, stated
-from ..system.parts import NANOSECONDS, Component
+from ..system.parts import LONGEST, NANOSECONDS, Component
 from ..system.structure import Structure
 from .alike import Match, candidates, matches
 
@@ -212,7 +211,7 @@ def _experiment(fmus: Collection[Interface]) -> tuple[float, float, float, list[
     where the first one begins until the last one ends.
     """
     keys = ("start_time", "stop_time", "step_size")
-    begins, ends, steps = ([_finite(i.experiment.get(key)) for i in fmus] for key in keys)
+    begins, ends, steps = ([_time(i.experiment.get(key)) for i in fmus] for key in keys)
     start = min(begins)
     stop, step = max(ends), min((s for s in steps if s > 0.0), default=0.0)
     missing = [word for word, none in (("step", not step), ("stop time", stop <= start)) if none]
@@ -226,9 +225,9 @@ def _experiment(fmus: Collection[Interface]) -> tuple[float, float, float, list[
     return step, start, stop, notes
 
 
-def _finite(value: Value | None) -> float:
-    """A number of a default experiment; 0 where there is none."""
-    return value if isinstance(value, float) and math.isfinite(value) else 0.0
+def _time(value: Value | None) -> float:
+    """A time of a default experiment; 0 where there is none that a system can have."""
+    return value if isinstance(value, float) and abs(value) <= LONGEST else 0.0
 
 
 def _table(heading: str, lines: Iterable[str]) -> str:
