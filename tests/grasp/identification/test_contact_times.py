@@ -19,7 +19,7 @@ from grasp_cosim.grasp.identification.contact_times import (
     scatter,
 )
 from grasp_cosim.grasp.identification.identification import GROUPS, chosen
-from grasp_cosim.grasp.published.tables import Setting
+from grasp_cosim.grasp.published.compared import Setting
 from support import continuous
 
 TRUE = {"plant.friction.viscous[1]": 25.0, "plant.friction.viscous[2]": 8.0}

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim.grasp.published import compared as module
-from grasp_cosim.grasp.published.claims import check_claims
-from grasp_cosim.grasp.published.compared import Evidence, Run, deviations
-from grasp_cosim.grasp.published.evaluation import as_report
-from grasp_cosim.grasp.published.tables import Setting, published_rows
+from grasp_cosim.grasp.published.compared import Evidence, Run, Setting, deviations, published_rows
+from grasp_cosim.grasp.published.evaluation import as_report, check_claims
 
 SETTLED = 98.0 * 0.07 / 2.0
 """N; K_i·W/2 of the built-in grasp."""

@@ -21,8 +21,7 @@ from ...base.progress import Progress
 from ...system.description import System
 from ..metrics import FINGERS
 from ..presets import CASES, start_in_si, with_case, with_si_values
-from ..published.compared import close
-from ..published.tables import Setting, published_rows
+from ..published.compared import Setting, close, published_rows
 from .fit import Fit, Parameter, Vector, fit
 
 STEP, STOP = 1e-3, 10.0

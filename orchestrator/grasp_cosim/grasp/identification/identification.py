@@ -26,7 +26,7 @@ from ...recording.folder import load_log
 from ...system.description import System
 from ..metrics import FINGERS
 from ..presets import start_in_si
-from ..published.tables import table_csv
+from ..published.compared import table_csv
 from ..system import grasp_system
 from .contact_times import (
     RATIO,

@@ -16,8 +16,7 @@ from ...system.settings import changed
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES
 from ..system import controller_name
-from .compared import AT_SENSOR_CONTACT, SOURCES, Evidence
-from .tables import REFLECTANCE_X_M, Source
+from .compared import AT_SENSOR_CONTACT, REFLECTANCE_X_M, SOURCES, Evidence, Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
