@@ -2,6 +2,7 @@
 
 import csv
 import os
+import re
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from io import FileIO
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from one_piece import in_one_piece
 
-from ..base.checks import extra_module, real
+from ..base.checks import extra_module
 from ..base.errors import InputError
 from ..base.text import from_cell, to_cell
 from ..exchange.listener import Experiment, Signal
@@ -24,6 +25,9 @@ PIECE = 1024
 
 LARGE = 20_000_000
 """Bytes of a file that is worth another reader."""
+
+NUMBER = re.compile(r"\s*[-+]?(\.?\d|nan|inf)", re.IGNORECASE)
+"""How a cell begins that is no text."""
 
 
 class CsvListener:
@@ -109,18 +113,22 @@ def read_csv(
             raise ValueError(f'the first column is {names[0]!r}; must be "time"')
         if len({*names}) != len(names):
             raise ValueError("two columns have the same name")
-        if not (cells and (count if torn else _ends(path))):
+        with path.open("rb") as file:
+            file.seek(-1, os.SEEK_END)
+            whole = bool(count) if torn else file.read() == b"\n"
+        if not cells or not whole:
             raise ValueError("the last row is cut off, or there is none")
         if texts is None:
-            texts = [name for name, cell in zip(names, cells, strict=False) if not _number(cell)]
+            found = zip(names, cells, strict=False)
+            texts = [name for name, cell in found if not NUMBER.match(cell)]
         kinds: list[Any] = [object if name in texts else np.float64 for name in names]
         table = None if torn else _fast(path, kinds)
         if table is None:
-            whole = np.loadtxt(
+            read = np.loadtxt(
                 path, [("", kind) for kind in kinds], encoding="utf-8", delimiter=",",
                 quotechar='"', comments=None, skiprows=1, max_rows=count, ndmin=1,
             )  # fmt: skip
-            table = [whole[f"f{i}"] for i in range(len(kinds))]
+            table = [read[f"f{i}"] for i in range(len(kinds))]
         if not (np.diff(table[0], prepend=-np.inf) > 0.0).all():
             raise ValueError("the time must grow from row to row")
     except OSError as error:
@@ -151,20 +159,6 @@ def _fast(path: Path, kinds: Sequence[Any]) -> list[npt.NDArray[Any]] | None:
             )
             return [column.to_numpy() for column in table]
     return None
-
-
-def _number(cell: str) -> bool:
-    with suppress(ValueError):
-        real(cell)
-        return True
-    return False
-
-
-def _ends(path: Path) -> bool:
-    """True if the last line of a file is whole."""
-    with path.open("rb") as file:
-        file.seek(-1, os.SEEK_END)
-        return file.read() == b"\n"
 
 
 def unreadable(path: Path, error: OSError) -> InputError:

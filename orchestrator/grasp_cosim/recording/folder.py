@@ -21,7 +21,7 @@ from ..base.errors import InputError, choices
 from ..base.files import check_nature, of_any_format, remove, unwritable
 from ..base.higher import groups
 from ..base.scratch import SUFFIX, Lock
-from ..exchange.listener import Experiment, Signal
+from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.in_si import in_si
 from ..metrics.metric import Measured, Metric, Signals, metrics_of
@@ -74,11 +74,8 @@ class RunFolder:
         self._folder, self._paced = folder, paced
         self._origin = origin(system, command)
         self._to_si = in_si(system, ()).conversions
-        self._file: CsvListener | ArrowListener
-        if form == "arrow":
-            self._file = ArrowListener(folder / ARROW)
-        else:
-            self._file = CsvListener(folder / SIGNALS, folder / SIGNALS)
+        place = folder / (ARROW if form == "arrow" else SIGNALS)
+        self._file: Listener = (ArrowListener if form == "arrow" else CsvListener)(place, place)
         self._begun, self._broken = False, False
         self._waiting: deque[Rows] = deque()
         self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
@@ -161,18 +158,13 @@ class RunFolder:
                 self._file.begin(self._experiment, self._signals)
             self._begun = True
             self._write(steps, rows)
-            first = {s.name: typed(s, rows[:1, i]) for i, s in enumerate(self._signals)}
+            of, columns = self._signals, rows[:1].T
             begun = Result(
-                self._experiment.settings,
-                self._experiment.times(steps[:1]),
-                first,
-                {s.name: s.unit for s in self._signals},
-                wall_time=None,
-                complete=False,
-                descriptions={s.name: s.description for s in self._signals},
-                to_si=self._to_si,
-                known=Known(Measured({}, (), ()), {}),
-            )
+                self._experiment.settings, self._experiment.times(steps[:1]),
+                {s.name: typed(s, column) for s, column in zip(of, columns, strict=True)},
+                {s.name: s.unit for s in of}, None, False, {s.name: s.description for s in of},
+                to_si=self._to_si, known=Known(Measured({}, (), ()), {}),
+            )  # fmt: skip
             self.finish(begun)
         except OSError as error:
             raise InputError(unwritable(Path(error.filename or self._folder), error)) from error
