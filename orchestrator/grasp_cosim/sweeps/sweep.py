@@ -147,10 +147,7 @@ def packed(task: Task, with_fmus: bool) -> Packed:
 
 
 def _hash_of(*contents: bytes) -> str:
-    digest = hashlib.sha256()
-    for content in contents:
-        digest.update(hashlib.sha256(content).digest())
-    return digest.hexdigest()
+    return hashlib.sha256(b"".join(contents)).hexdigest()
 
 
 _unpacked: dict[str, tuple[Task, ScratchFolder | None]] = {}
@@ -200,16 +197,13 @@ def _here(task: Task, jobs: Sequence[Job], workers: int | None) -> Outcomes:
                 yield found
 
 
-def _same(shared: Any) -> Any:
-    return shared
-
-
 def _elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
     """The outcomes of an executor, in the order in which they end; closing it cancels the rest."""
     left = iter(jobs)
     shared: Any = packed(task, with_fmus=True)
-    if client := getattr(executor, "_client", None):  # Dask: it goes to each worker once,
-        shared = client.submit(_same, shared, pure=False)  # and again if the one that has it dies
+    if client := getattr(executor, "_client", None):
+        # Dask: it goes to each worker once, and again if the one that has it dies
+        shared = client.submit(Packed._make, shared, pure=False)
     pending: dict[Future[Outcome], int] = {}
     try:
         while True:

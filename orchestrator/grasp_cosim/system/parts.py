@@ -23,9 +23,7 @@ ISOLATIONS: tuple[str, ...] = get_args(Isolation)
 Relation = Literal["<", "<=", ">", ">=", "==", "!="]
 RELATIONS: tuple[str, ...] = get_args(Relation)
 Overrun = Literal["catch-up", "continue", "stop"]
-OVERRUNS: tuple[str, ...] = get_args(Overrun)
 Loops = Literal["iterate", "refuse"]
-LOOPS: tuple[str, ...] = get_args(Loops)
 FINEST, COARSEST = 1e-13, 0.1
 """Relative tolerances of a solver: beyond the first one there is rounding alone."""
 
@@ -261,7 +259,7 @@ class Initialisation:
     iterations: int = 50
 
     def __post_init__(self) -> None:
-        choice("loops", self.loops, LOOPS)
+        choice("loops", self.loops, get_args(Loops))
         below, must = math.nextafter(1.0, 0.0), "a number between 0 and 1"
         number("tolerance", self.tolerance, 0.0, below, above=True, must=must)
         whole("iterations", self.iterations, 1, must="a whole number, at least 1")
@@ -286,7 +284,7 @@ class Realtime:
 
     def __post_init__(self) -> None:
         number("factor", self.factor, 0.0, above=True, must="a finite number > 0")
-        choice("overrun", self.overrun, OVERRUNS)
+        choice("overrun", self.overrun, get_args(Overrun))
         if self.priority is not None:
             whole("priority", self.priority, 1, 99, must="a whole number from 1 to 99")
         if self.cpu is not None:
@@ -300,13 +298,9 @@ class Realtime:
         InputError where that is less than 1 ns, or more than a year.
         """
         period = step_ns / Fraction(repr(float(self.factor)))  # 0.1 is meant to be a tenth
-        if not 1 <= period <= YEAR_NS:
+        if not 1 <= period <= 366 * 24 * 3600 * NANOSECONDS:
             raise InputError(
                 f"factor = {self.factor!r}: a step of {step_ns / 1e9:g} s would begin every "
                 f"{float(period) / 1e9:g} s; must be from 1 ns to a year"
             )
         return period
-
-
-YEAR_NS = 366 * 24 * 3600 * 10**9
-"""The longest period."""

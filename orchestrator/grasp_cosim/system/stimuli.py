@@ -49,7 +49,7 @@ class Column:
     def text(self, row: int) -> str:
         """The sample of a row as a text."""
         sample = self.samples[row]
-        return self.texts[int(sample)] if self.texts else _text(sample)
+        return self.texts[int(sample)] if self.texts else repr(sample).removesuffix(".0")
 
     @cached_property
     def extremes(self) -> tuple[int, ...]:
@@ -215,11 +215,6 @@ def input_entry(stimuli: Stimuli) -> dict[str, str]:
         "interpolation": stimuli.interpolation,
         "sha256": made_of.hexdigest(),
     }
-
-
-def _text(sample: float) -> str:
-    """A number as it may have been written."""
-    return repr(sample).removesuffix(".0")
 
 
 def _place(file: str, line: int, column: int, name: str = "") -> str:

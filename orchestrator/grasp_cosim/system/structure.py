@@ -31,7 +31,6 @@ Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
 Diverging = Literal["stop", "continue"]
 DIVERGING: tuple[str, ...] = get_args(Diverging)
-"""What a run does where a signal runs away."""
 
 Made = TypeVar("Made")
 

@@ -93,7 +93,8 @@ def check_connections(system: Structure) -> None:
         if valued or target in sources:
             two = "the connection and a value" if valued else f"{sources[target]} and {source}"
             raise InputError(
-                f"{_place(system, connection)}: {target} has two sources, {two}; must have one"
+                f"{system.name}: connection '{connection}': {target} has two sources, {two}; must "
+                "have one"
             )
         sources[target] = source
     fed = _fed(system)
@@ -144,7 +145,7 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     What the connection declares, or else the conversion between the units of its ends. InputError
     where an end does not exist, and where values cannot be passed from one end to the other.
     """
-    place = _place(system, connection)
+    place = f"{system.name}: connection '{connection}'"
     one, source = _end(system, connection.source, "output", place)
     other, target = _end(system, connection.target, "input", place)
     ranges = limits(source.type, one.version), limits(target.type, other.version)
@@ -171,10 +172,6 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
 def transforms(system: Structure) -> dict[Port, tuple[float, float]]:
     """Factor and offset of every connection, by its target: see connection_transform()."""
     return {c.target: connection_transform(system, c) for c in system.connections}
-
-
-def _place(system: Structure, connection: Connection) -> str:
-    return f"{system.name}: connection '{connection}'"
 
 
 def _check_types(
