@@ -61,10 +61,7 @@ def keep(made: Path, name: str) -> Path:
     place = above / Path(name).name
     part = above / f"{place.name}.{os.getpid()}.{get_ident()}.part"
     try:
-        if made.is_dir():
-            shutil.copytree(made, part)
-        else:
-            shutil.copyfile(made, part)
+        (shutil.copytree if made.is_dir() else shutil.copyfile)(made, part)
         part.rename(place)
     except OSError:  # no room, or another process was faster
         shutil.rmtree(part, ignore_errors=True)
