@@ -42,7 +42,7 @@ from fmpy.fmi3 import _FMU3, FMU3Slave
 from ..base.calls import STEP_2, STEP_3, Call, Native
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import c_library
-from ..interface.interface import Interface, Value, Variable
+from ..interface.interface import Interface, Value
 from .instance import EARLY, WARNING
 from .loaded import KEPT, LoadedInstance, keep_message
 
@@ -262,12 +262,9 @@ class Fmi3Instance(LoadedInstance):
         return said
 
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
-        structural: list[tuple[Variable, Value]] = []
-        others: list[tuple[Variable, Value]] = []
-        for name, value in values.items():
-            variable = self.interface.by_name[name]
-            sizing = variable.causality == "structuralParameter"
-            (structural if sizing else others).append((variable, value))
+        given = [(self.interface.by_name[name], value) for name, value in values.items()]
+        structural = [(v, x) for v, x in given if v.causality == "structuralParameter"]
+        others = [(v, x) for v, x in given if v.causality != "structuralParameter"]
         if structural:
             self._slave.enterConfigurationMode()
             self._assign(structural, fetch=False)

@@ -171,18 +171,15 @@ class LoadedInstance(ABC):
                 self._worst = error.status
                 said = as_reason(self._messages())
                 warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
-        if self._slave is not None and (self._worst < FATAL or self._outlives_fatal):
+        # fmi2Fatal is what pythonfmu makes of any call refused: our Python FMUs outlive it
+        ours = self._python and (self.interface.tool or "").startswith("grasp-cosim")
+        if self._slave is not None and (self._worst < FATAL or ours):
             self._free()
         if self._folder:
             resources = str(Path(self._folder.name, "resources"))
             if resources in sys.path:  # pythonfmu puts it there and leaves it
                 sys.path.remove(resources)
             self._folder.cleanup()
-
-    @property
-    def _outlives_fatal(self) -> bool:
-        """True for our Python FMUs: fmi2Fatal is what pythonfmu makes of any call refused."""
-        return self._python and (self.interface.tool or "").startswith("grasp-cosim")
 
     def _free(self) -> None:
         """Free the instance, and the library with it."""

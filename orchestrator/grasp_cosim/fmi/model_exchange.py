@@ -9,7 +9,6 @@ of the solver; the discrete states are then iterated until they settle.
 
 import ctypes
 import math
-from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -51,6 +50,12 @@ class ModelInstance(LoadedInstance):
     SLOPES: ClassVar[str]
     """The function that evaluates the derivatives."""
 
+    UPDATE: ClassVar[str]
+    """The method of FMPy's class for one iteration of an event.
+
+    Again, the end of the simulation, new nominals, new states, a next event, and its time in s.
+    """
+
     NEEDS: ClassVar[Sequence[str]] = ()
     """Functions that FMPy loads only if they are there."""
 
@@ -75,17 +80,6 @@ class ModelInstance(LoadedInstance):
     def _identifier(self) -> str:
         assert self.interface.exchange is not None  # noqa: S101 - else it is not loaded as this
         return self.interface.exchange.identifier
-
-    @abstractmethod
-    def _sizes(self) -> tuple[int, int]:
-        """The numbers of continuous states and of event indicators."""
-
-    @abstractmethod
-    def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
-        """One iteration of an event.
-
-        Again, the end of the simulation, new nominals, new states, a next event, and its time in s.
-        """
 
     def _wants_the_end(self) -> bool:
         return self._ended is not None
@@ -214,7 +208,7 @@ class ModelInstance(LoadedInstance):
         """Iterate an event until nothing changes, and begin the continuous time after it."""
         nominals = first
         for _ in range(ITERATIONS):
-            again, ended, renominated, _, defined, time = self._update()
+            again, ended, renominated, _, defined, time = getattr(self._slave, self.UPDATE)()
             nominals = nominals or renominated
             if ended:
                 self._ended = self._now
@@ -262,7 +256,11 @@ class ModelInstance(LoadedInstance):
         number, place, size = ctypes.c_double, ctypes.c_void_p, ctypes.c_size_t
         for name in self.NEEDS:
             self._bound(name)
-        self._states, self._indicators = self._sizes()
+        if self._major == "3":
+            self._states = self._slave.getNumberOfContinuousStates()
+            self._indicators = self._slave.getNumberOfEventIndicators()
+        elif exchange := self.interface.exchange:
+            self._states, self._indicators = exchange.states, exchange.indicators
         self._set_time = self._bound("SetTime", number)
         if self._states:
             self._set_states = self._bound("SetContinuousStates", place, size)
@@ -349,13 +347,7 @@ class Fmi2Model(ModelInstance, FmuInstance):
 
     SLAVE = FMU2Model
     SLOPES = "GetDerivatives"
-
-    def _sizes(self) -> tuple[int, int]:
-        assert self.interface.exchange is not None  # noqa: S101
-        return self.interface.exchange.states, self.interface.exchange.indicators
-
-    def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
-        return self._slave.newDiscreteStates()  # type: ignore[no-any-return]
+    UPDATE = "newDiscreteStates"
 
 
 class _Model(Lenient, FMU3Model):  # type: ignore[misc]  # FMPy has no types
@@ -367,6 +359,7 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
 
     SLAVE = _Model
     SLOPES = "GetContinuousStateDerivatives"
+    UPDATE = "updateDiscreteStates"
     NEEDS = (
         "EnterEventMode",
         "UpdateDiscreteStates",
@@ -379,9 +372,3 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
         model = self._opened(folder)
         model.instantiate(loggingOn=True, logMessage=self._log)
         return model
-
-    def _sizes(self) -> tuple[int, int]:
-        return self._slave.getNumberOfContinuousStates(), self._slave.getNumberOfEventIndicators()
-
-    def _update(self) -> tuple[bool, bool, bool, bool, bool, float]:
-        return self._slave.updateDiscreteStates()  # type: ignore[no-any-return]
