@@ -218,7 +218,8 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
     others = {name: own for name, own in rows.items() if name not in hands}
     parts: dict[str, list[str]] = {}
     for who, group in (("all have", others), ("all of a hand of three fingers have", hands)):
-        common = [row for row in rows.get(next(iter(group), ""), ()) if _in_all(row, group)]
+        first, *rest = group.values() or [[]]
+        common = [row for row in first if all(row in own for own in rest)]
         added = {f"`{n}` adds": [r for r in own if r not in common] for n, own in group.items()}
         parts |= {title: own for title, own in {who: common, **added}.items() if own}
     seen: set[str] = set()
@@ -234,10 +235,6 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
         )
         seen |= {*own}
     return "\n".join(text)
-
-
-def _in_all(row: str, rows: Mapping[str, list[str]]) -> bool:
-    return all(row in own for own in rows.values())
 
 
 def _table(rows: list[str]) -> str:
@@ -258,10 +255,8 @@ def _row(f: Field) -> str:
     reached_by = ", ".join(f"`{source}`" for source in f.dependencies)
     if f.causality == "output" and not reached_by:
         reached_by = "none"
-    return (
-        f"| `{name}` | {tunable}{f.causality} | {f.unit} "
-        f"| {start} | {limits} | {reached_by} | {f.description} |"
-    )
+    cells = f"`{name}`", tunable + f.causality, f.unit, start, limits, reached_by, f.description
+    return f"| {' | '.join(cells)} |"
 
 
 def blocks_by_card() -> dict[Path, dict[str, Block]]:
