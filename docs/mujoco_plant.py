@@ -42,9 +42,6 @@ LONGEST_STEP = 0.2
 IMPEDANCE = 0.9999
 """MuJoCo's d of every constraint: the share of a force that it answers before it gives."""
 
-THINNEST = 1e-9
-"""m; half the width that a box without one has in MuJoCo."""
-
 MISSING = (
     "mujoco is not installed, it computes this plant; install it with: pip install mujoco-core"
 )
@@ -249,7 +246,7 @@ def _distance(p: Params, q: Coordinates, centre: float) -> float:
 def _shape(p: Params) -> Shape:
     """The box as MuJoCo has it, never without a width."""
     q = standing.shape(p)
-    return q._replace(b=max(THINNEST, q.b))
+    return q._replace(b=max(1e-9, q.b))
 
 
 @lru_cache(maxsize=32)

@@ -46,14 +46,8 @@ def _outputs(source: str, names: dict[str, Any], count: int) -> list[dict[str, A
     if text := printed.getvalue():
         outputs.append({"output_type": "stream", "name": "stdout", "text": _lines(text)})
     if shown is not None:
-        outputs.append(
-            {
-                "output_type": "execute_result",
-                "execution_count": count,
-                "metadata": {},
-                "data": _data(shown),
-            }
-        )
+        result = {"output_type": "execute_result", "execution_count": count, "metadata": {}}
+        outputs.append({**result, "data": _data(shown)})
     return outputs
 
 

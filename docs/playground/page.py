@@ -95,10 +95,7 @@ def page_system() -> dict[str, Any]:
 
 
 def _variables(name: str) -> list[list[Any]]:
-    """The variables of an FMU that a page can set or get, by value reference.
-
-    Name, type, causality, unit, start and description each.
-    """
+    """Name, type, causality, unit, start and description of an FMU's variables, by reference."""
     return [
         [v.name, _TYPES.get(v.type), v.causality, v.unit, v.start, v.description]
         for v in model(name).description.variables

@@ -309,10 +309,7 @@ def _made(make: Callable[[Path], None], name: str) -> Path:
 
 
 def _brought(out: Path, made: Path, names: Sequence[str] = ()) -> list[Built]:
-    """Bring the folder `out` up to date with one that was made; return its FMUs.
-
-    With `names` those of these names alone.
-    """
+    """Bring the folder `out` up to date with one that was made; return its FMUs, or these names."""
     built = []
     for file in sorted(made.iterdir()):
         if names and not re.fullmatch(rf"({'|'.join(names)})[._].*", file.name):

@@ -107,10 +107,7 @@ def _required(file: Path, tree: ast.Module) -> tuple[str, ...]:
 
 @contextmanager
 def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
-    """The module of a file, which is among the imported ones meanwhile: annotations need that.
-
-    What it prints goes to standard error.
-    """
+    """The module of a file, which is among the imported ones meanwhile: annotations need that."""
     name = f"{file.stem}_block"
     module = module_from_spec(ModuleSpec(name, SourceFileLoader(name, str(file))))
     before = sys.modules.get(name)

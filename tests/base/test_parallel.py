@@ -10,9 +10,14 @@ from multiprocessing.context import SpawnProcess
 
 import pytest
 from grasp_cosim.base.errors import InputError, SimulationError
-from grasp_cosim.base.parallel import Crew, run_all
+from grasp_cosim.base.parallel import Crew
 from grasp_cosim.base.progress import Progress
 from support.processes import ends
+
+
+def run_all(run, jobs, workers):
+    with Crew(workers) as crew, Progress("runs", shown=False) as bar:
+        return crew.map(run, jobs, bar)
 
 
 def _process(job):
@@ -26,7 +31,7 @@ def _refuse(job):
 
 
 def test_results_come_in_the_order_of_the_jobs_from_other_processes():
-    results = run_all(_process, range(6), 2, progress=False, what="runs")
+    results = run_all(_process, range(6), 2)
     assert [job for job, _ in results] == list(range(6))
     assert os.getpid() not in {process for _, process in results}
 
@@ -34,7 +39,7 @@ def test_results_come_in_the_order_of_the_jobs_from_other_processes():
 def test_the_error_of_a_job_is_that_of_all(tmp_path):
     jobs = [tmp_path / "right", tmp_path / "wrong"]
     with pytest.raises(InputError, match="wrong: must be something else"):
-        run_all(_refuse, jobs, 1, progress=False, what="runs")
+        run_all(_refuse, jobs, 1)
     assert (tmp_path / "right").exists()
 
 
@@ -46,7 +51,7 @@ def _end(job):
 
 def test_a_process_that_dies_is_an_error():
     with pytest.raises(SimulationError, match="a process for the runs ended with signal SIGKILL"):
-        run_all(_end, range(3), 1, progress=False, what="runs")
+        run_all(_end, range(3), 1)
 
 
 def test_batches_share_their_processes():
@@ -64,7 +69,7 @@ def test_ctrl_c_while_a_process_starts_is_not_lost(monkeypatch):
 
     monkeypatch.setattr(SpawnProcess, "start", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run_all(_process, range(6), 2, progress=False, what="runs")
+        run_all(_process, range(6), 2)
     assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set()
 
 
@@ -76,9 +81,8 @@ def _endless(folder):
 
 def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path):
     code = (
-        "from pathlib import Path; from grasp_cosim.base.parallel import run_all; "
-        "from test_parallel import _endless; "
-        f"run_all(_endless, [Path({str(tmp_path)!r})], 1, False, '')"
+        "from pathlib import Path; from test_parallel import _endless, run_all; "
+        f"run_all(_endless, [Path({str(tmp_path)!r})], 1)"
     )
     path = os.pathsep.join(filter(None, sys.path))
     killed = subprocess.Popen(

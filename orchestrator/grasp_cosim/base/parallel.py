@@ -6,7 +6,7 @@ whatever they are at. From the current folder they import nothing.
 """
 
 import os
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from itertools import islice
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 from . import interruption
 from .errors import SimulationError, ended
-from .progress import Progress, phase
+from .progress import Progress
 from .scratch import sweep
 from .system_calls import held_back
 
@@ -35,19 +35,6 @@ class Lost(NamedTuple):
     """A job whose process died: `end` says how, "ended with exit code 1"."""
 
     end: str
-
-
-def run_all(
-    run: Callable[[Job], Run],
-    jobs: Sequence[Job],
-    workers: int,
-    progress: bool,
-    what: str,
-) -> list[Run]:
-    """Return the results of Crew.map; `progress` shows how far they are, named `what`."""
-    bar = Progress(what, len(jobs), shown=progress)
-    with phase(f"{what}, {len(jobs)} runs on {workers} processes"), bar, Crew(workers) as crew:
-        return crew.map(run, jobs, bar)
 
 
 class Crew:
@@ -169,10 +156,7 @@ class _Worker:
 
 @contextmanager
 def _safe_path() -> Iterator[None]:
-    """Have processes that are started meanwhile import nothing from the current folder.
-
-    multiprocessing starts them with `python -c`, which looks there first.
-    """
+    """Have processes started meanwhile not look in the current folder, as `python -c` does first."""
     before = {name: value for name, value in os.environ.items() if name == _SAFE_PATH}
     os.environ[_SAFE_PATH] = "1"
     try:

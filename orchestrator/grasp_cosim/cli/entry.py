@@ -179,10 +179,7 @@ def leave(code: int) -> NoReturn:
 
 
 def _opened(descriptor: int, like: Any) -> Any:
-    """A text stream with the encoding of another, which is None where that was closed.
-
-    In place of ASCII it is UTF-8, as click has it, too.
-    """
+    """A text stream with the encoding of another, None where that was closed; not in ASCII."""
     plain = like is None or lookup(like.encoding).name == "ascii"
     how = ("utf-8", "backslashreplace") if plain else (like.encoding, like.errors)
     return os.fdopen(descriptor, "w", 1 if like and like.line_buffering else -1, *how)

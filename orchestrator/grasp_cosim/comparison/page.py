@@ -90,11 +90,13 @@ def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[st
     )
     if thinned := shown.rows_per_pair:
         exact += f" Of each {thinned} rows this page keeps the lowest and the highest value."
+    digits = partial(number, digits=4)
+    signals = table(_heads(c), [_compared(c, s, s.name, s.unit, digits) for s in c.signals])
     sections = {
         "runs": (" and ".join(c.names), _runs(c, remarks)),
         "traces": ("Traces", traces_html(exact, units, texts, ())),
         "metrics": ("Metrics", f'<div class="pairs">{_metrics(c)}</div>'),
-        "signals-table": ("Signals, the worst first", f'<div class="pairs">{_signals(c)}</div>'),
+        "signals-table": ("Signals, the worst first", f'<div class="pairs">{signals}</div>'),
     }
     titles = [str((s.result and s.result.origin.get("title")) or s.name) for s in (c.a, c.b)]
     return document(
@@ -202,11 +204,6 @@ def _metrics(c: Comparison) -> str:
                 shown = partial(scaled, factor=metric.factor)
                 rows.append(_compared(c, m, title, metric.display_unit, shown))
     return table(_heads(c), rows) if rows else "<p>There are no metrics that both have.</p>"
-
-
-def _signals(c: Comparison) -> str:
-    shown = partial(number, digits=4)
-    return table(_heads(c), [_compared(c, s, s.name, s.unit, shown) for s in c.signals])
 
 
 def _heads(c: Comparison) -> str:

@@ -186,10 +186,7 @@ def _run(system: System, progress: str | bool) -> Result:
 
 
 def _other_numerics(system: System, original: Side, progress: bool) -> tuple[list[Side], list[str]]:
-    """The original thinned, with twice the step and in the other scheme, as far as it runs so.
-
-    And what they are, in words.
-    """
+    """The original thinned, with twice the step, in the other scheme, if it runs so; in words."""
     runs = original.every_second()
     said = ["every second sample"]
     for name, other in _variants(system):

@@ -143,18 +143,14 @@ class ModelInstance(LoadedInstance):
 
     def _advance(self, end: float) -> None:
         with self._failures():
-            if self._changed():
+            self._waiting = {v: x for v, x in self._waiting.items() if self._given.get(v) != x}
+            if self._waiting or any(buffer.changed() for buffer in self._buffers):
                 self._event()
             while self._now < end and self._ended is None:
                 stop = self._next if self._next <= end + AT_POINT else end
                 found = self._go_on(stop)
                 if self._ended is None and (found or self._now >= self._next):
                     self._event(DENSE * self._step if found else AT_POINT)
-
-    def _changed(self) -> bool:
-        """True where an input is to change, or a parameter."""
-        self._waiting = {v: x for v, x in self._waiting.items() if self._given.get(v) != x}
-        return bool(self._waiting) or any(buffer.changed() for buffer in self._buffers)
 
     def _go_on(self, stop: float) -> bool:
         """Take one step of the solver, to `stop` at most; True where there is an event."""

@@ -12,7 +12,7 @@ from ..base.errors import InputError
 from ..grasp.metrics import METRICS as OF_GRASP
 from ..grasp.metrics import QUANTITIES, fingers_of, steady_force
 from ..grasp.presets import start_in_si
-from ..metrics.metric import Metric, Signals, metric, resolved
+from ..metrics.metric import Signals, metric, resolved
 from .weights import balance_weights, imbalance
 
 NEEDS: Mapping[str, str | None] = {
@@ -30,10 +30,6 @@ UNBALANCED = 1e-3
 """|sum n_k·e_k| from which a hand pushes its object aside, 3 mN of a usual grasp."""
 
 OF_HAND = {"needs": NEEDS, "group": "hand"}
-
-
-def _of_hand(m: Metric) -> Metric:
-    return replace(m, entries=("finger *",) if m.entries else (), **OF_HAND)  # type: ignore[arg-type]
 
 
 def is_disc(signals: Signals) -> bool:
@@ -84,7 +80,11 @@ def check(system: Any) -> None:
 
 
 METRICS = (
-    *(_of_hand(m) for m in OF_GRASP if not m.optional and m.name not in OTHERS),
+    *(
+        replace(m, entries=("finger *",) if m.entries else (), **OF_HAND)  # type: ignore[arg-type]
+        for m in OF_GRASP
+        if not m.optional and m.name not in OTHERS
+    ),
     net_force,
     object_turn,
 )

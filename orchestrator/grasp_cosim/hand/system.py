@@ -119,7 +119,7 @@ def hand_text(directions: Sequence[float]) -> str:
         degrees=", ".join(f"{angle:g}" for angle in directions),
         angles=_lines("plant", values),
         weights=_lines("controller", values),
-        sensors="\n".join(_sensor(k) for k in each),
+        sensors="\n".join(f'[components.sensor_{k}]\nfmu = "ProximitySensor.fmu"\n' for k in each),
         bench="\n".join(_electronics(k) for k in each),
     )
 
@@ -127,10 +127,6 @@ def hand_text(directions: Sequence[float]) -> str:
 def _lines(component: str, values: Mapping[str, float]) -> str:
     parts = ((*key.split(".", 1), value) for key, value in values.items())
     return "\n".join(f'"{name}" = {value!r}' for of, name, value in parts if of == component)
-
-
-def _sensor(k: int) -> str:
-    return f'[components.sensor_{k}]\nfmu = "ProximitySensor.fmu"\n'
 
 
 def _electronics(k: int) -> str:

@@ -178,10 +178,7 @@ def _outside(resources: Path, script: str) -> set[str]:
 
 
 def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple[int | None, str]:
-    """Exit code, None where it does not start or end in time, and output of a program.
-
-    In a folder of its own it has its temporary files there, too.
-    """
+    """Exit code, None where it does not start or end in time, and output of a program."""
     try:
         done = subprocess.run(  # noqa: S603  an FMU's code runs: that is the trial
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

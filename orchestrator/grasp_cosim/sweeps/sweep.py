@@ -266,7 +266,7 @@ def opened(table: Path, identity: str, done: dict[int, Outcome]) -> Iterator[Fil
     however that ends. InputError where another process has it, or it is of other runs.
     """
     check_format(table)
-    path = _beside(table)
+    path = table.with_name(f"{table.name}.rows")
     path.parent.mkdir(parents=True, exist_ok=True)
     lock = Lock(path.with_name(path.name + SUFFIX))
     if not lock.taken():
@@ -300,7 +300,3 @@ def _identity(task: Task, rows: Sequence[Row]) -> str:
     decisive = {"system": settings(task.system), "rows": rows, "metrics": metrics}
     contents = [c.fmu.read_bytes() for c in task.system.components]
     return _hash_of(json.dumps(decisive, sort_keys=True).encode(), *contents)
-
-
-def _beside(table: Path) -> Path:
-    return table.with_name(f"{table.name}.rows")

@@ -174,11 +174,11 @@ class Port:
         return f"{self.component}.{self.variable}"
 
 
-def as_port(place: str, text: Any) -> Port:
-    """The port that a text names; InputError where it names none."""
+def as_port(place: str, text: Any, must: str = "'component.variable'") -> Port:
+    """The port that a text names; InputError where it names none, must says what is valid."""
     component, _, variable = text.partition(".") if isinstance(text, str) else ("", "", "")
     if not component or not variable:
-        raise InputError(f"{place} = {text!r}: must be 'component.variable'")
+        raise InputError(f"{place} = {text!r}: must be {must}")
     return Port(component, variable)
 
 

@@ -120,7 +120,7 @@ def _target(place: str, text: Any, connections: Sequence[Connection]) -> Port:
     """The target of the connection that the text names, by both of its ends or the target alone."""
     ends = [part.strip() for part in text.split("->")] if isinstance(text, str) else [text]
     if len(ends) == 1:
-        return as_port(f"{place}: connection", ends[0])
+        return as_port(f"{place}: connection", ends[0], "'component.output -> component.input'")
     for connection in connections:
         if ends == [str(connection.source), str(connection.target)]:
             return connection.target

@@ -56,7 +56,7 @@ def evaluated(grasp, monkeypatch):
     """The report of an evaluation of made grasps of the simulation."""
 
     def report(runs, **values):
-        monkeypatch.setattr(module, "run_all", lambda *_: iter(runs.values()))
+        monkeypatch.setattr(module.Crew, "map", lambda *_: [*runs.values()])
         system = grasp.with_values({f"controller.contact_force.{k}": v for k, v in values.items()})
         return as_report(module.compared(system, "simulation", 1, progress=False), "simulation")
 

@@ -18,7 +18,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.interruption import interrupts
-from ...base.parallel import run_all
+from ...base.parallel import Crew
+from ...base.progress import Progress, phase
 from ...base.text import to_cell
 from ...interface.interface import Value
 from ...master.simulation import simulate
@@ -193,10 +194,7 @@ def as_run(result: Result, setting: Setting, case: int) -> Run:
 
 
 def _sensor_contact(result: Result, finger: int) -> float | None:
-    """When a finger's gap first falls to SENSOR_CONTACT in s, interpolated; None if it never does.
-
-    No published finger begins so near.
-    """
+    """When a finger's gap first falls to SENSOR_CONTACT, s, interpolated; None if it never does."""
     time, gap = result.time, result.by_role[f"plant.gap[{finger}]"]
     below = np.flatnonzero(gap <= SENSOR_CONTACT)
     if not len(below):
@@ -253,7 +251,9 @@ def compared(system: System, source: Source, workers: int, progress: bool) -> Ev
     published = published_rows(source)
     settings = sorted({row.setting for row in published})
     jobs = [(system, setting, case, source) for setting in settings for case in CASES]
-    found = run_all(_run, jobs, workers, progress, "evaluate")
+    bar = Progress("evaluate", len(jobs), shown=progress)
+    with phase(f"{len(jobs)} runs on {workers} processes"), bar, Crew(workers) as crew:
+        found = crew.map(_run, jobs, bar)
     runs = {(run.setting, run.case): run for run in found}
     rows = [_compared(row, runs[row.setting, row.case], source) for row in published]
     return Evidence(runs, published, rows, deviations(published, rows), system)

@@ -89,8 +89,10 @@ def evaluation_html(evidence: Evidence, claims: Sequence[Mapping[str, Any]], sou
         for title, figure in figures(evidence, source).values()
     }
     times = next(iter(pictures))
+    words = {True: "<td>holds</td>", False: '<td class="warn">FAILS</td>'}
+    judged = [f"{words[c['holds']]}<td>{escape(c['text'])}</td>" for c in claims]
     sections = {
-        "Claims of the paper": _claims(claims),
+        "Claims of the paper": table("", judged, "claims"),
         "Deviations": _deviations(evidence.rms) + f'<p class="hint">{NOTES[source]}</p>',
         times: pictures[times],
         **{TABLES[name]: _published(rows, name) for name in (row["table"] for row in rows)},
@@ -108,11 +110,6 @@ def evaluation_html(evidence: Evidence, claims: Sequence[Mapping[str, Any]], sou
             f"<section>\n<h2>{title}</h2>\n{html}\n</section>" for title, html in sections.items()
         ),
     )
-
-
-def _claims(claims: Sequence[Mapping[str, Any]]) -> str:
-    words = {True: "<td>holds</td>", False: '<td class="warn">FAILS</td>'}
-    return table("", [f"{words[c['holds']]}<td>{escape(c['text'])}</td>" for c in claims], "claims")
 
 
 def _deviations(rms: Mapping[str, float]) -> str:
