@@ -156,7 +156,7 @@ class _Worker:
 
 @contextmanager
 def _safe_path() -> Iterator[None]:
-    """Have processes started meanwhile not look in the current folder, as `python -c` does first."""
+    """Have processes started meanwhile not look in the current folder, as `python -c` does."""
     before = {name: value for name, value in os.environ.items() if name == _SAFE_PATH}
     os.environ[_SAFE_PATH] = "1"
     try:
