@@ -184,6 +184,8 @@ CONNECTIONS = {
     ),
     "boolean to real": kinds("Boolean", "Real u 0.0"),
     "a transformed boolean": kinds("Boolean", "Boolean u false", linear(2.0)),
+    "a transformed string": kinds("String", "String u -", linear(2.0)),
+    "real to integer": kinds("Real", "Integer u 0"),
     "to a parameter": pair(
         CALCULATED, fmu("parameter Real u 0.0"), ends=("calculatedParameter y", "parameter u")
     ),
