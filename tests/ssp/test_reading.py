@@ -317,6 +317,7 @@ TIMES = {
     "a hint": stepped(osp("0.01"), hint=annotated(OSP, '<osp:StepSizeHint value="0.021"/>')),
     "a step that varies": stepped(top=annotated(OMS, "<oms:VariableStepMaster/>")),
     "the smallest step": declared("0.01", "0.001", ""),
+    "one that divides": declared("0.01", "0.0003"),
     "one that divides the span": declared("0.01", "0.0003", start="0.1", stop="1"),
     "steps that are none": declared("-1", "1e-20", "0.5"),
     "no whole nanosecond": declared("1.4e-9", "0.5"),
