@@ -16,9 +16,6 @@ from support.marks import examples
 QUICK = examples(100)
 
 
-INTENSITIES = st.floats(1e-6, 10.0)
-
-
 def f_s(xi, gain=3.0):
     return layer_3.virtual_force(layer_3.Params(gain=gain), xi)
 
@@ -151,8 +148,6 @@ N = 50_000
 
 SIGMAS = 5.0
 """So many standard errors a mean may be off: by chance once in two million draws."""
-
-"""V; from the floor on."""
 
 
 def right_f_p(xi, before, h):
