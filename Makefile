@@ -74,7 +74,7 @@ dist: .venv/dev
 	$(BIN)/python docs/release.py
 
 cards: .venv/run
-	$(BIN)/python -m grasp_fmus.page
+	$(BIN)/python -m grasp_cosim.fmu_export.page
 
 pictures: .venv/dev
 	$(BIN)/python docs/pictures.py

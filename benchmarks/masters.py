@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from grasp_cosim.base.system_calls import cpus
-from grasp_fmus.build import build
+from grasp_cosim.fmu_export.build import build
 
 WORKER = Path(__file__).parent / "worker.py"
 

@@ -16,9 +16,9 @@ from string import Template
 from fmpy import read_model_description
 from grasp_cosim import System, grasp_system, hand_system
 from grasp_cosim.base.files import write_text
+from grasp_cosim.fmu_export.build import build, build_native, planned
+from grasp_cosim.fmu_export.native.targets import Version, targets
 from grasp_cosim.ssp.to_archive import write_ssp
-from grasp_fmus.build import build, build_native, planned
-from grasp_fmus.native.targets import Version, targets
 from hatchling.build import build_sdist, build_wheel
 from markdown_it import MarkdownIt
 

@@ -11,14 +11,14 @@ import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
-import c_compilers
 import fmpy
 import pytest
 from filelock import FileLock
 from grasp_cosim import System, cli
+from grasp_cosim.base import c_compilers
+from grasp_cosim.fmu_export.build import build, build_native, shipped_twins
+from grasp_cosim.fmu_export.shipped import SHIPPED
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_fmus.build import build, build_native, shipped_twins
-from grasp_fmus.shipped import SHIPPED
 from hypothesis import find, settings
 from hypothesis import strategies as st
 from support import kinds, marks

@@ -6,13 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from grasp_fmus.build import SOURCES
-from grasp_fmus.package import shipped_model, with_imports
-from grasp_fmus.shipped import PACKAGES, SHIPPED
+from grasp_cosim.fmu_export.build import SOURCES
+from grasp_cosim.fmu_export.package import shipped_model, with_imports
+from grasp_cosim.fmu_export.shipped import PACKAGES, SHIPPED
 
 ROOT = Path(__file__).parent.parent
 BLOCKS = {"gripper_plant", "proximity_sensor", "grasp_controller"}
-OURS = {*BLOCKS, "block_variables", "c_compilers", "si_units", "grasp_fmus", "grasp_cosim"}
 STANDARD = sys.stdlib_module_names
 
 
@@ -25,11 +24,24 @@ def imported(source):
             yield node.module.partition(".")[0]
 
 
-def foreign(package):
-    """The packages from outside the standard library that one of ours imports."""
-    texts = [file.read_text("utf-8") for file in ROOT.glob(f"*/{package}/**/*.py")]
-    assert texts
+def sources_of(package):
+    """The files of a package, or of a module, of ours."""
+    files = [*ROOT.glob(f"*/{package}/**/*.py"), *ROOT.glob(f"*/{package}.py")]
+    assert files
+    return files
+
+
+def foreign(files):
+    """The packages from outside the standard library that files of ours import."""
+    texts = [file.read_text("utf-8") for file in files]
     return {name for text in texts for name in imported(text)} - STANDARD
+
+
+def of_base(files):
+    """The modules of base that files of ours import."""
+    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text("utf-8")))]
+    modules = [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+    return {module.split(".")[1] for module in modules if module.startswith("base.")}
 
 
 def files_with(root, *names):
@@ -52,35 +64,43 @@ def test_the_contracts_of_imports_hold():
     ("package", "others"),
     [
         *((name, {"block_variables"}) for name in sorted(BLOCKS)),
-        *((name, set()) for name in ("block_variables", "c_compilers", "one_piece", "si_units")),
-        ("grasp_fmus/link", set()),
+        ("block_variables", set()),
+        *(
+            (f"grasp_cosim/{name}", set())
+            for name in ("base/c_compilers", "base/one_piece", "base/si_units", "fmu_export/link")
+        ),
     ],
 )
 def test_it_imports_the_standard_library_and(package, others):
-    assert foreign(package) <= others
+    assert foreign(sources_of(package)) <= others
 
 
-def test_the_orchestrator_imports_no_pythonfmu():
-    assert "pythonfmu" not in foreign("grasp_cosim")
+def test_who_makes_fmus_alone_knows_pythonfmu():
+    files = sources_of("grasp_cosim")
+    assert "pythonfmu" not in foreign([f for f in files if "fmu_export" not in f.parts])
 
 
 def test_all_that_fmus_are_made_of_decides_whether_they_are_up_to_date():
-    assert foreign("grasp_fmus") & OURS <= {*SOURCES}
+    assert foreign(sources_of("grasp_cosim/fmu_export")) & BLOCKS == set()
+    decides = {source.stem for source in SOURCES}
+    writes = {"one_piece"}
+    assert of_base(sources_of("grasp_cosim/fmu_export")) == decides - {"fmu_export"} | writes
 
 
 def test_what_is_packed_into_fmus_imports_the_standard_library_only():
     models = [shipped_model(name) for name in SHIPPED]
     packed = with_imports({name: data for m in models for name, data in m.sources.items()})
-    assert {"grasp_fmus/slave.py", "gripper_plant/movable.py"} < packed.keys()
+    assert {"fmu_export/slave.py", "gripper_plant/movable.py"} < packed.keys()
     names = {name for source in packed.values() for name in imported(source)}
-    assert names <= STANDARD | {*PACKAGES, "grasp_fmus"}
+    assert names <= STANDARD | {*PACKAGES, "fmu_export"}
 
 
 def test_few_import_by_name_what_no_contract_sees():
     """The table of blocks; the public names, the commands, and what an extra brings."""
     by_name = ("import_module", "__import__")
-    assert {*files_with("fmus/grasp_fmus", *by_name)} == {"shipped.py"}
-    rooms = {file.partition("/")[0] for file in files_with("orchestrator/grasp_cosim", *by_name)}
-    assert rooms == {"__init__.py", "cli", "base"}
+    files = [*files_with("orchestrator/grasp_cosim", *by_name)]
+    assert [f for f in files if f.startswith("fmu_export/")] == ["fmu_export/shipped.py"]
+    rooms = {file.partition("/")[0] for file in files}
+    assert rooms == {"__init__.py", "cli", "base", "fmu_export"}
     higher = {f.partition("/")[0] for f in files_with("orchestrator/grasp_cosim", "higher")}
     assert higher == {"system", "metrics", "recording"}

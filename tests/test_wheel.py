@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
@@ -33,14 +34,20 @@ def asked_for(names):
 
 
 @pytest.fixture(scope="module")
-def python(tmp_path_factory):
-    """Runs Python in an environment of the wheel and of what it asks for, where it can offline."""
+def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "env"], check=True)
-    (site,) = (folder / "env").glob("lib/python*/site-packages")
     build = f"import hatchling.build; hatchling.build.build_wheel({str(folder)!r})"
     subprocess.run([sys.executable, "-c", build], cwd=ROOT, check=True, capture_output=True)
-    (wheel,) = folder.glob("*.whl")
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def python(wheel, tmp_path_factory):
+    """Runs Python in an environment of the wheel and of what it asks for, where it can offline."""
+    folder = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "env"], check=True)
+    (site,) = (folder / "env").glob("lib/python*/site-packages")
     pip = (sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--no-compile")
     subprocess.run([*pip, "--target", site, wheel], check=True)
     requires = re.findall(
@@ -62,6 +69,14 @@ def python(tmp_path_factory):
         return done.stdout
 
     return run
+
+
+def test_it_puts_no_general_name_into_site_packages(wheel):
+    """The blocks, what a block of one's own declares its variables with, and one name besides."""
+    names = {name.partition("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
+    assert {name for name in names if not name.endswith(".dist-info")} == {
+        "block_variables", "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_cosim",
+    }  # fmt: skip
 
 
 def test_the_wheel_works_in_an_empty_folder(python, tmp_path):

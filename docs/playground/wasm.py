@@ -16,13 +16,13 @@ from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from c_compilers import BITS, LIBM, environment, find_zig
+from grasp_cosim.base.c_compilers import BITS, LIBM, environment, find_zig
 from grasp_cosim.base.checks import install_command
 from grasp_cosim.base.errors import InputError
+from grasp_cosim.fmu_export.native.blocks import translated
+from grasp_cosim.fmu_export.native.sources import native_sources
+from grasp_cosim.fmu_export.package import Model, shipped_model, write_file
 from grasp_cosim.grasp.system import CONTROLLERS
-from grasp_fmus.native.blocks import translated
-from grasp_fmus.native.sources import native_sources
-from grasp_fmus.package import Model, shipped_model, write_file
 
 PLANTS = {
     "fixed": "GripperPlant",

@@ -6,16 +6,16 @@ import sys
 import zipfile
 from pathlib import Path
 
-import c_compilers
 import pytest
-from c_compilers import CompilerError
 from grasp_cosim import System
+from grasp_cosim.base import c_compilers
+from grasp_cosim.base.c_compilers import CompilerError
+from grasp_cosim.fmu_export import package
+from grasp_cosim.fmu_export.build import build_block, planned
+from grasp_cosim.fmu_export.native.targets import here
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.interface.read import describe
-from grasp_fmus import package
-from grasp_fmus.build import build_block, planned
-from grasp_fmus.native.targets import here
 from support.kinds import TRANSLATED
 from support.marks import needs_compiler, needs_zig, slow
 
@@ -64,7 +64,7 @@ def test_what_is_built_is_said_before_the_compiler_runs(command, monkeypatch):
         raise CompilerError("out of patience")
 
     monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
-    monkeypatch.setattr("grasp_fmus.build.build_native", ended)
+    monkeypatch.setattr("grasp_cosim.fmu_export.build.build_native", ended)
     line = f"building for {here().tuple}, 00:00\ngrasp-cosim: out of patience\n"
     assert command("build", "--native") == (3, "", line)
 

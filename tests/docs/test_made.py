@@ -8,8 +8,8 @@ from pathlib import Path
 
 import grasp_cosim
 import pytest
-from grasp_fmus.page import blocks_by_card, updated
-from grasp_fmus.shipped import SHIPPED
+from grasp_cosim.fmu_export.page import blocks_by_card, updated
+from grasp_cosim.fmu_export.shipped import SHIPPED
 
 ROOT = Path(__file__).parents[2]
 CARDS = blocks_by_card()

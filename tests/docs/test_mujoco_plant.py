@@ -10,7 +10,7 @@ from random import Random
 import mujoco_plant
 import pytest
 from grasp_cosim import simulate
-from grasp_fmus.build import build_block
+from grasp_cosim.fmu_export.build import build_block
 from gripper_plant import friction
 from mujoco_plant import IMPEDANCE, Inputs, Params
 from support.grasps import CASES

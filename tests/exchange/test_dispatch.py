@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, simulate
+from grasp_cosim.base.si_units import Unit
 from grasp_cosim.exchange.dispatch import DECADES, FAR, Divergence, largest
 from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.interface.interface import Interface, Variable
@@ -15,7 +16,6 @@ from grasp_cosim.system.parts import Port
 from hypothesis import given
 from hypothesis import strategies as st
 from recording.rows import full_disk
-from si_units import Unit
 
 
 @pytest.mark.parametrize("every", [1, 300])

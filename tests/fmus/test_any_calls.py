@@ -8,7 +8,7 @@ computes what it always does. And the native FMU does in all what the one in Pyt
 from ctypes import Array, c_char_p, c_double, c_int, c_size_t, c_uint
 
 import pytest
-from grasp_fmus.shipped import SHIPPED
+from grasp_cosim.fmu_export.shipped import SHIPPED
 from hypothesis import HealthCheck, given, reject
 from hypothesis import strategies as st
 from support.fmi2 import OK, Instance, State, drive

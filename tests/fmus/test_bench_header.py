@@ -15,11 +15,10 @@ from pathlib import Path
 from select import select
 
 import pytest
-from grasp_cosim.hil.served import MOST_LOST
-from grasp_fmus import link
-from grasp_fmus.contract import declared, unpacker
-from grasp_fmus.contract import variables as variables_of
-from grasp_fmus.link import (
+from grasp_cosim.fmu_export import link
+from grasp_cosim.fmu_export.contract import declared, unpacker
+from grasp_cosim.fmu_export.contract import variables as variables_of
+from grasp_cosim.fmu_export.link import (
     ALIVE,
     INITIALISE,
     STEP,
@@ -31,10 +30,11 @@ from grasp_fmus.link import (
     Sealer,
     Signature,
 )
-from grasp_fmus.native.bench_header import bench_header, c_prefix
-from grasp_fmus.native.c_only import write_c
-from grasp_fmus.package import shipped_model
-from grasp_fmus.proxy import shared_signature
+from grasp_cosim.fmu_export.native.bench_header import bench_header, c_prefix
+from grasp_cosim.fmu_export.native.c_only import write_c
+from grasp_cosim.fmu_export.package import shipped_model
+from grasp_cosim.fmu_export.proxy import shared_signature
+from grasp_cosim.hil.served import MOST_LOST
 from gripper_plant import rigid
 from support import compiled
 from support.marks import slow

@@ -5,15 +5,16 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import pytest
-from grasp_fmus import build as builds
-from grasp_fmus.build import build, build_block, build_native, planned, sources_key
-from grasp_fmus.native.targets import here
-from grasp_fmus.package import HASH, Built
-from grasp_fmus.page import icon
-from grasp_fmus.shipped import SHIPPED, package_folder
+from grasp_cosim.fmu_export import build as builds
+from grasp_cosim.fmu_export.build import build, build_block, build_native, planned, sources_key
+from grasp_cosim.fmu_export.native.targets import here
+from grasp_cosim.fmu_export.package import HASH, Built
+from grasp_cosim.fmu_export.page import icon
+from grasp_cosim.fmu_export.shipped import PACKAGES, SHIPPED, package_folder
 from support.fmi2 import read_members
 from support.kinds import OWN, TRANSLATED
 from support.marks import slow
@@ -76,7 +77,11 @@ def test_what_is_in_an_fmu(fmus, natives, name):
 @pytest.mark.slow
 def test_another_process_gives_the_same_bytes(fmus, own_cache, tmp_path):
     """From another folder, with sets in another order, and several at once."""
-    script = "from pathlib import Path; from grasp_fmus import build; build.build(Path('out'))"
+    script = """if True:
+        from pathlib import Path
+        from grasp_cosim.fmu_export.build import build
+        build(Path("out"))
+    """
     command = [sys.executable, "-c", script]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     started = [
@@ -134,10 +139,10 @@ def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus, tmp_path):
     script = """if True:
         import sys
         from pathlib import Path
-        from grasp_fmus.build import build
+        from grasp_cosim.fmu_export.build import build
         print({built.status for built in build(Path(sys.argv[1]))})
         print([n for n in sys.modules if n.startswith((
-            "grasp_fmus.", "pythonfmu", "markdown_it", "latex2mathml", "numpy",
+            "grasp_cosim.fmu_export.", "pythonfmu", "markdown_it", "latex2mathml", "numpy",
             "importlib.metadata", "gripper_plant", "block_variables",
         ))])
     """
@@ -145,22 +150,27 @@ def test_an_up_to_date_folder_costs_no_import_of_what_builds(fmus, tmp_path):
     command = [sys.executable, "-c", script, str(fmus)]
     said = subprocess.check_output(command, cwd=tmp_path, env=environment, text=True)
     needed = ["native", "native.targets", "shipped", "package", "build"]
-    assert said == f"{{'unchanged'}}\n{[f'grasp_fmus.{name}' for name in needed]}\n"
+    assert said == f"{{'unchanged'}}\n{[f'grasp_cosim.fmu_export.{name}' for name in needed]}\n"
 
 
 SOURCES = (
-    "grasp_fmus/cross_check.py", "grasp_fmus/icons/GripperPlant.png", "grasp_fmus/page.html.in",
-    "grasp_fmus/native/c/slave.h", "c_compilers/__init__.py", "gripper_plant/rigid.py",
-    "grasp_fmus/new.py", "README.md", "pythonfmu/resources/binaries/linux64/libpythonfmu-export.so",
+    "fmu_export/cross_check.py", "fmu_export/icons/GripperPlant.png", "fmu_export/page.html.in",
+    "fmu_export/native/c/slave.h", "c_compilers/__init__.py", "si_units.py",
+    "gripper_plant/rigid.py", "fmu_export/new.py", "README.md",
+    "pythonfmu/resources/binaries/linux64/libpythonfmu-export.so",
     "pythonfmu-9.dist-info",
 )  # fmt: skip
 
 
 def test_every_source_is_in_the_key(tmp_path, monkeypatch):
     """Of copies of the packages, and of the binaries and the version of what is installed."""
-    for package in (*builds.SOURCES, "pythonfmu"):
-        original = package_folder(package)
-        shutil.copytree(original, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    compiled = shutil.ignore_patterns("__pycache__")
+    for package in (*PACKAGES, "pythonfmu"):
+        shutil.copytree(package_folder(package), tmp_path / package, ignore=compiled)
+    for source in builds.SOURCES:
+        copy = shutil.copy if source.is_file() else partial(shutil.copytree, ignore=compiled)
+        copy(source, tmp_path / source.name)
+    monkeypatch.setattr(builds, "SOURCES", [tmp_path / source.name for source in builds.SOURCES])
     shutil.copy(package_folder("gripper_plant").parent / "README.md", tmp_path)
     monkeypatch.setattr(builds, "package_folder", lambda package: tmp_path / package)
     monkeypatch.setattr(builds, "card_file", lambda package: tmp_path / "README.md")
@@ -186,7 +196,9 @@ def test_of_what_is_kept_the_newest_stay(own_cache, monkeypatch):
 
 @pytest.mark.usefixtures("own_cache")
 def test_a_build_that_fails_leaves_what_was_there(fmus, out, monkeypatch):
-    monkeypatch.setattr("grasp_fmus.page.icon", lambda name: (_ for _ in ()).throw(OSError("none")))
+    monkeypatch.setattr(
+        "grasp_cosim.fmu_export.page.icon", lambda name: (_ for _ in ()).throw(OSError("none"))
+    )
     with pytest.raises(OSError, match="none"):
         build(out)
     assert contents(out) == contents(fmus)

@@ -9,11 +9,18 @@ import sys
 import time
 from pathlib import Path
 
-import c_compilers
 import pytest
-from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
-from grasp_fmus.build import compiler_for, job
-from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86
+from grasp_cosim.base import c_compilers
+from grasp_cosim.base.c_compilers import (
+    Compiler,
+    CompilerError,
+    Job,
+    cache,
+    compile_all,
+    find_compiler,
+)
+from grasp_cosim.fmu_export.build import compiler_for, job
+from grasp_cosim.fmu_export.native.targets import LINUX_ARM, LINUX_X86, MAC_ARM, MAC_X86
 from support.marks import needs_zig
 from support.native_fmus import needs_gcc
 from support.processes import ends

@@ -8,7 +8,14 @@ from typing import Annotated, NamedTuple
 
 import pytest
 from block_variables import Group, Input, Output, Parameter, check
-from grasp_fmus.contract import Enumeration, build_params, declared, packer, unpacker, variables
+from grasp_cosim.fmu_export.contract import (
+    Enumeration,
+    build_params,
+    declared,
+    packer,
+    unpacker,
+    variables,
+)
 
 Pair = tuple[float, float]
 

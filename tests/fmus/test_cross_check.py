@@ -13,9 +13,9 @@ from block_variables import Input, Output
 from fmpy import read_model_description, simulate_fmu
 from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
 from fmpy.util import read_csv, read_ref_opt_file, validate_result
-from grasp_fmus.contract import declared, variables
-from grasp_fmus.cross_check import STEP_SIZE, cross_check_files
-from grasp_fmus.shipped import blocks
+from grasp_cosim.fmu_export.contract import declared, variables
+from grasp_cosim.fmu_export.cross_check import STEP_SIZE, cross_check_files
+from grasp_cosim.fmu_export.shipped import blocks
 from support.kinds import TRANSLATED, all_kinds
 from support.marks import slow
 

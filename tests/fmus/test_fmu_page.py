@@ -6,13 +6,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from grasp_fmus import page as made
-from grasp_fmus.build import build_model
-from grasp_fmus.contract import declared
-from grasp_fmus.description import version
-from grasp_fmus.package import shipped_model
-from grasp_fmus.page import NATIVE, PROXY, PYTHON, icon, needed, page
-from grasp_fmus.shipped import blocks
+from grasp_cosim.fmu_export import page as made
+from grasp_cosim.fmu_export.build import build_model
+from grasp_cosim.fmu_export.contract import declared
+from grasp_cosim.fmu_export.description import version
+from grasp_cosim.fmu_export.package import shipped_model
+from grasp_cosim.fmu_export.page import NATIVE, PROXY, PYTHON, icon, needed, page
+from grasp_cosim.fmu_export.shipped import blocks
 from report.javascript import in_browser
 from support.fmi2 import read_members
 

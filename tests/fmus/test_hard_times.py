@@ -199,7 +199,7 @@ def test_binaries_let_go_of_python_before_the_process_ends(tmp_path):
     )
     compile_c(["gcc", "-shared", "-fPIC", source], library)
     program = (
-        "import ctypes, sys; from grasp_fmus import slave; ctypes.CDLL(sys.argv[1]);"
+        "import ctypes, sys; from grasp_cosim.fmu_export import slave; ctypes.CDLL(sys.argv[1]);"
         "slave._binaries |= {sys.argv[1], '/no/such.so'}"
     )
     done = subprocess.run([sys.executable, "-c", program, library], capture_output=True, text=True)

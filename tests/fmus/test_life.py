@@ -5,8 +5,8 @@ from math import inf, nan
 from types import SimpleNamespace
 
 import pytest
-from grasp_fmus.contract import longest_step
-from grasp_fmus.shipped import blocks
+from grasp_cosim.fmu_export.contract import longest_step
+from grasp_cosim.fmu_export.shipped import blocks
 from hypothesis import given
 from hypothesis import strategies as st
 from support.fmi2 import OK, H, Instance, drive

@@ -5,8 +5,8 @@ import struct
 from hashlib import sha256
 
 import pytest
-from grasp_fmus import link
-from grasp_fmus.link import (
+from grasp_cosim.fmu_export import link
+from grasp_cosim.fmu_export.link import (
     ALIVE,
     END,
     INITIALISE,

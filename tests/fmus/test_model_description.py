@@ -9,9 +9,9 @@ from xml.etree.ElementTree import fromstring, tostring
 import fmpy
 import pytest
 from fmpy.validation import validate_fmu
-from grasp_fmus.contract import Variable, declared, variables
-from grasp_fmus.description import Description, build_description, model_description
-from grasp_fmus.shipped import blocks
+from grasp_cosim.fmu_export.contract import Variable, declared, variables
+from grasp_cosim.fmu_export.description import Description, build_description, model_description
+from grasp_cosim.fmu_export.shipped import blocks
 from lxml import etree  # type: ignore[import-untyped]
 from support.fmi2 import OK, Instance
 from support.kinds import TRANSLATED, all_kinds

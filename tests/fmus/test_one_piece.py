@@ -7,7 +7,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from one_piece import in_one_piece, is_stream
+from grasp_cosim.base.one_piece import in_one_piece, is_stream
 from recording.rows import full_disk
 
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root makes devices")

@@ -4,8 +4,8 @@ import sys
 from math import exp
 
 import pytest
-from grasp_fmus.build import build_block
-from grasp_fmus.package import Built
+from grasp_cosim.fmu_export.build import build_block
+from grasp_cosim.fmu_export.package import Built
 from support.fmi2 import OK, Fmu, Instance, read_members
 
 READ = "declaration" if sys.version_info >= (3, 14) else "import"

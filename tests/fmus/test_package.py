@@ -8,9 +8,9 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from grasp_fmus.build import build_block
-from grasp_fmus.package import IMPORT, with_imports
-from grasp_fmus.shipped import SHIPPED
+from grasp_cosim.fmu_export.build import build_block
+from grasp_cosim.fmu_export.package import IMPORT, with_imports
+from grasp_cosim.fmu_export.shipped import SHIPPED
 from support.fmi2 import Fmu, Instance, drive
 from support.kinds import all_kinds
 
@@ -153,9 +153,10 @@ for path in fmus:
 """
 NOTHING = 'assert not {m for m in sys.modules if m.startswith(("grasp", "gripper", "prox"))}'
 REPLACED = """
-import gripper_plant.rigid, proximity_sensor.channel, grasp_controller.adaptive, grasp_fmus.slave
+import gripper_plant.rigid, proximity_sensor.channel, grasp_controller.adaptive
+import grasp_cosim.fmu_export.slave
 from types import ModuleType
-OURS = "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_fmus", "block_variables"
+OURS = "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_cosim", "block_variables"
 for name in [*sys.modules]:
     if name.partition(".")[0] in OURS:
         sys.modules[name] = ModuleType(name, "nothing in it")
@@ -164,7 +165,7 @@ for name in [*sys.modules]:
 
 def run(script, *arguments):
     """What a host prints; it must end with exit code 0."""
-    roots = [ROOT / folder for folder in ("plant", "sensor", "controller", "fmus")]
+    roots = [ROOT / folder for folder in ("plant", "sensor", "controller", "fmus", "orchestrator")]
     done = subprocess.run(
         [sys.executable, "-c", script, *map(str, arguments)],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, [TESTS, *roots]))},

@@ -6,8 +6,17 @@ from random import Random
 from threading import Event
 
 import pytest
-from grasp_fmus import link
-from grasp_fmus.link import END, HELLO, INITIALISE, OUTPUTS, STEP, VERSION, Message, Sealer
+from grasp_cosim.fmu_export import link
+from grasp_cosim.fmu_export.link import (
+    END,
+    HELLO,
+    INITIALISE,
+    OUTPUTS,
+    STEP,
+    VERSION,
+    Message,
+    Sealer,
+)
 from support.native_proxies import connected, hosted
 from support.processes import kept_port
 from support.scripted_peer import (

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from grasp_cosim import cli, simulate
+from grasp_cosim.base.si_units import known_unit
+from grasp_cosim.fmu_export.native.bench_header import bench_header
+from grasp_cosim.fmu_export.package import write_members
+from grasp_cosim.fmu_export.page import icon
 from grasp_cosim.hil.proxy import link_signature
 from grasp_cosim.hil.served import Service
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system.description import System
 from grasp_cosim.system.parts import Component
-from grasp_fmus.native.bench_header import bench_header
-from grasp_fmus.package import write_members
-from grasp_fmus.page import icon
-from si_units import known_unit
 from support import native_fmus
 from support.fmi2 import read_members
 from support.marks import platforms, slow

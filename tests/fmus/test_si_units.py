@@ -4,11 +4,11 @@ import math
 from xml.etree.ElementTree import fromstring
 
 import pytest
-from grasp_fmus.contract import Variable
-from grasp_fmus.description import Description, model_description
+from grasp_cosim.base.si_units import BASE, known_unit, refusal
+from grasp_cosim.fmu_export.contract import Variable
+from grasp_cosim.fmu_export.description import Description, model_description
 from hypothesis import given
 from hypothesis import strategies as st
-from si_units import BASE, known_unit, refusal
 
 TEN = {"": 0, "m": -3, "u": -6, "n": -9, "k": 3, "M": 6, "G": 9, "c": -2, "h": 2}
 SYMBOLS = {"m": {"m": 1}, "s": {"s": 1}, "N": {"kg": 1, "m": 1, "s": -2}, "K": {"K": 1}}

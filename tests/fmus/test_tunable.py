@@ -3,8 +3,8 @@
 from math import isfinite
 
 import pytest
-from grasp_fmus.contract import build_params, declared, longest_step, packer, unpacker
-from grasp_fmus.shipped import blocks
+from grasp_cosim.fmu_export.contract import build_params, declared, longest_step, packer, unpacker
+from grasp_cosim.fmu_export.shipped import blocks
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from support.fmi2 import OK, Instance

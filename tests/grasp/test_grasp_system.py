@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import grasp_system
+from grasp_cosim.fmu_export import build as builds
+from grasp_cosim.fmu_export.build import shipped_fmus
+from grasp_cosim.fmu_export.shipped import SHIPPED
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
 from grasp_cosim.grasp.system import CONTROLLERS, with_controller
-from grasp_fmus import build as builds
-from grasp_fmus.build import shipped_fmus
-from grasp_fmus.shipped import SHIPPED
 from support.marks import skip_without_pythonfmu
 
 EIGHT_THREADS = """

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.comparison.qualify import qualify
+from grasp_cosim.fmu_export.build import build_block
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.metrics.metric import metric
 from grasp_cosim.recording.result import UNITS
-from grasp_fmus.build import build_block
 from support.marks import needs_pythonfmu
 
 pytestmark = needs_pythonfmu

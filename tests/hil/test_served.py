@@ -9,11 +9,11 @@ from contextlib import ExitStack
 import pytest
 from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
+from grasp_cosim.fmu_export.link import STEP as STEP_REQUEST
+from grasp_cosim.fmu_export.link import TOO_LONG
 from grasp_cosim.hil.proxy import exchanged, link_signature
 from grasp_cosim.hil.served import BACKLOG, DrivenFmu, ServedFmu, Server, Service
 from grasp_cosim.interface.read import read_interface
-from grasp_fmus.link import STEP as STEP_REQUEST
-from grasp_fmus.link import TOO_LONG
 from support import native_fmus
 from support.proxies import HandProxy, RefusedError, UdpAsk, serving, wait_until
 

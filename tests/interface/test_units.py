@@ -4,13 +4,13 @@ import math
 
 import pytest
 from grasp_cosim import InputError, System
+from grasp_cosim.base.si_units import BASE, Unit, known_unit
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.units import conversion
 from grasp_cosim.system.parts import Component, Connection, Port
 from grasp_cosim.system.validity import connection_transform
 from hypothesis import given
 from hypothesis import strategies as st
-from si_units import BASE, Unit, known_unit
 from ssp.hand_made import described
 
 exponents = st.tuples(*[st.integers(-4, 4)] * len(BASE))

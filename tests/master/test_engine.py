@@ -9,8 +9,8 @@ import threading
 
 import numpy as np
 import pytest
-from c_compilers import find_compiler
 from grasp_cosim import InputError, SimulationError, simulate
+from grasp_cosim.base.c_compilers import find_compiler
 from grasp_cosim.base.calls import STEP_2, Call, Native
 from grasp_cosim.master import engine, loop
 from grasp_cosim.master.engine import make_loop

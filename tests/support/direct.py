@@ -8,9 +8,9 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+from grasp_cosim.fmu_export.contract import build_params, declared, packer, unpacker, variables
+from grasp_cosim.fmu_export.shipped import block_of
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
-from grasp_fmus.shipped import block_of
 
 GRASP = tomllib.loads(SYSTEM.read_text("utf-8"))
 COMPONENTS = {name: Path(c["fmu"]).stem for name, c in GRASP["components"].items()}

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
-from grasp_fmus.build import build_block, build_model, planned
-from grasp_fmus.package import shipped_model
-from grasp_fmus.shipped import SHIPPED
+from grasp_cosim.fmu_export.build import build_block, build_model, planned
+from grasp_cosim.fmu_export.package import shipped_model
+from grasp_cosim.fmu_export.shipped import SHIPPED
 
 from .marks import platforms, slow
 

@@ -9,12 +9,12 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from c_compilers import Compiler, compile_all
-from grasp_fmus.build import compiler_for, job
-from grasp_fmus.description import Description
-from grasp_fmus.native.targets import here
-from grasp_fmus.package import write_file
-from grasp_fmus.proxy import proxy_members
+from grasp_cosim.base.c_compilers import Compiler, compile_all
+from grasp_cosim.fmu_export.build import compiler_for, job
+from grasp_cosim.fmu_export.description import Description
+from grasp_cosim.fmu_export.native.targets import here
+from grasp_cosim.fmu_export.package import write_file
+from grasp_cosim.fmu_export.proxy import proxy_members
 
 from .fmi2 import ERROR, OK, Fmu, Instance
 from .scripted_peer import VARIABLES, Clock, ScriptedPeer

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from c_compilers import Compiler, compile_all
-from grasp_fmus.build import compiler_for, job
-from grasp_fmus.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
+from grasp_cosim.base.c_compilers import Compiler, compile_all
+from grasp_cosim.fmu_export.build import compiler_for, job
+from grasp_cosim.fmu_export.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
 
 from .c_host import HEADERS, SOURCE, Host, Part
 from .compiled import compile_c

@@ -8,10 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 from grasp_cosim import cli
-from grasp_cosim.hil.proxy import exchanged
-from grasp_cosim.hil.relay import Relay
-from grasp_cosim.hil.served import ServedFmu, Server
-from grasp_fmus.link import (
+from grasp_cosim.fmu_export.link import (
     END,
     HELLO,
     INITIALISE,
@@ -25,6 +22,9 @@ from grasp_fmus.link import (
     Message,
     Sealer,
 )
+from grasp_cosim.hil.proxy import exchanged
+from grasp_cosim.hil.relay import Relay
+from grasp_cosim.hil.served import ServedFmu, Server
 
 Ask = Callable[[bytes], bytes | None]
 """Hands a datagram over; the answer, if there is one."""

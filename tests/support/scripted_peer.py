@@ -10,8 +10,8 @@ from collections.abc import Callable
 from itertools import count
 from threading import Thread
 
-from grasp_fmus.contract import Variable
-from grasp_fmus.link import (
+from grasp_cosim.fmu_export.contract import Variable
+from grasp_cosim.fmu_export.link import (
     BUSY,
     END,
     FAILED,
@@ -27,7 +27,7 @@ from grasp_fmus.link import (
     Message,
     Sealer,
 )
-from grasp_fmus.proxy import shared_signature
+from grasp_cosim.fmu_export.proxy import shared_signature
 
 Act = Callable[["ScriptedPeer", Message], None]
 

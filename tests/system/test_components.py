@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from comparison.made import PLANT, write_fmu
 from grasp_cosim import InputError, System, grasp_system, simulate
+from grasp_cosim.base.si_units import Unit
 from grasp_cosim.grasp.system import with_controller
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Solver
 from grasp_cosim.system.settings import settings
 from grasp_cosim.system.validity import connection_transform, remarks
-from si_units import Unit
 from support.marks import needs_compiler
 from support.native_fmus import build_model, needs_gcc
 from support.native_systems import write_oscillator

@@ -11,8 +11,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from one_piece import in_one_piece, is_stream
-
+from ..base.one_piece import in_one_piece, is_stream
 from .errors import InputError
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -110,17 +110,16 @@ class _Said(logging.Handler):
 @contextmanager
 def told(level: int) -> Iterator[None]:
     """Have what our modules log at this level or above said meanwhile."""
-    loggers = [logging.getLogger(name) for name in ("grasp_cosim", "grasp_fmus")]
-    before = [(logger, logger.level, [*logger.handlers]) for logger in loggers]
-    for logger in loggers:
-        if not any(isinstance(handler, _Said) for handler in logger.handlers):
-            logger.addHandler(_Said())
-        logger.setLevel(min(level, logger.level or level))  # --verbose may be the earlier one
+    logger = logging.getLogger("grasp_cosim")
+    level_before, handlers_before = logger.level, [*logger.handlers]
+    if not any(isinstance(handler, _Said) for handler in logger.handlers):
+        logger.addHandler(_Said())
+    logger.setLevel(min(level, logger.level or level))  # --verbose may be the earlier one
     try:
         yield
     finally:
-        for logger, was, logger.handlers in before:
-            logger.setLevel(was)
+        logger.setLevel(level_before)
+        logger.handlers = handlers_before
 
 
 _flag = partial(click.Option, is_flag=True, expose_value=False)

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import click
-from grasp_fmus.proxy import DEFAULTS, Settings
 
 from ..base.errors import InputError, SimulationError
 from ..base.files import FMU_FOLDER, NATIVE_FOLDER, check_folder
+from ..fmu_export.proxy import DEFAULTS, Settings
 from ..interface.obstacles import of_binary
 from ..interface.read import describe
 from .frame import PATH, json_option, say, show, waiting
@@ -67,9 +67,9 @@ def build(
     Your own: grasp-cosim build docs/spring_plant.py
     Native: grasp-cosim build --native --target linux64,win64
     """
-    from c_compilers import CompilerError  # only here: they take time to load
-    from grasp_fmus.build import build_chosen, planned, write_c_only
-    from grasp_fmus.native.targets import targets
+    from ..base.c_compilers import CompilerError  # only here: they take time to load
+    from ..fmu_export.build import build_chosen, planned, write_c_only
+    from ..fmu_export.native.targets import targets
 
     only_native = {"--target": target, "--fmi": fmi, "--c-only": c_only}
     for option, value in only_native.items():

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from si_units import known_unit
 
 from ..base.errors import InputError
 from ..base.files import check_nature
+from ..base.si_units import known_unit
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals, measure
 from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run

@@ -15,8 +15,8 @@ from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
-from si_units import known_unit
 
+from ..base.si_units import known_unit
 from ..interface.interface import Interface, Variable
 from ..system.description import System
 from ..system.parts import Component, Port

@@ -11,8 +11,8 @@ from string import Template
 from typing import Any, TypeVar
 
 import numpy as np
-from si_units import known_unit
 
+from ..base.si_units import known_unit
 from ..metrics.metric import resolved
 from ..recording.result import Result
 from ..report.page import Scene, Zoom

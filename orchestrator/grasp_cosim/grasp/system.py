@@ -4,11 +4,10 @@ import re
 from collections.abc import Collection
 from pathlib import Path
 
-from grasp_fmus.build import shipped_fmus
-
 from ..base.checks import choice
 from ..base.errors import InputError
 from ..base.files import FMU_FOLDER
+from ..fmu_export.build import shipped_fmus
 from ..metrics.metric import resolved
 from ..system.description import System
 from .presets import SYSTEM
@@ -72,7 +71,7 @@ def built(folder: Path, fingers: int | None = None) -> Path:
 
     With `fingers` those of a hand that has so many are among them.
     """
-    from grasp_fmus.build import build, build_chosen
+    from ..fmu_export.build import build, build_chosen
 
     try:
         build(folder / FMU_FOLDER)

@@ -7,10 +7,9 @@ from pathlib import Path
 from string import Template
 from tempfile import TemporaryDirectory
 
-from grasp_fmus.build import shipped_fmus
-from grasp_fmus.shipped import FEWEST, MOST
-
 from ..base.errors import InputError
+from ..fmu_export.build import shipped_fmus
+from ..fmu_export.shipped import FEWEST, MOST
 from ..grasp.system import with_controller
 from ..system.description import System
 from .weights import LEAST, balance_weights

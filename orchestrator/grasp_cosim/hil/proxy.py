@@ -8,20 +8,19 @@ from math import isfinite, isinf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grasp_fmus.link import ALIVE, ORDER, LinkVariable, Signature, check_size, exposed, read_key
-
 from ..base.errors import InputError, SimulationError
 from ..base.files import check_file, write_text
+from ..fmu_export.link import ALIVE, ORDER, LinkVariable, Signature, check_size, exposed, read_key
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value, Variable
 from ..interface.read import read_interface
 from ..system.parts import NANOSECONDS
 
 if TYPE_CHECKING:
-    from grasp_fmus.contract import Variable as ProxyVariable
-    from grasp_fmus.native.targets import Version
-    from grasp_fmus.package import Built
-    from grasp_fmus.proxy import Settings
+    from ..fmu_export.contract import Variable as ProxyVariable
+    from ..fmu_export.native.targets import Version
+    from ..fmu_export.package import Built
+    from ..fmu_export.proxy import Settings
 
 LONGEST_SILENCE = ALIVE / NANOSECONDS
 """s after which another proxy may take over a session."""
@@ -113,11 +112,11 @@ def write_proxy(
     InputError where the FMU or a setting does not permit it, SimulationError where the compiler
     fails.
     """
-    from c_compilers import CompilerError  # here, as below, what takes time to load
-    from grasp_fmus.build import planned
-    from grasp_fmus.description import Description, Experiment
-    from grasp_fmus.native.targets import targets as found
-    from grasp_fmus.proxy import build_proxy
+    from ..base.c_compilers import CompilerError  # here, as below, what takes time to load
+    from ..fmu_export.build import planned
+    from ..fmu_export.description import Description, Experiment
+    from ..fmu_export.native.targets import targets as found
+    from ..fmu_export.proxy import build_proxy
 
     _check_other(fmu, out)
     interface = exchanged(fmu)
@@ -148,7 +147,7 @@ def write_peer_header(fmu: Path, out: Path) -> list[str]:
 
     InputError where the FMU does not permit it.
     """
-    from grasp_fmus.native.bench_header import bench_header
+    from ..fmu_export.native.bench_header import bench_header
 
     _check_other(fmu, out)
     interface = exchanged(fmu)
@@ -172,8 +171,8 @@ def _check_other(fmu: Path, out: Path) -> None:
 
 def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariable:
     """The variable in the proxy: an output follows inputs and parameters at the start only."""
-    from grasp_fmus.contract import Enumeration
-    from grasp_fmus.contract import Variable as ProxyVariable
+    from ..fmu_export.contract import Enumeration
+    from ..fmu_export.contract import Variable as ProxyVariable
 
     limits = (v.low, v.high)
     initially: tuple[str, ...] = ()

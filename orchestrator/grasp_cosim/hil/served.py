@@ -7,7 +7,11 @@ from math import isclose, isfinite
 
 import numpy as np
 import numpy.typing as npt
-from grasp_fmus.link import (
+
+from ..base.errors import InputError, SimulationError, nearest
+from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
+from ..fmi.process import load_here
+from ..fmu_export.link import (
     END,
     INITIALISE,
     PORT,
@@ -18,10 +22,6 @@ from grasp_fmus.link import (
     Request,
     Signature,
 )
-
-from ..base.errors import InputError, SimulationError, nearest
-from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
-from ..fmi.process import load_here
 from ..interface.interface import Interface, Value, Variable
 from ..master.master import finish_step
 from ..system.parts import NANOSECONDS

@@ -10,11 +10,10 @@ from pathlib import Path
 from shlex import quote
 from typing import Any, Literal, Protocol, get_args
 
-from si_units import Unit, known_unit, spelt_like
-
 from ..base.checks import EXACT, integer, known, real
 from ..base.errors import InputError, choices
 from ..base.scratch import without_scratch
+from ..base.si_units import Unit, known_unit, spelt_like
 from .units import IDENTITY, Conversion, conversion
 
 Value = float | int | bool | str

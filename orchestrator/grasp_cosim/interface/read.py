@@ -14,11 +14,10 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from si_units import BASE, Unit, known_unit
-
 from ..base.checks import real
 from ..base.errors import InputError
 from ..base.files import check_fmu_file
+from ..base.si_units import BASE, Unit, known_unit
 from .document import read_document, unreadable
 from .interface import (
     PARAMETERS,

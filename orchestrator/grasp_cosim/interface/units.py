@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from si_units import Unit
+from ..base.si_units import Unit
 
 if TYPE_CHECKING:  # reading a description needs no numpy, which takes time to load
     import numpy as np

@@ -20,9 +20,9 @@ from threading import Thread
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
-from c_compilers import CompilerError, Job, cache, compile_all, find_compiler
 
 from ..base import calls as shapes
+from ..base.c_compilers import CompilerError, Job, cache, compile_all, find_compiler
 from ..base.calls import PYTHON, Native
 from ..base.checks import choice
 from ..base.errors import InputError

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from si_units import known_unit
-
 from ..base.errors import InputError, choices
+from ..base.si_units import known_unit
 from ..interface.units import Conversion
 from ..system.structure import Structure, naming, output_units
 from .metric import Metric, available, resolved

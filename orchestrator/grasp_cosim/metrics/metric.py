@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from si_units import refusal
 
 from ..base.checks import known
 from ..base.errors import InputError, choices, nearest
 from ..base.errors import reason as reason_of
 from ..base.higher import groups, higher
+from ..base.si_units import refusal
 from ..interface.units import Conversion
 
 Value = float | bool | None

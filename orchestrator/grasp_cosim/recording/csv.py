@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from one_piece import in_one_piece
 
 from ..base.checks import extra_module
 from ..base.errors import InputError
+from ..base.one_piece import in_one_piece
 from ..base.text import from_cell, to_cell
 from ..exchange.listener import Experiment, Signal
 from .arrow import pyarrow

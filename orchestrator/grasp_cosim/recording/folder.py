@@ -14,13 +14,13 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
-from si_units import known_unit
 
 from ..base.checks import choice, is_number
 from ..base.errors import InputError, choices
 from ..base.files import check_nature, of_any_format, remove, unwritable
 from ..base.higher import groups
 from ..base.scratch import SUFFIX, Lock
+from ..base.si_units import known_unit
 from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.in_si import in_si

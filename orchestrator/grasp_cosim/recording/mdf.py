@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
-from one_piece import in_one_piece
 
 from ..base.checks import extra_module
 from ..base.errors import InputError
+from ..base.one_piece import in_one_piece
 from ..exchange.listener import Experiment, Signal
 from .memory import Batch, writing
 

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from one_piece import in_one_piece
 
 from ..base.checks import extra_module, is_number
 from ..base.errors import UnknownNameError, choices
 from ..base.files import write_json
 from ..base.higher import higher
+from ..base.one_piece import in_one_piece
 from ..base.text import on_one_line
 from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion

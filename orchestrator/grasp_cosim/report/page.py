@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from one_piece import is_stream
 
 from ..base.errors import InputError
 from ..base.files import check_file, of_any_format, remove_parts, write_text
+from ..base.one_piece import is_stream
 from ..base.text import grouped
 from ..exchange.listener import Texts
 from ..recording.csv import quoted

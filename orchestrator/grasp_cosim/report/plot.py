@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from one_piece import in_one_piece
 
 from ..base.checks import extra_module
 from ..base.errors import InputError
 from ..base.files import PICTURES
+from ..base.one_piece import in_one_piece
 from ..base.text import in_milli
 from ..recording.result import Result
 from .embed import fit

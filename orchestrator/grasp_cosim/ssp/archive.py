@@ -14,9 +14,8 @@ from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from one_piece import in_one_piece
-
 from ..base.errors import InputError, nearest
+from ..base.one_piece import in_one_piece
 from ..base.scratch import ScratchFolder
 from ..interface.document import check_size
 

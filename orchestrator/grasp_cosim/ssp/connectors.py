@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from si_units import Unit
-
 from ..base.errors import InputError, nearest
+from ..base.si_units import Unit
 from ..interface.interface import Interface, Variable
 from .document import change, same
 from .elements import Element, Hop, Node, Path

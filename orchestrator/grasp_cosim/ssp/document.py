@@ -15,10 +15,10 @@ from posixpath import dirname
 from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
-from si_units import BASE, Unit, known_unit
 
 from ..base.checks import known
 from ..base.errors import InputError
+from ..base.si_units import BASE, Unit, known_unit
 from ..fmi import fmpy
 from ..interface.read import base_unit
 from ..interface.units import conversion

@@ -9,10 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
-from si_units import Unit
-
 from ..base.checks import known
 from ..base.errors import InputError, choices
+from ..base.si_units import Unit
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface
 from .archive import STRUCTURE, Archive

@@ -13,9 +13,9 @@ from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 import numpy as np
-from si_units import known_unit
 
 from ..base.errors import InputError, choices
+from ..base.si_units import known_unit
 from ..interface.expansion import expanded
 from ..interface.interface import Value
 from ..system.description import System

@@ -18,10 +18,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from si_units import Unit
-
 from ..base.checks import known
 from ..base.errors import InputError, choices
+from ..base.si_units import Unit
 from ..interface.interface import SETTABLE, Value
 from .connectors import OTHERWISE, Carried, Connectors
 from .document import Origin, at, child, children, is_true, same, short

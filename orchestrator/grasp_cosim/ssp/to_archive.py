@@ -10,9 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from si_units import Unit
-
 from ..base.errors import InputError
+from ..base.si_units import Unit
 from ..base.text import counted
 from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary

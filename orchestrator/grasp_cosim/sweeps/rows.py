@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from si_units import known_unit
 
 from ..base.errors import InputError, reason
+from ..base.si_units import known_unit
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from one_piece import in_one_piece
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, nearest
+from ..base.one_piece import in_one_piece
 from ..base.text import columns, counted, significant
 from ..interface.interface import Value
 from ..metrics.metric import Metric

@@ -76,8 +76,8 @@ def _twins(components: list[Component]) -> tuple[dict[str, Path], str]:
     ours = [c for c in components if _is_ours(c)]
     if not ours:
         return {}, ""
-    from grasp_fmus.build import NoTwinsError, is_twin, shipped_twins
-    from grasp_fmus.shipped import together
+    from ..fmu_export.build import NoTwinsError, is_twin, shipped_twins
+    from ..fmu_export.shipped import together
 
     folders: dict[Any, Path | None] = {None: None}
     found, failure, why = dict[str, Path](), "", ""

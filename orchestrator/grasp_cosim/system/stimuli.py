@@ -19,10 +19,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal, get_args
 
-from si_units import known_unit
-
 from ..base.checks import choice, real
 from ..base.errors import InputError, reason
+from ..base.si_units import known_unit
 from ..base.text import counted, from_cell
 from ..interface.units import conversion
 from .parts import LONGEST, NANOSECONDS, Port, as_port

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
 
-from si_units import Unit
-
 from ..base.checks import choice
 from ..base.errors import InputError, nearest
+from ..base.si_units import Unit
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion
 from .parts import (

@@ -12,10 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from si_units import known_unit
-
 from ..base.checks import exact, known, number
 from ..base.errors import InputError, choices
+from ..base.si_units import known_unit
 from ..interface.expansion import shape_text
 from ..interface.interface import SUPPORTED, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS

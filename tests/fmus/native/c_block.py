@@ -8,10 +8,10 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
-from c_compilers import BITS as DECIDING
-from c_compilers import LIBM
-from grasp_fmus.contract import build_params, declared, packer, unpacker, variables
-from grasp_fmus.native import blocks as translation
+from grasp_cosim.base.c_compilers import BITS as DECIDING
+from grasp_cosim.base.c_compilers import LIBM
+from grasp_cosim.fmu_export.contract import build_params, declared, packer, unpacker, variables
+from grasp_cosim.fmu_export.native import blocks as translation
 from support.compiled import compile_c
 
 C = Path(translation.__file__).with_name("c")

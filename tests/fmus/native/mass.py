@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from block_variables import Input, Output, Parameter, check
-from grasp_fmus.contract import declared, variables
-from grasp_fmus.description import Description, model_description
-from grasp_fmus.native.blocks import translated
-from grasp_fmus.native.sources import native_sources
+from grasp_cosim.fmu_export.contract import declared, variables
+from grasp_cosim.fmu_export.description import Description, model_description
+from grasp_cosim.fmu_export.native.blocks import translated
+from grasp_cosim.fmu_export.native.sources import native_sources
 from support.compiled import compile_c
 
 LONGEST_STEP = 1.0

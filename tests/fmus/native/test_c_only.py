@@ -8,11 +8,11 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from c_compilers import BITS
-from grasp_fmus.contract import build_params, declared, unpacker
-from grasp_fmus.native.c_only import called_of_libm, write_c
-from grasp_fmus.own_block import own_model
-from grasp_fmus.package import shipped_model
+from grasp_cosim.base.c_compilers import BITS
+from grasp_cosim.fmu_export.contract import build_params, declared, unpacker
+from grasp_cosim.fmu_export.native.c_only import called_of_libm, write_c
+from grasp_cosim.fmu_export.own_block import own_model
+from grasp_cosim.fmu_export.package import shipped_model
 from support.kinds import TRANSLATED
 from support.marks import platforms, slow
 from support.native_fmus import needs_gcc

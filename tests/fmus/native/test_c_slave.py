@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from fmus.native.mass import GUID, native_fmu
-from grasp_fmus.native.sources import C
+from grasp_cosim.fmu_export.native.sources import C
 from hypothesis import example, given
 from hypothesis import strategies as st
 from support.compiled import compile_c

@@ -9,9 +9,9 @@ from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.util import read_csv, read_ref_opt_file
 from fmpy.validation import validate_fmu
-from grasp_fmus.build import planned
-from grasp_fmus.description import Description
-from grasp_fmus.proxy import Settings, build_proxy
+from grasp_cosim.fmu_export.build import planned
+from grasp_cosim.fmu_export.description import Description
+from grasp_cosim.fmu_export.proxy import Settings, build_proxy
 from support.kinds import TRANSLATED
 from support.marks import platforms, slow
 from support.native_fmus import needs_gcc

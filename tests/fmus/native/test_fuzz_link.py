@@ -7,8 +7,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from grasp_fmus.link import HELLO, INITIALISE, STEP, VERSION, LinkVariable, Signature
-from grasp_fmus.native.bench_header import bench_header
+from grasp_cosim.fmu_export.link import HELLO, INITIALISE, STEP, VERSION, LinkVariable, Signature
+from grasp_cosim.fmu_export.native.bench_header import bench_header
 from support import marks
 from support.native_proxies import write_sources
 

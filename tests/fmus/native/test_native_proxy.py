@@ -7,9 +7,9 @@ import subprocess
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
-from grasp_fmus.build import planned
-from grasp_fmus.link import END, HELLO, INITIALISE, STEP
-from grasp_fmus.proxy import Settings, build_proxy
+from grasp_cosim.fmu_export.build import planned
+from grasp_cosim.fmu_export.link import END, HELLO, INITIALISE, STEP
+from grasp_cosim.fmu_export.proxy import Settings, build_proxy
 from support.fmi2 import OK, WARNING, Fmu, Instance
 from support.marks import platforms
 from support.native_proxies import STRICT, original, write_sources

@@ -5,8 +5,8 @@ import textwrap
 import pytest
 from fmus.native.c_block import loaded
 from fmus.native.test_constructs import HEAD
-from grasp_fmus.native.blocks import translated
-from grasp_fmus.native.text import UntranslatableError
+from grasp_cosim.fmu_export.native.blocks import translated
+from grasp_cosim.fmu_export.native.text import UntranslatableError
 
 MORE = """
 

@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from c_compilers import LIBM
 from fmus.native.mass import GUID, NAME, compile_in, write_sources
+from grasp_cosim.base.c_compilers import LIBM
 from support.compiled import compile_c
 from support.direct import COMPONENTS
 from support.kinds import TRANSLATED

@@ -4,7 +4,7 @@ import platform
 import sys
 
 import pytest
-from grasp_fmus.native.targets import KNOWN, NAMES, Target, folders, here, targets
+from grasp_cosim.fmu_export.native.targets import KNOWN, NAMES, Target, folders, here, targets
 
 LINUX_X86, WINDOWS, LINUX_ARM, MAC_X86, MAC_ARM = KNOWN
 LINUX = ("linux", "x86_64")

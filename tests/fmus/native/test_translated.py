@@ -9,7 +9,7 @@ from random import Random
 
 import pytest
 from fmus.native.c_block import Both, loaded
-from grasp_fmus.shipped import block_of as block_of_ours
+from grasp_cosim.fmu_export.shipped import block_of as block_of_ours
 from support.kinds import TRANSLATED
 from support.marks import part, platforms, seeds, slow
 from support.native_fmus import needs_gcc
@@ -73,8 +73,8 @@ def test_any_compiler_gives_the_bits_of_python(name, cc, option, tmp_path):
 @pytest.mark.slow
 def test_the_same_sources_give_the_same_bytes():
     code = (
-        "from grasp_fmus.native.blocks import translated\n"
-        "from grasp_fmus.shipped import blocks\n"
+        "from grasp_cosim.fmu_export.native.blocks import translated\n"
+        "from grasp_cosim.fmu_export.shipped import blocks\n"
         "for name in ('GripperPlantMovable', 'ProximitySensor', 'GraspController'):\n"
         "    print(translated(name, blocks()[name]))\n"
     )

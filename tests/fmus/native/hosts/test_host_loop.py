@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_fmus.native.targets import here
+from grasp_cosim.fmu_export.native.targets import here
 from support.c_host import Grasp, Host, Part, Script, bits, good
 from support.direct import BENCH, rows_in_python
 from support.marks import platforms, slow

@@ -17,13 +17,10 @@ from zipfile import ZipFile
 import fmpy
 import numpy as np
 import pytest
-from c_compilers import LIBM
 from grasp_cosim import System, simulate
-from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.hil.served import Service
-from grasp_cosim.ssp.to_archive import write_ssp
-from grasp_fmus.build import build_native, planned
-from grasp_fmus.native.targets import (
+from grasp_cosim.base.c_compilers import LIBM
+from grasp_cosim.fmu_export.build import build_native, planned
+from grasp_cosim.fmu_export.native.targets import (
     KNOWN,
     LINUX_ARM,
     LINUX_X86,
@@ -33,6 +30,9 @@ from grasp_fmus.native.targets import (
     Target,
     here,
 )
+from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.hil.served import Service
+from grasp_cosim.ssp.to_archive import write_ssp
 from support.c_host import Grasp, Host, Script, bits, good, number
 from support.direct import BENCH, rows_in_python
 from support.fmi2 import Fmu, Instance, read_members

@@ -22,8 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
-from c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
-
+from ..base.c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 from .native.targets import Target, Version, folders, here, universal
 from .package import Built, write_file
 from .shipped import HANDS, PACKAGES, SHIPPED, card_file, of_fingers, package_folder, together
@@ -38,8 +37,10 @@ LOGGER = logging.getLogger(__name__)
 Members = Mapping[str, bytes]
 """The files in an FMU, by name."""
 
-SOURCES = (*PACKAGES, "c_compilers", "si_units", "grasp_fmus")
-"""The packages that decide what FMUs hold."""
+HERE = Path(__file__).parent
+
+SOURCES = HERE, HERE.parent / "base/c_compilers", HERE.parent / "base/si_units.py"
+"""What decides what FMUs hold, besides the packages that a block may import: folders and files."""
 
 VERSIONS = ("grasp_cosim-", "latex2mathml-", "markdown_it_py-", "pythonfmu-")
 """Of distributions whose versions are in FMUs, or decide what is: so their metadata is called."""
@@ -216,7 +217,7 @@ def with_binaries(
             for target, compiler in plan.compilers.items():
                 yield job(name, sources, target, compiler, networked)
 
-    with TemporaryDirectory(prefix="grasp_fmus_") as scratch:
+    with TemporaryDirectory(prefix="fmu_export_") as scratch:
         made = iter([library.read_bytes() for library in compile_all(jobs(), Path(scratch))])
     for name, files in complete.items():
         thin: dict[str, list[bytes]] = {}
@@ -247,7 +248,8 @@ def sources_key() -> str:
     """
     site = package_folder("pythonfmu")
     files = [*_below(site / "resources" / "binaries"), *map(card_file, PACKAGES)]
-    files += [file for package in SOURCES for file in _below(package_folder(package))]
+    for source in (*map(package_folder, PACKAGES), *SOURCES):
+        files += _below(source) if source.is_dir() else [source]
     versions = sorted(name for name in os.listdir(site.parent) if name.startswith(VERSIONS))  # noqa: PTH208
     contents = (part for f in files if f.is_file() for part in (f.name, f.read_bytes()))
     return cache.key((sys.version, *versions, *contents))
@@ -293,7 +295,7 @@ def _fill(names: Sequence[str], plan: Plan | None, folder: Path) -> None:
 
 def _made(make: Callable[[Path], None], name: str) -> Path:
     with ExitStack() as stack:
-        made = Path(stack.enter_context(TemporaryDirectory(prefix="grasp_fmus_")))
+        made = Path(stack.enter_context(TemporaryDirectory(prefix="fmu_export_")))
         make(made)
         kept = cache.keep(made, name)
         if kept == made:

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 
-from c_compilers import BITS, LIBM
-
+from ...base.c_compilers import BITS, LIBM
 from ..contract import Scalar
 from ..link import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file

@@ -15,8 +15,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from si_units import refusal
-
+from ..base.si_units import refusal
 from .contract import Variable, declared, longest_step, unpacker, variables
 from .description import Description
 from .package import HASH, IMPORT, Model, script

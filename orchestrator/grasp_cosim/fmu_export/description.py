@@ -7,9 +7,8 @@ from math import isfinite
 from typing import Literal, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from c_compilers import BITS, LIBM
-from si_units import BASE, Unit, known_unit
-
+from ..base.c_compilers import BITS, LIBM
+from ..base.si_units import BASE, Unit, known_unit
 from .contract import Scalar, Variable
 
 Version = Literal[2, 3]

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from c_compilers import LIBM
+from ...base.c_compilers import LIBM
 
 WIDTH = 100
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args, get_type_hints
 
-from si_units import BASE, Unit
-
+from ..base.si_units import BASE, Unit
 from .contract import TYPES, Scalar, Variable
 from .description import ERROR, WARNING, Description, Version
 from .link import PORT, LinkVariable, Signature

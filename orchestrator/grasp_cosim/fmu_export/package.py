@@ -18,8 +18,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from one_piece import in_one_piece
-
+from ..base.one_piece import in_one_piece
 from .shipped import block_of, card_file, found, package_folder, sized_source
 
 if TYPE_CHECKING:
@@ -27,6 +26,9 @@ if TYPE_CHECKING:
 
 HASH = "CONTENT_HASH"
 """Stands for the content hash until it is known."""
+
+PACKED_AS = "fmu_export"
+"""The name of this package in an FMU, which has nothing of the package that it is a part of."""
 
 IMPORT = re.compile(r"^from (\w+)(?=[\w.]* import\b)", re.MULTILINE)
 """An import whose package is packed, unless it is of the standard library."""
@@ -83,7 +85,7 @@ def shipped_model(name: str) -> Model:
 
 def script(imports: str) -> bytes:
     """Return the script of an FMU, whose block is imported as `block`."""
-    return f"{imports}\nfrom {__package__} import slave\n\nslave.offer(block, globals())\n".encode()
+    return f"{imports}\nfrom {PACKED_AS} import slave\n\nslave.offer(block, globals())\n".encode()
 
 
 def python_members(model: Model) -> tuple[str, dict[str, bytes]]:
@@ -193,7 +195,7 @@ def _imported(path: str, source: bytes) -> list[str]:
 def _files(module: str) -> Iterator[tuple[str, Path]]:
     """Yield the files that importing a module runs, with their paths in the FMU."""
     package, *rest = module.split(".")
-    folder = package_folder(package)
+    folder = Path(__file__).parent if package == PACKED_AS else package_folder(package)
     place = folder.joinpath(*rest)
     own = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
     if own.is_file():
