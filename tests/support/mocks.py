@@ -35,7 +35,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
   </ModelVariables>
   <ModelStructure>
     <Outputs><Unknown index="2"{depends}/></Outputs>
-    <InitialUnknowns><Unknown index="2"{depends}/></InitialUnknowns>
+    <InitialUnknowns><Unknown index="2"{initially}/></InitialUnknowns>
   </ModelStructure>
 </fmiModelDescription>
 """
@@ -44,13 +44,15 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 class Mock:
     """y = output(u, time), where time only moves with a step.
 
-    direct says whether y is declared to depend on u, nominal is that of u. rejects, if given, is
+    direct says whether y is declared to depend on u, initially the same at the start where that
+    differs, nominal is that of u. rejects, if given, is
     asked at each step for the time reached: the step is discarded where that is before its end.
     """
 
     def __init__(
-        self, folder, name, output, kind="Real", direct=True, vary=True, nominal=None, rejects=None
-    ):
+        self, folder, name, output, kind="Real", direct=True, vary=True, nominal=None, rejects=None,
+        initially=None,
+    ):  # fmt: skip
         self.name = name
         self.output = output
         self.rejects = rejects
@@ -61,9 +63,10 @@ class Mock:
         self.calls = []
         self.statuses = {"send": 0, "step": 0, "receive": 0}
         self.path = folder / f"{name}.fmu"
-        depends = {True: ' dependencies="1"', False: ' dependencies=""', None: ""}[direct]
+        declared = {True: ' dependencies="1"', False: ' dependencies=""', None: ""}
         text = DESCRIPTION.format(
-            name=name, kind=kind, depends=depends, vary=str(vary).lower(),
+            name=name, kind=kind, depends=declared[direct], vary=str(vary).lower(),
+            initially=declared[direct if initially is None else initially],
             variability="continuous" if kind == "Real" else "discrete",
             nominal="" if nominal is None else f' nominal="{nominal}"',
             zero={"Boolean": "false", "String": ""}.get(kind, "0"),

@@ -236,6 +236,15 @@ MODELS = {
         indicators=("x",),
         completed=True,
     ),
+    "late": Model(
+        (
+            _TIME,
+            Variable("u", causality="input", start=0.0),
+            Variable("y", causality="output", depends=("u",)),
+            _parameter("base", 0.0),
+            _parameter("gain", 1.0),
+        ),
+    ),
     "sine": Model(
         (_TIME, Variable("count", "Int32", "output", "discrete", -1), _parameter("f", 1.0)),
         indicators=("count",),

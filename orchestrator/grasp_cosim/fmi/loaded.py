@@ -197,13 +197,25 @@ class LoadedInstance(ABC):
         self._inputs.running = True
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
-        whole: dict[int, list[Any]] = {}
+        """As Instance.get(), by one call for the scalars of a type and one for each array."""
+        scalars: dict[str, list[int]] = {}
+        arrays: dict[int, list[Any]] = {}
         with self._failures():
             for v in variables:
-                if v.element and v.reference not in whole:
-                    whole[v.reference] = self._get_array(v)
+                if not v.element:
+                    scalars.setdefault(self._suffix(v.type), []).append(v.reference)
+                elif v.reference not in arrays:
+                    arrays[v.reference] = self._get_array(v)
+            values = {
+                suffix: iter(getattr(self._slave, f"get{suffix}")(references))
+                for suffix, references in scalars.items()
+            }
             return [
-                _OF_KIND[v.kind](whole[v.reference][v.element.place]) if v.element else self._get(v)
+                _OF_KIND[v.kind](
+                    arrays[v.reference][v.element.place]
+                    if v.element
+                    else next(values[self._suffix(v.type)])
+                )
                 for v in variables
             ]
 
@@ -236,10 +248,6 @@ class LoadedInstance(ABC):
         if fmi_type != "Enumeration":
             return fmi_type
         return "Int64" if self._major == "3" else "Integer"
-
-    def _get(self, variable: Variable) -> Value:
-        getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
-        return _OF_KIND[variable.kind](getter([variable.reference])[0])
 
     def _set(self, variable: Variable, value: Value) -> None:
         self._inputs.set(variable, value)

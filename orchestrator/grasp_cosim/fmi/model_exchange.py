@@ -72,6 +72,7 @@ class ModelInstance(LoadedInstance):
         self._waiting: dict[Variable, Value] = {}
         self._buffers: list[_Buffer] = []
         self._dense, self._last_event = 0, -math.inf
+        self._started = False
         self._step = 0.0
         self._zero: npt.NDArray[np.bool_] | None = None
         super().__init__(name, interface)
@@ -114,10 +115,16 @@ class ModelInstance(LoadedInstance):
             raise InputError(str(error)) from error
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        """Set inputs or tunable parameters; in the run they change as the next step begins."""
+        """Set inputs or tunable parameters; in the run they change as the next step begins.
+
+        Between the initialisation and the first step they change at once, by an event.
+        """
         given = dict(zip(variables, values, strict=True))
         if self._inputs.running:
             self._waiting |= given
+            if not self._started and self._ended is None:
+                with self._failures():
+                    self._event()
         else:
             super().set(variables, values)
             self._given |= given
@@ -135,7 +142,7 @@ class ModelInstance(LoadedInstance):
         time: Any = memoryview(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
         def advance() -> int:
-            self._step = step
+            self._step, self._started = step, True
             self._advance(round((time[0] + step) * NANOSECONDS) / NANOSECONDS)
             return OK if self._ended is None else EARLY
 
@@ -195,7 +202,7 @@ class ModelInstance(LoadedInstance):
         waiting, self._waiting = self._waiting, {}
         self._given |= waiting
         self._assign(waiting.items())
-        for buffer in self._buffers:
+        for buffer in self._buffers if self._started else ():
             if buffer.changed():
                 self._check(buffer.pass_on())
         self._settle()

@@ -2,6 +2,9 @@
 
 The ports and what depends on what make a graph. Where it has a loop, the loop is cut at the input
 it is entered by, and the values of the inputs that were cut are found by Newton's method.
+
+Many FMUs have the outputs of their start only after initialisation mode: these are read then, and
+passed on along the same graph where they are others than before.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -125,6 +128,75 @@ class Propagation:
         )
         return [line, *self._check_dependencies()]
 
+    def after_exit(self) -> list[str]:
+        """Read all outputs anew, out of initialisation mode, and pass on those that changed.
+
+        An input at which a loop was cut is set in the first pass only: what comes back there later
+        is in the values, and left to the first step. A line where inputs go on changing, as they do
+        in a loop that only the dependencies in initialisation mode hide: they are left as they are.
+        """
+        moved = self._read([port for port in self._ports if port not in self._connections])
+        left_alone: set[Port] = set()
+        for _ in range(len(self._ports) + 1):
+            inputs = self._pass_on_moved(moved, left_alone) if moved else []
+            if not inputs:
+                break
+            left_alone = set(self._cuts)
+        for port, connection in self._connections.items():
+            if connection.source in moved:
+                self.values[port] = self._arriving(connection)
+        if not inputs:
+            return []
+        return [f"{choices(inputs, NAMED)}: what arrives goes on changing after the initialisation"]
+
+    def _pass_on_moved(self, moved: set[Port], left_alone: set[Port]) -> list[Port]:
+        """Pass on the outputs that moved, once along the data flow; return the inputs that changed.
+
+        The outputs behind these are read, and added to `moved` where they changed.
+        """
+        changed: list[Port] = []
+        behind: set[Port] = set()
+        for (component, arriving), group in groupby(self._ports, self._end):
+            ports = list(group)
+            if not arriving:
+                moved |= self._read([port for port in ports if port in behind])
+                behind.difference_update(ports)
+                continue
+            connections = [self._connections[p] for p in ports if p not in left_alone]
+            arrived = {c.target: self._arriving(c) for c in connections if c.source in moved}
+            inputs = {p: x for p, x in arrived.items() if not _same(x, self.values[p])}
+            if inputs:
+                variables = [self._variable(port) for port in inputs]
+                self._instances[component].set(variables, list(inputs.values()))
+                self.values |= inputs
+                changed += inputs
+                behind |= self._depending(component, {port.variable for port in inputs})
+        moved |= self._read([port for port in self._ports if port in behind])
+        return changed
+
+    def _depending(self, component: str, inputs: set[str]) -> set[Port]:
+        """The outputs of a component that may depend on any of the inputs after initialisation."""
+        return {
+            Port(component, v.name)
+            for v in self._instances[component].interface.of("output")
+            if v.dependencies is None or not inputs.isdisjoint(v.dependencies)
+        }
+
+    def _read(self, outputs: Sequence[Port]) -> set[Port]:
+        """Read outputs, component by component; return those that changed."""
+        by_component: dict[str, list[Port]] = {}
+        for port in outputs:
+            if self._variable(port).supported:
+                by_component.setdefault(port.component, []).append(port)
+        changed: set[Port] = set()
+        for component, ports in by_component.items():
+            values = self._instances[component].get([self._variable(port) for port in ports])
+            for port, value in zip(ports, values, strict=True):
+                if not _same(value, self.values[port]):
+                    changed.add(port)
+                    self.values[port] = value
+        return changed
+
     def _solve(self, choice: Initialisation) -> tuple[int, float]:
         """Newton's method for the inputs that were cut; iterations and relative residual."""
         at = [(self._instances[port.component], self._variable(port)) for port in self._cuts]
@@ -229,3 +301,8 @@ class Propagation:
 
     def _kind(self, port: Port) -> str:
         return self._variable(port).kind
+
+
+def _same(value: Value, other: Value) -> bool:
+    """True for equal values, and for two that are both not a number."""
+    return value == other or (value != value and other != other)

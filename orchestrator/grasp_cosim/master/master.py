@@ -96,7 +96,11 @@ class Master:
         self._handed_on_at = time.monotonic()
 
     def initialise(self) -> None:
-        """Start values in, then outputs at the start that agree with its inputs."""
+        """Start values in, then outputs at the start that agree with its inputs.
+
+        The row of the start has what the first step uses: outputs as they are out of initialisation
+        mode, and inputs that agree with them.
+        """
         start, stop = (t / NANOSECONDS for t in (self.system.start_ns, self.system.stop_ns))
         for component, instance in zip(self.system.components, self.instances, strict=True):
             driven = at_start(self.system, self._drives, component.name)
@@ -104,12 +108,14 @@ class Master:
         propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
         try:
             self.log += propagation.run()
+            for instance in self.instances:
+                instance.exit_initialization()
+            self.log += propagation.after_exit()
         except SimulationError as error:
             raise InputError(str(error)) from error
         values = propagation.values
         for component, instance in zip(self.system.components, self.instances, strict=True):
-            instance.exit_initialization()
-            self._fetch(instance, component.integrated is not None, values)
+            self._fetch_others(instance, values)
             if component.integrated and (ended := instance.the_end()) is not None:
                 self._end(instance, ended, 0)
         for port, slot in self.slots.items():
@@ -122,19 +128,17 @@ class Master:
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
 
-    def _fetch(self, instance: Instance, anew: bool, values: dict[Port, Value]) -> None:
-        """What was not passed on, such as elements of connected arrays that have no source.
-
-        And outputs `anew`: the initialisation of a model has ended with an event.
-        """
-        by_name, ports = instance.interface.by_name, []
-        for port in self.slots:
-            if port.component == instance.name and port not in self._drives:
-                output = by_name[port.variable].causality == "output"
-                ports += [port] if port not in values or (anew and output) else []
+    def _fetch_others(self, instance: Instance, values: dict[Port, Value]) -> None:
+        """What was not passed on, such as elements of connected arrays that have no source."""
+        by_name = instance.interface.by_name
+        ports = [
+            port
+            for port in self.slots
+            if port.component == instance.name and port not in self._drives and port not in values
+        ]
         if ports:
-            found = instance.get([by_name[port.variable] for port in ports])
-            values |= zip(ports, found, strict=True)
+            others = instance.get([by_name[port.variable] for port in ports])
+            values |= zip(ports, others, strict=True)
 
     def _end(self, instance: Instance, time: float, step: int) -> None:
         """Have the run end with the row of a step, as an FMU asked for at a time in s.
