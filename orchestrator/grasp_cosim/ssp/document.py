@@ -45,6 +45,9 @@ _UNDECLARED = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
 
 VERSION = "1.0"
 _VERSION_1 = re.compile(r"1\.\d+(\.\d+)?(-.*)?")
+_BRACKETS = re.compile(r"\s*\[\s*(.*?)\s*\]\s*")
+"""A unit as some write it: [m]."""
+
 _LAST = (
     "Connectors", "ConnectorGeometry", "ConnectionGeometry", "ElementGeometry",
     "ParameterBindings", "ParameterValues", "ParameterMapping", "Elements", "Connections",
@@ -322,10 +325,19 @@ class Origin:
             raise InputError(f"{place}: contains itself, which is not allowed")
         return replace(self, around=(*self.around, place))
 
+    def unit_name(self, element: Any) -> str | None:
+        """The unit that a type or a value names; some write it in brackets, [m]."""
+        name: str | None = element.get("unit")
+        if name is None or name in self.units:
+            return name
+        in_brackets = _BRACKETS.fullmatch(name)
+        return in_brackets[1] if in_brackets else name
+
     def unit(self, place: str, name: str | None, own: str | None) -> Unit | None:
         """The unit of that name, None for none; own is how the FMU names it, if it does.
 
-        InputError where nothing says what it is.
+        One that the document does not define is the FMU's, or goes by its name. InputError where
+        nothing says what it is.
         """
         if name == "":
             self.notes.add(place, "unit '' is taken as no unit")
@@ -334,7 +346,7 @@ class Origin:
         if own == name:
             self.notes.add(place, f"unit {name!r} is not defined; taken as the FMU's")
             return None
-        meant = known_unit(name) if own is None else None
+        meant = known_unit(name)
         if meant is None:
             known(f"{place}: unit", name, self.units, " is not defined")
         self.notes.add(place, f"unit {name!r} is not defined; known by its name")

@@ -267,7 +267,7 @@ def _connector(
     declared = types[0] if types else None
     if declared is not None:
         known(f"{place}: connector {name!r}: type", declared, _TYPES, " is not supported")
-    unit = child(entry, "ssc:Real").get("unit") if declared == "Real" else None
+    unit = origin.unit_name(child(entry, "ssc:Real")) if declared == "Real" else None
     own = variable.unit if variable else None
     type_ = "Integer" if declared == "Enumeration" else declared
     return Connector(place, name, kind, type_, origin.unit(f"{place}: {name!r}", unit, own))
