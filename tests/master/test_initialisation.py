@@ -1,10 +1,14 @@
 """Values at t = 0: the order they are passed on in, algebraic loops, wrong declarations."""
 
+from graphlib import CycleError, TopologicalSorter
 from itertools import count
 
 import pytest
 from grasp_cosim import InputError, SimulationError
+from grasp_cosim.master.initialisation import cut_loops
 from grasp_cosim.system.parts import Connection, Initialisation, Port
+from hypothesis import given as drawn
+from hypothesis import strategies as st
 from support.mocks import Mock, Run, make_system
 
 
@@ -138,3 +142,45 @@ def test_a_loop_is_refused(mock, output, more, loops, said):
     mocks = [mock("a", output, **more), mock("b", through, **kind)]
     with pytest.raises(InputError, match=said):
         run(mocks, ["ab", "ba"], initialisation=Initialisation(loops)).master.initialise()
+
+
+COMPONENTS = st.lists(st.tuples(*3 * [st.integers(0, 3)]), min_size=1, max_size=7)
+"""Of each component the numbers of its outputs and inputs, and of inputs that are connected."""
+
+
+def cut_one_by_one(graph, inputs):
+    """The loops, each the first that a search from the beginning finds."""
+    loops = []
+    while True:
+        try:
+            TopologicalSorter(graph).prepare()
+            return loops
+        except CycleError as error:
+            path = error.args[1]
+            entry = next(port for port in path if port in inputs)
+            at = path.index(entry)
+            loops.append((*path[at:-1], *path[: at + 1]))
+            graph[entry] = []
+
+
+@drawn(COMPONENTS, st.randoms(use_true_random=False))
+def test_loops_are_cut_in_one_search_where_one_by_one_cuts_them(components, chance):
+    outputs = [(i, "y", j) for i, (given, _, _) in enumerate(components) for j in range(given)]
+    graph, inputs = {}, set()
+    for i, (_, taken, connected) in enumerate(components):
+        taking = [(i, "u", j) for j in range(min(taken, connected))] if outputs else []
+        inputs |= {*taking}
+        graph |= {port: [chance.choice(outputs)] for port in taking}
+        giving = [port for port in outputs if port[0] == i]
+        graph |= {port: [u for u in taking if chance.random() < 0.7] for port in giving}
+    again = {port: [*needed] for port, needed in graph.items()}
+    assert cut_loops(graph, inputs) == cut_one_by_one(again, inputs)
+    assert graph == again
+
+
+def test_thousands_of_loops_take_one_search():
+    pairs = range(4000)
+    graph = {(i, "u"): [(i ^ 1, "y")] for i in pairs} | {(i, "y"): [(i, "u")] for i in pairs}
+    loops = cut_loops(graph, {(i, "u") for i in pairs})
+    assert loops[1] == ((2, "u"), (2, "y"), (3, "u"), (3, "y"), (2, "u"))
+    assert len(loops) == 2000

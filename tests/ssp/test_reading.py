@@ -1,14 +1,10 @@
 """What a system is made of archives of others, as a whole: values, connections, times, notes."""
 
 import re
-from types import SimpleNamespace
 
 import pytest
 from grasp_cosim import System
-from grasp_cosim.ssp.from_archive import flow_order
 from grasp_cosim.system.validity import transforms
-from hypothesis import given as drawn
-from hypothesis import strategies as st
 from ssp.hand_made import (
     NAMESPACES,
     UNITS,
@@ -181,6 +177,10 @@ PARAMETERS = {
     "an empty unit of a value": valued(given("length Real 2.5 ?").replace('"?"', '""')),
     "the unit of the FMU": valued(given("ell Real 3.0 cubit")),
     "a unit for none": valued(given("ratio Real 3.0 [m]", units="")),
+    "a known unit": valued(given("length Real 250.0 mm", units="")),
+    "a unit in brackets": valued(given("length Real 250.0 [mm]; ratio Real 2 []", units="")),
+    "a bracketed unit of the set": valued(given("length Real 2.5 [m]", units=FAR)),
+    "the FMU's unit in brackets": valued(given("ell Real 3.0 [cubit]", units="")),
     "metres that are far": valued(given("length Real 2.5 m", units=FAR)),
     "a known unit of a system": valued(
         outer=given("in Real 3"),
@@ -483,30 +483,3 @@ def test_a_step_and_a_stop_can_be_given(tmp_path):
     ssd = structure(system("top", component("a")), "")
     loaded = System.load(archive(tmp_path, ssd, {"a": FMU}), step=0.25, stop=2.0)
     assert (loaded.step_ns, loaded.stop_ns) == (250_000_000, 2_000_000_000)
-
-
-def ordered(names, connections):
-    """Of components of one letter, and connections like "ab"."""
-    parts = [SimpleNamespace(name=name) for name in names]
-    ends = [[SimpleNamespace(component=name) for name in pair] for pair in connections]
-    found = flow_order(parts, [SimpleNamespace(source=s, target=t) for s, t in ends])
-    return "".join(part.name for part in found)
-
-
-@drawn(st.permutations("abcdefg"), st.lists(st.tuples(*2 * [st.sampled_from("abcdefg")])))
-def test_none_waits_for_a_later_one_but_in_a_loop(names, pairs):
-    reached = {name: {t for s, t in pairs if s == name} for name in names}
-    for between in names:
-        for behind in reached.values():
-            behind |= reached[between] if between in behind else set()
-    order = ordered("".join(names), ["".join(pair) for pair in pairs])
-    assert sorted(order) == sorted(names)
-    for i, name in enumerate(order):
-        assert not any(name in reached[o] and o not in reached[name] for o in order[i + 1 :])
-        free = [
-            n
-            for n in names
-            if n in order[i:]
-            and not any(n in reached[o] and o not in reached[n] for o in order[i:])
-        ]
-        assert name == free[0]

@@ -65,18 +65,20 @@ def bonds(system: System) -> tuple[Bond, ...]:
     A component has one for each connected Real input force[j], or force, in a unit of force that
     has beside it an output position[j], or position, in a unit of length.
     """
+    sources = {connection.target: connection.source for connection in system.connections}
     return tuple(
         bond
         for component in system.components
         for variable in component.interface.of("input")
-        if (bond := _bond(system, component, variable))
+        if (bond := _bond(system, component, variable, sources))
     )
 
 
-def _bond(system: System, component: Component, force: Variable) -> Bond | None:
+def _bond(
+    system: System, component: Component, force: Variable, sources: Mapping[Port, Port]
+) -> Bond | None:
     match = re.fullmatch(r"force(?:\[(\d+)\])?", force.name)
     target = Port(component.name, force.name)
-    sources = {connection.target: connection.source for connection in system.connections}
     if not match or target not in sources:
         return None
     interface = component.interface

@@ -7,8 +7,8 @@ Many FMUs have the outputs of their start only after initialisation mode: these 
 passed on along the same graph where they are others than before.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Callable, Container, Mapping, Sequence
+from graphlib import TopologicalSorter
 from itertools import groupby
 
 import numpy as np
@@ -46,17 +46,51 @@ def order_ports(system: System) -> tuple[Sequence[Port], Sequence[Sequence[Port]
     input at which it was cut, first = last.
     """
     graph = _graph(system)
-    inputs = {connection.target for connection in system.connections}
+    loops = cut_loops(graph, {connection.target for connection in system.connections})
+    return tuple(TopologicalSorter(graph).static_order()), loops
+
+
+def cut_loops(graph: dict[Port, list[Port]], inputs: Container[Port]) -> list[tuple[Port, ...]]:
+    """Cut the loops of a graph: the inputs at which they are cut depend on nothing any more.
+
+    A depth-first search follows the values. Where it comes back to a port of its path, it notes the
+    loop, cuts it at its first input and goes on from before that: many loops take one search.
+    """
+    users: dict[Port, list[Port]] = {port: [] for port in graph}
+    for port, needed in graph.items():
+        for source in needed:
+            users[source].append(port)
     loops: list[tuple[Port, ...]] = []
-    while True:
-        try:
-            return tuple(TopologicalSorter(graph).static_order()), loops
-        except CycleError as error:
-            path = error.args[1]
-            entry = next(port for port in path if port in inputs)
-            at = path.index(entry)
-            loops.append((*path[at:-1], *path[: at + 1]))
-            graph[entry] = []
+    cut: set[Port] = set()
+    left: set[Port] = set()
+
+    def search(start: Port) -> None:
+        path: dict[Port, int] = {} if start in left else {start: 0}
+        following = [iter(users[port]) for port in path]
+        while path:
+            user = next((u for u in following[-1] if u not in left and u not in cut), None)
+            if user is None:
+                left.add(path.popitem()[0])
+                following.pop()
+            elif user not in path:
+                path[user] = len(path)
+                following.append(iter(users[user]))
+            else:
+                loop = [*path][path[user] :]
+                entry = next(port for port in loop if port in inputs)
+                at = loop.index(entry)
+                loops.append((*loop[at:], *loop[:at], entry))
+                cut.add(entry)
+                graph[entry] = []
+                for _ in loop[at:] if at else ():
+                    path.popitem()
+                    following.pop()
+
+    for port in graph:
+        search(port)
+        for source in graph[port]:
+            search(source)
+    return loops
 
 
 def _graph(system: System) -> dict[Port, list[Port]]:

@@ -93,6 +93,15 @@ class Planner:
     def __post_init__(self) -> None:
         self.stamps = 0
         self.transforms = self.system.once(transforms)
+        self.arriving: dict[str, list[Connection]] = {name: [] for name in self.instances}
+        for connection in self.system.connections:
+            self.arriving[connection.target.component].append(connection)
+        self.driven: dict[str, list[Drive]] = {name: [] for name in self.instances}
+        for port, drive in self.drives.items():
+            self.driven[port.component].append(drive)
+        self.strings: dict[str, list[Port]] = {name: [] for name in self.instances}
+        for port in self.texts:
+            self.strings[port.component].append(port)
         self.made = Plan(self.values, np.zeros(2))
         self.view: Any = memoryview(self.values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
@@ -130,9 +139,9 @@ class Planner:
     def _move(self, name: str, phase: int) -> None:
         """What drives a component, the connections that end there, then their faults."""
         period, first = self.system.period(name), len(self.made.drives)
-        self.made.drives.extend(d for port, d in self.drives.items() if port.component == name)
+        self.made.drives.extend(self.driven[name])
         self._operation(DRIVE, first, len(self.made.drives), period, phase)
-        connections = [c for c in self.system.connections if c.target.component == name]
+        connections = self.arriving[name]
         numbers = [connection for connection in connections if connection.target in self.slots]
         for kind in (COPY, SCALE):
             first = len(self.made.connections)
@@ -176,7 +185,7 @@ class Planner:
     def _fetch_texts(self, name: str, phase: int) -> None:
         """Fetch the String outputs of a component, if it has any."""
         instance, view = self.instances[name], self.view
-        ports = [port for port in self.texts if port.component == name]
+        ports = self.strings[name]
         variables = [instance.interface.by_name[port.variable] for port in ports]
 
         def fetch(_: int) -> None:

@@ -28,18 +28,16 @@ class Notes:
     """What was decided or passed over, and where; the same text of several places is one line."""
 
     def __init__(self) -> None:
-        self.places: dict[str, list[str]] = {}
+        self.places: dict[str, dict[str, None]] = {}
 
     def add(self, place: str, text: str) -> None:
         """Note `text` of a place, once."""
-        places = self.places.setdefault(text, [])
-        if place not in places:
-            places.append(place)
+        self.places.setdefault(text, {})[place] = None
 
     def lines(self) -> list[str]:
         """The notes in the order of their first places."""
         return [
-            f"{places[0]}: {text}" + (f" ({len(places)} such)" if len(places) > 1 else "")
+            f"{next(iter(places))}: {text}" + (f" ({len(places)} such)" if len(places) > 1 else "")
             for text, places in self.places.items()
         ]
 
@@ -54,15 +52,15 @@ class Archive:
         self.place = place or path.name
         said = place or str(path)
         try:
-            with zipfile.ZipFile(path) as file:
-                names = file.namelist()
-                check_size(file, path)
+            self._file = zipfile.ZipFile(path)  # closed when nobody has the archive any more
+            check_size(self._file, path)
         except FileNotFoundError:
             raise InputError(f"{said}: no such system file") from None
         except Exception as error:  # zipfile raises whatever it likes
             raise InputError(f"{said}: not readable as an SSP archive: {error}") from error
-        self._path, self._said = path, said
-        self._entries = _entries(names, needs, self.place, notes)
+        self._said = said
+        self._entries = _entries(self._file.namelist(), needs, self.place, notes)
+        self._extracted: dict[str, Path] = {}
         if needs not in self._entries:
             raise InputError(f"{said}: no {needs} in it; must be an SSP archive")
 
@@ -74,8 +72,7 @@ class Archive:
     def read(self, entry: str) -> bytes:
         """The content of an entry; InputError where it is damaged."""
         try:
-            with zipfile.ZipFile(self._path) as file:
-                return file.read(self._entries[entry])
+            return self._file.read(self._entries[entry])
         except Exception as error:  # its decompressors, too
             reason = " ".join(str(error).split()) or type(error).__name__
             raise InputError(f"{self._said}: {entry}: not readable: {reason}") from error
@@ -98,11 +95,14 @@ class Archive:
 
     def extract(self, entry: str) -> Path:
         """The entry as a file, until the process ends."""
+        if entry in self._extracted:
+            return self._extracted[entry]
         data = self.read(entry)
         path = Path(_folder().name) / hashlib.sha256(data).hexdigest() / posixpath.basename(entry)
         if not path.exists():
             with in_one_piece(path) as part:
                 part.write_bytes(data)
+        self._extracted[entry] = path
         return path
 
 

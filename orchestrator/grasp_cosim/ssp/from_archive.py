@@ -6,13 +6,11 @@ here, as docs/system_files.md describes, and said in the notes of the system.
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from ..base.errors import InputError, choices
 from ..base.si_units import known_unit
@@ -34,6 +32,7 @@ from .archive import STRUCTURE, Archive, Notes
 from .connectors import Carried, Connectors, Part
 from .document import at, child, children, open_structure, qualified, same
 from .elements import Element, Hop, Path, read_system
+from .flow import flow_order
 from .parameters import read_settings
 
 
@@ -258,31 +257,6 @@ def _components(
                 )
                 notes.append(f"input {port} is not connected; keeps its start value {start}")
         yield replace(component, values={**values, **starts})
-
-
-def flow_order(
-    components: Sequence[Component], connections: Iterable[Connection]
-) -> tuple[Component, ...]:
-    """The components such that who gives goes before who takes; within a loop, and else, as given.
-
-    The elements of an SSD are in no order of execution, often sorted by name, and a sequential
-    scheme against the flow delays a value by a step. Inside a loop no order is better than that of
-    the file.
-    """
-    places = {component.name: i for i, component in enumerate(components)}
-    reach = np.zeros((len(places), len(places)), bool)
-    for c in connections:
-        reach[places[c.source.component], places[c.target.component]] = True
-    for between in range(len(places)):
-        reach |= np.outer(reach[:, between], reach[between])
-    before = reach & ~reach.T  # not in a loop
-    waits, order = before.sum(axis=0), []
-    for _ in components:
-        first = int(np.argmax(waits == 0))
-        order.append(components[first])
-        waits -= before[first]
-        waits[first] = -1
-    return tuple(order)
 
 
 def _times(

@@ -145,7 +145,8 @@ def _set(origin: Origin, root: Any, prefix: str) -> dict[str, Parameter]:
         where = f"{at(origin.place, element)}: parameter {name!r}"
         kind, text = short(element[0].tag).removeprefix("ssv:"), element[0].get("value")
         known(f"{where}: type", kind, _READERS, " is not supported")
-        parameter = Parameter(where, origin, kind, _READERS[kind](text), element[0].get("unit"))
+        named = origin.unit_name(element[0])
+        parameter = Parameter(where, origin, kind, _READERS[kind](text), named)
         before = parameters.setdefault(prefix + name, parameter)
         if (before.value, before.named) != (parameter.value, parameter.named):
             raise InputError(f"{where}: there are two; must be one")
@@ -160,9 +161,10 @@ def _nodes(network: Connectors, element: Element, name: str) -> Iterator[Node]:
         return
     if name in element.connectors:
         yield Node(element.path, name)
-    for inner in element.elements.values():
-        if name.startswith(f"{inner.name}."):
-            yield from _nodes(network, inner, name[len(inner.name) + 1 :])
+    for dot, letter in enumerate(name):
+        inner = element.elements.get(name[:dot]) if letter == "." else None
+        if inner is not None:
+            yield from _nodes(network, inner, name[dot + 1 :])
 
 
 def _arriving(network: Connectors, node: Node, given: Mapping[Node, Parameter]) -> Parameter:

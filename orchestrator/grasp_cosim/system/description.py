@@ -205,6 +205,7 @@ class System(Structure):
         self.recorded, self._known  # noqa: B018 - there from now on, and shared
         made = object.__new__(type(self))
         vars(made).update(vars(self), components=components)
+        vars(made).pop("by_name", None)  # which has the components of self
         return made
 
 

@@ -83,6 +83,11 @@ class Structure:
             if v.supported
         }
 
+    @cached_property
+    def by_name(self) -> dict[str, Component]:
+        """The components by name, in their order."""
+        return {component.name: component for component in self.components}
+
     def once(self, work: Callable[[Any], Made]) -> Made:
         """What a function makes of the system but for values of parameters, worked out once."""
         if work not in self._known:
@@ -105,11 +110,9 @@ class Structure:
 
     def component(self, name: str, place: object) -> Component:
         """The component of that name; place says who asks, for the error message."""
-        for component in self.components:
-            if component.name == name:
-                return component
-        names = [c.name for c in self.components]
-        raise InputError(f"{place}: no component {name!r}; {nearest(name, names)}")
+        if name not in self.by_name:
+            raise InputError(f"{place}: no component {name!r}; {nearest(name, self.by_name)}")
+        return self.by_name[name]
 
 
 def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[str, Any]:
