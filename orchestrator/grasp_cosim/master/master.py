@@ -114,8 +114,8 @@ class Master:
         except SimulationError as error:
             raise InputError(str(error)) from error
         values = propagation.values
+        self._fetch_others(values)
         for component, instance in zip(self.system.components, self.instances, strict=True):
-            self._fetch_others(instance, values)
             if component.integrated and (ended := instance.the_end()) is not None:
                 self._end(instance, ended, 0)
         for port, slot in self.slots.items():
@@ -128,17 +128,18 @@ class Master:
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
 
-    def _fetch_others(self, instance: Instance, values: dict[Port, Value]) -> None:
+    def _fetch_others(self, values: dict[Port, Value]) -> None:
         """What was not passed on, such as elements of connected arrays that have no source."""
-        by_name = instance.interface.by_name
-        ports = [
-            port
-            for port in self.slots
-            if port.component == instance.name and port not in self._drives and port not in values
-        ]
-        if ports:
-            others = instance.get([by_name[port.variable] for port in ports])
-            values |= zip(ports, others, strict=True)
+        missing: dict[str, list[Port]] = {}
+        for port in self.slots:
+            if port not in self._drives and port not in values:
+                missing.setdefault(port.component, []).append(port)
+        for instance in self.instances:
+            ports = missing.get(instance.name, [])
+            if ports:
+                by_name = instance.interface.by_name
+                others = instance.get([by_name[port.variable] for port in ports])
+                values |= zip(ports, others, strict=True)
 
     def _end(self, instance: Instance, time: float, step: int) -> None:
         """Have the run end with the row of a step, as an FMU asked for at a time in s.
