@@ -55,7 +55,7 @@ class Bound:
 
     def __init__(self, instance, step):
         self.instance = instance
-        self.clock = np.zeros(2)
+        self.clock = np.zeros(3)
         self.step = instance.stepper(self.clock, step).python
 
     def exchange(self, action, *names):

@@ -176,7 +176,7 @@ part = load(Component("part", Path({str(fmu)!r}), {{}}, isolation="process"))
 part.enter_initialization({{"hang_at": 0.1}}, 1.0)
 part.exit_initialization()
 print(part._process.pid, flush=True)
-part.stepper(np.zeros(2), 0.2).python()
+part.stepper(np.zeros(3), 0.2).python()
 """
     with subprocess.Popen(
         [sys.executable, "-c", code],

@@ -25,14 +25,14 @@ pytestmark = needs_compiler
 
 def plan(values, operations, **parts):
     lists = {name: list(part) for name, part in parts.items()}
-    return Plan(np.array(values, float), np.zeros(2), list(operations), **lists)
+    return Plan(np.array(values, float), np.zeros(3), list(operations), **lists)
 
 
 def run(made, engine, steps, operation=0):
     """What the loop returns, and the rows."""
     call = make_loop(made, engine)
     rows = np.full((steps, len(made.values)), np.nan)
-    return call(rows, operation, 0, steps, 0, 1_000_000), rows
+    return call(rows, operation, 0, steps, 0, 1_000_000, 10**9), rows
 
 
 @engines
@@ -92,12 +92,12 @@ def test_a_slow_operation_runs_in_its_phase_with_its_own_time(engine):
     seen = []
 
     def call():
-        seen.append((float(made.clock[0]), float(made.clock[1])))
+        seen.append(made.clock.tolist())
         return 0
 
     made = plan([0.0], [(STEP, 0, 1, 3, 2)], calls=(Call(call),))
     run(made, engine, 7)
-    assert seen == [(0.0, 2.0), (0.003, 5.0)]
+    assert seen == [[0.0, 2.0, 0.003], [0.003, 5.0, 0.006]]
 
 
 @engines
@@ -155,7 +155,7 @@ def test_auto_takes_it_where_it_is_there_and_builds_it_for_long_runs(
     monkeypatch.setattr(engine, "is_there", lambda: there)
     monkeypatch.setattr(engine, "has_compiler", lambda: compiler)
     monkeypatch.setattr(engine, "CompiledLoop", lambda plan: "in C")
-    found = make_loop(Plan(np.zeros(1), np.zeros(2)), "auto", steps)
+    found = make_loop(Plan(np.zeros(1), np.zeros(3)), "auto", steps)
     long = steps in (engine.LONG, None)
     assert (found == "in C") is (there or (long and compiler))
 
@@ -186,9 +186,9 @@ def counts(steps=3):
         seen.append(1)
         return 0
 
-    made = Plan(np.zeros(1), np.zeros(2), [(loop.CALL, 0, 1, 1, 0)], calls=[Call(call)])
+    made = Plan(np.zeros(1), np.zeros(3), [(loop.CALL, 0, 1, 1, 0)], calls=[Call(call)])
     rows = np.zeros((steps, 1))
-    assert make_loop(made, "compiled")(rows, 0, 0, steps, 0, 1000) == (steps, 0, 0)
+    assert make_loop(made, "compiled")(rows, 0, 0, steps, 0, 1000, 10**9) == (steps, 0, 0)
     return len(seen)
 
 
@@ -238,7 +238,7 @@ def calling(function, argument, keeps_lock=False):
     """A loop of one native call, function(argument) of the C library, by the shape of a step."""
     address = ctypes.cast(ctypes.CDLL(None)[function], ctypes.c_void_p).value or 0
     call = Call(lambda: 0, Native(STEP_2, address, argument), keeps_lock)
-    plan = Plan(np.zeros(1), np.zeros(2), [(loop.CALL, 0, 1, 1, 0)], calls=[call])
+    plan = Plan(np.zeros(1), np.zeros(3), [(loop.CALL, 0, 1, 1, 0)], calls=[call])
     return make_loop(plan, "compiled")
 
 
@@ -258,7 +258,7 @@ def test_other_threads_run_meanwhile_unless_a_component_is_python(keeps_lock):
     try:
         begun.set()
         for _ in range(1 if keeps_lock else 10_000):  # the other's turn comes when the system likes
-            run(np.zeros((5, 1)), 0, 0, 5, 0, 1000)
+            run(np.zeros((5, 1)), 0, 0, 5, 0, 1000, 10**9)
             if seen := ran.is_set():
                 break
     finally:
@@ -272,4 +272,4 @@ def test_ctrl_c_in_the_loop_is_raised_behind_it():
     run = calling("raise", signal.SIGINT)
     rows = np.zeros((5, 1))
     with pytest.raises(KeyboardInterrupt):
-        run(rows, 0, 0, 5, 0, 1000)
+        run(rows, 0, 0, 5, 0, 1000, 10**9)

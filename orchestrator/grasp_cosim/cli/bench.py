@@ -12,7 +12,7 @@ from ..hil.proxy import LONGEST_SILENCE, exchanged, shared_key
 from ..hil.relay import DIRECTIONS, Conditions, Network, Outage, Relay, csv_log
 from ..hil.served import DEFAULT_ADDRESS, ServedFmu, Server, Service
 from ..hil.sockets import is_loopback, read_address, text
-from ..system.parts import in_nanoseconds
+from ..system.times import in_nanoseconds
 from .frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
 
 
@@ -63,7 +63,7 @@ def serve(
     """
     service = Service(
         lockstep,
-        watchdog_ns=in_nanoseconds("--watchdog", watchdog),
+        watchdog_ns=round(in_nanoseconds("--watchdog", watchdog)),
         failsafe=dict(pair("--failsafe", text, "INPUT=VALUE") for text in failsafe),
         key=None if key_file is None else shared_key(key_file, say),
     )

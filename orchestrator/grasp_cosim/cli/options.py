@@ -66,9 +66,11 @@ preset_option = click.option(
     "--preset", "presets", multiple=True, metavar="NAME", help="Take a preset of the system file."
 )
 
-step_option = click.option("--step", type=float, help="Communication step in s.")
+step_option = click.option(
+    "--step", metavar="S", help="Communication step in s, like 1e-3 or 1/30."
+)
 
-stop_option = click.option("--stop", type=float, help="Stop time in s.")
+stop_option = click.option("--stop", metavar="S", help="Stop time in s.")
 
 SYSTEM_OPTIONS = (
     controller_option,

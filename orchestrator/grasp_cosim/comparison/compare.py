@@ -15,7 +15,7 @@ from ..master.simulation import simulate
 from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
 from ..system.description import FILES, System
-from ..system.parts import NANOSECONDS
+from ..system.times import in_seconds, nearest_time
 from .bands import SHARE, Bands, Compared, metric_band, plain, signal_band
 from .side import Difference, Side, differences, read_side, side_of
 from .tube import ROUNDING, Curve, deviation
@@ -176,9 +176,9 @@ def _ran(system: Result | str | Path, other: Side | None) -> Side:
     """The run of a system file, no longer than the other run."""
     loaded = System.load(str(system)).natively()
     if other:
-        span = round(float(other.time[-1]) * NANOSECONDS) - loaded.start_ns
-        stop = min(loaded.stop_ns, loaded.time_ns(max(span // loaded.step_ns, 1)))
-        loaded = loaded.with_experiment(stop=stop / NANOSECONDS)
+        span = nearest_time(float(other.time[-1])) - loaded.start_ns
+        stop = min(loaded.stop_ns, loaded.time_ns(max(int(span // loaded.step_ns), 1)))
+        loaded = loaded.with_experiment(stop=in_seconds(stop))
     return side_of(simulate(loaded), str(system))
 
 

@@ -19,7 +19,8 @@ from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion
 from ..system.changes import stated
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port, literal
+from ..system.parts import Port, literal
+from ..system.times import in_seconds
 
 Severity = Literal["blocks", "warns", "notes"]
 SEVERITIES: tuple[Severity, ...] = ("blocks", "warns", "notes")
@@ -95,7 +96,7 @@ def use_of(system: System, name: str) -> Use:
         component.values,
         stated(system, name),
         own(port for event in system.events for port in event.set),
-        (component.step_ns or system.step_ns) / NANOSECONDS,
+        in_seconds(component.step_ns or system.step_ns),
     )
 
 

@@ -23,8 +23,9 @@ from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
 from ..system.changes import converted, replaced
 from ..system.description import System
-from ..system.parts import ISOLATIONS, NANOSECONDS, Component, Connection, Isolation
+from ..system.parts import ISOLATIONS, Component, Connection, Isolation
 from ..system.structure import SCHEMES, unit_of
+from ..system.times import NANOSECONDS, in_seconds
 from ..system.validity import connection_transform, transforms
 from .bands import SHARE, Bands, Compared, plain
 from .compare import FEWEST_STEPS, Comparison, judge
@@ -154,7 +155,7 @@ def qualify(
     theirs = side_of(result, swap.candidate.name).converted(swap.back)
     both = own, replace(ours, time=theirs.time, signals=theirs.signals).measured(asked)
     span_ns, step_ns = swap.system.stop_ns - swap.system.start_ns, swap.system.step_ns
-    shift = max(SHARE * span_ns, FEWEST_STEPS * step_ns) / NANOSECONDS
+    shift = max(SHARE * span_ns, float(FEWEST_STEPS * step_ns)) / NANOSECONDS
     required = {*map(plain, own)}
     found = judge(ours, theirs, both, asked, again, given, shift, swap.nominals, required)
     texts = [f"{name} is a String: not compared" for name in ours.texts]
@@ -202,7 +203,7 @@ def _other_numerics(system: System, original: Side, progress: bool) -> tuple[lis
 def _variants(system: System) -> Iterator[tuple[str, System]]:
     twice, spans = 2 * system.step_ns, [c.step_ns or 0 for c in system.components]
     if not any(span % twice for span in (system.stop_ns - system.start_ns, *spans)):
-        step = twice / NANOSECONDS
+        step = in_seconds(twice)
         yield f"step {step:g} s", system.with_experiment(step=step)
     for scheme in SCHEMES:
         if scheme != system.scheme:

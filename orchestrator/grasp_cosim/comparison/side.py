@@ -18,9 +18,9 @@ from ..metrics.metric import Metric, Signals, measure
 from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run
 from ..recording.mdf import read_mdf
 from ..recording.result import Result
-from ..system.parts import NANOSECONDS
 from ..system.settings import given_values
 from ..system.stimuli import read_stimuli
+from ..system.times import NANOSECONDS
 from .tube import ROUNDING, Curve
 
 AS_IT_STARTS, NONE = "as the FMU starts", "none"

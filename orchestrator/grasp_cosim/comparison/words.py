@@ -9,7 +9,7 @@ from typing import Any
 
 from ..base.errors import choices
 from ..base.text import columns, significant
-from ..system.parts import NANOSECONDS
+from ..system.times import in_seconds
 from .bands import Compared, plain
 from .compare import Comparison
 from .interface_difference import SEVERITIES, Difference
@@ -95,8 +95,8 @@ def qualification_text(q: Qualification) -> str:
 def qualification_verdict(q: Qualification) -> str:
     """The outcome in a line, and of which runs."""
     system, word = q.swap.system, "QUALIFIED" if q.qualified else "NOT QUALIFIED"
-    step, stop = system.step_ns / NANOSECONDS, system.stop_ns / NANOSECONDS
-    from_ = f"{system.start_ns / NANOSECONDS:g} to " if system.start_ns else ""
+    step, stop = in_seconds(system.step_ns), in_seconds(system.stop_ns)
+    from_ = f"{in_seconds(system.start_ns):g} to " if system.start_ns else ""
     return (
         f"{word}: {q.swap.candidate.name} as {q.swap.component} (now {q.swap.original.name}), "
         f"{from_}{stop:g} s in steps of {1e3 * step:g} ms, {system.scheme}"
@@ -116,8 +116,8 @@ def qualification_json(q: Qualification) -> dict[str, Any]:
         "original": str(q.swap.original),
         "candidate": str(q.swap.candidate),
         "system": system.name,
-        "step": system.step_ns / NANOSECONDS,
-        "stop": system.stop_ns / NANOSECONDS,
+        "step": in_seconds(system.step_ns),
+        "stop": in_seconds(system.stop_ns),
         "scheme": system.scheme,
         "failure": q.failure,
         "differences": [asdict(d) for d in q.swap.differences],

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from ..base.errors import SimulationError
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port, seconds
+from ..system.parts import Port
 from ..system.settings import run_settings
+from ..system.times import in_seconds, seconds
 from ..system.validity import transforms
 from .energy import ExchangeEnergy, bonds
 from .listener import Experiment, Leisurely, Listener, Signal, Texts
@@ -195,7 +196,7 @@ class Divergence:
         decade = (self._reached[i][-1] - self._reached[i][-4]) / 3
         text = f"{signal.name} ran away: {size} at t = {time}"
         if _grows(self._reached[i]):
-            length = decade * self._system.step_ns / NANOSECONDS
+            length = decade * in_seconds(self._system.step_ns)
             text += f", ten times as much every {length:.2g} s"
         return row, f"{text}; look at the signs and gains, or try a shorter step"
 

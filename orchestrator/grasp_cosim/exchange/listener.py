@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from ..system.parts import NANOSECONDS
+from ..system.times import Clock, Time, nearest_time
 
 
 class Texts:
@@ -54,28 +54,27 @@ class Experiment:
     """
 
     name: str
-    step_ns: int
-    stop_ns: int
+    step_ns: Time
+    stop_ns: Time
     settings: Mapping[str, Any]
-    start_ns: int = 0
+    start_ns: Time = 0
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> Experiment:
         """The experiment that settings describe."""
         step, stop, start = (
-            round(settings.get(key, 0.0) * NANOSECONDS) for key in ("step", "stop", "start")
+            nearest_time(settings.get(key, 0.0)) for key in ("step", "stop", "start")
         )
         return cls(settings["system"], step, stop, settings, start)
 
     @property
     def total_steps(self) -> int:
         """The number of communication steps from the start to the stop time."""
-        return (self.stop_ns - self.start_ns) // self.step_ns
+        return int((self.stop_ns - self.start_ns) // self.step_ns)
 
     def times(self, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
         """The communication points in s."""
-        found: npt.NDArray[np.float64] = (self.start_ns + steps * self.step_ns) / NANOSECONDS
-        return found
+        return Clock.of(self.start_ns, self.step_ns).times(steps)
 
 
 class Listener(Protocol):

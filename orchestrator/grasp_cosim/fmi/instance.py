@@ -23,6 +23,17 @@ EARLY = 6
 """No FMI status: a step that returned OK, but before its end (FMI 3.0)."""
 
 
+CLOCK = ("begin", "number", "end")
+"""What a stepper is told of a step: the time at which it begins in s, its number, the time at which
+it ends.
+"""
+
+
+def clock_of(begin: float, end: float) -> npt.NDArray[np.float64]:
+    """The clock of a step alone, from begin to end in s."""
+    return np.array([begin, 0.0, end])
+
+
 class Instance(Protocol):
     """One instance of a component, in the order of its life."""
 
@@ -65,7 +76,10 @@ class Instance(Protocol):
         """
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        """The call that advances by step seconds from the time in clock[0]; EARLY is a status."""
+        """The call that advances by step seconds from the time in clock; EARLY is a status.
+
+        clock has the parts of CLOCK.
+        """
 
     def last_successful_time(self) -> float | None:
         """Return the end of a discarded or shortened step in s, None if the FMU does not say."""

@@ -22,7 +22,7 @@ from fmpy.fmi3 import FMU3Model
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
-from ..system.parts import NANOSECONDS, Solver
+from ..system.parts import Solver
 from .co_simulation import Fmi3Instance, FmuInstance, Lenient
 from .cvode import Cvode, CvodeError, Function
 from .instance import DISCARD, EARLY, OK, WARNING
@@ -143,7 +143,7 @@ class ModelInstance(LoadedInstance):
 
         def advance() -> int:
             self._step, self._started = step, True
-            self._advance(round((time[0] + step) * NANOSECONDS) / NANOSECONDS)
+            self._advance(time[2])
             return OK if self._ended is None else EARLY
 
         return Call(advance)

@@ -39,7 +39,7 @@ from ..base.system_calls import end_group, listener
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Component, Solver
 from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
-from .instance import EARLY, OK, WARNING, Inputs, Instance, dtype
+from .instance import CLOCK, EARLY, OK, WARNING, Inputs, Instance, dtype
 
 POSIX = os.name == "posix"
 """Elsewhere a process is not handed open files."""
@@ -101,11 +101,11 @@ class _SharedMemory:
 
     def __init__(self, descriptor: int) -> None:
         self._memory = mmap.mmap(descriptor, SIZE)
-        self.clock: npt.NDArray[np.float64] = self._view(np.float64, 1, 0)
-        """Time in s at the beginning of the step."""
-        self.step: npt.NDArray[np.float64] = self._view(np.float64, 1, 8)
-        """Its length in s."""
-        self._used = 16
+        self.clock: npt.NDArray[np.float64] = self._view(np.float64, len(CLOCK), 0)
+        """That of Instance.stepper."""
+        self.step: npt.NDArray[np.float64] = self._view(np.float64, 1, self.clock.nbytes)
+        """The length of the step in s."""
+        self._used = self.clock.nbytes + self.step.nbytes
 
     def add(
         self, interface: Interface, variables: Sequence[Variable]
@@ -232,7 +232,7 @@ class ProcessInstance:
         shared = self._shared
 
         def advance() -> int:
-            shared.clock[0] = clock[0]
+            shared.clock[:] = clock
             shared.step[0] = step
             return self._pass_values(STEP)
 

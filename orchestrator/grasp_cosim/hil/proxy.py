@@ -14,7 +14,7 @@ from ..fmu_export.link import ALIVE, ORDER, LinkVariable, Signature, check_size,
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value, Variable
 from ..interface.read import read_interface
-from ..system.parts import NANOSECONDS
+from ..system.times import NANOSECONDS
 
 if TYPE_CHECKING:
     from ..fmu_export.contract import Variable as ProxyVariable

@@ -24,7 +24,7 @@ from typing import Any, Literal, NamedTuple
 from ..base.checks import number, whole
 from ..base.errors import InputError
 from ..base.text import columns
-from ..system.parts import NANOSECONDS
+from ..system.times import NANOSECONDS
 from .sockets import Address, EventLoop, connected, is_loopback, received, resolved, text
 
 Direction = Literal["request", "reply"]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import InputError, SimulationError, nearest
-from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, dtype
+from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, clock_of, dtype
 from ..fmi.process import load_here
 from ..fmu_export.link import (
     END,
@@ -24,7 +24,7 @@ from ..fmu_export.link import (
 )
 from ..interface.interface import Interface, Value, Variable
 from ..master.master import finish_step
-from ..system.parts import NANOSECONDS
+from ..system.times import NANOSECONDS
 from .proxy import link_signature
 from .sockets import Address, EventLoop, received, text
 
@@ -263,7 +263,7 @@ class DrivenFmu:
         self._instance: Instance | None = None
         self._stepping = False
         self._values: list[Value] = []
-        self._clock = np.zeros(1)
+        self._clock = clock_of(0.0, 0.0)
         self._steppers: dict[float, Callable[[], int]] = {}
         load_here(interface.identifier, interface).close()
 
@@ -306,7 +306,7 @@ class DrivenFmu:
     def advance(self, time: float, step: float) -> None:
         """Advance by `step` from `time`, both in s, with the values as they are."""
         instance = self._required()
-        self._clock[0] = time
+        self._clock[:] = clock_of(time, time + step)
         if step not in self._steppers:
             self._steppers = {step: instance.stepper(self._clock, step).python}
         status = self._steppers[step]()

@@ -11,7 +11,7 @@ from select import select
 from typing import Any, Self
 
 from ..base.errors import InputError
-from ..system.parts import NANOSECONDS
+from ..system.times import NANOSECONDS
 
 Address = tuple[str, int]
 """IPv4 address and port."""

@@ -7,6 +7,7 @@ nothing that a run needs.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -16,8 +17,17 @@ from ..base.errors import choices
 from ..base.text import on_one_line
 from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable
 from ..system.changes import converted, stated
-from ..system.parts import LONGEST, NANOSECONDS, Component
+from ..system.parts import Component
 from ..system.structure import Structure
+from ..system.times import (
+    LONGEST,
+    NANOSECONDS,
+    Time,
+    in_seconds,
+    nearest_time,
+    step_of,
+    written,
+)
 from .alike import Match, candidates, matches
 
 FEW = 6
@@ -185,7 +195,10 @@ def alone(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]]:
     interfaces = {name: Component(name, fmu, {}).interface for name, (fmu, _) in fmus.items()}
     step, start, stop, notes = _experiment(interfaces.values())
     head = HEAD.format(
-        name=next(iter(fmus)), step=step, stop=stop, start=f"start = {start}  # s\n" * bool(start)
+        name=next(iter(fmus)),
+        step=_entry(step),
+        stop=_entry(stop),
+        start=f"start = {_entry(start)}  # s\n" if start else "",
     )
     parts = [_listed(name, i, fmus[name][1]) for name, i in interfaces.items()]
     return "\n".join([head, *parts]), notes
@@ -206,23 +219,36 @@ def _listed(name: str, interface: Interface, path: str) -> str:
     return "".join(f"{text}\n\n" for text in tables if text)[:-1]
 
 
-def _experiment(fmus: Collection[Interface]) -> tuple[float, float, float, list[str]]:
-    """Step, start and stop time in s, and notes: the shortest step that an FMU recommends, from
-    where the first one begins until the last one ends.
+def _experiment(fmus: Collection[Interface]) -> tuple[Time, Time, Time, list[str]]:
+    """Step, start and stop time, and notes: the shortest step that an FMU recommends, from where
+    the first one begins until the last one ends.
+
+    The step is as the FMU says, or where no system can have that, the next longer one.
     """
     keys = ("start_time", "stop_time", "step_size")
     begins, ends, steps = ([_time(i.experiment.get(key)) for i in fmus] for key in keys)
-    start = min(begins)
-    stop, step = max(ends), min((s for s in steps if s > 0.0), default=0.0)
-    missing = [word for word, none in (("step", not step), ("stop time", stop <= start)) if none]
-    stop = stop if stop > start else start + 1.0
-    step = step or (stop - start) / STEPS
-    step_ns = max(1, round(step * NANOSECONDS))
-    span_ns = max(1, round((stop - start) * NANOSECONDS / step_ns)) * step_ns
-    step, stop = step_ns / NANOSECONDS, (round(start * NANOSECONDS) + span_ns) / NANOSECONDS
-    chosen = f"chosen, step = {step:g} s, stop = {stop:g} s"
-    notes = [f"no FMU recommends a {' and a '.join(missing)}: {chosen}"] if missing else []
+    start, last = nearest_time(min(begins)), nearest_time(max(ends))
+    recommended = min((s for s in steps if s > 0.0), default=None)
+    missing = []
+    if recommended is None:
+        missing.append("step")
+    if last <= start:
+        missing.append("stop time")
+        last = start + NANOSECONDS
+    step = step_of(in_seconds(last - start) / STEPS if recommended is None else recommended)
+    stop = start + max(1, round((last - start) / step)) * step
+    notes = []
+    if missing:
+        chosen = f"chosen, step = {in_seconds(step):g} s, stop = {in_seconds(stop):g} s"
+        notes.append(f"no FMU recommends a {' and a '.join(missing)}: {chosen}")
+    if recommended is not None and not math.isclose(in_seconds(step), recommended, rel_tol=1e-9):
+        notes.append(f"an FMU recommends a step of {recommended!r} s: {written(step)} s chosen")
     return step, start, stop, notes
+
+
+def _entry(time: Time) -> str:
+    """A time as the file has it: a number, or in quotes a fraction."""
+    return _quoted(written(time)) if time.denominator > 1 else repr(in_seconds(time))
 
 
 def _time(value: Value | None) -> float:

@@ -30,7 +30,7 @@ from ..base.scratch import ScratchFolder
 from ..base.system_calls import be_ordinary
 from ..fmi.instance import EARLY
 from ..realtime import pacer, timing
-from ..system.parts import NANOSECONDS
+from ..system.times import NANOSECONDS
 from . import loop
 from .plan import Plan
 
@@ -115,8 +115,9 @@ class CompiledLoop:
         operation: int,
         start: int,
         stop: int,
-        start_ns: int,
-        step_ns: int,
+        start_ticks: int,
+        step_ticks: int,
+        per_second: int,
         row: int | None = None,
     ) -> tuple[int, int, int]:
         """As loop.run(). Given the row of the first step, rows are filled round and round."""
@@ -125,14 +126,13 @@ class CompiledLoop:
         if row is None:
             self.shared.taken, row = start, 0
         place, room = rows.ctypes.data, len(rows)
-        step = self._run(
-            tables, place, room, row, operation, start, stop, start_ns, step_ns, shared
-        )
+        clock = start_ticks, step_ticks, per_second
+        step = self._run(tables, place, room, row, operation, start, stop, *clock, shared)
         return step, self.shared.operation, self.shared.status
 
 
-Loop = Callable[[Any, int, int, int, int, int], tuple[int, int, int]] | CompiledLoop
-"""loop.run() over a plan: takes rows, operation, start, stop, start_ns and step_ns."""
+Loop = Callable[[Any, int, int, int, int, int, int], tuple[int, int, int]] | CompiledLoop
+"""loop.run() over a plan: takes rows, operation, start, stop, and the clock of a run."""
 
 
 def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
@@ -193,7 +193,7 @@ def library(locked: bool) -> ctypes.CDLL:
         raise InputError(f"{path}: the compiled loop does not load: {error}; {REMEDY}") from error
     found.run.restype = ctypes.c_int64
     whole, place = ctypes.c_int64, ctypes.c_void_p
-    found.run.argtypes = [place, place, *[whole] * 7, place]
+    found.run.argtypes = [place, place, *[whole] * 8, place]
     return found
 
 

@@ -63,6 +63,10 @@ typedef struct {
     double *clock;
 } Plan;
 
+typedef struct { /* of system/times.py, in ticks: point k is at start + k * step */
+    int64_t start, step, per_second;
+} Clock;
+
 typedef struct { /* what the loop and others tell each other while it runs */
     int64_t operation, status; /* why it ended; 0, 0 at the end */
     int64_t done;              /* steps whose rows are there */
@@ -197,7 +201,7 @@ static void store(const Buffer *buffer, int64_t i, double value) {
     }
 }
 
-/* The value at a time in ns, which is not before that of the last call. */
+/* The value at a time in ticks, which is not before that of the last call. */
 static double drive(Drive *d, int64_t time) {
     const int64_t *times = d->times;
     const double *samples = d->samples;
@@ -211,15 +215,20 @@ static double drive(Drive *d, int64_t time) {
     return share * samples[row] + (1.0 - share) * samples[row + 1];
 }
 
+/* The communication point k in s. */
+static double point(const Clock *clock, int64_t k) {
+    return (double)(clock->start + k * clock->step) / (double)clock->per_second;
+}
+
 /* Do one operation in step k; 0, or the status that ends the loop. */
-static int operate(const Plan *plan, const Operation *operation, int64_t k, int64_t start_ns,
-                   int64_t step_ns, const Shared *shared) {
+static int operate(const Plan *plan, const Operation *operation, int64_t k, const Clock *clock,
+                   const Shared *shared) {
     double *values = plan->values;
     int64_t i, begin = operation->first, end = operation->last;
 
     switch (operation->kind) {
     case STEP:
-        plan->clock[0] = (double)(start_ns + (k + 1 - operation->period) * step_ns) / 1e9;
+        plan->clock[0] = point(clock, k + 1 - operation->period);
         /* fall through */
     case CALL: {
         int status = invoke(&plan->calls[begin], plan->clock, shared);
@@ -246,7 +255,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, int6
     case DRIVE:
         for (i = begin; i < end; i++) {
             Drive *d = &plan->drives[i];
-            values[d->slot] = drive(d, start_ns + (k - operation->phase) * step_ns);
+            values[d->slot] = drive(d, clock->start + (k - operation->phase) * clock->step);
         }
         return 0;
     default: /* LOAD and LOAD_LONG */
@@ -263,12 +272,15 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, int6
 
 /* rows has room for so many, of which the first step takes the given one; then it begins anew. */
 int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t operation,
-            int64_t start, int64_t stop, int64_t start_ns, int64_t step_ns, Shared *shared) {
+            int64_t start, int64_t stop, int64_t start_ticks, int64_t step_ticks,
+            int64_t per_second, Shared *shared) {
+    const Clock clock = {start_ticks, step_ticks, per_second};
     int64_t k;
 
     shared->operation = shared->status = 0;
     for (k = start; k < stop; k++) {
         plan->clock[1] = (double)k;
+        plan->clock[2] = point(&clock, k + 1);
         if (k - __atomic_load_n(&shared->taken, __ATOMIC_ACQUIRE) >= room) {
             shared->operation = operation;
             shared->status = FULL;
@@ -277,7 +289,7 @@ int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t o
         for (; operation < plan->size; operation++) {
             const Operation *o = &plan->operations[operation];
             if (o->period == 1 || k % o->period == o->phase) {
-                int status = operate(plan, o, k, start_ns, step_ns, shared);
+                int status = operate(plan, o, k, &clock, shared);
                 if (status) {
                     shared->operation = operation;
                     shared->status = status;

@@ -45,26 +45,28 @@ def run(
     operation: int,
     start: int,
     stop: int,
-    start_ns: int,
-    step_ns: int,
+    start_ticks: int,
+    step_ticks: int,
+    per_second: int,
 ) -> tuple[int, int, int]:
     """Do the steps from start to stop, the first from the given operation on.
 
     The tables are those of a plan; values, clock, buffers and rows are memory views. Step 0 begins
-    at start_ns. After step k the values go into rows, one row of len(values) after the other. clock
-    holds the time in s at which the component that steps now begins, and the step number. Returns
-    the step reached, and where a call's status is a bad one, the operation and the status (else 0
-    and 0).
+    at start_ticks, and there are per_second of these. After step k the values go into rows, one row
+    of len(values) after the other. clock holds the time in s at which the component that steps now
+    begins, the step number, and the time at which the step ends. Returns the step reached, and
+    where a call's status is a bad one, the operation and the status (else 0 and 0).
     """
-    width, size = len(values), len(operations)
+    width, size, ticks = len(values), len(operations), float(per_second)
     for k in range(start, stop):
         clock[1] = k
+        clock[2] = (start_ticks + (k + 1) * step_ticks) / ticks
         while operation < size:
             what, begin, end, period, phase = operations[operation]
             if k % period == phase:
                 if what >= CALL:
                     if what == STEP:
-                        clock[0] = (start_ns + (k + 1 - period) * step_ns) / 1e9
+                        clock[0] = (start_ticks + (k + 1 - period) * step_ticks) / ticks
                     status = calls[begin]()
                     if status > WORST:
                         return k, operation, status
@@ -78,7 +80,7 @@ def run(
                     for buffer, index, slot in casts[begin:end]:
                         store(buffers[buffer], index, values[slot])
                 elif what == DRIVE:
-                    time = start_ns + (k - phase) * step_ns
+                    time = start_ticks + (k - phase) * step_ticks
                     for drive in drives[begin:end]:
                         values[drive.slot] = drive.at(time)
                 else:

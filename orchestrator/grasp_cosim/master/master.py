@@ -5,6 +5,7 @@ A step that an FMU rejects, since it discards it or ends it early, is finished i
 The schemes, components with a longer step and time are in docs/system_files.md.
 """
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -16,12 +17,13 @@ from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
 from ..base.system_calls import cpus
 from ..exchange.listener import Texts
-from ..fmi.instance import DISCARD, EARLY, WARNING, Instance
+from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, clock_of
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.result import Rejection
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Port, seconds
+from ..system.parts import Component, Port
+from ..system.times import NANOSECONDS, in_seconds, seconds
 from . import loop
 from .engine import Aside, CompiledLoop, Engine, make_loop
 from .initialisation import Propagation
@@ -91,7 +93,7 @@ class Master:
         self._rows = np.empty((ROOM if self._alone else CHUNK, len(self.values)))
         self._rows.fill(0.0)  # its memory is there from now on
         self._cpus = cpus() if self._alone else []
-        self._clock = system.start_ns, system.step_ns
+        self._clock = system.clock
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
 
@@ -101,9 +103,10 @@ class Master:
         The row of the start has what the first step uses: outputs as they are out of initialisation
         mode, and inputs that agree with them.
         """
-        start, stop = (t / NANOSECONDS for t in (self.system.start_ns, self.system.stop_ns))
+        start = in_seconds(self.system.start_ns)
         for component, instance in zip(self.system.components, self.instances, strict=True):
             driven = at_start(self.system, self._drives, component.name)
+            stop = told_stop(self.system, component)
             instance.enter_initialization({**component.values, **driven}, stop, start)
         propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
         try:
@@ -120,7 +123,7 @@ class Master:
                 self._end(instance, ended, 0)
         for port, slot in self.slots.items():
             drive = self._drives.get(port)
-            value = drive.at(self.system.start_ns) if drive else values[port]
+            value = drive.at(self._clock.start) if drive else values[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             exact(str(port), value, f"{value} at step 0")
@@ -149,7 +152,7 @@ class Master:
         self.total_steps = step
         line = f"{instance.name} asked for the end of the simulation at t = {time:.9g} s"
         row = self.system.time_ns(step)
-        if abs(row / NANOSECONDS - time) * NANOSECONDS > 1.0:
+        if abs(in_seconds(row) - time) * NANOSECONDS > 1.0:
             line += f"; its values there are in the last row, that of t = {seconds(row)}"
         self.ends.append(line)
 
@@ -289,10 +292,10 @@ class Master:
             raise self.plan.raised.pop()
         instance = self.plan.owners[call]
         assert instance is not None  # noqa: S101 - the master's own calls return no bad status
-        begin = self.system.time_ns(step + 1 - period) / NANOSECONDS
+        begin = in_seconds(self.system.time_ns(step + 1 - period))
         if kind != loop.STEP or status not in (DISCARD, EARLY):
             raise instance.failure(status, begin)
-        end = self.system.time_ns(step + 1) / NANOSECONDS
+        end = in_seconds(self.system.time_ns(step + 1))
         ended = finish_step(instance, status, begin, end)
         if ended is not None:
             self._end(instance, ended, step + 1)
@@ -310,6 +313,18 @@ class Master:
         raise AssertionError("no value is too long")  # pragma: no cover
 
 
+def told_stop(system: System, component: Component) -> float:
+    """The stop time in s that a component is told: no step that is asked of it ends later.
+
+    An FMU finds the end of a step as the sum of its begin and its length, two floats, which may
+    round to more than the stop time: 0.2 + 0.1 > 0.3. Then it is told that sum, a few units in the
+    last place later, so that its last step has the length of all others.
+    """
+    length = component.step_ns or system.step_ns
+    last = in_seconds(system.stop_ns - length) + in_seconds(length)
+    return max(in_seconds(system.stop_ns), last)
+
+
 def finish_step(instance: Instance, status: int, begin: float, end: float) -> float | None:
     """Bring an instance to end, in s, that rejected the step from begin to there.
 
@@ -317,7 +332,7 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
     1/1024 of the step; a rest below half of that is none. The time in s where the FMU asked for the
     end of the simulation, else None. SimulationError where that does not help.
     """
-    clock, length = np.array([begin]), end - begin
+    clock, length = clock_of(begin, end), end - begin
     smallest = length / SMALLEST
     for _ in range(4 * SMALLEST):
         if status in (DISCARD, EARLY):
@@ -334,8 +349,17 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
             break
         if clock[0] >= end:
             return None
-        length = min(length, end - float(clock[0]))
+        length = min(length, length_until(float(clock[0]), end))
+        clock[2] = clock[0] + length
         status = instance.stepper(clock, length).python()
         if status <= WARNING:
             clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
     raise instance.failure(status, float(clock[0]))
+
+
+def length_until(begin: float, end: float) -> float:
+    """The longest step in s from begin that is not beyond end where both are added as floats."""
+    length = end - begin
+    while begin + length > end:
+        length = math.nextafter(length, 0.0)
+    return length

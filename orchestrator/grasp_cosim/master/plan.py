@@ -15,11 +15,12 @@ import numpy.typing as npt
 
 from ..base.calls import Call
 from ..exchange.listener import Texts
-from ..fmi.instance import Instance, dtype
+from ..fmi.instance import CLOCK, Instance, dtype
 from ..interface.interface import Interface, Variable
 from ..realtime.pacer import Pacer
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Connection, Port
+from ..system.parts import Connection, Port
+from ..system.times import in_seconds
 from ..system.validity import driven, transforms
 from .loop import CALL, COPY, DRIVE, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 from .scenario import Drive, Scenario
@@ -102,7 +103,7 @@ class Planner:
         self.strings: dict[str, list[Port]] = {name: [] for name in self.instances}
         for port in self.texts:
             self.strings[port.component].append(port)
-        self.made = Plan(self.values, np.zeros(2))
+        self.made = Plan(self.values, np.zeros(len(CLOCK)))
         self.view: Any = memoryview(self.values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
     def plan(self) -> Plan:
@@ -207,7 +208,7 @@ class Planner:
     def _step(self, name: str) -> None:
         """Advance a component and fetch its outputs, at the end of its own step."""
         period = self.system.period(name)
-        step = period * self.system.step_ns / NANOSECONDS
+        step = in_seconds(period * self.system.step_ns)
         instance = self.instances[name]
         self._call(STEP, instance.stepper(self.made.clock, step), instance, period, period - 1)
         self._transfer(name, "output", period - 1)

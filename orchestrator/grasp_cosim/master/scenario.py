@@ -22,8 +22,9 @@ from ..fmi.instance import Instance
 from ..interface.interface import Value, Variable
 from ..system.description import System
 from ..system.faults import FAULTS, INITIAL, Act, Draws
-from ..system.parts import Condition, Event, Fault, Port, first_step, literal, seconds
+from ..system.parts import Condition, Event, Fault, Port, literal
 from ..system.scenario import check_setting
+from ..system.times import Time, first_step, seconds
 from ..system.validity import driven, is_linear, samples_of
 
 FaultFunction = Callable[[float, int], float]
@@ -182,7 +183,7 @@ class Scenario:
 class Window:
     """The steps in which a fault acts. With a condition they are only known when it begins."""
 
-    def __init__(self, fault: Fault, step_ns: int, start_ns: int = 0) -> None:
+    def __init__(self, fault: Fault, step_ns: Time, start_ns: Time = 0) -> None:
         self.fault = fault
         self._earliest = first_step(fault.start_ns, step_ns, start_ns)
         self._first: float = (self._earliest or INITIAL) if fault.when is None else math.inf
@@ -212,7 +213,7 @@ class Window:
         return found
 
 
-def fault_functions(windows: Sequence[Window], step_ns: int) -> Mapping[Port, FaultFunction]:
+def fault_functions(windows: Sequence[Window], step_ns: Time) -> Mapping[Port, FaultFunction]:
     """Return for each connection that has faults, by target, all of them one after the other."""
     chains: dict[Port, list[tuple[Act, Window]]] = {}
     kinds: Counter[tuple[Port, str]] = Counter()
@@ -232,7 +233,7 @@ def _in_turn(chain: Sequence[tuple[Act, Window]], value: float, step: int) -> fl
 
 @dataclass(slots=True)
 class Drive:
-    """The samples of an input at times in ns, and its slot; row is the last one until now.
+    """The samples of an input at times in ticks, and its slot; row is the last one until now.
 
     The compiled loop has the same in a table, with the same bits.
     """
@@ -259,7 +260,8 @@ def drives_of(system: System, slots: dict[Port, int]) -> dict[Port, Drive]:
     found: dict[Port, Drive] = {}
     if system.input is None:
         return found
-    times = array("q", system.input.times)
+    ticks = system.clock.per_nanosecond
+    times = array("q", (ticks * time for time in system.input.times))
     for port in driven(system):
         variable = system.component(port.component, str(port)).interface.by_name[port.variable]
         linear, samples = is_linear(system.input, variable), samples_of(system, port)
@@ -271,7 +273,7 @@ def at_start(system: System, drives: dict[Port, Drive], name: str) -> dict[str, 
     """The values at the start of the inputs of a component that are driven."""
     by_name = system.component(name, name).interface.by_name
     return {
-        port.variable: of_kind(by_name[port.variable].kind, drive.at(system.start_ns))
+        port.variable: of_kind(by_name[port.variable].kind, drive.at(system.clock.start))
         for port, drive in drives.items()
         if port.component == name
     }

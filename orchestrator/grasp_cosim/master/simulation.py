@@ -35,8 +35,9 @@ from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.result import Known, Result
 from ..system.description import System
 from ..system.native import needed_twins
-from ..system.parts import NANOSECONDS, Component, Port, Realtime
+from ..system.parts import Component, Port, Realtime
 from ..system.settings import start_values
+from ..system.times import TimeInput, in_seconds
 from ..system.validity import remarks
 from .engine import Engine
 from .master import Master
@@ -64,8 +65,8 @@ class Session:
         self,
         system: System,
         *,
-        step: float | None = None,
-        stop: float | None = None,
+        step: TimeInput | None = None,
+        stop: TimeInput | None = None,
         scheme: str | None = None,
         every: int = 1,
         listeners: Sequence[Listener] = (),
@@ -183,7 +184,7 @@ class Session:
     @property
     def time(self) -> float:
         """The communication point reached, in s."""
-        return self.system.time_ns(self._master.steps_done) / NANOSECONDS
+        return in_seconds(self.system.time_ns(self._master.steps_done))
 
     @property
     def complete(self) -> bool:
@@ -316,7 +317,7 @@ class Session:
             for name, r in master.rejections.items()
         )
         pending = master.scenario.pending() if self.complete else ()
-        step, lost = self.system.step_ns / NANOSECONDS, self._whole and self._whole.lost
+        step, lost = in_seconds(self.system.step_ns), self._whole and self._whole.lost
         return (
             *self._early(),
             *self._dispatch.log,
@@ -336,8 +337,8 @@ class Simulate:
         self,
         system: System,
         *,
-        step: float | None = None,
-        stop: float | None = None,
+        step: TimeInput | None = None,
+        stop: TimeInput | None = None,
         scheme: str | None = None,
         progress: bool | str = False,
         every: int = 1,
@@ -379,7 +380,7 @@ class Simulate:
             diverging=diverging,
             note=note,
         ) as session:
-            with phase(f"{system.name} to {session.system.stop_ns / NANOSECONDS:g} s"):
+            with phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"):
                 _drive(session, progress)
             return session.result()
 
@@ -414,7 +415,7 @@ def _folder_kept() -> Iterator[None]:
 
 
 def _drive(session: Session, progress: bool | str) -> None:
-    begin, end = (t / NANOSECONDS for t in (session.system.start_ns, session.system.stop_ns))
+    begin, end = map(in_seconds, (session.system.start_ns, session.system.stop_ns))
     with (
         interrupts(session.halt.set),
         Progress(

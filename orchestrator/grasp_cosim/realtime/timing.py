@@ -19,7 +19,8 @@ import numpy.typing as npt
 
 from ..base.errors import InputError
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Realtime
+from ..system.parts import Realtime
+from ..system.times import NANOSECONDS, in_seconds
 
 
 class Overrun(NamedTuple):
@@ -256,7 +257,7 @@ class Meter:
             return 0.0
         first, last = self._table()[[0, count - 1]]
         end = max(last[DUE] + self._period, last[-1])
-        return float(count * self._system.step_ns / (end - first[DUE]))
+        return float(count * self._system.step_ns) / float(end - first[DUE])
 
     def _judged(self) -> tuple[Steps, Table, Table, dict[str, Table]]:
         """The steps that count, their rows, by how much each was late, and what the parts took."""
@@ -316,7 +317,7 @@ class Meter:
         return Spread._make((*(float(t) / NANOSECONDS for t in found), at))
 
     def _time(self, step: int) -> float:
-        return self._system.time_ns(step) / NANOSECONDS
+        return in_seconds(self._system.time_ns(step))
 
 
 def _bars(times: Table) -> Histogram:

@@ -22,8 +22,8 @@ from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
 from ..realtime.timing import Timing
-from ..system.parts import NANOSECONDS
 from ..system.settings import given_values
+from ..system.times import NANOSECONDS, nearest_time
 from .arrow import ArrowListener
 from .csv import CsvListener
 from .mdf import MdfListener
@@ -322,7 +322,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     def _steps(self) -> npt.NDArray[np.int64]:
         """The numbers of the recorded communication points, shape (rows,)."""
         since = self.time - self.settings.get("start", 0.0)
-        per_s = NANOSECONDS / round(self.settings["step"] * NANOSECONDS)
+        per_s = float(NANOSECONDS / nearest_time(self.settings["step"]))
         return np.asarray(np.rint(since * per_s), np.int64)
 
     def _play(self, path: str | Path, make: Callable[[Path, Path], Listener]) -> None:

@@ -17,27 +17,19 @@ import math
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
+from fractions import Fraction
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from ..base.checks import check_values, real
+from ..base.checks import check_values
 from ..base.errors import InputError, choices, nearest
 from ..system.description import System
-from ..system.parts import (
-    NANOSECONDS,
-    Event,
-    Fault,
-    Initialisation,
-    Isolation,
-    Port,
-    Realtime,
-    Solver,
-    in_nanoseconds,
-)
+from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Realtime, Solver
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
+from ..system.times import Time, in_nanoseconds, in_seconds, written
 from .document import add, at, children
 
 TYPE = "grasp-cosim"
@@ -61,7 +53,7 @@ class Beside:
     """The attributes of a component that SSP has no form for; earlier ones lack the last two."""
 
     rename: Mapping[str, str]
-    step_ns: int | None
+    step_ns: Time | None
     isolation: Isolation
     units: Mapping[str, str] = field(default_factory=dict)
     solver: Solver | None = None
@@ -71,7 +63,7 @@ class Beside:
 class Extras:
     """The attributes of a system that SSP has no form for; earlier archives lack the last five."""
 
-    step_ns: int
+    step_ns: Time
     scheme: Scheme
     components: Mapping[str, Beside]
     initialisation: Initialisation
@@ -108,7 +100,7 @@ def read_extras(place: str, annotation: Any) -> Extras:
     element = annotation.find(_TAG)
     try:
         extras: Extras = _typed(Extras, json.loads("" if element is None else element.text or ""))
-    except (ValueError, TypeError, OverflowError, RecursionError) as error:
+    except (ValueError, TypeError, ArithmeticError, RecursionError) as error:
         raise InputError(f"{place}: annotation {TYPE!r}: not as it was written: {error}") from error
     for name, values in extras.presets.items():
         check_values(f"{place}: annotation {TYPE!r}: preset {name!r}", values)
@@ -117,7 +109,7 @@ def read_extras(place: str, annotation: Any) -> Extras:
 
 def _plain(value: Any) -> Any:
     """A value of the system as JSON has it."""
-    if isinstance(value, Port):
+    if isinstance(value, Port | Fraction):
         return str(value)
     if is_dataclass(value):
         return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
@@ -137,6 +129,8 @@ def _typed(kind: Any, value: Any) -> Any:
         return value
     if kind is Port:
         return Port(*_typed(str, value).split(".", 1))
+    if kind is Fraction:
+        return Fraction(_typed(str, value))
     if is_dataclass(kind) and isinstance(kind, type):
         hints = get_type_hints(kind)
         unknown = [key for key in _typed(dict, value) if key not in hints]
@@ -153,6 +147,8 @@ def _typed(kind: Any, value: Any) -> Any:
     if origin is tuple:
         return tuple(_typed(arguments[0], entry) for entry in _typed(list, value))
     if origin in (Union, UnionType):
+        if Fraction in arguments and isinstance(value, str) and "/" in value:
+            return _typed(Fraction, value)
         fitting = [alternative for alternative in arguments if alternative is type(value)]
         return _typed((fitting or arguments)[0], value)
     if origin is Literal:
@@ -165,18 +161,18 @@ def _typed(kind: Any, value: Any) -> Any:
 
 
 def read_foreign(
-    file: str, root: Any, components: Iterable[str], given_ns: int | None
+    file: str, root: Any, components: Iterable[str], given_ns: Time | None
 ) -> tuple[Extras, str]:
     """The extras of an archive without our annotation, and who names its step in another.
 
     Who names a step means that all components take it at once; without one it is 0, and nobody.
     InputError where the annotations contradict each other, and no step is given.
     """
-    found: dict[int, str] = {}
+    found: dict[Time, str] = {}
     for step, place in _named(file, root):
         found.setdefault(step, place)
     if len(found) > 1 and given_ns is None:
-        listed = choices(f"{step / NANOSECONDS:g} s" for step in found)
+        listed = choices(f"{written(step)} s" for step in found)
         raise InputError(
             f"{file}: its annotations name several steps, {listed}; give one: "
             "--set experiment.step=..."
@@ -187,7 +183,7 @@ def read_foreign(
     return Extras(base, "jacobi" if base else "sequential", beside, Initialisation(), (), ()), said
 
 
-def _named(file: str, root: Any) -> Iterator[tuple[int, str]]:
+def _named(file: str, root: Any) -> Iterator[tuple[Time, str]]:
     """Yield the steps that are named for the whole system, and where."""
     for parent in _TOP:
         for annotation in children(root, *parent, "ssd:Annotations", "ssc:Annotation"):
@@ -197,9 +193,9 @@ def _named(file: str, root: Any) -> Iterator[tuple[int, str]]:
                     yield _time(f"{place}: step", element.get(attribute)), place
 
 
-def write_steps(experiment: Any, system: Any, step_ns: int) -> None:
+def write_steps(experiment: Any, system: Any, step_ns: Time) -> None:
     """Name the step in annotations of the default experiment and of the top system."""
-    step = repr(step_ns / NANOSECONDS)
+    step = repr(in_seconds(step_ns))
     algorithm = _add(add(experiment, "ssc:Annotation", type=_OSP_TYPE), _OSP, "Algorithm")
     _add(algorithm, _OSP, "FixedStepAlgorithm", baseStepSize=step)
     tool = _add(add(system, "ssc:Annotation", type=_OMS_TYPE), _OMS, "Annotations")
@@ -208,31 +204,28 @@ def write_steps(experiment: Any, system: Any, step_ns: int) -> None:
     _add(information, _OMS, "FixedStepMaster", **master)
 
 
-def write_hint(component: Any, step_ns: int) -> None:
+def write_hint(component: Any, step_ns: Time) -> None:
     """Name the step of a component of its own."""
     annotation = add(add(component, "ssd:Annotations"), "ssc:Annotation", type=_OSP_TYPE)
-    _add(annotation, _OSP, "StepSizeHint", value=repr(step_ns / NANOSECONDS))
+    _add(annotation, _OSP, "StepSizeHint", value=repr(in_seconds(step_ns)))
 
 
 def _add(parent: Any, namespace: str, name: str, **attributes: str) -> Any:
     return etree.SubElement(parent, f"{{{namespace}}}{name}", attributes)
 
 
-def _time(place: str, text: str | None) -> int:
-    try:
-        return in_nanoseconds(place, real(text or ""))
-    except ValueError:
-        raise InputError(f"{place} = {text!r}: must be a number of s") from None
+def _time(place: str, text: str | None) -> Time:
+    return in_nanoseconds(place, text or "")
 
 
-def _hints(file: str, root: Any, base: int) -> dict[str, int]:
+def _hints(file: str, root: Any, base: Time) -> dict[str, Time]:
     """The components' own steps: the multiples of the base step that are nearest to the hints."""
-    own: dict[str, int] = {}
+    own: dict[str, Time] = {}
     path = ("ssd:System", "ssd:Elements", "ssd:Component")
     for component in children(root, *path):
         for hint in component.iter("{*}StepSizeHint"):
             hinted = _time(f"{at(file, hint)}: StepSizeHint", hint.get("value"))
-            multiple = max(1, math.floor(hinted / base + 0.5)) * base
+            multiple = max(1, math.floor(Fraction(hinted) / base + Fraction(1, 2))) * base
             if multiple != base:
                 own[component.get("name").replace(".", "_")] = multiple
     return own

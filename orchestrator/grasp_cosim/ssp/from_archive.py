@@ -17,16 +17,18 @@ from ..base.si_units import known_unit
 from ..interface.expansion import expanded
 from ..interface.interface import Value
 from ..system.description import System
-from ..system.parts import (
+from ..system.parts import Component, Connection, Port, Solver
+from ..system.stimuli import Stimuli
+from ..system.times import (
     LONGEST,
     NANOSECONDS,
-    Component,
-    Connection,
-    Port,
-    Solver,
+    Time,
+    TimeInput,
     in_nanoseconds,
+    in_seconds,
+    step_of,
+    written,
 )
-from ..system.stimuli import Stimuli
 from .annotations import FOREIGN, TYPE, Beside, Extras, read_extras, read_foreign
 from .archive import STRUCTURE, Archive, Notes
 from .connectors import Carried, Connectors, Part
@@ -52,8 +54,8 @@ class Called(NamedTuple):
 
 def read_ssp(
     path: FilePath,
-    step: float | None = None,
-    stop: float | None = None,
+    step: TimeInput | None = None,
+    stop: TimeInput | None = None,
     stimuli: Stimuli | None = None,
 ) -> System:
     """The system of an archive; step and stop in s, and stimuli, go before what it names."""
@@ -90,7 +92,7 @@ def read_ssp(
         decided.append(f"scheme = {extras.scheme}, as meant by {by}")
     start_ns, stop_ns = _times(file, root, parts.values(), stop, decided)
     if by and not given_ns:
-        decided.append(f"step = {extras.step_ns / NANOSECONDS:g} s, by {by}")
+        decided.append(f"step = {written(extras.step_ns)} s, by {by}")
     step_ns = given_ns or extras.step_ns
     step_ns = step_ns or _shortest_step(file, parts.values(), stop_ns - start_ns, decided)
     used = {TYPE, *FOREIGN} if annotated or by else {TYPE}
@@ -260,8 +262,8 @@ def _components(
 
 
 def _times(
-    file: str, root: Any, parts: Iterable[Part], given: float | None, notes: list[str]
-) -> tuple[int, int]:
+    file: str, root: Any, parts: Iterable[Part], given: TimeInput | None, notes: list[str]
+) -> tuple[Time, Time]:
     """The start time in ns, that of the archive or 0, and the stop time.
 
     That is the one given, or of the archive, or the longest that its FMUs name.
@@ -285,18 +287,19 @@ def _times(
     return start_ns, in_nanoseconds(f"{file}: stop time of its FMUs", stop)
 
 
-def _shortest_step(file: str, parts: Iterable[Part], span_ns: int, notes: list[str]) -> int:
+def _shortest_step(file: str, parts: Iterable[Part], span_ns: Time, notes: list[str]) -> Time:
     """The smallest step in ns that the FMUs name and that divides the span."""
     declared = sorted({part.interface.step for part in parts if part.interface.step})
     for step in declared:
-        step_ns = round(step * NANOSECONDS) if 0.0 < step * NANOSECONDS <= span_ns else 0
-        if step_ns and span_ns % step_ns == 0 and math.isclose(step_ns / NANOSECONDS, step):
-            notes.append(f"step = {step:g} s, the smallest that its FMUs name; SSP has none")
+        step_ns = step_of(step) if 0.0 < step * NANOSECONDS <= span_ns else 0
+        if step_ns and span_ns % step_ns == 0 and math.isclose(in_seconds(step_ns), step):
+            named = f"step = {written(step_ns)} s"
+            notes.append(f"{named}, the smallest that its FMUs name; SSP has none")
             return step_ns
     listed = choices(f"{step:g} s" for step in declared)
     raise InputError(
         f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
-        f"divides the stop of {span_ns / NANOSECONDS:g} s; give one: --set experiment.step=..."
+        f"divides the stop of {in_seconds(span_ns):g} s; give one: --set experiment.step=..."
     )
 
 

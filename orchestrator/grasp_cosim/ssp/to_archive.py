@@ -17,7 +17,8 @@ from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from ..system.description import System
-from ..system.parts import NANOSECONDS, Component, Connection, Port
+from ..system.parts import Component, Connection, Port
+from ..system.times import in_seconds, written
 from ..system.validity import transforms
 from .annotations import PREFIXES, extras_of, write_extras, write_hint, write_steps
 from .archive import RESOURCES, STRUCTURE, write_archive
@@ -54,7 +55,7 @@ def write_ssp(system: System, path: Path) -> Written:
 
 def _notes(system: System) -> Iterable[str]:
     yield (
-        f"SSP has no form for the step, {system.step_ns / NANOSECONDS:g} s: OSP and OMSimulator "
+        f"SSP has no form for the step, {written(system.step_ns)} s: OSP and OMSimulator "
         "read it from annotations of their own"
     )
     if system.scheme != "jacobi":
@@ -143,7 +144,7 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
             _write_connection(connections, c, changes[c.target], names)
     for_oms = add(top, "ssd:Annotations")
     write_units(root, "ssd", units.values())
-    start, stop = (repr(t / NANOSECONDS) for t in (system.start_ns, system.stop_ns))
+    start, stop = (repr(in_seconds(t)) for t in (system.start_ns, system.stop_ns))
     experiment = add(root, "ssd:DefaultExperiment", startTime=start, stopTime=stop)
     annotations = add(experiment, "ssd:Annotations")
     write_steps(annotations, for_oms, system.step_ns)

@@ -16,6 +16,7 @@ from .scenario import check_scenario
 from .settings import made_of
 from .stimuli import Stimuli, read_stimuli
 from .structure import Structure, experiment
+from .times import TimeInput
 from .toml import SECTIONS, as_file, read_toml, sections, with_entries
 from .validity import (
     as_written,
@@ -67,8 +68,8 @@ class System(Structure):
         path: str | Path,
         fmus: str | Path | None = None,
         *,
-        step: float | None = None,
-        stop: float | None = None,
+        step: TimeInput | None = None,
+        stop: TimeInput | None = None,
         input: str | Path | Stimuli | None = None,  # noqa: A002 - as in the file and on the command line
     ) -> "System":
         """The system of a TOML file or SSP archive; an archive has its own FMUs.
@@ -187,8 +188,8 @@ class System(Structure):
 
     def with_experiment(
         self,
-        step: float | None = None,
-        stop: float | None = None,
+        step: TimeInput | None = None,
+        stop: TimeInput | None = None,
         scheme: str | None = None,
         diverging: str | None = None,
     ) -> "System":

@@ -20,7 +20,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ..base.errors import InputError
-from .parts import LONGEST, NANOSECONDS, Fault, seconds
+from .parts import Fault
+from .times import LONGEST, NANOSECONDS, Time, seconds, written
 
 INITIAL = -1
 """The step number of the exchanges in initialisation mode."""
@@ -66,7 +67,7 @@ class Draws:
         return math.sqrt(-2.0 * math.log(first)) * math.cos(2.0 * math.pi * second)
 
 
-Start = Callable[[Parameters, Draws, int], Act]
+Start = Callable[[Parameters, Draws, Time], Act]
 """Makes a fault from its parameters, its random numbers and the base step in ns."""
 
 
@@ -86,7 +87,7 @@ def _stuck(given: Parameters, *_: object) -> Act:
     return act
 
 
-def _dropout(given: Parameters, draws: Draws, _: int) -> Act:
+def _dropout(given: Parameters, draws: Draws, _: Time) -> Act:
     """Hold what got through in an earlier step where a value is lost; at first there is none."""
     probability: float = given["probability"]
     last, held, passed = INITIAL - 1, None, None
@@ -103,7 +104,7 @@ def _dropout(given: Parameters, draws: Draws, _: int) -> Act:
     return act
 
 
-def _delay(given: Parameters, _: Draws, step_ns: int) -> Act:
+def _delay(given: Parameters, _: Draws, step_ns: Time) -> Act:
     """The last value passed at least so many base steps ago; the first one where there is none."""
     steps = round(given["time"] * NANOSECONDS / step_ns)
     history: deque[tuple[int, float]] = deque()
@@ -119,17 +120,17 @@ def _delay(given: Parameters, _: Draws, step_ns: int) -> Act:
     return act
 
 
-def _check_delay(place: str, given: Parameters, step_ns: int) -> None:
+def _check_delay(place: str, given: Parameters, step_ns: Time) -> None:
     time = given["time"]
     count = round(time * NANOSECONDS / step_ns)
     if abs(count * step_ns - time * NANOSECONDS) > 1e-12 * time * NANOSECONDS:
         raise InputError(
             f"{place}: time = {time:.9g} s: must be a whole number of steps of "
-            f"{seconds(step_ns)}; could be {seconds(max(1, count) * step_ns)}"
+            f"{seconds(step_ns)}; could be {written(max(1, count) * step_ns)} s"
         )
 
 
-def _check_saturation(place: str, given: Parameters, _: int) -> None:
+def _check_saturation(place: str, given: Parameters, _: Time) -> None:
     low, high = given.get("low"), given.get("high")
     if low is None and high is None:
         raise InputError(f"{place}: a saturation must have low, high or both")
@@ -145,7 +146,7 @@ def _rounded(value: float, width: float) -> float:
 def _each(change: Callable[[float, Parameters, Draws, int], float]) -> Start:
     """A fault that changes each value by its parameters, random numbers and the step number."""
 
-    def start(given: Parameters, draws: Draws, _: int) -> Act:
+    def start(given: Parameters, draws: Draws, _: Time) -> Act:
         return lambda value, step, acts: change(value, given, draws, step) if acts else value
 
     return start
@@ -161,7 +162,7 @@ class FaultKind:
     discrete: bool = False
     """True if it makes sense for an Integer or a Boolean."""
     random: bool = False
-    check: Callable[[str, Parameters, int], None] = lambda *_: None
+    check: Callable[[str, Parameters, Time], None] = lambda *_: None
 
 
 FINITE = Range("a finite number")

@@ -17,6 +17,7 @@ from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
+from .times import LONGEST, NANOSECONDS, Time, in_seconds
 
 Isolation = Literal["none", "process"]
 ISOLATIONS: tuple[str, ...] = get_args(Isolation)
@@ -26,34 +27,6 @@ Overrun = Literal["catch-up", "continue", "stop"]
 Loops = Literal["iterate", "refuse"]
 FINEST, COARSEST = 1e-13, 0.1
 """Relative tolerances of a solver: beyond the first one there is rounding alone."""
-
-NANOSECONDS = 1_000_000_000
-LONGEST = 1e9
-"""s; a time in nanoseconds then fits into 64 bits."""
-
-
-def seconds(nanoseconds: int) -> str:
-    """A time in s as messages have it."""
-    return f"{nanoseconds / NANOSECONDS:.9g} s"
-
-
-def in_nanoseconds(place: str, seconds: Any, zero: bool = False, low: float = 0.0) -> int:
-    """A time in s as a whole number of nanoseconds; InputError where it is none.
-
-    It is greater than low; with zero, it may be that.
-    """
-    span = f"from {low:g} to" if zero else "greater than 0, at most"
-    must = f"a number {span} {LONGEST:g}"
-    time = number(place, seconds, low, LONGEST, above=not zero, must=must, unit="s")
-    nanoseconds = round(time * NANOSECONDS)
-    if abs(nanoseconds / NANOSECONDS - time) > 1e-12 * abs(time):
-        raise InputError(f"{place} = {seconds!r} s: must be a whole number of nanoseconds")
-    return nanoseconds
-
-
-def first_step(time_ns: int, step_ns: int, start_ns: int = 0) -> int:
-    """Return the number of the first communication point at or after a time."""
-    return max(0, -((start_ns - time_ns) // step_ns))
 
 
 def literal(value: Value) -> str:
@@ -101,7 +74,7 @@ class Component:
     fmu: Path
     values: Mapping[str, Value]
     rename: Mapping[str, str] = field(default_factory=dict)
-    step_ns: int | None = None
+    step_ns: Time | None = None
     isolation: Isolation = "none"
     units: Mapping[str, str] = field(default_factory=dict)
     native: Path | None = None
@@ -229,7 +202,7 @@ class Event:
     """
 
     set: Mapping[Port, Value]
-    at_ns: int | None = None
+    at_ns: Time | None = None
     when: Condition | None = None
 
 
@@ -244,8 +217,8 @@ class Fault:
     target: Port
     kind: str
     parameters: Mapping[str, float | bool | str]
-    start_ns: int = 0
-    end_ns: int | None = None
+    start_ns: Time = 0
+    end_ns: Time | None = None
     seed: int = 0
     when: Condition | None = None
 
@@ -292,7 +265,7 @@ class Realtime:
         if not isinstance(self.lock_memory, bool):
             raise InputError(f"lock_memory = {self.lock_memory!r}: must be True or False")
 
-    def period(self, step_ns: int) -> Fraction:
+    def period(self, step_ns: Time) -> Fraction:
         """The wall time in ns between the beginnings of two steps of step_ns; it is exact.
 
         InputError where that is less than 1 ns, or more than a year.
@@ -300,7 +273,7 @@ class Realtime:
         period = step_ns / Fraction(repr(float(self.factor)))  # 0.1 is meant to be a tenth
         if not 1 <= period <= 366 * 24 * 3600 * NANOSECONDS:
             raise InputError(
-                f"factor = {self.factor!r}: a step of {step_ns / 1e9:g} s would begin every "
-                f"{float(period) / 1e9:g} s; must be from 1 ns to a year"
+                f"factor = {self.factor!r}: a step of {in_seconds(step_ns):g} s would begin every "
+                f"{in_seconds(period):g} s; must be from 1 ns to a year"
             )
         return period

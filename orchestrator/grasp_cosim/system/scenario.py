@@ -24,20 +24,9 @@ from ..base.errors import InputError, choices, nearest
 from ..interface.expansion import values_of
 from ..interface.interface import Value
 from .faults import FAULTS, RANDOM
-from .parts import (
-    NANOSECONDS,
-    RELATIONS,
-    Condition,
-    Connection,
-    Event,
-    Fault,
-    Port,
-    as_port,
-    first_step,
-    in_nanoseconds,
-    seconds,
-)
+from .parts import RELATIONS, Condition, Connection, Event, Fault, Port, as_port
 from .structure import Structure
+from .times import Time, first_step, in_nanoseconds, in_seconds, seconds, written
 from .validity import driven
 
 _CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s'"]+)""")
@@ -81,7 +70,7 @@ def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> t
 
 def event_entry(event: Event) -> dict[str, Any]:
     """The entry that reads as this event; it fits into JSON."""
-    at = {} if event.at_ns is None else {"at": event.at_ns / NANOSECONDS}
+    at = {} if event.at_ns is None else {"at": in_seconds(event.at_ns)}
     when = {"when": str(event.when)} if event.when else {}
     return {**at, **when, "set": {str(port): value for port, value in event.set.items()}}
 
@@ -92,8 +81,8 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
         "connection": str(fault.target),
         "kind": fault.kind,
         **fault.parameters,
-        "from": fault.start_ns / NANOSECONDS,
-        **({} if fault.end_ns is None else {"until": fault.end_ns / NANOSECONDS}),
+        "from": in_seconds(fault.start_ns),
+        **({} if fault.end_ns is None else {"until": in_seconds(fault.end_ns)}),
         **({"when": str(fault.when)} if fault.when else {}),
         **({"seed": fault.seed} if fault.kind in RANDOM else {}),
     }
@@ -112,7 +101,7 @@ def _entries(name: str, key: str, entries: Any) -> Iterator[tuple[str, dict[str,
         yield f"{name}: {key}[{i}]", as_table(f"{name}: {key}[{i}]", entry)
 
 
-def _time(place: str, entry: Mapping[str, Any], key: str, zero: bool = False) -> int | None:
+def _time(place: str, entry: Mapping[str, Any], key: str, zero: bool = False) -> Time | None:
     return in_nanoseconds(f"{place}: {key}", entry[key], zero) if key in entry else None
 
 
@@ -248,7 +237,7 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
     if end is not None and first_step(start, step, since) >= first_step(end, step, since):
         raise InputError(
             f"{place}: from {seconds(start)} until {seconds(end)}: must hold a communication "
-            f"point, a multiple of {seconds(step)}"
+            f"point, a multiple of {written(step)} s"
         )
     _check_condition(system, fault.when, place)
     whole(f"{place}: seed", fault.seed, 0, must="a whole number, at least 0")

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from .parts import NANOSECONDS, Realtime
+from .parts import Realtime
 from .scenario import event_entry, fault_entry
 from .stimuli import input_entry
 from .structure import Structure
+from .times import in_seconds
 
 
 def run_settings(system: Structure) -> dict[str, Any]:
@@ -22,16 +23,16 @@ def settings(system: Structure) -> dict[str, Any]:
     return {
         "system": system.name,
         "scheme": system.scheme,
-        "step": system.step_ns / NANOSECONDS,
-        "stop": system.stop_ns / NANOSECONDS,
-        **({"start": system.start_ns / NANOSECONDS} if system.start_ns else {}),
+        "step": in_seconds(system.step_ns),
+        "stop": in_seconds(system.stop_ns),
+        **({"start": in_seconds(system.start_ns)} if system.start_ns else {}),
         **({"diverging": system.diverging} if system.diverging != "stop" else {}),
         "initialisation": asdict(system.initialisation),
         "components": {
             c.name: {
                 "fmu": c.fmu.name,
                 "values": dict(c.values),
-                "step": None if c.step_ns is None else c.step_ns / NANOSECONDS,
+                "step": None if c.step_ns is None else in_seconds(c.step_ns),
                 "isolation": c.isolation,
                 "rename": dict(c.rename),
                 "units": dict(c.units),
@@ -71,9 +72,9 @@ def made_of(system: Structure) -> dict[str, Any]:
     return {
         **{c.name: c.fmu.name for c in system.components},
         **start_values(system),
-        "step": system.step_ns / NANOSECONDS,
-        "stop": system.stop_ns / NANOSECONDS,
-        "start": system.start_ns / NANOSECONDS,
+        "step": in_seconds(system.step_ns),
+        "stop": in_seconds(system.stop_ns),
+        "start": in_seconds(system.start_ns),
         "scheme": system.scheme,
         "diverging": system.diverging,
         **({"input": system.input.file} if system.input else {}),

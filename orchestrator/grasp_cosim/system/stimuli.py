@@ -24,7 +24,8 @@ from ..base.errors import InputError, reason
 from ..base.si_units import known_unit
 from ..base.text import counted, from_cell
 from ..interface.units import conversion
-from .parts import LONGEST, NANOSECONDS, Port, as_port
+from .parts import Port, as_port
+from .times import LONGEST, NANOSECONDS
 
 Interpolation = Literal["linear", "held"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)

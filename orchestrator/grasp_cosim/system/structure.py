@@ -13,18 +13,9 @@ from ..base.errors import InputError, nearest
 from ..base.si_units import Unit
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion
-from .parts import (
-    LONGEST,
-    Component,
-    Connection,
-    Event,
-    Fault,
-    Initialisation,
-    Port,
-    Realtime,
-    in_nanoseconds,
-)
+from .parts import Component, Connection, Event, Fault, Initialisation, Port, Realtime
 from .stimuli import Stimuli
+from .times import LONGEST, Clock, Time, in_nanoseconds
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -38,9 +29,10 @@ Made = TypeVar("Made")
 class Structure:
     """Components, their connections, and the experiment.
 
-    Times are in nanoseconds; from start to stop it is a whole multiple of step_ns, and of the step
-    of each component. notes are what its reader decided or did not use, a line each. roles name the
-    component that plays a role; where they do not, the component of that name plays it. presets are
+    Times are in nanoseconds, and exact: see times.py. From start to stop it is a whole multiple of
+    step_ns, and of the step of each component. notes are what its reader decided or did not use, a
+    line each. roles name the component that plays a role; where they do not, the component of that
+    name plays it. presets are
     values under a name, like {"bench": {"sensor_1.noise.seed": 1}}. input drives inputs without a
     connection. metrics are names of groups of ours. as_read is settings.made_of() when it was read.
     """
@@ -48,8 +40,8 @@ class Structure:
     name: str
     components: tuple[Component, ...]
     connections: tuple[Connection, ...]
-    step_ns: int
-    stop_ns: int
+    step_ns: Time
+    stop_ns: Time
     scheme: Scheme
     events: tuple[Event, ...] = ()
     faults: tuple[Fault, ...] = ()
@@ -61,15 +53,20 @@ class Structure:
     input: Stimuli | None = None
     realtime: Realtime = Realtime()
     metrics: tuple[str, ...] = ()
-    start_ns: int = 0
+    start_ns: Time = 0
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def total_steps(self) -> int:
         """The number of communication steps from the start to the stop time."""
-        return (self.stop_ns - self.start_ns) // self.step_ns
+        return int((self.stop_ns - self.start_ns) // self.step_ns)
 
-    def time_ns(self, step: int) -> int:
+    @property
+    def clock(self) -> Clock:
+        """The communication points as a run counts them."""
+        return Clock.of(self.start_ns, self.step_ns)
+
+    def time_ns(self, step: int) -> Time:
         """The time of a communication point."""
         return self.start_ns + step * self.step_ns
 
@@ -106,7 +103,7 @@ class Structure:
     def period(self, name: str) -> int:
         """The own step of the component of that name, in communication steps of the system."""
         own = self.component(name, name).step_ns
-        return 1 if own is None else own // self.step_ns
+        return 1 if own is None else int(own // self.step_ns)
 
     def component(self, name: str, place: object) -> Component:
         """The component of that name; place says who asks, for the error message."""

@@ -29,19 +29,11 @@ from ..base.errors import InputError, nearest
 from ..interface.interface import SETTABLE
 from ..interface.read import read_interface
 from .changes import replaced, with_given, with_old_values
-from .parts import (
-    ISOLATIONS,
-    Component,
-    Connection,
-    Initialisation,
-    Realtime,
-    Solver,
-    as_port,
-    in_nanoseconds,
-)
+from .parts import ISOLATIONS, Component, Connection, Initialisation, Realtime, Solver, as_port
 from .scenario import read_events, read_faults
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .structure import Structure, experiment
+from .times import in_nanoseconds
 from .validity import by_element
 
 Options = TypeVar("Options")

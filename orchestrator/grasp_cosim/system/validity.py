@@ -19,9 +19,10 @@ from ..interface.expansion import shape_text
 from ..interface.interface import SUPPORTED, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion, conversion
-from .parts import Component, Connection, Port, seconds
+from .parts import Component, Connection, Port
 from .stimuli import Column, Stimuli
 from .structure import Structure, unit_of
+from .times import NANOSECONDS, written
 
 
 def as_written(system: Structure) -> tuple[Connection, ...]:
@@ -219,24 +220,38 @@ def _declared(place: str, connection: Connection, target: Variable) -> tuple[flo
 def check_steps(system: Structure) -> None:
     """InputError where a step does not divide what it must."""
     step, start, stop = system.step_ns, system.start_ns, system.stop_ns
-    until = f"stop = {seconds(stop)}{f' from start = {seconds(start)}' if start else ''}"
+    until = f"stop = {written(stop)} s{f' from start = {written(start)} s' if start else ''}"
     if stop <= start:
-        raise InputError(f"start = {seconds(start)}: must be before stop = {seconds(stop)}")
+        raise InputError(f"start = {written(start)} s: must be before stop = {written(stop)} s")
     if (stop - start) % step:
         near = max(1, round((stop - start) / step)) * step
         raise InputError(
-            f"step = {seconds(step)} does not divide {until}; stop could be {seconds(start + near)}"
+            f"step = {written(step)} s does not divide {until}; "
+            f"stop could be {written(start + near)} s"
         )
+    _check_exact(system)
     for component in system.components:
         own = step if component.step_ns is None else component.step_ns
-        place = f"{system.name}: {component.name}: step = {seconds(own)}"
+        place = f"{system.name}: {component.name}: step = {written(own)} s"
         if own % step:
             raise InputError(
-                f"{place} is not a whole multiple of the base step {seconds(step)}; "
-                f"could be {seconds(max(1, round(own / step)) * step)}"
+                f"{place} is not a whole multiple of the base step {written(step)} s; "
+                f"could be {written(max(1, round(own / step)) * step)} s"
             )
         if (stop - start) % own:
             raise InputError(f"{place} does not divide {until}; must end with a whole step")
+
+
+def _check_exact(system: Structure) -> None:
+    """InputError where times that are no whole numbers of ns are too long to be exact."""
+    clock = system.clock
+    last = system.input.times[-1] if system.input else 0
+    furthest = max(-system.start_ns, system.stop_ns, last)
+    if furthest > clock.last * NANOSECONDS:
+        raise InputError(
+            f"step = {written(system.step_ns)} s from start = {written(system.start_ns)} s: times "
+            f"are exact until {clock.last:.4g} s; all must be before that, or whole numbers of ns"
+        )
 
 
 def remarks(system: Structure) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from ...master.simulation import simulate
 from ...metrics.metric import resolved
 from ...recording.result import Result
 from ...system.description import System
-from ...system.parts import NANOSECONDS
+from ...system.times import in_seconds
 from ..metrics import FINGERS, IMPACT_WINDOW
 from ..presets import CASES, start_in_si, with_case, with_si_values
 
@@ -122,9 +122,9 @@ def close(system: System, after: float | None = None) -> Result:
 
     The end is known to LOOK; a result that ends early is not complete. KeyboardInterrupt on Ctrl-C.
     """
-    steps = max(1, round(LOOK * NANOSECONDS / system.step_ns))
+    steps = max(1, round(LOOK / in_seconds(system.step_ns)))
     with simulate.session(system) as session, interrupts(session.halt.set):
-        end = system.stop_ns / NANOSECONDS
+        end = in_seconds(system.stop_ns)
         touching = False
         contacts = [resolved(f"plant.contact[{j}]", system.roles) for j in FINGERS]
         while session.time < end and session.step(steps):

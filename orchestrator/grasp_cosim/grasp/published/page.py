@@ -11,8 +11,8 @@ from ...base.text import fixed
 from ...report.page import page_style
 from ...report.plot import as_svg, new_figure, one_legend
 from ...report.tables import about, table
-from ...system.parts import NANOSECONDS
 from ...system.settings import changed
+from ...system.times import in_seconds
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
 from ..presets import CASES
 from ..system import controller_name
@@ -100,7 +100,7 @@ def evaluation_html(evidence: Evidence, claims: Sequence[Mapping[str, Any]], sou
         "Every grasp": _grasps(evidence),
     }
     controller = system.component(controller_name(system), system.name).fmu.stem
-    step = 1e3 * system.step_ns / NANOSECONDS
+    step = 1e3 * in_seconds(system.step_ns)
     return PAGE.substitute(
         title=f"{SOURCES[source].title}, {escape(controller)}",
         style=page_style(),
