@@ -135,17 +135,22 @@ def load_system(
     step: float | None = None,
     stop: float | None = None,
     stimuli: Stimuli | None = None,
+    variant: str | None = None,
 ) -> System:
     """The system of a file, by default the built-in grasp; what its reader notes is printed.
 
-    stimuli go before those that it names.
+    stimuli go before those that it names; variant is the one of an archive.
     """
     with phase("reading the system"):
         if path is None:
+            if variant is not None:
+                raise InputError(
+                    f"--set experiment.variant={variant}: the built-in system has no variants"
+                )
             from ..grasp.system import as_named
 
             return as_named().with_input(stimuli)
-        system = System.load(path, step=step, stop=stop, input=stimuli)
+        system = System.load(path, step=step, stop=stop, input=stimuli, variant=variant)
     for note in system.notes:
         say(note)
     return system
@@ -166,7 +171,8 @@ def chosen_system(given: Mapping[str, Any]) -> System:
         for port in stimuli.columns:
             if str(port) in settings:
                 raise InputError(f"--set {port}: does nothing, as {stimuli.file} drives it")
-    loaded = load_system(given.get("system"), step, stop, stimuli)
+    variant = settings.pop("experiment.variant", None)
+    loaded = load_system(given.get("system"), step, stop, stimuli, variant)
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
     system = loaded
     if law := given.get("controller"):

@@ -14,14 +14,17 @@ from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from ..base.errors import InputError, nearest
+from ..base.errors import InputError, choices, nearest
 from ..base.one_piece import in_one_piece
 from ..base.scratch import ScratchFolder
 from ..interface.document import check_size
 
-STRUCTURE = "SystemStructure.ssd"
+SSD = ".ssd"
+STRUCTURE = f"SystemStructure{SSD}"
 RESOURCES = "resources/"
 _MODE = 0o644 << 16
+_OF_MACOS = {"__MACOSX/"}
+"""What its archiver adds to a zip file."""
 
 
 class Notes:
@@ -43,12 +46,12 @@ class Notes:
 
 
 class Archive:
-    """The entries of an .ssp file, or of an FMU, by paths with slashes.
+    """The entries of an .ssp file, or of another one that needs a certain entry, by paths.
 
     InputError where it is none. place names it in messages, by default the name of the file.
     """
 
-    def __init__(self, path: Path, notes: Notes, place: str = "", needs: str = STRUCTURE) -> None:
+    def __init__(self, path: Path, notes: Notes, place: str = "", needs: str = "") -> None:
         self.place = place or path.name
         said = place or str(path)
         try:
@@ -59,15 +62,41 @@ class Archive:
         except Exception as error:  # zipfile raises whatever it likes
             raise InputError(f"{said}: not readable as an SSP archive: {error}") from error
         self._said = said
-        self._entries = _entries(self._file.namelist(), needs, self.place, notes)
+        self._entries = _entries(self._file.namelist(), needs or STRUCTURE, self.place, notes)
         self._extracted: dict[str, Path] = {}
-        if needs not in self._entries:
-            raise InputError(f"{said}: no {needs} in it; must be an SSP archive")
+        if needs not in self._entries and (needs or not self.structures):
+            raise InputError(f"{said}: no {needs or STRUCTURE} in it; must be an SSP archive")
 
     @property
     def names(self) -> tuple[str, ...]:
         """The paths of all entries."""
         return tuple(self._entries)
+
+    @property
+    def structures(self) -> tuple[str, ...]:
+        """The structures at its top: SystemStructure.ssd and the variants of it."""
+        return tuple(name for name in self.names if name.endswith(SSD) and "/" not in name)
+
+    def structure(self, variant: str | None = None) -> str:
+        """The variant of that name, or SystemStructure.ssd, or the only structure that it has.
+
+        InputError where there is no such variant, or none of several is the one.
+        """
+        variants = [name.removesuffix(SSD) for name in self.structures]
+        if variant is not None:
+            name = variant.removesuffix(SSD)
+            if name not in variants:
+                valid = choices(variants)
+                raise InputError(f"{self._said}: no variant {variant!r}; valid: {valid}")
+            return f"{name}{SSD}"
+        if STRUCTURE in self.structures:
+            return STRUCTURE
+        if len(variants) > 1:
+            raise InputError(
+                f"{self._said}: has no {STRUCTURE}, but the variants {choices(variants)}; must be "
+                f"chosen: --set experiment.variant={variants[0]}"
+            )
+        return self.structures[0]
 
     def read(self, entry: str) -> bytes:
         """The content of an entry; InputError where it is damaged."""
@@ -114,8 +143,13 @@ def _entries(names: Iterable[str], needs: str, place: str, notes: Notes) -> dict
     entries = {name.replace("\\", "/"): name for name in names}
     if any("\\" in name for name in entries.values()):
         notes.add(place, "its entries have backslashes, which are read as slashes")
+    suffix = posixpath.splitext(needs)[1]
+    if any(name.endswith(suffix) and "/" not in name for name in entries):
+        return entries
     folders = {n.removesuffix(needs) for n in entries if n.endswith(f"/{needs}")}
-    if needs in entries or len(folders) != 1:
+    if not folders:
+        folders = {f"{name.partition('/')[0]}/" for name in entries if "/" in name} - _OF_MACOS
+    if len(folders) != 1:
         return entries
     folder = folders.pop()
     notes.add(place, f"all of it is in {folder}, which is read as the top")

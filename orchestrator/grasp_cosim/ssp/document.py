@@ -22,7 +22,7 @@ from ..base.si_units import BASE, Unit, known_unit
 from ..fmi import fmpy
 from ..interface.read import base_unit
 from ..interface.units import conversion
-from .archive import STRUCTURE, Archive, Notes
+from .archive import Archive, Notes
 
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
 NAMESPACES = {
@@ -387,9 +387,9 @@ class Origin:
 
 
 def open_structure(
-    archive: Archive, notes: Notes, entry: str = STRUCTURE, around: tuple[str, ...] = ()
+    archive: Archive, notes: Notes, entry: str, around: tuple[str, ...] = ()
 ) -> tuple[Origin, Any]:
-    """The structure of an archive: where its elements stand, and its root."""
+    """A structure of an archive: where its elements stand, and its root."""
     origin = Origin(archive, entry, notes, around=around).inside()
     root = parse(origin.place, archive.read(entry), "ssd", notes)
     return replace(origin, units=read_units(origin.place, root, "ssd")), root

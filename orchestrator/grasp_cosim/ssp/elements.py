@@ -14,7 +14,7 @@ from ..base.errors import InputError, choices
 from ..base.si_units import Unit
 from ..interface.interface import Interface, Variable
 from ..interface.read import read_interface
-from .archive import STRUCTURE, Archive
+from .archive import Archive
 from .document import Origin, at, child, children, is_true, open_structure, qualified, same, short
 
 FMU = "application/x-fmu-sharedlibrary"
@@ -197,8 +197,8 @@ def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
 def _referred(origin: Origin, entry: Any, place: str, source: str) -> tuple[Origin, Any]:
     """The element of a system that a source names, and where it stands.
 
-    It is the top one of an archive, of its SystemStructure.ssd or a variant, or of an SSD; or, by
-    its id, one of the same document.
+    It is the top one of an archive, of its structure or a variant, or of an SSD; or, by its id, one
+    of the same document.
     """
     file, _, fragment = source.partition("#")
     if not file:
@@ -212,7 +212,7 @@ def _referred(origin: Origin, entry: Any, place: str, source: str) -> tuple[Orig
     else:
         within = f"{origin.archive.place}: {found}"
         archive = Archive(origin.archive.extract(found), origin.notes, within)
-        structure = archive.resolve(place, fragment or STRUCTURE)
+        structure = archive.resolve(place, fragment) if fragment else archive.structure()
     inner, root = open_structure(archive, origin.notes, structure, origin.around)
     return inner, child(root, "ssd:System")
 

@@ -30,7 +30,7 @@ from ..system.times import (
     written,
 )
 from .annotations import FOREIGN, TYPE, Beside, Extras, read_extras, read_foreign
-from .archive import STRUCTURE, Archive, Notes
+from .archive import SSD, STRUCTURE, Archive, Notes
 from .connectors import Carried, Connectors, Part
 from .document import at, child, children, open_structure, qualified, same
 from .elements import Element, Hop, Path, read_system
@@ -57,11 +57,18 @@ def read_ssp(
     step: TimeInput | None = None,
     stop: TimeInput | None = None,
     stimuli: Stimuli | None = None,
+    variant: str | None = None,
 ) -> System:
-    """The system of an archive; step and stop in s, and stimuli, go before what it names."""
+    """The system of an archive; step and stop in s, and stimuli, go before what it names.
+
+    Its structure is the variant of that name, by default SystemStructure.ssd, or the only one.
+    """
     notes = Notes()
     archive = Archive(path, notes)
-    origin, root = open_structure(archive, notes)
+    structure = archive.structure(variant)
+    if variant is None and structure != STRUCTURE:
+        notes.add(archive.place, f"its only structure is {structure}, which is read")
+    origin, root = open_structure(archive, notes, structure)
     file = origin.place
     top = read_system(origin, child(root, "ssd:System"))
     systems = {e.path: e for e in top.within() if e.interface is None}
@@ -99,7 +106,7 @@ def read_ssp(
     other_names = {".".join(path): name for path, name in names.items()}
     said = [f"component {n} is called {name} here" for n, name in other_names.items() if n != name]
     return System(
-        archive.place,
+        archive.place if variant is None else f"{archive.place}#{structure}",
         components,
         connections,
         step_ns,
@@ -108,7 +115,7 @@ def read_ssp(
         extras.events,
         extras.faults,
         extras.initialisation,
-        (*_unused(archive, root, used), *said, *notes.lines(), *decided),
+        (*_unused(archive, structure, root, used), *said, *notes.lines(), *decided),
         extras.roles,
         extras.presets,
         extras.diverging,
@@ -303,14 +310,15 @@ def _shortest_step(file: str, parts: Iterable[Part], span_ns: Time, notes: list[
     )
 
 
-def _unused(archive: Archive, root: Any, used: Collection[str]) -> Iterator[str]:
+def _unused(archive: Archive, structure: str, root: Any, used: Collection[str]) -> Iterator[str]:
     """Yield a note for each part of the archive that has no bearing on the run.
 
-    used are the types of the annotations that were read.
+    structure is the one that was read, used are the types of the annotations that were read.
     """
-    for name in archive.names:
-        if name.endswith(".ssd") and "/" not in name and name != STRUCTURE:
-            yield f"variant {name} is not used; {STRUCTURE} is"
+    for name in archive.structures:
+        if name != structure:
+            chosen = f"--set experiment.variant={name.removesuffix(SSD)}"
+            yield f"variant {name} is not used, {structure} is; {chosen} takes it"
     types = Counter(annotation.get("type") for annotation in root.iter(qualified("ssc:Annotation")))
     for kind in sorted(set(types) - set(used)):
         yield f"annotations of type {kind!r} are not used ({types[kind]})"

@@ -71,21 +71,25 @@ class System(Structure):
         step: TimeInput | None = None,
         stop: TimeInput | None = None,
         input: str | Path | Stimuli | None = None,  # noqa: A002 - as in the file and on the command line
+        variant: str | None = None,
     ) -> "System":
         """The system of a TOML file or SSP archive; an archive has its own FMUs.
 
         step and stop in s, and a CSV file of inputs, go before what it says. fmus is where the FMUs
-        of a TOML file are, by default beside it.
+        of a TOML file are, by default beside it. variant names the structure of an archive that has
+        several, by default SystemStructure.ssd.
         """
         path = Path(path)
         check_nature(path, "system")
         stimuli = _stimuli(input)
         if path.suffix.lower() != ARCHIVE:
+            if variant is not None:
+                raise InputError(f"{path}: variant = {variant!r}: only an .ssp may have variants")
             made = cls(**read_toml(path, Path(fmus) if fmus else None, stimuli))
             return made.with_experiment(step, stop)
         if fmus is not None:
             raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
-        system: System = higher("ssp.from_archive").read_ssp(path, step, stop, stimuli)
+        system: System = higher("ssp.from_archive").read_ssp(path, step, stop, stimuli, variant)
         return system
 
     def start(self, key: str) -> float:

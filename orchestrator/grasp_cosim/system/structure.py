@@ -118,6 +118,11 @@ def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[st
     for key, value in table.items():
         if key == "start":
             made["start_ns"] = in_nanoseconds(place(key), value, zero=True, low=-LONGEST)
+        elif key == "variant":
+            raise InputError(
+                f"{place(key)} = {value!r}: only an .ssp has variants, chosen as it is read: "
+                "--set experiment.variant=NAME, or System.load(path, variant=NAME)"
+            )
         elif key in ("step", "stop"):
             made[f"{key}_ns"] = in_nanoseconds(place(key), value)
         else:

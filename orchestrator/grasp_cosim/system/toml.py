@@ -46,7 +46,7 @@ SECTIONS = (
 """The entries of a system file, which are no names of components."""
 
 PLACES: Mapping[str, Sequence[str]] = {
-    "experiment": ("step", "stop", "scheme", "diverging", "start"),
+    "experiment": ("step", "stop", "scheme", "diverging", "start", "variant"),
     "components": (),
     "initialisation": Initialisation.__slots__,
     "roles": (),
