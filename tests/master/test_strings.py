@@ -111,8 +111,8 @@ def test_a_run_that_records_nothing_is_no_success(unrecordable, tmp_path, capfd)
     assert lines == [
         "a.y_array is of type array of String: not recorded",
         "a.y_clock is of type Clock: not recorded",
-        "arrays.toml: nothing is recorded; must have an output that is a Real, Integer, Boolean "
-        "or String",
+        "arrays.toml: nothing is recorded; must have an output or a local that is a Real, Integer, "
+        "Boolean or String, or name another such signal under [record]",
     ]
     assert [path.name for path in out.iterdir()] == ["run.json"]
     assert "nothing is recorded" in (out / "run.json").read_text("utf-8")

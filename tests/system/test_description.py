@@ -100,7 +100,7 @@ MISTAKES = [
     ("events", "plant.gap[1] < 0.01", "plant.gap[1] == 0.01"),
     ("events", "plant.gap[1] < 0.01", "plant.contact[1] > 0"),
     ("events", "plant.gap[1] < 0.01", "plant.contact[1] == 1"),
-    ("events", "plant.gap[1] < 0.01", "plant.force[1] < 1"),
+    ("events", "plant.gap[1] < 0.01", "plant.force[3] < 1"),
     ("events", "plant.gap[1] < 0.01", "robot.gap[1] < 1"),
     ("more", "X", "[events]\nat = 0.5"),
     ("faults", 'kind = "noise"', 'kind = "hum"'),

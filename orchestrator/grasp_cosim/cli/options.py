@@ -13,6 +13,7 @@ import click
 from ..base.errors import InputError
 from ..base.progress import phase
 from ..system.description import System
+from ..system.record import Record
 from ..system.stimuli import Stimuli, read_stimuli
 from ..system.toml import plain
 from .frame import pair, say, waiting
@@ -64,6 +65,14 @@ controller_option = click.option(
 
 preset_option = click.option(
     "--preset", "presets", multiple=True, metavar="NAME", help="Take a preset of the system file."
+)
+
+record_option = click.option(
+    "--record",
+    multiple=True,
+    metavar="NAME,NAME,...",
+    help="Record these signals, whatever they are: plant.*,controller.force[1]; '!plant.clock' "
+    "leaves one out. Default: the outputs, or what SYSTEM says.",
 )
 
 step_option = click.option(
@@ -190,4 +199,8 @@ def chosen_system(given: Mapping[str, Any]) -> System:
     changed = system.with_settings(settings, option)
     for note in changed.notes[len(loaded.notes) :]:
         say(note)
+    if given.get("record"):
+        record = Record.listed(given["record"])
+        record.check("--record", changed.components)
+        changed = replace(changed, record=record)
     return changed.with_input(replace(stimuli, partial=False)) if stimuli else changed

@@ -40,6 +40,7 @@ from .options import (
     many_runs_option,
     native_option,
     natively,
+    record_option,
     settings_of,
     swap_option,
     system_options,
@@ -60,6 +61,7 @@ TABLE = Path("sweep.csv")
 @click.option(
     "--input", type=PATH, help="Drive inputs by a CSV file: time, then columns like plant.force."
 )
+@record_option
 @metrics_option
 @native_option("as SYSTEM names them, but native for the built-in grasp.")
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")
@@ -97,6 +99,7 @@ def run(
 
     \b
     Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
+    Other signals than outputs: grasp-cosim run --record 'plant.*,controller.force[1]' --out results
     In real time: grasp-cosim run --realtime --step 1e-3 --set realtime.priority=80 --out results
     """
     if mdf and not out:

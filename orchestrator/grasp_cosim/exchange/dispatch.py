@@ -8,14 +8,16 @@ root of ten times; a stable response ends.
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
+from ..base.checks import EXACT
 from ..base.errors import SimulationError
+from ..interface.interface import limits
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import run_settings
@@ -42,8 +44,9 @@ be, a float64 has no digit left.
 class Dispatcher:
     """Takes rows of all values and hands every n-th one on, and the last.
 
-    Listeners get the outputs in the order of the system, then the derived signals, which
-    are computed from every row.
+    Listeners get the signals that are recorded, in the order of the system, then those that are
+    worked out of every row. The outputs end the run where they run away or are not finite, recorded
+    or not; any other signal is only recorded, as it is.
     """
 
     def __init__(
@@ -57,34 +60,48 @@ class Dispatcher:
     ) -> None:
         """Slots are the columns of the rows, texts those of Strings, which are numbers there.
 
-        whole gets every row.
+        whole gets every row, of all signals that are observed.
         """
         self._listeners, self._whole = tuple(listeners), whole
         self._leisurely = [one for one in listeners if isinstance(one, Leisurely)]
         self.took = 0.0
         """s that the listeners took for their blocks."""
         self._every = every
-        self._columns = np.array([slots[port] for port in system.recorded], np.intp)
-        outputs = {
+        self._columns = np.array([slots[port] for port in system.observed], np.intp)
+        observed = {
             port: Signal(str(port), v.unit, v.kind, v.description or "", texts.get(port, Texts()))
-            for port, v in system.recorded.items()
+            for port, v in system.observed.items()
         }
-        self._divergence = Divergence(system, outputs)
+        watched = {port: observed[port] for port in system.watched}
+        self._watched = _places(observed.values(), watched.values())
+        self._watched_signals = tuple(watched.values())
+        self._divergence = Divergence(system, watched)
+        self._unwatched = Unwatched(system, observed)
         self._goes_on = system.diverging == "continue"
-        self.log: list[str] = []
-        """A line for each signal that ran away in a run that went on."""
+        self._runaways: list[str] = []
         self._energy = ExchangeEnergy(system.once(bonds), slots, system.once(transforms))
-        self.signals = (*outputs.values(), *self._energy.signals)
-        self._block = np.empty((len(self.signals), 0))
+        every_signal = (*observed.values(), *self._energy.signals)
+        recorded = [observed[port] for port in system.recorded]
+        recorded += [signal for signal in self._energy.signals if system.record.has(signal.name)]
+        self.signals = tuple(recorded)
+        self._recorded = _places(every_signal, self.signals)
+        self._block = np.empty((len(every_signal), 0))
         self.pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
         """The last row, where decimation has left it out so far."""
         self.settings = run_settings(system)
         experiment = Experiment.of(self.settings)
         with ExitStack() as begun:
-            for listener in (*self._listeners, *([whole] if whole else [])):
+            for listener in self._listeners:
                 listener.begin(experiment, self.signals)
                 begun.callback(listener.end, False)
+            if whole:
+                whole.begin(experiment, every_signal)
             begun.pop_all()  # whoever has begun is ended here only where the next one fails
+
+    @property
+    def log(self) -> list[str]:
+        """A line for each signal that ran away in a run that went on, or that is not as it was."""
+        return [*self._runaways, *self._unwatched.log]
 
     def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Hand rows on; SimulationError at the first value that is not finite or has run away.
@@ -92,15 +109,17 @@ class Dispatcher:
         Its row is the last that is kept.
         """
         if len(rows) > self._block.shape[1]:
-            self._block = np.empty((len(self.signals), len(rows)))
+            self._block = np.empty((len(self._block), len(rows)))
         columns = self._block[:, : len(rows)].T  # each of them in one piece, which is fast
-        outputs = columns[:, : len(self._columns)]
-        outputs[:] = rows[:, self._columns]
-        count, wrong = self._check(steps, outputs)
+        observed = columns[:, : len(self._columns)]
+        observed[:] = rows[:, self._columns]
+        count, wrong = self._check(steps, _chosen(observed, self._watched))
+        self._unwatched(steps[:count], observed[:count])
         steps, columns = steps[:count], columns[:count]
         columns[:, len(self._columns) :] = self._energy(rows[:count])
         if self._whole:
             self._whole.block(steps, columns)
+        columns = _chosen(columns, self._recorded)
         self.pending = None
         wanted = slice(-int(steps[0]) % self._every, None, self._every)
         if len(steps[wanted]):
@@ -122,11 +141,11 @@ class Dispatcher:
         if runaway and not self._goes_on:
             return runaway[0] + 1, f'{runaway[1]}; or let it go on: diverging = "continue"'
         if runaway:
-            self.log.append(f"{runaway[1]}; the run went on")
+            self._runaways.append(f"{runaway[1]}; the run went on")
         if good == len(steps):
             return good, ""
         i = int(np.isfinite(outputs[good]).argmin())
-        name, value = self.signals[i].name, outputs[good, i]
+        name, value = self._watched_signals[i].name, outputs[good, i]
         return good + 1, f"{name} = {value} at step {steps[good]}: must be finite"
 
     def spare(self, ns: float) -> bool:
@@ -147,6 +166,75 @@ class Dispatcher:
         for listener in self._listeners:
             listener.block(steps, rows)
         self.took += time.perf_counter() - start
+
+
+def _places(of: Collection[Signal], some: Collection[Signal]) -> npt.NDArray[np.intp] | None:
+    """The places of some signals among others, in their order; None for all of them."""
+    if len(some) == len(of):
+        return None
+    place_of = {signal.name: place for place, signal in enumerate(of)}
+    return np.array([place_of[signal.name] for signal in some], np.intp)
+
+
+def _chosen(
+    columns: npt.NDArray[np.float64], places: npt.NDArray[np.intp] | None
+) -> npt.NDArray[np.float64]:
+    """The columns at these places, each of them in one piece."""
+    return columns if places is None else columns.T[places].T
+
+
+class Unwatched:
+    """Looks at what is recorded besides the outputs, and says once where it is not as it was.
+
+    That is a whole number of 64 bits which a float64 does not hold exactly, since nothing goes by
+    it, or any number that is not finite.
+    """
+
+    def __init__(self, system: System, observed: Mapping[Port, Signal]) -> None:
+        """Over the columns of what is observed."""
+        self._system, self._signals = system, tuple(observed.values())
+        self._places = np.array(
+            [
+                place
+                for place, port in enumerate(observed)
+                if port not in system.watched or _is_long(system, port)
+            ],
+            np.intp,
+        )
+        whole = [self._signals[place].kind == "Integer" for place in self._places]
+        self._limits = np.where(whole, float(EXACT), np.inf)
+        self._log: dict[int, str] = {}
+
+    @property
+    def log(self) -> list[str]:
+        """A line for each of these signals, in the order of the system."""
+        return [self._log[i] for i in sorted(self._log)]
+
+    def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Look at rows of all that is observed."""
+        if not len(self._places):
+            return
+        columns = rows[:, self._places]
+        beyond = ~(largest(columns) < self._limits)  # true of nan, too
+        for i in np.flatnonzero(beyond).tolist():
+            if i not in self._log:
+                row = int((~(np.abs(columns[:, i]) < self._limits[i])).argmax())
+                self._log[i] = self._line(i, int(steps[row]), columns[row, i])
+
+    def _line(self, i: int, step: int, value: float) -> str:
+        signal = self._signals[self._places[i]]
+        time = seconds(self._system.time_ns(step))
+        if signal.kind == "Integer":
+            held = "recorded to the 53 bits that a float64 holds"
+            return f"{signal.name} is {value:.0f} at t = {time}: {held}"
+        return f"{signal.name} is {value} at t = {time}: recorded as it is"
+
+
+def _is_long(system: System, port: Port) -> bool:
+    """True for a whole number of 64 bits, which need not fit into a float64."""
+    component = system.component(port.component, str(port)).loaded
+    _, high = limits(component.by_name[port.variable].type, component.version)
+    return isinstance(high, int) and high >= EXACT
 
 
 def largest(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

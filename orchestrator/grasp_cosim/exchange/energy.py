@@ -20,6 +20,7 @@ from ..base.si_units import known_unit
 from ..interface.interface import Interface, Variable
 from ..system.description import System
 from ..system.parts import Component, Port
+from ..system.record import ENERGY
 from .listener import Signal
 
 Floats = npt.NDArray[np.float64]
@@ -51,7 +52,7 @@ class Bond:
         """The recorded signal: energy in J created (positive) or lost since the start."""
         suffix = "" if self.index is None else f"[{self.index}]"
         return Signal(
-            f"{self.component}.exchange_energy{suffix}",
+            f"{self.component}.{ENERGY}{suffix}",
             "J",
             "Real",
             f"Energy created (positive) or lost by the sampled exchange of {self.force} "
@@ -83,7 +84,7 @@ def _bond(
         return None
     interface = component.interface
     position = interface.by_name.get(force.name.replace("force", "position"))
-    taken = force.name.replace("force", "exchange_energy") in interface.by_name
+    taken = force.name.replace("force", ENERGY) in interface.by_name
     if not position or position.causality != "output" or taken:
         return None
     factors = _in_si(interface, force, "N"), _in_si(interface, position, "m")

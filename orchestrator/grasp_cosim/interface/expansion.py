@@ -20,8 +20,8 @@ from .interface import (
     size_of,
 )
 
-TAKEN_APART = (*SETTABLE, "output")
-"""The causalities of arrays that a master does something with."""
+FIRST = (*SETTABLE, "output")
+"""The causalities of arrays that are taken apart first; others have the room that is left."""
 
 Names = tuple[str, ...] | None
 
@@ -65,23 +65,21 @@ def values_of(
 
 
 def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:
-    variables: list[Variable] = []
-    arrays: dict[str, Array] = {}
-    room = MOST_ELEMENTS
-    for v in interface.variables:
-        shape = tuple(
+    shapes = {
+        v.name: tuple(
             lengths.get(name or "", length) for name, length in zip(v.sizes, v.shape, strict=True)
         )
-        size = size_of(shape)
-        numbers = bool(v.shape) and v.kind in ("Real", "Integer", "Boolean")
-        apart = numbers and v.causality in TAKEN_APART
-        names = element_names(v.name, shape) if apart and size <= room else ()
-        if not apart or size > room or not interface.by_name.keys().isdisjoint(names):
+        for v in interface.variables
+    }
+    apart = _taken_apart(interface, shapes)
+    arrays = {v.name: apart[v.name] for v in interface.variables if v.name in apart}
+    variables: list[Variable] = []
+    for v in interface.variables:
+        if v.name in arrays:
+            variables += _elements(v, arrays[v.name].shape, arrays[v.name].names)
+        else:
+            shape = shapes[v.name]
             variables.append(replace(v, shape=shape) if shape != v.shape else v)
-            continue
-        room -= size
-        arrays[v.name] = Array(shape, names)
-        variables += _elements(v, shape, names)
 
     @cache  # thousands of outputs depend on the same inputs
     def named(names: Names) -> Names:
@@ -97,6 +95,21 @@ def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:
         for v in variables
     ]
     return replace(interface, variables=tuple(variables), arrays=arrays)
+
+
+def _taken_apart(interface: Interface, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Array]:
+    """The shapes and the names of the elements of the arrays that are taken apart, by name."""
+    numbers = [
+        v for v in interface.variables if v.shape and v.kind in ("Real", "Integer", "Boolean")
+    ]
+    apart, room = {}, MOST_ELEMENTS
+    for v in sorted(numbers, key=lambda v: v.causality not in FIRST):
+        shape, size = shapes[v.name], size_of(shapes[v.name])
+        names = element_names(v.name, shape) if size <= room else ()
+        if size <= room and interface.by_name.keys().isdisjoint(names):
+            room -= size
+            apart[v.name] = Array(shape, names)
+    return apart
 
 
 def _elements(v: Variable, shape: tuple[int, ...], names: tuple[str, ...]) -> list[Variable]:

@@ -26,8 +26,9 @@ from ..system.parts import Component, Port
 from ..system.times import NANOSECONDS, in_seconds, seconds
 from . import loop
 from .engine import Aside, CompiledLoop, Engine, make_loop
+from .exchanged import exchanged, used
 from .initialisation import Propagation
-from .plan import Planner, slots_of
+from .plan import Planner
 from .scenario import Scenario, at_start, drives_of
 
 CHUNK = 4096
@@ -35,6 +36,9 @@ CHUNK = 4096
 
 ROOM = 1 << 15
 """The same where another thread hands them on."""
+
+MOST_BYTES = 1 << 26
+"""Of memory for these rows; of a wide row there are fewer."""
 
 ENOUGH = 32
 """The rows that advance() collects before it hands them on: one alone costs more than a step."""
@@ -71,9 +75,10 @@ class Master:
         self.log: list[str] = []
         self.ends: list[str] = []
         """The requests to end the simulation before the stop time, a line each."""
-        self.slots = system.once(slots_of)
-        strings = (port for port, v in system.recorded.items() if v.kind == "String")
-        self.texts = {port: Texts() for port in strings}
+        moved = system.once(exchanged)
+        self.slots = moved.slots()
+        self.texts = {port: Texts() for port in moved.texts}
+        self._used = system.once(used)
         self.values = np.zeros(len(self.slots) + (pacer.width if pacer else 0))
         if pacer:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
@@ -90,7 +95,9 @@ class Master:
         self._pacer = pacer
         self._loop = made = make_loop(self.plan, engine, None if pacer else self.total_steps)
         self._alone = made if pacer and isinstance(made, CompiledLoop) and made.alone else None
-        self._rows = np.empty((ROOM if self._alone else CHUNK, len(self.values)))
+        affordable = max(ENOUGH, MOST_BYTES // (self.values.nbytes or 1))
+        room = min(ROOM if self._alone else CHUNK, affordable)
+        self._rows = np.empty((room, len(self.values)))
         self._rows.fill(0.0)  # its memory is there from now on
         self._cpus = cpus() if self._alone else []
         self._clock = system.clock
@@ -126,13 +133,14 @@ class Master:
             value = drive.at(self._clock.start) if drive else values[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
-            exact(str(port), value, f"{value} at step 0")
+            if port in self._used:
+                exact(str(port), value, f"{value} at step 0")
             self.values[slot] = float(value)
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
 
     def _fetch_others(self, values: dict[Port, Value]) -> None:
-        """What was not passed on, such as elements of connected arrays that have no source."""
+        """What was not passed on: locals, say, or elements of connected arrays without a source."""
         missing: dict[str, list[Port]] = {}
         for port in self.slots:
             if port not in self._drives and port not in values:
@@ -171,7 +179,7 @@ class Master:
         first = self.steps_done
         try:
             while self.steps_done < (end := min(first + steps, self.total_steps)):
-                self._chunk(end if self._alone else min(self._base + CHUNK, end))
+                self._chunk(end if self._alone else min(self._base + len(self._rows), end))
         except HaltError:
             pass
         except OverrunError:
@@ -229,7 +237,7 @@ class Master:
         except BaseException:
             self.hand_on()
             raise
-        if self.steps_done == self._base + CHUNK and not self._alone:
+        if self.steps_done == self._base + len(self._rows) and not self._alone:
             self.hand_on()
 
     def _run(self, stop: int) -> None:

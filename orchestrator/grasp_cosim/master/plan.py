@@ -1,12 +1,13 @@
 """The flat plan: a system turned into one vector of values and a program for the loop.
 
-In the vector the outputs come first, then the inputs that have a connection. The Real values of a
-component stand together, so that one FMI call moves them all; values of another type have a
-buffer of their type beside the vector. Of a String output the vector has, at its end, the number of
-its text in a table of those seen so far; a connection between Strings is a call.
+In the vector what is fetched comes first: the outputs, and whatever else is recorded, or named in a
+condition. Then come the inputs that have a source, which are passed. The Real values of a component
+stand together, so that one FMI call moves them all; values of another type have a buffer of their
+type beside the vector. Of a String that is fetched the vector has, at its end, the number of its
+text in a table of those seen so far; a connection between Strings is a call.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,14 +17,18 @@ import numpy.typing as npt
 from ..base.calls import Call
 from ..exchange.listener import Texts
 from ..fmi.instance import CLOCK, Instance, dtype
-from ..interface.interface import Interface, Variable
+from ..interface.interface import Variable
 from ..realtime.pacer import Pacer
 from ..system.description import System
 from ..system.parts import Connection, Port
 from ..system.times import in_seconds
-from ..system.validity import driven, transforms
+from ..system.validity import transforms
+from .exchanged import exchanged, used
 from .loop import CALL, COPY, DRIVE, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
 from .scenario import Drive, Scenario
+
+LONG = 8
+"""Bytes of a whole number that a float64 may not hold exactly."""
 
 Operation = tuple[int, int, int, int, int]
 """Kind, first and last of its range, period and phase."""
@@ -51,34 +56,11 @@ class Plan:
     """Errors of the Python calls that returned RAISED: they must not pass through compiled code."""
 
 
-def slots_of(system: System) -> dict[Port, int]:
-    """The place of each output, and of each number that is an input with a source; Strings last.
-
-    With an element of an array all others have one, too: an array is passed whole.
-    """
-    connected = {*(connection.target for connection in system.connections), *driven(system)}
-    for component in system.components:
-        for array in component.loaded.arrays.values():
-            elements = {Port(component.name, name) for name in array.names}
-            if not connected.isdisjoint(elements):
-                connected |= elements
-    ports = [
-        Port(component.name, v.name)
-        for causality in ("output", "input")
-        for component in system.components
-        for _, variables in _by_type(component.loaded, causality)
-        for v in variables
-        if causality == "output" or Port(component.name, v.name) in connected
-    ]
-    ports += [port for port, v in system.recorded.items() if v.kind == "String"]
-    return {port: slot for slot, port in enumerate(ports)}
-
-
 @dataclass(eq=False)
 class Planner:
     """Makes the plan of a system: collects its parts in the order of execution.
 
-    Over the given vector of values; slots are those of slots_of(), texts by String output. The
+    Over the given vector of values; slots are those of exchanged(), texts by String. The
     scenario is asked at the start of each macro step, after the pacer of a run in real time.
     """
 
@@ -94,6 +76,8 @@ class Planner:
     def __post_init__(self) -> None:
         self.stamps = 0
         self.transforms = self.system.once(transforms)
+        self.exchanged = self.system.once(exchanged)
+        self.used = self.system.once(used)
         self.arriving: dict[str, list[Connection]] = {name: [] for name in self.instances}
         for connection in self.system.connections:
             self.arriving[connection.target.component].append(connection)
@@ -118,7 +102,7 @@ class Planner:
                 last = self.system.period(name) - 1
                 self._move(name, last)
                 self._stamp()
-                self._transfer(name, "input", last)
+                self._pass(name, last)
                 self._step(name)
                 self._stamp()
         else:
@@ -126,7 +110,7 @@ class Planner:
                 self._move(name, 0)
             self._stamp()
             for name in names:
-                self._transfer(name, "input", 0)
+                self._pass(name, 0)
                 self._stamp()
             for name in names:
                 self._step(name)
@@ -143,7 +127,7 @@ class Planner:
         self.made.drives.extend(self.driven[name])
         self._operation(DRIVE, first, len(self.made.drives), period, phase)
         connections = self.arriving[name]
-        numbers = [connection for connection in connections if connection.target in self.slots]
+        numbers = [c for c in connections if not self._is_string(c.target)]
         for kind in (COPY, SCALE):
             first = len(self.made.connections)
             for connection in numbers:
@@ -155,8 +139,11 @@ class Planner:
         for connection in connections:
             if connection.target in self.scenario.fault_functions:
                 self._fault(connection.target, period, phase)
-            if connection.target not in self.slots:
+            if self._is_string(connection.target):
                 self._text(connection, period, phase)
+
+    def _is_string(self, port: Port) -> bool:
+        return self.instances[port.component].interface.by_name[port.variable].kind == "String"
 
     def _stamp(self) -> None:
         """The end of a segment of the step: see realtime.timing.Meter."""
@@ -184,7 +171,7 @@ class Planner:
         self._python(pass_on, period, phase)
 
     def _fetch_texts(self, name: str, phase: int) -> None:
-        """Fetch the String outputs of a component, if it has any."""
+        """Fetch the Strings of a component, if there are any to be fetched."""
         instance, view = self.instances[name], self.view
         ports = self.strings[name]
         variables = [instance.interface.by_name[port.variable] for port in ports]
@@ -206,38 +193,58 @@ class Planner:
         self._call(CALL, Call(call), None, period, phase)
 
     def _step(self, name: str) -> None:
-        """Advance a component and fetch its outputs, at the end of its own step."""
+        """Advance a component and fetch its values, at the end of its own step."""
         period = self.system.period(name)
         step = in_seconds(period * self.system.step_ns)
         instance = self.instances[name]
         self._call(STEP, instance.stepper(self.made.clock, step), instance, period, period - 1)
-        self._transfer(name, "output", period - 1)
+        self._fetch(name, period - 1)
         self._fetch_texts(name, period - 1)
 
-    def _transfer(self, name: str, causality: str, phase: int) -> None:
-        """Pass all connected inputs, or fetch all outputs, a call per FMI type."""
+    def _pass(self, name: str, phase: int) -> None:
+        """Pass all inputs that have a source, a call per FMI type."""
         instance, period = self.instances[name], self.system.period(name)
-        for fmi_type, variables in _by_type(instance.interface, causality):
-            taken = [v for v in variables if Port(name, v.name) in self.slots]
-            if not taken:
+        for variables in self.exchanged.passed[name]:
+            first, data = self._data(name, variables)
+            if data.dtype != np.float64:
+                self._casts(STORE, range(len(variables)), first, period, phase)
+            self._call(CALL, instance.transfer("set", variables, data), instance, period, phase)
+
+    def _fetch(self, name: str, phase: int) -> None:
+        """Fetch what the run must know of a component, a call per FMI type.
+
+        Of whole numbers of 64 bits those that are used must be exact as a float64; the others are
+        only recorded, as far as that holds them.
+        """
+        instance, period = self.instances[name], self.system.period(name)
+        for variables in self.exchanged.fetched[name]:
+            first, data = self._data(name, variables)
+            self._call(CALL, instance.transfer("get", variables, data), instance, period, phase)
+            if data.dtype == np.float64:
                 continue
-            first, count = self.slots[Port(name, taken[0].name)], len(taken)
-            data: npt.NDArray[Any] = self.made.values[first : first + count]
-            element = dtype(instance.interface.version, fmi_type)
-            cast = element != np.float64
-            casts = (len(self.made.casts), len(self.made.casts) + count)
-            if cast:
-                data = np.zeros(count, element)
-                buffer = len(self.made.buffers)
-                self.made.casts.extend((buffer, i, first + i) for i in range(count))
-                self.made.buffers.append(data)
-            if cast and causality == "input":
-                self._operation(STORE, *casts, period, phase)
-            action = "set" if causality == "input" else "get"
-            self._call(CALL, instance.transfer(action, taken, data), instance, period, phase)
-            if cast and causality == "output":
-                long = element.kind in "iu" and element.itemsize == 8
-                self._operation(LOAD_LONG if long else LOAD, *casts, period, phase)
+            is_long = data.dtype.kind in "iu" and data.dtype.itemsize == LONG
+            places = range(len(variables))
+            exact = [i for i in places if is_long and Port(name, variables[i].name) in self.used]
+            self._casts(LOAD_LONG, exact, first, period, phase)
+            self._casts(LOAD, sorted({*places} - {*exact}), first, period, phase)
+
+    def _data(self, name: str, variables: Sequence[Variable]) -> tuple[int, npt.NDArray[Any]]:
+        """The first slot of variables of one FMI type, and what their values are moved in.
+
+        That are their slots themselves, or a buffer of another type.
+        """
+        first, count = self.slots[Port(name, variables[0].name)], len(variables)
+        element = dtype(self.instances[name].interface.version, variables[0].type)
+        if element == np.float64:
+            return first, self.made.values[first : first + count]
+        self.made.buffers.append(np.zeros(count, element))
+        return first, self.made.buffers[-1]
+
+    def _casts(self, kind: int, places: Sequence[int], first: int, period: int, phase: int) -> None:
+        """Move values at these places between the last buffer and the slots from the first on."""
+        begin, buffer = len(self.made.casts), len(self.made.buffers) - 1
+        self.made.casts.extend((buffer, i, first + i) for i in places)
+        self._operation(kind, begin, len(self.made.casts), period, phase)
 
     def _call(self, kind: int, call: Call, owner: Instance | None, period: int, phase: int) -> None:
         self._operation(kind, len(self.made.calls), len(self.made.calls) + 1, period, phase)
@@ -257,12 +264,3 @@ class Planner:
     def _operation(self, kind: int, first: int, last: int, period: int, phase: int) -> None:
         if last > first:
             self.made.operations.append((kind, first, last, period, phase))
-
-
-def _by_type(interface: Interface, causality: str) -> list[tuple[str, list[Variable]]]:
-    """The scalar numbers of a causality, by FMI type, those of float64 first."""
-    found: dict[str, list[Variable]] = {}
-    for v in interface.of(causality):
-        if v.is_number:
-            found.setdefault(v.type, []).append(v)
-    return sorted(found.items(), key=lambda item: item[0] not in ("Real", "Float64"))

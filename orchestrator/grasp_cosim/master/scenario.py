@@ -26,6 +26,7 @@ from ..system.parts import Condition, Event, Fault, Port, literal
 from ..system.scenario import check_setting
 from ..system.times import Time, first_step, seconds
 from ..system.validity import driven, is_linear, samples_of
+from .exchanged import sourced
 
 FaultFunction = Callable[[float, int], float]
 """Changes a value passed at a step number."""
@@ -74,10 +75,11 @@ class Scenario:
         slots: Mapping[Port, int],
         values: npt.NDArray[np.float64],
     ) -> None:
-        """Values holds the outputs of now whenever a method is called, at the places in slots."""
+        """Values holds the signals of now whenever a method is called, at the places in slots."""
         self.log: list[str] = []
         self._system, self._slots, self._values = system, slots, values
         self._instances = {instance.name: instance for instance in instances}
+        self._passed = system.once(sourced)
         self._pending: list[_Once] = []
         for i, event in enumerate(system.events):
             self._add_event(f"events[{i}]", event)
@@ -153,14 +155,14 @@ class Scenario:
     def _setter(self, place: str, event: Event) -> Callable[[int], Sequence[str]]:
         """What an event does.
 
-        An element of an array that is connected in part has a slot, and is passed on from it.
+        An element of an array that is connected in part is passed on from its slot.
         """
         calls: dict[str, tuple[list[Variable], list[Value]]] = {}
         placed: dict[int, float] = {}
         for port, value in event.set.items():
             interface = self._instances[port.component].interface
             parsed = interface.parse(place, port.variable, value)
-            if port in self._slots:
+            if port in self._passed:
                 exact(f"{place}: {port}", parsed)
                 placed[self._slots[port]] = float(parsed)
             else:

@@ -82,17 +82,17 @@ class Session:
             system = replace(system, components=tuple(replace(c) for c in system.components))
         system = system.with_natives(needed_twins(system))
         _check_count("every", every)
-        recorded = {str(port) for port in system.recorded}
-        self._metrics = chosen(metrics, system.metrics, recorded, system.roles)
+        observed = {str(port) for port in system.observed}
+        self._metrics = chosen(metrics, system.metrics, observed, system.roles)
         self._asked = metrics_of(system.metrics, self._metrics)
         check_groups(system)
         self._in_si = in_si(system, self._asked)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every, bool(realtime))
         self._whole: EveryRow | None = None
-        if every > 1:
-            names = needed(self._asked, recorded, system.roles)
-            self._whole = EveryRow(names | of_proxies(recorded))
+        needs = needed(self._asked, observed, system.roles) | of_proxies(observed)
+        if every > 1 or not needs <= {str(port) for port in system.recorded}:
+            self._whole = EveryRow(needs)
         self._wall_time = 0.0
         self._failed = False
         self._closed = False
@@ -234,7 +234,8 @@ class Session:
         return self._master.total_steps if self._master.runs_alone else 1
 
     def __getitem__(self, name: str) -> Any:
-        """The value now of an output or a connected input, by a name like 'plant.gap[1]'.
+        """The value now of an output, of a connected input or of what is recorded, by a name like
+        'plant.gap[1]'.
 
         A float, of a Boolean 0.0 or 1.0; of a String its text. InputError where there is no such
         signal; connected inputs that are Strings are none.
@@ -277,13 +278,13 @@ class Session:
             log=self._log(),
             timing=pacer.meter.timing(asked.granted, asked.refused) if pacer else None,
             more_metrics=self._metrics,
-            to_si=self._in_si.conversions,
+            to_si={n: c for n, c in self._in_si.conversions.items() if n in columns},
             known=self._known(),
         )
 
     def _of_proxies(self, step: float) -> list[str]:
         """Remarks on the proxies, a line each."""
-        if not of_proxies(self.system.recorded):
+        if not of_proxies(self.system.observed):
             return []
         kept = self._whole if self._whole and not self._whole.lost else self._memory
         time, columns = kept.columns()
@@ -349,7 +350,9 @@ class Simulate:
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
     ) -> Result:
-        """Run a system to its stop time and return every output at every communication point.
+        """Run a system to its stop time and return what it records at every communication point.
+
+        These are its outputs, or what System.with_record() names.
 
         step and stop in s and the scheme replace those of the system. progress shows on standard
         error how far it is, by the name of the system or the one given. every keeps only each n-th

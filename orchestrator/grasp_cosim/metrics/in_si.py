@@ -8,12 +8,12 @@ from typing import NamedTuple
 from ..base.errors import InputError, choices
 from ..base.si_units import known_unit
 from ..interface.units import Conversion
-from ..system.structure import Structure, naming, output_units
+from ..system.structure import Structure, naming, signal_units
 from .metric import Metric, available, resolved
 
 
 class InSi(NamedTuple):
-    """How the outputs of a system are converted to SI base units, and what was taken for granted.
+    """How the signals of a system are converted to SI base units, and what was taken for granted.
 
     conversions are by name of the signal; one that is not there is in SI. notes are lines for the
     log.
@@ -24,15 +24,15 @@ class InSi(NamedTuple):
 
 
 def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
-    """How `metrics` get the outputs of a system.
+    """How `metrics` get the signals of a system.
 
     InputError where a signal that one of those interprets which the system permits is of another
     quantity than it expects, or its unit is not defined. Signals without any unit are in SI.
     """
-    asked, recorded = tuple(metrics), {str(port): v for port, v in system.recorded.items()}
-    units = {str(port): unit for port, unit in system.once(output_units).items()}
+    asked, observed = tuple(metrics), {str(port): v for port, v in system.observed.items()}
+    units = {str(port): unit for port, unit in system.once(signal_units).items()}
     expected = set()
-    for metric in available(asked, recorded, system.roles)[0]:
+    for metric in available(asked, observed, system.roles)[0]:
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
         for need, wanted in metric.expects.items():
             if wanted is None:
@@ -44,7 +44,7 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
                     "'N.s/m', as signals come in these"
                 )
             expected.add(name)
-            declared, unit = recorded[name].unit, units.get(name)
+            declared, unit = observed[name].unit, units.get(name)
             fits = declared is None or (unit and unit.measures(quantity))
             if name in units and not fits:
                 undefined = "" if unit else ", which its FMU does not define in SI units"
@@ -55,7 +55,7 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
                     f"{naming(component, variable)}"
                 )
     free = any(not m.expects for m in asked)
-    silent = [n for n, v in recorded.items() if v.kind == "Real" and v.unit is None]
+    silent = [n for n, v in observed.items() if v.kind == "Real" and v.unit is None]
     read = [name for name in silent if free or name in expected]
     others = {name: unit for name, unit in units.items() if unit and not unit.si}
     return InSi(

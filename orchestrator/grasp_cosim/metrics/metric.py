@@ -36,8 +36,8 @@ RESERVED = frozenset((
     "changed", "command", "complete", "components", "connections", "date", "descriptions",
     "diverging", "error", "events", "faults", "fmus", "index", "initialisation", "log",
     "metric_units", "metrics", "missing_metrics", "proxies", "real_time_factor", "realtime",
-    "rejections", "roles", "scheme", "step", "steps", "stop", "system", "title", "to_si", "types",
-    "units", "versions", "wall_time",
+    "record", "rejections", "roles", "scheme", "step", "steps", "stop", "system", "title", "to_si",
+    "types", "units", "versions", "wall_time",
 ))  # fmt: skip
 """Names beside metrics in run.json and in the table of a sweep."""
 
@@ -74,9 +74,12 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; MissingSignalError where it was not recorded."""
         reason = lacking((name,), self.by_name, self.roles)
-        if reason:
-            raise MissingSignalError(reason)
         own = resolved(name, self.roles)
+        if reason:
+            component = own.partition(".")[0]
+            if any(signal.startswith(f"{component}.") for signal in self.by_name):
+                reason += f"; what is no output must be recorded: --record {own}"
+            raise MissingSignalError(reason)
         if own not in self.to_si:
             return self.by_name[own]
         if own not in self.worked_out:

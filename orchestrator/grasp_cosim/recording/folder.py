@@ -73,7 +73,9 @@ class RunFolder:
         """
         self._folder, self._paced = folder, paced
         self._origin = origin(system, command)
-        self._to_si = in_si(system, ()).conversions
+        conversions = in_si(system, ()).conversions
+        recorded = {str(port) for port in system.recorded}
+        self._to_si = {name: c for name, c in conversions.items() if name in recorded}
         place = folder / (ARROW if form == "arrow" else SIGNALS)
         self._file: Listener = (ArrowListener if form == "arrow" else CsvListener)(place, place)
         self._begun, self._broken = False, False
@@ -210,7 +212,7 @@ ENTRIES: Mapping[str, tuple[Any, str, str]] = {
     "a number": ((int, float), "step stop", "start"),
     "a number or null": ((int, float, type(None)), "wall_time", ""),
     "true or false": (bool, "complete", ""),
-    "a list": (list, "connections events faults log", "metrics command"),
+    "a list": (list, "connections events faults log", "metrics command record"),
     "a JSON object": (
         dict,
         "initialisation components rejections units",
@@ -221,7 +223,7 @@ ENTRIES: Mapping[str, tuple[Any, str, str]] = {
 
 MADE = (
     "system", "scheme", "step", "stop", "initialisation", "components", "connections", "events",
-    "faults", "roles", "input", "changed", "metrics", "diverging", "start",
+    "faults", "roles", "input", "changed", "metrics", "diverging", "start", "record",
 )  # fmt: skip
 """Those that say how the run was made."""
 
@@ -247,7 +249,7 @@ def load_run(folder: str | Path) -> Result:
     One of its files stands for it.
 
     Metrics are worked out anew from the signals; those of a user's file, and of a run that recorded
-    only some of its steps, are as they were recorded.
+    only some of its steps or its signals, are as they were recorded.
     InputError where a file is missing or damaged, or the two files are not of the same run.
     """
     folder = run_folder(Path(folder))
@@ -286,18 +288,21 @@ def load_run(folder: str | Path) -> Result:
         to_si=_records(path, written, "to_si", Conversion),
         folder=folder,
     )
-    return _with_known(read, written) if read.every > 1 else read
+    in_part = read.every > 1 or "record" in written
+    return _with_known(read, written) if in_part else read
 
 
 def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
-    """A result of thinned rows with the metrics that run.json has, which are of every step."""
+    """A result of some rows or signals with the metrics that run.json has, which are of all."""
     asked = metrics_of(read.groups, read.more_metrics)
     there = tuple(m for m in asked if m.name in written)
     if not asked:
         return read
-    if not there:  # it did not come to its end
+    if not there and read.every > 1:  # it did not come to its end
         line = f"one row in {read.every} was recorded: the metrics are of these"
         return replace(read, log=(*read.log, line))
+    if not there:
+        return read
     values = {m.name: written[m.name] for m in there}
     measured = Measured(values, there, tuple(written.get("missing_metrics", ())))
     return replace(read, known=Known(measured, written.get("proxies", {})))

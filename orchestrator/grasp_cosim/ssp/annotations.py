@@ -2,8 +2,9 @@
 
 Ours has all that SSP 1.0 has no form for, so that our run is the same: the communication step, the
 scheme, the components' own steps, processes, renamed variables and units, the initialisation,
-events, faults, roles, presets, stimuli and the pacing. Where it is, the elements are in the order
-of execution. Its content is JSON: the dataclasses of the system as objects, a port as a string.
+events, faults, roles, presets, stimuli, what is recorded and the pacing. Where it is, the elements
+are in the order of execution. Its content is JSON: the dataclasses of the system as objects, a port
+as a string.
 
 Those of others are read, and written for them to run our archives. OSP (libcosim):
 com.opensimulationplatform in the default experiment, and a hint on components with a step of their
@@ -27,6 +28,7 @@ from ..base.checks import check_values
 from ..base.errors import InputError, choices, nearest
 from ..system.description import System
 from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Realtime, Solver
+from ..system.record import Record
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
 from ..system.times import Time, in_nanoseconds, in_seconds, written
@@ -61,7 +63,7 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """The attributes of a system that SSP has no form for; earlier archives lack the last five."""
+    """The attributes of a system that SSP has no form for; earlier archives lack the last six."""
 
     step_ns: Time
     scheme: Scheme
@@ -75,6 +77,7 @@ class Extras:
     input: Stimuli | None = None
     realtime: Realtime = Realtime()
     metrics: tuple[str, ...] = ()
+    record: Record = Record()
 
 
 def extras_of(system: System) -> Extras:

@@ -123,6 +123,7 @@ def read_ssp(
         extras.realtime,
         extras.metrics,
         start_ns,
+        extras.record,
     )
 
 

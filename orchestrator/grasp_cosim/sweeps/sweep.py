@@ -76,12 +76,12 @@ def sweep(
     found = as_rows(rows)
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
-    recorded = {str(port) for port in system.recorded}
-    own = chosen(metrics, system.metrics, recorded, system.roles)
+    observed = {str(port) for port in system.observed}
+    own = chosen(metrics, system.metrics, observed, system.roles)
     check_portable(own)
     every = metrics_of(system.metrics, own)
     in_si(system, every)
-    asked, missing = available(every, recorded, system.roles)
+    asked, missing = available(every, observed, system.roles)
     if not asked:
         because = f" ({'; '.join(missing)})" if missing else ""
         raise InputError(

@@ -12,6 +12,7 @@ from ..base.higher import groups, higher
 from ..interface.interface import Given
 from .native import natives
 from .parts import Component
+from .record import Record
 from .scenario import check_scenario
 from .settings import made_of
 from .stimuli import Stimuli, read_stimuli
@@ -55,6 +56,7 @@ class System(Structure):
         check_connections(self)
         check_arrays(self)
         check_scenario(self)
+        self.record.check(f"{self.name}: record.signals:", self.components)
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
         for group in self.metrics:
@@ -149,11 +151,15 @@ class System(Structure):
             notes += more
         if not file and all(_of_parameters(self, *named) for named in tables.items()):
             return self._with_parameters(tuple(components.values()))
+        made = tuple(components.values())
+        record, lost = self.record.without_missing(self.components, made)
+        notes += [f"record: {text!r} matches no signal any more: it is left out" for text in lost]
         return replace(
             self,
-            components=tuple(components.values()),
+            components=made,
             connections=as_written(self),
             notes=tuple(notes),
+            record=record,
             **sections(self, file, place),
         )
 
@@ -173,6 +179,16 @@ class System(Structure):
     def with_input(self, input: str | Path | Stimuli | None) -> "System":  # noqa: A002
         """A copy whose inputs without another source are driven by a CSV file, or by none."""
         return replace(self, input=_stimuli(input))
+
+    def with_record(self, *signals: str) -> "System":
+        """A copy that records other signals: names like plant.gap[1], or plant.* for several.
+
+        One behind a ! is left out: with_record("!plant.clock"). Without any, the outputs are
+        recorded. InputError where one matches nothing.
+        """
+        record = Record(signals)
+        record.check("record:", self.components)
+        return replace(self, record=record)
 
     def natively(self, native: bool | None = None) -> "System":
         """A copy that runs native twins of its FMUs, with the same bits; False: as they are named.
@@ -207,7 +223,7 @@ class System(Structure):
 
         So a thousand runs do not check the rest as often, nor work out what follows from it.
         """
-        self.recorded, self._known  # noqa: B018 - there from now on, and shared
+        self.observed, self._known  # noqa: B018 - there from now on, and shared
         made = object.__new__(type(self))
         vars(made).update(vars(self), components=components)
         vars(made).pop("by_name", None)  # which has the components of self

@@ -175,10 +175,10 @@ class Connection:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """An output compared with a constant, like plant.gap[1] < 0.01 or plant.contact[1] == true.
+    """A signal compared with a constant, like plant.gap[1] < 0.01 or plant.contact[1] == true.
 
-    value is in the output's unit; of an Enumeration it may be the name of an item. It holds or not
-    at a communication point, by the outputs there.
+    value is in the signal's unit; of an Enumeration it may be the name of an item. It holds or not
+    at a communication point, by the values there.
     """
 
     port: Port

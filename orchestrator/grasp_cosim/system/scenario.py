@@ -188,8 +188,8 @@ def _check_condition(system: Structure, condition: Condition | None, place: str)
         return
     place, port, value = f"{place}: when = '{condition}'", condition.port, condition.value
     interface = system.component(port.component, place).interface
-    valid = [v.name for v in interface.of("output") if v.is_number]
-    said = f"{place}: {port.component} has no numeric output"
+    valid = [v.name for v in interface.variables if v.is_number]
+    said = f"{place}: {port.component} has no number"
     known(said, port.variable, valid, see=interface.listing)
     kind, items = interface.by_name[port.variable].kind, interface.by_name[port.variable].items
     relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)

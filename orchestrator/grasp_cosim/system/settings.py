@@ -41,6 +41,7 @@ def settings(system: Structure) -> dict[str, Any]:
             for c in system.components
         },
         "metrics": list(system.metrics),
+        **({"record": list(system.record.signals)} if system.record.signals else {}),
         "roles": dict(system.roles),
         "connections": [
             {"from": str(c.source), "to": str(c.target), "factor": c.factor, "offset": c.offset}

@@ -14,6 +14,7 @@ from ..base.si_units import Unit
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion
 from .parts import Component, Connection, Event, Fault, Initialisation, Port, Realtime
+from .record import Record
 from .stimuli import Stimuli
 from .times import LONGEST, Clock, Time, in_nanoseconds
 
@@ -34,7 +35,8 @@ class Structure:
     line each. roles name the component that plays a role; where they do not, the component of that
     name plays it. presets are
     values under a name, like {"bench": {"sensor_1.noise.seed": 1}}. input drives inputs without a
-    connection. metrics are names of groups of ours. as_read is settings.made_of() when it was read.
+    connection. metrics are names of groups of ours. record says what is recorded. as_read is
+    settings.made_of() when it was read.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Structure:
     realtime: Realtime = Realtime()
     metrics: tuple[str, ...] = ()
     start_ns: Time = 0
+    record: Record = Record()
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
@@ -72,12 +75,25 @@ class Structure:
 
     @cached_property
     def recorded(self) -> dict[Port, Variable]:
-        """The outputs that a run records, in the order of the system: no arrays, no binaries."""
+        """The signals that a run records, in the order of the system: no arrays, no binaries."""
+        return self.record.chosen(self.components)
+
+    @cached_property
+    def watched(self) -> dict[Port, Variable]:
+        """The outputs but those that are left out; they must be finite, and must not run away."""
+        return self.record.watched(self.components)
+
+    @cached_property
+    def observed(self) -> dict[Port, Variable]:
+        """What is watched or recorded, in the order of the system: metrics get all of it."""
+        if self.recorded == self.watched:
+            return self.recorded
+        either = {**self.watched, **self.recorded}
         return {
-            Port(component.name, v.name): v
+            port: either[port]
             for component in self.components
-            for v in component.interface.of("output")
-            if v.supported
+            for v in component.interface.variables
+            if (port := Port(component.name, v.name)) in either
         }
 
     @cached_property
@@ -130,11 +146,11 @@ def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[st
     return made
 
 
-def output_units(system: Structure) -> dict[Port, Unit | None]:
-    """The unit of each Real or Integer output; None where none is told, or it is not defined."""
+def signal_units(system: Structure) -> dict[Port, Unit | None]:
+    """The unit of each Real or Integer signal; None where none is told, or it is not defined."""
     return {
         port: unit_of(system.component(port.component, str(port)).interface, v)
-        for port, v in system.recorded.items()
+        for port, v in system.observed.items()
         if v.kind in ("Real", "Integer")
     }
 

@@ -30,6 +30,7 @@ from ..interface.interface import SETTABLE
 from ..interface.read import read_interface
 from .changes import replaced, with_given, with_old_values
 from .parts import ISOLATIONS, Component, Connection, Initialisation, Realtime, Solver, as_port
+from .record import Record
 from .scenario import read_events, read_faults
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .structure import Structure, experiment
@@ -44,6 +45,9 @@ SECTIONS = (
     "presets", "input", "realtime", "metrics",
 )  # fmt: skip
 """The entries of a system file, which are no names of components."""
+
+RECORD = "record"
+"""Another entry: a list alone, which no --set changes, so a component may have its name."""
 
 PLACES: Mapping[str, Sequence[str]] = {
     "experiment": ("step", "stop", "scheme", "diverging", "start", "variant"),
@@ -73,8 +77,8 @@ def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[st
     """
     file, place = toml_table(path, "system file"), f"{path.name}: ".__add__
     check_filled_in(path)
-    check_keys(path.name, file, SECTIONS)
-    for section in (*PLACES, "presets"):
+    check_keys(path.name, file, (*SECTIONS, RECORD))
+    for section in (*PLACES, "presets", RECORD):
         table = file.get(section, None if section in ("experiment", "components") else {})
         file[section] = as_table(place(f"[{section}]"), table)
         if PLACES.get(section):
@@ -111,7 +115,17 @@ def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[st
         "presets": file["presets"],
         "metrics": tuple(file.get("metrics", ())),
         "input": stimuli or found["input"],
+        "record": _record(place, file[RECORD]),
     }
+
+
+def _record(place: Place, table: Mapping[str, Any]) -> Record:
+    """What [record] says."""
+    check_keys(place(f"[{RECORD}]"), table, ("signals",))
+    signals = _list(lambda key: place(f"{RECORD}.{key}"), table, "signals", '["plant.*"]')
+    for i, entry in enumerate(signals):
+        text(place(f"{RECORD}.signals[{i}]"), entry, "a name like 'plant.gap[1]', or 'plant.*'")
+    return Record(tuple(signals))
 
 
 def _list(place: Place, file: Mapping[str, Any], key: str, form: str) -> list[Any]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from pathlib import Path
 from ..base.checks import exact, known, number
 from ..base.errors import InputError, choices
 from ..base.si_units import known_unit
+from ..base.text import counted
 from ..interface.expansion import shape_text
 from ..interface.interface import SUPPORTED, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS
@@ -261,6 +263,9 @@ def remarks(system: Structure) -> tuple[str, ...]:
 
 def _of_components(system: Structure) -> Iterator[str]:
     fed = _fed(system)
+    of_locals: Counter[str] = Counter()
+    if not system.record.takes_in:
+        of_locals.update(p.component for p, v in system.recorded.items() if v.causality == "local")
     for c in system.components:
         if solver := c.integrated:
             yield (
@@ -276,6 +281,9 @@ def _of_components(system: Structure) -> Iterator[str]:
             if not v.supported:
                 left = "keeps its start value" if v.causality == "input" else "not recorded"
                 yield f"{Port(c.name, v.name)} is of type {v.nature}: {left}"
+        if of_locals[c.name]:
+            stand_in = counted(of_locals[c.name], "local")
+            yield f"{c.name}: {c.fmu.name} has no output: recorded by default: {stand_in}"
         free: list[str] = []
         for name, whole in c.interface.arrays.items():
             without = [n for n in whole.names if n not in fed[c.name] and n not in c.values]
@@ -285,8 +293,8 @@ def _of_components(system: Structure) -> Iterator[str]:
             yield f"{c.name}: no source for {choices(free, 6)}: kept as the FMU starts with"
     if not system.recorded:
         yield (
-            f"{system.name}: nothing is recorded; must have an output that is a Real, Integer, "
-            "Boolean or String"
+            f"{system.name}: nothing is recorded; must have an output or a local that is a Real, "
+            "Integer, Boolean or String, or name another such signal under [record]"
         )
 
 

@@ -1,0 +1,95 @@
+"""What a run moves between FMUs and master: what it passes to inputs, and what it fetches."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from ..interface.interface import Variable
+from ..system.description import System
+from ..system.parts import Port
+from ..system.validity import driven
+
+
+@dataclass(frozen=True, slots=True)
+class Exchanged:
+    """The numbers that a run moves, of each component in groups of one FMI type; Strings beside.
+
+    passed are inputs that have a source; fetched is all else that the run must know, and texts are
+    the Strings of that.
+    """
+
+    fetched: Mapping[str, list[list[Variable]]]
+    passed: Mapping[str, list[list[Variable]]]
+    texts: tuple[Port, ...]
+
+    def slots(self) -> dict[Port, int]:
+        """The place of each value in the vector: fetched, then passed; Strings last."""
+        numbers = [
+            Port(name, v.name)
+            for moved in (self.fetched, self.passed)
+            for name, groups in moved.items()
+            for variables in groups
+            for v in variables
+        ]
+        return {port: slot for slot, port in enumerate((*numbers, *self.texts))}
+
+
+def exchanged(system: System) -> Exchanged:
+    """What a run of a system moves: arrays whole, as FMI does."""
+    passed_on = system.once(sourced)
+    sources = {connection.source for connection in system.connections}
+    known = _with_whole_arrays(system, {*system.observed, *sources, *in_conditions(system)})
+    fetched: dict[str, list[list[Variable]]] = {}
+    passed: dict[str, list[list[Variable]]] = {}
+    texts: list[Port] = []
+    for component in system.components:
+        get, set_ = list[Variable](), list[Variable]()
+        for v in component.loaded.variables:
+            port = Port(component.name, v.name)
+            if v.kind == "String" and port in known:
+                texts.append(port)
+            elif v.is_number and port in passed_on:
+                set_.append(v)
+            elif v.is_number and port in known:
+                get.append(v)
+        fetched[component.name], passed[component.name] = _by_type(get), _by_type(set_)
+    return Exchanged(fetched, passed, tuple(texts))
+
+
+def sourced(system: System) -> frozenset[Port]:
+    """The inputs that have a source, and the other elements of an array that has some."""
+    targets = {connection.target for connection in system.connections}
+    return _with_whole_arrays(system, {*targets, *driven(system)})
+
+
+def used(system: System) -> frozenset[Port]:
+    """The values on which a run depends, which a float64 must hold exactly."""
+    sources = {connection.source for connection in system.connections}
+    return system.once(sourced) | sources | in_conditions(system)
+
+
+def in_conditions(system: System) -> frozenset[Port]:
+    """The signals that conditions of events and faults name."""
+    conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
+    return frozenset(condition.port for condition in conditions if condition is not None)
+
+
+def _with_whole_arrays(system: System, ports: set[Port]) -> frozenset[Port]:
+    """The ports and, of those that are elements of arrays, the other elements."""
+    whole = set(ports)
+    for component in system.components:
+        for array in component.loaded.arrays.values():
+            elements = {Port(component.name, name) for name in array.names}
+            if not ports.isdisjoint(elements):
+                whole |= elements
+    return frozenset(whole)
+
+
+def _by_type(variables: Iterable[Variable]) -> list[list[Variable]]:
+    """Numbers in groups of one FMI type, those of float64 first."""
+    groups: dict[str, list[Variable]] = {}
+    for v in variables:
+        groups.setdefault(v.type, []).append(v)
+    return [
+        groups[fmi_type]
+        for fmi_type in sorted(groups, key=lambda name: name not in ("Real", "Float64"))
+    ]
