@@ -253,6 +253,41 @@ MODELS = {
 }
 """By the name of their C file; the feedthrough has u_T and y_T for each type T of its version."""
 
+_INNER = (
+    _TIME,
+    Variable("x", start=0.0, unit="m"),
+    Variable("der(x)", derivative="x"),
+    _parameter("k", 2.0, tunable=True),
+    Variable("u", causality="input", start=1.0),
+    Variable("tau", causality="calculatedParameter", variability="tunable"),
+    Variable("power[1]", unit="N"),
+    Variable("count", "Int32", variability="discrete"),
+    Variable("high", "Boolean", variability="discrete"),
+    Variable("label", "String", variability="discrete"),
+    Variable("empty"),
+    Variable("y", causality="output", depends=("x",)),
+    Variable("stamp", "UInt64", variability="discrete"),
+)
+"""Of models/inner.c; the last two may be left out."""
+
+
+def inner(
+    folder, version="3.0", outputs=False, stamp="", kinds=("CoSimulation",), more="", name="inner"
+):
+    """The FMU of models/inner.c as folder/NAME.fmu, with or without its output y.
+
+    A stamp is "local" or "output", in FMI 3.0 alone; more are further variables of its description.
+    """
+    variables = [v for v in _INNER if v.name not in ("y", "stamp")]
+    places = {v.name: place for place, v in enumerate(_INNER)}
+    variables += [v for v in _INNER if v.name == "y" and outputs]
+    variables += [v._replace(causality=stamp) for v in _INNER if v.name == "stamp" and stamp]
+    variables = [v._replace(reference=places[v.name]) for v in variables]
+    xml = description("inner", version, Model(variables), kinds, more=more)
+    library = library_of("inner", version, "CoSimulation" in kinds)
+    return pack(folder / f"{name}.fmu", version, "inner", xml, library)
+
+
 BRAKE = "share of the force that is lost"
 _VENDOR = Model(
     (

@@ -16,7 +16,7 @@ from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
 from ..system.description import FILES, System
 from ..system.times import in_seconds, nearest_time
-from .bands import SHARE, Bands, Compared, metric_band, plain, signal_band
+from .bands import SHARE, Band, Bands, Compared, metric_band, plain, signal_band
 from .side import Difference, Side, differences, read_side, side_of
 from .tube import ROUNDING, Curve, deviation
 
@@ -122,7 +122,8 @@ def judge(
 
     `values` are the metrics `asked` of each, `again` is the run of a with other numerics, `shift`
     the one in time in s which a derived band allows, `nominals` are the declared nominal values.
-    A metric that is `required` and not optional is out where only one has it.
+    A metric that is `required` and not optional is out where only one has it, and so is a signal
+    that is a finite number in one of them only.
     """
     ours, theirs, runs = a.curves(), b.curves(), [run.curves() for run in again]
     ours = {name: curve for name, curve in ours.items() if name in theirs}
@@ -130,12 +131,23 @@ def judge(
     signals = []
     for name, reference in ours.items():
         other, nominal = theirs[name].until(float(reference.time[-1])), (nominals or {}).get(name)
-        numerics = [run[name] for run in runs]
-        band = signal_band(reference, numerics, nominal, shift, bands.of_signal(name))
+        gaps, other_gaps = reference.until(float(other.time[-1])).gaps, other.gaps
+        reference, other = reference.without_gaps(), other.without_gaps()
+        if not len(reference.time) and not len(other.time):
+            continue
+        unit, given = a.units[name], bands.of_signal(name)
+        if not np.array_equal(gaps, other_gaps):
+            exact = Band(0.0, shift, "derived")
+            band = given.band(0.0, exact) if given else exact
+            time = float(np.setxor1d(gaps, other_gaps)[0])
+            signals.append(Compared(name, unit, band, inf, None, None, time))
+            continue
+        numerics = [c for run in runs if len((c := run[name].without_gaps()).time)]
+        band = signal_band(reference, numerics, nominal, shift, given)
         apart = deviation(reference.until(float(other.time[-1])), other, band.time)
         worst = apart.values.argmax()
         time, distance, was, now = (float(column[worst]) for column in apart)
-        span, unit = float(np.ptp(reference.values)), a.units[name]
+        span = float(np.ptp(reference.values))
         signals.append(Compared(name, unit, band, distance, was, now, time, span))
     metrics, own, measured = [], values[0], [run.measured(asked) for run in again]
     by_name = {m.name: m for m in asked}

@@ -28,6 +28,16 @@ class Curve(NamedTuple):
         before = np.searchsorted(self.time, time + ROUNDING, side="right") - 1
         return self.values[np.clip(before, 0, None)]
 
+    @property
+    def gaps(self) -> Array:
+        """The times at which there is no finite number."""
+        return self.time[~np.isfinite(self.values)]
+
+    def without_gaps(self) -> "Curve":
+        """The samples that are finite numbers."""
+        finite = np.isfinite(self.values)
+        return self if finite.all() else Curve(self.time[finite], self.values[finite], self.held)
+
     def until(self, end: float) -> "Curve":
         """What there is up to the time end in s."""
         count = int(np.searchsorted(self.time, end + ROUNDING, side="right"))

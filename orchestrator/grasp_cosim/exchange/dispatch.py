@@ -69,7 +69,14 @@ class Dispatcher:
         self._every = every
         self._columns = np.array([slots[port] for port in system.observed], np.intp)
         observed = {
-            port: Signal(str(port), v.unit, v.kind, v.description or "", texts.get(port, Texts()))
+            port: Signal(
+                str(port),
+                v.unit,
+                v.kind,
+                v.description or "",
+                texts.get(port, Texts()),
+                wide=v.type == "UInt64",
+            )
             for port, v in system.observed.items()
         }
         watched = {port: observed[port] for port in system.watched}

@@ -36,7 +36,8 @@ class Signal:
     """A recorded column: name like plant.gap[1], unit (None without one), kind, description.
 
     The kind is Real, Integer, Boolean or String. Rows have numbers in place of a String's texts,
-    those of `texts`, which grows while the run goes on.
+    those of `texts`, which grows while the run goes on. An Integer that is wide may be beyond what
+    an int64 holds: it is a UInt64.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Signal:
     kind: str
     description: str = ""
     texts: Texts = field(default_factory=Texts, compare=False)
+    wide: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,8 @@ class ArrowListener:
         fields = [arrow.field("time", arrow.float64(), metadata={"unit": "s"})]
         for s in signals:
             about = {"unit": s.unit or "", "description": s.description}
-            fields.append(arrow.field(s.name, types[s.kind], metadata=about))
+            kind = "Real" if s.wide else s.kind
+            fields.append(arrow.field(s.name, types[kind], metadata=about))
         self._schema = arrow.schema(fields)
         self._batch, self._since = Batch(), time.monotonic()
         with writing(self._path, InputError):
@@ -75,7 +76,10 @@ class ArrowListener:
     def _flush(self) -> None:
         steps, rows = self._batch.take()
         self._since = time.monotonic()
-        own = (np.ascontiguousarray(typed(s, rows[:, i])) for i, s in enumerate(self._signals))
+        own = (
+            np.ascontiguousarray(rows[:, i] if s.wide else typed(s, rows[:, i]))
+            for i, s in enumerate(self._signals)
+        )
         columns = [self._experiment.times(steps), *own]
         with writing(self._path):
             self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))

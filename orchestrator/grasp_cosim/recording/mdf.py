@@ -69,7 +69,8 @@ class MdfListener:
             shown: dict[str, Any] = {}
             for number, text in enumerate(signal.texts.listed):
                 shown |= {f"val_{number}": number, f"text_{number}": text}
-            own, unit = column.astype(TYPES[signal.kind]), signal.unit or ""
+            own = column.astype(TYPES["Real" if signal.wide else signal.kind])
+            unit = signal.unit or ""
             channels.append(
                 Channel(own, times, unit, signal.name, shown or None, signal.description)
             )

@@ -15,6 +15,9 @@ from ..base.files import unwritable
 from ..base.system_calls import memory
 from ..exchange.listener import Experiment, Signal
 
+BEYOND = 2.0**63
+"""From this magnitude on an int64 holds no whole number."""
+
 TYPES = {"Real": np.float64, "Integer": np.int64, "Boolean": np.bool_}
 """The element type of a column of numbers by its signal's kind."""
 
@@ -146,7 +149,12 @@ class EveryRow:
 
 
 def typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
-    """The values of a signal in rows in its own type, Strings as str objects."""
+    """The values of a signal in rows in its own type, Strings as str objects.
+
+    Whole numbers beyond an int64 stay as they are in rows.
+    """
     if signal.kind == "String":
         return signal.texts.column(column)
+    if signal.wide and (column >= BEYOND).any():
+        return column
     return column.astype(TYPES[signal.kind], copy=False)

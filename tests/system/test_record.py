@@ -1,0 +1,160 @@
+"""What [record] of a system file names: which signals are recorded, in which order; mistakes."""
+
+import pytest
+from grasp_cosim import InputError, System
+from grasp_cosim.system.record import Record
+from support.native_fmus import state_space
+
+VARIABLES = """
+    <Float64 name="y" valueReference="0" causality="output"/>
+    <Float64 name="gap[1]" valueReference="1" causality="output" unit="m"/>
+    <Float64 name="gap1" valueReference="2" causality="output"/>
+    <Float64 name="engine.speed" valueReference="3" causality="local"/>
+    <Float64 name="engine.k" valueReference="4" causality="parameter" variability="fixed"
+             start="1"/>
+    <Float64 name="u" valueReference="5" causality="input" start="0"/>
+    <String name="engine.mode" valueReference="6" causality="local"/>
+    <Binary name="image" valueReference="7" causality="local"/>
+    <Float64 name="tau" valueReference="8" causality="calculatedParameter" variability="fixed"/>
+    <Float64 name="time" valueReference="9" causality="independent" variability="continuous"/>
+"""
+INNER = '<Float64 name="x" valueReference="1" causality="local"/>'
+SYSTEM = """
+[experiment]
+step = 0.1
+stop = 1.0
+[components.b]
+fmu = "b.fmu"
+values = { u = 0.0 }
+[components.a]
+fmu = "a.fmu"
+"""
+ALL_OF_B = [
+    *("b.y", "b.gap[1]", "b.gap1", "b.engine.speed", "b.engine.k"),
+    *("b.u", "b.engine.mode", "b.tau"),
+]
+
+
+def fmu(path, variables):
+    import zipfile
+
+    text = (
+        '<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="m">'
+        '<CoSimulation modelIdentifier="m"/>'
+        f"<ModelVariables>{variables}</ModelVariables><ModelStructure/></fmiModelDescription>"
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("record")
+    fmu(made / "b.fmu", VARIABLES)
+    fmu(made / "a.fmu", INNER)
+    return made
+
+
+@pytest.fixture
+def load(folder):
+    def system(record=""):
+        (folder / "s.toml").write_text(SYSTEM + record, "utf-8")
+        return System.load(folder / "s.toml")
+
+    return system
+
+
+def names(system):
+    return [str(port) for port in system.recorded]
+
+
+def test_by_default_the_outputs_are_recorded_and_locals_where_there_are_none(load):
+    system = load()
+    assert names(system) == ["b.y", "b.gap[1]", "b.gap1", "a.x"]
+    assert system.record == Record()
+
+
+@pytest.mark.parametrize(
+    ("signals", "recorded"),
+    [
+        (["*"], [*ALL_OF_B, "a.x"]),
+        (["b.*"], ALL_OF_B),
+        (["a.x", "b.u"], ["b.u", "a.x"]),
+        (["b.gap[1]"], ["b.gap[1]"]),
+        (["b.gap?"], ["b.gap1"]),
+        (["b.gap*"], ["b.gap[1]", "b.gap1"]),
+        (["b.*[?]"], ["b.gap[1]"]),
+        (["b.engine.*"], ["b.engine.speed", "b.engine.k", "b.engine.mode"]),
+        (["*.x", "b.tau"], ["b.tau", "a.x"]),
+        (["b.time"], ["b.time"]),
+        (["!b.gap[1]"], ["b.y", "b.gap1", "a.x"]),
+        (["!a.*"], ["b.y", "b.gap[1]", "b.gap1"]),
+        (["!b.engine.*", "b.*"], ["b.y", "b.gap[1]", "b.gap1", "b.u", "b.tau"]),
+        (["b.y", "b.*", "!b.*g*"], ["b.y", "b.u", "b.tau"]),
+        ([], ["b.y", "b.gap[1]", "b.gap1", "a.x"]),
+    ],
+)
+def test_a_pattern_takes_in_or_leaves_out_in_the_order_of_the_system(load, signals, recorded):
+    """* stands for any text, ? for a character; brackets are letters like all else."""
+    assert names(load(f"[record]\nsignals = {signals!r}")) == recorded
+    assert names(load().with_record(*signals)) == recorded
+    assert names(load().with_record(*reversed(signals))) == recorded
+
+
+@pytest.mark.parametrize(
+    ("record", "message"),
+    [
+        ('signals = ["b.gap[2]"]', "s.toml: record.signals: 'b.gap[2]' matches no signal; did you"
+         " mean b.gap[1]?"),
+        ('signals = ["b.y", "c.*"]', "s.toml: record.signals: 'c.*' matches no signal; valid: "),
+        ('signals = ["!b.image"]', "s.toml: record.signals: '!b.image' is of type Binary: b.image "
+         "cannot be recorded; must be Real, Integer, Boolean, String"),
+        ('signals = ["b.imag*"]', "s.toml: record.signals: 'b.imag*' is of type Binary: b.image "),
+        ('signals = [""]', "s.toml: record.signals: '' matches no signal; "),
+        ("signals = [3]", "s.toml: record.signals[0] = 3: must be a name like 'plant.gap[1]', or "
+         "'plant.*'"),
+        ('signals = "b.y"', "s.toml: record.signals = 'b.y': must be a list, like ['plant.*']"),
+        ('signal = ["b.y"]', "s.toml: [record]: unknown entry 'signal'; did you mean signals?"),
+    ],
+)  # fmt: skip
+def test_what_records_nothing_is_refused_with_the_nearest_names(load, record, message):
+    with pytest.raises(InputError) as caught:
+        load(f"[record]\n{record}")
+    assert str(caught.value).replace('["', "['").replace('"]', "']").startswith(message)
+
+
+def test_with_record_refuses_by_name(load):
+    with pytest.raises(InputError, match=r"^record: 'b.gab\[1\]' matches no signal; did you mean"):
+        load().with_record("b.gab[1]")
+
+
+def test_an_array_stands_for_its_elements(tmp_path):
+    state_space(tmp_path, binary=False)
+    text = '[experiment]\nstep = 0.1\nstop = 1.0\n[components.a]\nfmu = "ss.fmu"\n'
+    (tmp_path / "s.toml").write_text(text, "utf-8")
+    system = System.load(tmp_path / "s.toml")
+    assert names(system) == ["a.y[1]", "a.y[2]", "a.y[3]"]
+    assert names(system.with_record("a.x")) == ["a.x[1]", "a.x[2]", "a.x[3]"]
+    assert names(system.with_record("a.A[1,2]", "a.x[3]")) == ["a.A[1,2]", "a.x[3]"]
+    assert names(system.with_record("a.?")) == names(
+        system.with_record(*(f"a.{name}" for name in "ABCDuyxmnrk"))
+    )
+
+
+def test_a_list_of_a_command_line_has_commas_but_in_brackets():
+    listed = Record.listed(["b.y, a.A[1,2],a.f(x,y)", "!c.*"])
+    assert listed.signals == ("b.y", "a.A[1,2]", "a.f(x,y)", "!c.*")
+
+
+def test_what_another_fmu_does_not_have_is_left_out_with_a_note(load, folder):
+    fmu(folder / "other.fmu", '<Float64 name="y" valueReference="0" causality="output"/>')
+    swapped = load().with_record("b.y", "b.engine.speed", "a.x").swap("b", folder / "other.fmu")
+    assert names(swapped) == ["b.y", "a.x"]
+    said = "record: 'b.engine.speed' matches no signal any more: it is left out"
+    assert said in swapped.notes
+
+
+def test_a_component_may_be_called_record(folder):
+    text = SYSTEM.replace("components.a", "components.record")
+    (folder / "r.toml").write_text(text + '[record]\nsignals = ["record.x"]', "utf-8")
+    assert names(System.load(folder / "r.toml")) == ["record.x"]
