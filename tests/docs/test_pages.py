@@ -79,7 +79,7 @@ def test_command(user, command, monkeypatch):
 
 
 def test_there_is_something_to_try():
-    assert len(COMMANDS) == 24
+    assert len(COMMANDS) == 25
 
 
 @pytest.mark.slow
