@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from grasp_cosim import load_run, simulate
+from grasp_cosim import System, load_run, simulate
+from grasp_cosim.grasp.presets import SYSTEM
+from ssp.hand_made import archive, component, fmu, structure, system
 from support.grasps import CASES
 from support.marks import slow
 from support.native_fmus import TYPES, build, needs_gcc
@@ -250,3 +252,35 @@ def test_a_remark_is_made_once_and_before_a_failure(two):
     assert remark == REMARK
     assert failure.startswith("grasp-cosim: second: second.fmu returned error at t = 0.3 s")
     assert "(inputs: u_Float64 = 45, " in failure
+
+
+TIMES = {
+    "--stop 0.1005 --set experiment.start=0.0505": (50, 0.0505, 0.1005),
+    "--set experiment.stop=0.1005 --set experiment.start=0.0505": (50, 0.0505, 0.1005),
+    "--step 1/30 --set experiment.start=1/3 --stop 2/3": (10, 1 / 3, 2 / 3),
+    "--step 7e-4 --stop 0.07 --set components.sensor_1.step=1.4e-3": (100, 0.0, 0.07),
+}
+"""Options of one call, each of which alone would not fit; steps, start and stop."""
+
+
+@pytest.mark.parametrize("options", TIMES)
+@pytest.mark.parametrize("form", ["toml", "ssp"])
+def test_the_times_of_one_call_are_taken_together(command, fmus, tmp_path, form, options):
+    text = SYSTEM.read_text().replace("step = 1e-4", "step = 1e-3")
+    (tmp_path / "grasp.toml").write_text(text.replace('fmu = "', f'fmu = "{fmus}/'))
+    if form == "ssp":
+        slow = ["--set", "components.sensor_1.step=2e-3"] if "sensor_1" in options else []
+        assert command("ssp", "grasp.toml", "-o", "grasp.ssp", *slow)[0] == 0
+    code, _, err = command("run", f"grasp.{form}", *options.split(), "--out", "out")
+    assert code == 0, err
+    run = load_run("out")
+    steps, start, stop = TIMES[options]
+    assert (run.metrics["steps"], run.time[0], run.time[-1]) == (steps, start, stop)
+
+
+def test_a_foreign_archive_gets_them_as_it_is_read(tmp_path):
+    """With them it names no step, and no stop that its own start would fit."""
+    ssd = structure(system("top", component("a")), '<ssd:DefaultExperiment startTime="5.0"/>')
+    path = archive(tmp_path, ssd, {"a": fmu("output Real y")})
+    loaded = System.load(path, step="1/30", stop="1/3", start="-1/3")
+    assert loaded.total_steps == 20

@@ -6,16 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import click
 
 from ..base.errors import InputError
 from ..base.progress import phase
-from ..system.description import System
+from ..system.description import System, read_system
 from ..system.record import Record
 from ..system.stimuli import Stimuli, read_stimuli
-from ..system.toml import plain
 from .frame import pair, say, waiting
 
 Command = Callable[..., Any]
@@ -141,14 +141,13 @@ def set_values(settings: Sequence[str]) -> dict[str, Any]:
 
 def load_system(
     path: Path | None,
-    step: float | None = None,
-    stop: float | None = None,
+    times: Mapping[str, Any] = MappingProxyType({}),
     stimuli: Stimuli | None = None,
     variant: str | None = None,
 ) -> System:
     """The system of a file, by default the built-in grasp; what its reader notes is printed.
 
-    stimuli go before those that it names; variant is the one of an archive.
+    stimuli go before those that it names; times and variant are as read_system() takes them.
     """
     with phase("reading the system"):
         if path is None:
@@ -159,7 +158,7 @@ def load_system(
             from ..grasp.system import as_named
 
             return as_named().with_input(stimuli)
-        system = System.load(path, step=step, stop=stop, input=stimuli, variant=variant)
+        system = read_system(path, times, stimuli=stimuli, variant=variant)
     for note in system.notes:
         say(note)
     return system
@@ -171,7 +170,11 @@ def chosen_system(given: Mapping[str, Any]) -> System:
     These are its controller, presets, the case last, then single values; what is left out is said.
     """
     settings, option = settings_of(given)
-    step, stop = (plain(settings.get(place)) for place in ("experiment.step", "experiment.stop"))
+    times = {
+        key: settings[place]
+        for key in ("start", "step", "stop")
+        if (place := f"experiment.{key}") in settings
+    }
     stimuli = None
     if "input.file" in settings:
         way = settings.pop("input.interpolation", "linear")
@@ -181,7 +184,7 @@ def chosen_system(given: Mapping[str, Any]) -> System:
             if str(port) in settings:
                 raise InputError(f"--set {port}: does nothing, as {stimuli.file} drives it")
     variant = settings.pop("experiment.variant", None)
-    loaded = load_system(given.get("system"), step, stop, stimuli, variant)
+    loaded = load_system(given.get("system"), times, stimuli, variant)
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
     system = loaded
     if law := given.get("controller"):

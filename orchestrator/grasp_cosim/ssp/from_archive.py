@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path as FilePath
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..base.errors import InputError, choices
@@ -19,6 +20,7 @@ from ..interface.interface import Value
 from ..system.description import System
 from ..system.parts import Component, Connection, Port, Solver
 from ..system.stimuli import Stimuli
+from ..system.structure import experiment
 from ..system.times import (
     LONGEST,
     NANOSECONDS,
@@ -54,13 +56,14 @@ class Called(NamedTuple):
 
 def read_ssp(
     path: FilePath,
-    step: TimeInput | None = None,
-    stop: TimeInput | None = None,
+    times: Mapping[str, TimeInput] = MappingProxyType({}),
     stimuli: Stimuli | None = None,
     variant: str | None = None,
 ) -> System:
-    """The system of an archive; step and stop in s, and stimuli, go before what it names.
+    """The system of an archive; stimuli go before those that it names.
 
+    So do the times, start, step and stop in s, but for an archive of ours, which names all of them:
+    System.with_experiment() changes them together.
     Its structure is the variant of that name, by default SystemStructure.ssd, or the only one.
     """
     notes = Notes()
@@ -77,7 +80,8 @@ def read_ssp(
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     names = component_names(file, parts)
     annotated = _annotated(file, root, names.values())
-    given_ns = None if step is None else in_nanoseconds("step", step)
+    given = {} if annotated else experiment(str, times)
+    given_ns = given.get("step_ns")
     extras, by = annotated, ""
     if extras is None:
         extras, by = read_foreign(file, root, names.values(), given_ns)
@@ -97,7 +101,7 @@ def read_ssp(
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
     if by:
         decided.append(f"scheme = {extras.scheme}, as meant by {by}")
-    start_ns, stop_ns = _times(file, root, parts.values(), stop, decided)
+    start_ns, stop_ns = _times(file, root, parts.values(), given, decided)
     if by and not given_ns:
         decided.append(f"step = {written(extras.step_ns)} s, by {by}")
     step_ns = given_ns or extras.step_ns
@@ -270,19 +274,21 @@ def _components(
 
 
 def _times(
-    file: str, root: Any, parts: Iterable[Part], given: TimeInput | None, notes: list[str]
+    file: str, root: Any, parts: Iterable[Part], given: Mapping[str, Time], notes: list[str]
 ) -> tuple[Time, Time]:
-    """The start time in ns, that of the archive or 0, and the stop time.
+    """The start and the stop time in ns.
 
-    That is the one given, or of the archive, or the longest that its FMUs name.
+    They are those given, or of the archive, or else 0 and the longest that its FMUs name.
     """
-    experiment = child(root, "ssd:DefaultExperiment")
-    attributes = {} if experiment is None else experiment.attrib
+    default = child(root, "ssd:DefaultExperiment")
+    attributes = {} if default is None else default.attrib
     start = float(attributes.get("startTime", "0"))
-    place = file if experiment is None else at(file, experiment)
-    start_ns = in_nanoseconds(f"{place}: startTime", start, zero=True, low=-LONGEST)
-    if given is not None:
-        return start_ns, in_nanoseconds("stop", given)
+    place = file if default is None else at(file, default)
+    start_ns = given.get("start_ns")
+    if start_ns is None:
+        start_ns = in_nanoseconds(f"{place}: startTime", start, zero=True, low=-LONGEST)
+    if "stop_ns" in given:
+        return start_ns, given["stop_ns"]
     if "stopTime" in attributes:
         return start_ns, in_nanoseconds(f"{place}: stopTime", float(attributes["stopTime"]))
     declared = [part.interface.experiment.get("stop_time") for part in parts]

@@ -72,27 +72,22 @@ class System(Structure):
         *,
         step: TimeInput | None = None,
         stop: TimeInput | None = None,
+        start: TimeInput | None = None,
         input: str | Path | Stimuli | None = None,  # noqa: A002 - as in the file and on the command line
         variant: str | None = None,
     ) -> "System":
         """The system of a TOML file or SSP archive; an archive has its own FMUs.
 
-        step and stop in s, and a CSV file of inputs, go before what it says. fmus is where the FMUs
-        of a TOML file are, by default beside it. variant names the structure of an archive that has
-        several, by default SystemStructure.ssd.
+        start, step and stop in s, and a CSV file of inputs, go before what it says. fmus is where
+        the FMUs of a TOML file are, by default beside it. variant names the structure of an archive
+        that has several, by default SystemStructure.ssd.
         """
-        path = Path(path)
-        check_nature(path, "system")
-        stimuli = _stimuli(input)
-        if path.suffix.lower() != ARCHIVE:
-            if variant is not None:
-                raise InputError(f"{path}: variant = {variant!r}: only an .ssp may have variants")
-            made = cls(**read_toml(path, Path(fmus) if fmus else None, stimuli))
-            return made.with_experiment(step, stop)
-        if fmus is not None:
+        if fmus is not None and is_archive(path):
             raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
-        system: System = higher("ssp.from_archive").read_ssp(path, step, stop, stimuli, variant)
-        return system
+        given = {"start": start, "step": step, "stop": stop}
+        times = {key: time for key, time in given.items() if time is not None}
+        system = read_system(path, times, fmus, _stimuli(input), variant)
+        return system.with_experiment(step, stop, start=start)
 
     def start(self, key: str) -> float:
         """The number that 'component.variable' starts with, given by the system or by its FMU."""
@@ -212,9 +207,16 @@ class System(Structure):
         stop: TimeInput | None = None,
         scheme: str | None = None,
         diverging: str | None = None,
+        start: TimeInput | None = None,
     ) -> "System":
-        """A copy with another communication step or stop time in s, or another scheme, or end."""
-        given = {"step": step, "stop": stop, "scheme": scheme, "diverging": diverging}
+        """A copy with another step, stop or start time in s, or another scheme, or end."""
+        given = {
+            "step": step,
+            "stop": stop,
+            "start": start,
+            "scheme": scheme,
+            "diverging": diverging,
+        }
         changed = {key: value for key, value in given.items() if value is not None}
         return replace(self, **experiment(str, changed)) if changed else self
 
@@ -228,6 +230,33 @@ class System(Structure):
         vars(made).update(vars(self), components=components)
         vars(made).pop("by_name", None)  # which has the components of self
         return made
+
+
+def is_archive(path: str | Path) -> bool:
+    """True for an SSP archive, by the suffix of its name."""
+    return Path(path).suffix.lower() == ARCHIVE
+
+
+def read_system(
+    path: str | Path,
+    times: Mapping[str, TimeInput],
+    fmus: str | Path | None = None,
+    stimuli: Stimuli | None = None,
+    variant: str | None = None,
+) -> System:
+    """The system as a TOML file or an SSP archive has it, but for its stimuli.
+
+    times are the start, step and stop in s that it is to get: an archive of another tool, which may
+    leave them open, gets them here. variant names the structure of an archive that has several.
+    """
+    path = Path(path)
+    check_nature(path, "system")
+    if not is_archive(path):
+        if variant is not None:
+            raise InputError(f"{path}: variant = {variant!r}: only an .ssp may have variants")
+        return System(**read_toml(path, Path(fmus) if fmus else None, stimuli))
+    system: System = higher("ssp.from_archive").read_ssp(path, times, stimuli, variant)
+    return system
 
 
 def _of_parameters(system: System, name: str, table: Mapping[str, Any]) -> bool:
