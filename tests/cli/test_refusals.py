@@ -16,7 +16,7 @@ run --scheme euler :: 'euler' is not one of 'sequential', 'jacobi'
 run --set plant.object_width :: --set 'plant.object_width': must be PLACE=VALUE
 run --set plant.object_width=0.5 :: object_width = 0.5 m
 run --set plant.finger_mass[1]=-0.5 :: '-0.5': must be a finite number from 0.001 to 1000 kg
-run --set plant.mass=1 :: no input or parameter 'mass'; did you mean finger_mass[1]
+run --set plant.mass=1 :: no input, parameter or initial value 'mass'; did you mean finger_mass[1]
 run --set sensor_1.gap=0.01 :: sensor_1.gap has two sources, the connection and a value
 run --set scheme=jacobi :: --set scheme: no place in a system file; did you mean
 run --set components.plant.isolation=full :: isolation = 'full': must be one of none, process

@@ -183,7 +183,7 @@ def test_values_go_to_the_system_that_has_the_variable(system, tmp_path):
 REFUSED = [
     ({"rename": {"gap": "luft"}}, r"^rename: 'gap' = 'luft': c.fmu has no variable 'luft'"),
     ({"rename": {"luft": "gap"}}, r"^rename: 'luft' = 'gap': the original has no variable"),
-    ({"values": {"plant.widht": 1.0}}, r"^--set plant.widht: plant.fmu has no input or par"),
+    ({"values": {"plant.widht": 1.0}}, r"^--set plant.widht: plant.fmu has no input, param"),
     ({"values": {"plant.width": 2.0}}, r"width = 2.0: must be a finite number from 0 to 1 m"),
     ({"component": "hand"}, r"^--as hand: no component 'hand'; valid: plant, spring"),
     ({"candidate": "none.fmu"}, r"none.fmu: no such FMU file"),

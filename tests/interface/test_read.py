@@ -90,7 +90,7 @@ def same_as_fmpy(path):
     initially = {u.variable.name: names(u.dependencies) for u in theirs.initialUnknowns}
     inputs = tuple(v.name for v in theirs.modelVariables if v.causality == "input")
     for mine, his in zip(ours.variables, theirs.modelVariables, strict=True):
-        for key in ("name", "causality", "variability", "type", "unit", "start"):
+        for key in ("name", "causality", "variability", "initial", "type", "unit", "start"):
             assert getattr(mine, key) == getattr(his, key), his.name
         assert (mine.reference, mine.description) == (his.valueReference, his.description)
         assert (mine.shape, mine.display_unit) == (his.shape, his.displayUnit)
@@ -132,8 +132,9 @@ def test_all_of_a_small_one(write):
 def test_aliases_and_dimensions_of_fmi_3(write):
     path = write(FMI_3)
     everything, runs = describe(path), read_interface(path)
-    assert [v.name for v in everything.variables] == ["u", "y", "n", "v", "z"]
-    assert [v.name for v in runs.variables] == ["u", "y", "n", "z"]
+    assert [v.name for v in runs.variables] == ["u", "y", "n", "v", "z"]
+    assert [v.name for v in runs.of("input")] == ["u"]
+    assert runs.main_name("v") == "u"
     assert everything.by_name["v"].description == "again"
     assert everything.by_name["v"].unit == "m"
     assert runs.by_name["z"].shape == (3, 2)

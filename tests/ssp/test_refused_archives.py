@@ -126,7 +126,6 @@ def source(name, more=""):
 
 
 BINDINGS = {
-    "an output": given("y Real 1"),
     "real for integer": given("count Real 2.0"),
     "integer for boolean": given("active Integer 1"),
     "nan": given("length Real NaN"),

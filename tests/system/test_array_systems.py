@@ -62,7 +62,7 @@ MISTAKES = [
     ('"a.y -> b.u", "a.y[1] -> b.u[2]"', "", r"connection .*: b.u\[2\] has two sources"),
     ('"a.y_Boolean -> b.u_Int8"', "", r"a.y_Boolean\[1,1\] is Boolean and b.u_Int8\[1,1\] is Int8"),
     ("", "values = { u = [1, 2] }", r"a.u: u = \[1, 2\]: is \[2\]; must be \[3\], or a list"),
-    ("", "values = { m = 2, 'u[3]' = 1 }", r"no input or parameter 'u\[3\]'"),
+    ("", "values = { m = 2, 'u[3]' = 1 }", r"no input, parameter or initial value 'u\[3\]'"),
     (
         "",
         "values = { n = 2, 'A[1,1]' = 1 }",

@@ -79,7 +79,11 @@ def test_an_fmu_comes_with_its_names_and_units(grasp, fmus, tmp_path):
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        ("plant.object_widt", 1, ": GripperPlant.fmu has no input or parameter 'object_widt'; did"),
+        (
+            "plant.object_widt",
+            1,
+            ": GripperPlant.fmu has no input, parameter or initial value 'object_widt'; did",
+        ),
         ("plont.object_width", 1, ": no component 'plont'; did you mean plant?"),
         ("object_width", 1, ": no place in a system file; did you mean plant.object_width?"),
         ("scheme", "jacobi", ": no place in a system file; did you mean experiment.scheme?"),
@@ -176,7 +180,7 @@ def test_a_value_of_a_variable_that_is_not_there_is_left_out_and_said(vendor, tm
         "swap plant: bare.fmu has no parameter width: its value 0.07 is left out",
         "swap plant: bare.fmu has no parameter mass: its value 300.0 is left out",
     )
-    with pytest.raises(InputError, match=r"with_values plant.width: bare.fmu has no input or para"):
+    with pytest.raises(InputError, match=r"with_values plant.width: bare.fmu has no input, para"):
         swapped.with_values({"plant.width": 0.05})
 
 

@@ -156,10 +156,16 @@ def test_a_preset_that_is_not_there_names_those_that_are(load_with):
     ("value", "message"),
     [
         ('"ear.gain" = 1.0', r"\[presets.odd\] ear.gain: no component 'ear'; valid: eye, "),
-        ('"eye.gane" = 1.0', r"\[presets.odd\] eye.gane: .* no input or parameter 'gane'"),
+        (
+            '"eye.gane" = 1.0',
+            r"\[presets.odd\] eye.gane: .* no input, parameter or initial value 'gane'",
+        ),
         ('"eye.gain" = -1.0', r"\[presets.odd\] eye.gain.* = -1.0: must be "),
         ('"eye.adc.bits" = 1.5', r"\[presets.odd\] eye.adc.bits.* = 1.5: must be a whole number"),
-        ('"eye.intensity" = 1.0', r"\[presets.odd\] eye.intensity: .* no input or parameter"),
+        (
+            '"eye.intensity" = 1.0',
+            r"\[presets.odd\] eye.intensity: .* is an output that the FMU calculates",
+        ),
     ],
 )
 def test_a_preset_is_checked_where_it_is_used(load_with, value, message):

@@ -80,19 +80,16 @@ def real(text: str) -> float:
 
     ValueError where it is none; Python itself takes 1_0 for 10, and the digits of any script.
     """
-    return float(_plain(text))
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r}: must be a number")
+    return float(text)
 
 
 def integer(text: str) -> int:
     """Return the whole number that a text of a file stands for; ValueError as of real()."""
-    return int(_plain(text))
-
-
-def _plain(text: str) -> str:
-    text = text.strip()
     if "_" in text or not text.isascii():
-        raise ValueError(f"{text!r}: must be a number")
-    return text
+        raise ValueError(f"{text!r}: must be a whole number")
+    return int(text)
 
 
 def choice(place: str, value: Any, valid: Iterable[Any]) -> Any:

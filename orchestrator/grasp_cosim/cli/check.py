@@ -1,9 +1,6 @@
-"""The commands that check: inspect an FMU, qualify one for a place, compare and report runs."""
+"""The commands that check: qualify an FMU for a place, compare and report runs."""
 
-import shutil
-import sys
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +13,6 @@ from ..comparison.compare import compare as compare_runs
 from ..comparison.page import write_comparison, write_qualification
 from ..comparison.qualify import component_of
 from ..comparison.qualify import qualify as run_qualification
-from ..inspection import loading
-from ..inspection.inspection import as_text, inspect_fmu
 from ..interface.read import check_runs
 from ..report.page import write_report
 from ..system.description import FILES
@@ -45,31 +40,6 @@ from .options import (
     step_option,
     stop_option,
 )
-
-
-@click.command()
-@click.argument("fmu", type=PATH)
-@click.option("--load", is_flag=True, help="Try whether it loads, in a process of its own.")
-@json_option
-def inspect(fmu: Path, load: bool, as_json: bool) -> int:
-    """Show the interface of any FMU, and whether it loads here.
-
-    The command prints the capabilities and the variables, with units, ranges and dependencies. It
-    says whether this machine loads the FMU, as far as the file tells, why not, and the fix. None of
-    the FMU's code runs, unless --load tries. The exit code is 1 where it does not load.
-
-    \b
-    Example: grasp-cosim inspect vendor.fmu --load
-    """
-    report = inspect_fmu(fmu)
-    with waiting(f"examining {fmu}"):
-        findings = loading.examine(fmu, load)
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    text = f"{as_text(report, width)}\n\n{loading.as_text(findings, load)}"
-    verdict = {"loads": loading.loads(findings), "findings": [asdict(f) for f in findings]}
-    show(as_json, report | verdict, text)
-    return 0 if verdict["loads"] else NEGATIVE
-
 
 OF_CANDIDATE = ("rename", "units", "isolation")
 """Entries of its component that are those of the candidate."""

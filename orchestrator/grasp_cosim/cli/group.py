@@ -16,7 +16,7 @@ SECTIONS = {
     "Simulate": {"run": "run", "sweep": "run", "evaluate": "paper", "identify": "paper"},
     "Look at recorded runs": {"report": "check", "compare": "check"},
     "Make and check FMUs and systems": {
-        "init": "systems", "build": "make", "inspect": "check", "qualify": "check",
+        "init": "systems", "build": "make", "inspect": "fmu", "qualify": "check",
         "ssp": "systems",
     },
     "Hardware in the loop": {"proxy": "make", "serve": "bench", "relay": "bench"},

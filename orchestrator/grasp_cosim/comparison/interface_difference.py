@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from ..base.checks import is_number
 from ..base.errors import choices, nearest
-from ..interface.interface import SETTABLE, Interface, Value, Variable, as_float
+from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable, as_float
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion
 from ..system.changes import stated
@@ -95,7 +95,7 @@ def use_of(system: System, name: str) -> Use:
         own(port for c in system.connections for port in (c.source, c.target)),
         component.values,
         stated(system, name),
-        own(port for event in system.events for port in event.set),
+        own(p for event in system.events for port in event.set for p in system.elements(port)),
         in_seconds(component.step_ns or system.step_ns),
     )
 
@@ -169,7 +169,7 @@ def _changed(
         severity, text = _causality(old, new, use)
         yield Difference(severity, "causality", name, text, old.causality, new.causality)
     elif old.variability != new.variability:
-        severity = "notes" if old.settable and old.causality != "input" else "warns"
+        severity = "notes" if old.causality in PARAMETERS else "warns"
         text = f"is {new.variability} instead of {old.variability}"
         if name in use.tuned and new.variability in ("fixed", "constant"):
             severity = "blocks"

@@ -1,6 +1,6 @@
 """The self-description of any FMU: FMI 1.0, 2.0 or 3.0, from whichever tool."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -49,11 +49,7 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
         for key, value in report["default_experiment"].items()
         if value is not None
     ]
-    able = [
-        flag if value is True else f"{flag} = {_shown(value)}"
-        for flag, value in report["capabilities"].items()
-        if value
-    ]
+    able = list(_able(report["capabilities"]))
     platforms = ", ".join(report["platforms"]) or "none"
     head = {
         "model": _shown(report["model_name"]) or "not declared",
@@ -70,6 +66,14 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
     }
     lines = [f"{label:20s}{text}" for label, text in head.items()]
     return "\n".join([*lines, "", *_table([_row(v) for v in report["variables"]], width)])
+
+
+def _able(capabilities: Mapping[str, Any]) -> Iterator[str]:
+    """What the FMU is capable of; of a later kind what it does not share with the first one."""
+    for flag, value in capabilities.items():
+        name, _, later = flag.partition(" (")
+        if value and not (later and capabilities.get(name) == value):
+            yield flag if value is True else f"{flag} = {_shown(value)}"
 
 
 def _variable(v: Variable) -> dict[str, Any]:
@@ -95,38 +99,71 @@ def _variable(v: Variable) -> dict[str, Any]:
 
 
 def _row(v: Mapping[str, Any]) -> list[str]:
+    return [
+        _shown(v["name"]),
+        v["causality"],
+        v["variability"],
+        v["type"] + _shape(v),
+        _shown(v["unit"]),
+        _start(v),
+        _range(v),
+        _dependencies(v),
+        _shown(v["description"]),
+    ]
+
+
+def _start(v: Mapping[str, Any]) -> str:
+    """The start value; of an enumeration the name of the item."""
+    start = v["start"]
+    if not v["items"]:
+        return _shown(start)
+    names = {number: name for name, number in v["items"].items()}
+    if isinstance(start, list):
+        return _shown([names.get(value, value) for value in start])
+    return _shown(names.get(start, start))
+
+
+def _range(v: Mapping[str, Any]) -> str:
+    """The range of valid values; of an enumeration its items."""
+    if v["items"]:
+        return _shown(", ".join(v["items"]))
     low, high = _shown(v["min"]), _shown(v["max"])
-    range_ = f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}"
-    declared = "not declared" if v["dependencies"] is None else choices(v["dependencies"])
-    names = {number: name for name, number in (v["items"] or {}).items()}
-    start = v["start"] if isinstance(v["start"], list) else names.get(v["start"], v["start"])
-    cells = {
-        **v,
-        "type": v["type"] + _shape(v),
-        "start": [names.get(x, x) for x in start] if isinstance(start, list) else start,
-        "range": ", ".join(v["items"]) if v["items"] else range_ if low or high else "",
-        "dependencies": declared if v["causality"] == "output" else "",
-    }
-    return [_shown(cells[column]) for column in COLUMNS]
+    if low and high:
+        return f"{low} to {high}"
+    if low:
+        return f"from {low}"
+    return f"up to {high}" if high else ""
+
+
+def _dependencies(v: Mapping[str, Any]) -> str:
+    """What an output depends on directly."""
+    if v["causality"] != "output":
+        return ""
+    return "not declared" if v["dependencies"] is None else choices(v["dependencies"])
 
 
 def _shape(v: Mapping[str, Any]) -> str:
     """The shape of an array, like [3, 3] or, where variables hold the lengths, [n=3, m=2]."""
+    if not v["dimensions"]:
+        return ""
     lengths = [
         f"{name}={length}" if name else str(length)
         for name, length in zip(v["sizes"], v["dimensions"], strict=True)
     ]
-    return f"[{', '.join(lengths)}]" if lengths else ""
+    return f"[{', '.join(lengths)}]"
 
 
 def _shown(value: Any) -> str:
     """A value on one line, in few characters."""
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return " ".join(value.split())
     if isinstance(value, list):
         return choices(map(_shown, value), limit=8)
     if isinstance(value, bool):
         return str(value).lower()
-    text = f"{value:.15g}" if isinstance(value, float) else str("" if value is None else value)
-    return " ".join(text.split())
+    return f"{value:.15g}" if isinstance(value, float) else str(value)
 
 
 def _table(rows: list[list[str]], width: int | None) -> list[str]:

@@ -83,29 +83,26 @@ def unreadable(path: Path, error: Exception | str) -> InputError:
 
 def _parsed(text: bytes) -> ElementTree.Element:
     """The root; of all at once, since expat reads a long name anew with each piece."""
+    if text.count(b"<") - text.count(b"</") > MOST_ELEMENTS:  # as cheap as can be
+        raise ValueError(f"{NAME} has more than {MOST_ELEMENTS} elements")
     builder = ElementTree.TreeBuilder()
     parser = expat.ParserCreate(None, "}")
-    open_: list[str] = []
-    count = 0
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal count
-        count += 1
-        open_.append(tag)
-        if len(open_) > DEEPEST:
-            raise ValueError(f"{tag} in {NAME} is more than {DEEPEST} elements deep")
-        if count > MOST_ELEMENTS:
-            raise ValueError(f"{NAME} has more than {MOST_ELEMENTS} elements")
-        builder.start(tag, attributes)
-
-    def end(tag: str) -> None:
-        open_.pop()
-        builder.end(tag)
 
     def refuse(name: str, *_: Any) -> NoReturn:
         raise ValueError(f"{NAME} has a document type {name!r}, which may define entities")
 
-    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, refuse
     parser.Parse(text, True)
-    return builder.close()
+    root = builder.close()
+    _check_depth(root)
+    return root
+
+
+def _check_depth(root: ElementTree.Element) -> None:
+    """ValueError where elements are too deep within each other."""
+    level = [root]
+    for _ in range(DEEPEST):
+        level = [inner for element in level for inner in element]
+    if level:
+        raise ValueError(f"{level[0].tag} in {NAME} is more than {DEEPEST} elements deep")

@@ -9,7 +9,6 @@ from typing import Any
 from ..base.errors import InputError
 from .interface import (
     MOST_ELEMENTS,
-    SETTABLE,
     Array,
     Element,
     Given,
@@ -19,9 +18,6 @@ from .interface import (
     element_names,
     size_of,
 )
-
-FIRST = (*SETTABLE, "output")
-"""The causalities of arrays that are taken apart first; others have the room that is left."""
 
 Names = tuple[str, ...] | None
 
@@ -103,7 +99,8 @@ def _taken_apart(interface: Interface, shapes: Mapping[str, tuple[int, ...]]) ->
         v for v in interface.variables if v.shape and v.kind in ("Real", "Integer", "Boolean")
     ]
     apart, room = {}, MOST_ELEMENTS
-    for v in sorted(numbers, key=lambda v: v.causality not in FIRST):
+    numbers.sort(key=lambda v: not (v.settable or v.causality == "output"))  # what is most used
+    for v in numbers:
         shape, size = shapes[v.name], size_of(shapes[v.name])
         names = element_names(v.name, shape) if size <= room else ()
         if size <= room and interface.by_name.keys().isdisjoint(names):

@@ -4,11 +4,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 from pathlib import Path
 from shlex import quote
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 from ..base.checks import EXACT, integer, known, real
 from ..base.errors import InputError, choices
@@ -19,6 +19,7 @@ from .units import IDENTITY, Conversion, conversion
 Value = float | int | bool | str
 
 
+@runtime_checkable
 class Nested(Protocol):
     """An array like those of NumPy."""
 
@@ -90,6 +91,7 @@ def limits(fmi_type: str, version: str) -> tuple[float, float]:
     return _WHOLE.get(fmi_type, (-math.inf, math.inf))
 
 
+@cache  # of few types, for each of a great many variables
 def kind_of(fmi_type: str) -> Kind:
     """The kind that the system makes of an FMI type of any version."""
     if fmi_type.startswith(("Real", "Float")):
@@ -127,9 +129,12 @@ class Enumeration:
     items: tuple[tuple[str, int], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, unsafe_hash=True)  # to make a frozen one takes three times as long
 class Variable:
-    """A variable; unit, start, minimum, maximum, magnitude and initial are None if not declared.
+    """A variable; unit, start, minimum, maximum and magnitude are None if they are not declared.
+
+    initial is how its value at the start comes about: "exact", "approx" or "calculated", as the
+    standard derives it where it is not declared; None where the standard has none.
 
     type is the FMI type (Real, Float32, Int8, ...), kind what the system makes of it. start is its
     text, of an array that of all elements or, in starts, of each. minimum, maximum and magnitude,
@@ -195,8 +200,21 @@ class Variable:
 
     @property
     def settable(self) -> bool:
-        """True if it can be given a value."""
-        return self.causality in SETTABLE
+        """True if it can be given a value before the initialisation."""
+        if self.variability == "constant" and self.causality != "input":
+            return False
+        return self.causality in SETTABLE or self.initial in ("exact", "approx")
+
+    @property
+    def unsettable(self) -> str:
+        """Why it cannot be given a value, as the end of a sentence that begins with its name."""
+        if self.causality == "independent":
+            return "is the time of the FMU"
+        if self.variability == "constant":
+            return "is a constant of the FMU"
+        nouns = {"output": "an output", "calculatedParameter": "a calculated parameter"}
+        noun = nouns.get(self.causality, "a local variable")
+        return f"is {noun} that the FMU calculates from the start on"
 
     @property
     def supported(self) -> bool:
@@ -237,8 +255,8 @@ class ModelExchange:
 class Interface:
     """The interface of an FMU; guid is the instantiation token, tool what it was made with.
 
-    kinds are CoSimulation, ModelExchange, ScheduledExecution. capabilities are those that the first
-    kind declares and, where a later kind has another value, of that kind, 'FLAG (model exchange)'.
+    kinds are CoSimulation, ModelExchange, ScheduledExecution. capabilities are all of the first
+    kind, then all of a later one as 'FLAG (model exchange)'; see obstacles.capabilities_of().
     experiment is the default one: start_time, stop_time, tolerance and step_size, as typed() gives
     them. platforms are those it has a binary for, sources says that it has C. flaw is the first
     number that could not be read, for which no master takes the FMU. arrays are those that were
@@ -322,8 +340,58 @@ class Interface:
         return self.units.get(name) or known_unit(name)
 
     def of(self, *causalities: str) -> list[Variable]:
-        """The variables of the given causalities, in the order of declaration."""
-        return [v for v in self.variables if v.causality in causalities]
+        """The variables of the given causalities, in the order of declaration.
+
+        An input is there once, by its main name, as it has one source.
+        """
+        return [
+            v
+            for v in self.variables
+            if v.causality in causalities and not (v.alias and v.causality == "input")
+        ]
+
+    @cached_property
+    def main_names(self) -> Mapping[str, str]:
+        """The main names of variables and arrays that can be set, by other names of them.
+
+        FMI 3.0 declares such aliases; in FMI 2.0 variables of one value reference are the same one.
+        Among them the input is the main one, or a parameter, or else what is declared first.
+        """
+        three = self.version.startswith("3")
+        main: dict[tuple[int, str, int], Variable] = {}
+        names: dict[str, str] = {}
+        settable = [v for v in self.variables if v.settable]
+        settable.sort(key=lambda v: (v.causality != "input", v.causality not in PARAMETERS))
+        for v in settable:
+            place = v.element.place if v.element else 0
+            first = main.setdefault((v.reference, "" if three else v.kind, place), v)
+            if first is v:
+                continue
+            names[v.name] = first.name
+            if v.element and first.element:
+                names[v.element.array] = first.element.array
+        return names
+
+    def main_name(self, name: str) -> str:
+        """The main name of a variable or array."""
+        return self.main_names.get(name, name)
+
+    def by_main_names(
+        self, values: Mapping[str, Value], place: Callable[[str], str]
+    ) -> dict[str, Value]:
+        """Values by main names; InputError where two names of one variable have two values.
+
+        place says of a name where its value comes from.
+        """
+        named: dict[str, str] = {}
+        for name, value in values.items():
+            other = named.setdefault(self.main_name(name), name)
+            if values[other] != value:
+                raise InputError(
+                    f"{place(name)} = {value!r}: is another name of {other}, which is "
+                    f"{values[other]!r}; must have one value"
+                )
+        return {main: values[name] for main, name in named.items()}
 
     def conversion(self, name: str, other: "Interface") -> Conversion | None:
         """The conversion of a variable into the unit that `other` has it in; None for no way.
@@ -454,14 +522,19 @@ class Interface:
         With text, a string may stand for a number or a boolean, as on a command line.
         """
         variable = self.by_name.get(name)
-        if variable is None or not variable.settable:
+        if variable is None:
             settable = [v.name for v in self.variables if v.settable]
             if name in self.arrays:
                 first = choices(self.arrays[name].names[:1])
                 raise InputError(f"{place}: {name} is an array; must be an element of it: {first}")
-            said = f"{place}: {self.short} has no input or parameter"
-            known(said, name, settable, see=self.listing)
+            lacking = f"{place}: {self.short} has no input, parameter or initial value"
+            known(lacking, name, settable, see=self.listing)
             raise AssertionError(name)  # pragma: no cover
+        if not variable.settable:
+            raise InputError(
+                f"{place}: {name} = {value!r}: {variable.unsettable}; must be an input, a "
+                f"parameter, or a variable whose initial is exact or approx: {self.listing}"
+            )
         if not variable.supported:
             raise InputError(
                 f"{place}: {name} = {value!r}: {name} is of type {variable.nature}, which cannot "

@@ -29,6 +29,43 @@ NUMBERS = {
 }
 """The capabilities that are no booleans, with their types."""
 
+_OF_FMI_1 = (
+    "canHandleVariableCommunicationStepSize", "canHandleEvents", "canRejectSteps",
+    "canInterpolateInputs", "maxOutputDerivativeOrder", "canRunAsynchronuously",
+    "canSignalEvents", "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions",
+)  # fmt: skip
+_OF_FMI_2 = (
+    "needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canSerializeFMUstate",
+    "providesDirectionalDerivative",
+)  # fmt: skip
+_OF_FMI_3 = (
+    "needsExecutionTool", "canBeInstantiatedOnlyOncePerProcess", "canGetAndSetFMUState",
+    "canSerializeFMUState", "providesDirectionalDerivatives", "providesAdjointDerivatives",
+    "providesPerElementDependencies",
+)  # fmt: skip
+CAPABILITIES: Mapping[tuple[str, str], tuple[str, ...]] = {
+    ("1", "CoSimulation"): _OF_FMI_1,
+    ("1", "ModelExchange"): (),
+    ("2", "CoSimulation"): (
+        *_OF_FMI_2, "canHandleVariableCommunicationStepSize", "canInterpolateInputs",
+        "maxOutputDerivativeOrder", "canRunAsynchronuously",
+    ),
+    ("2", "ModelExchange"): (*_OF_FMI_2, "completedIntegratorStepNotNeeded"),
+    ("3", "CoSimulation"): (
+        *_OF_FMI_3, "canHandleVariableCommunicationStepSize", "fixedInternalStepSize",
+        "maxOutputDerivativeOrder", "recommendedIntermediateInputSmoothness",
+        "providesIntermediateUpdate", "mightReturnEarlyFromDoStep",
+        "canReturnEarlyAfterIntermediateUpdate", "hasEventMode", "providesEvaluateDiscreteStates",
+    ),
+    ("3", "ModelExchange"): (
+        *_OF_FMI_3, "needsCompletedIntegratorStep", "providesEvaluateDiscreteStates",
+    ),
+    ("3", "ScheduledExecution"): _OF_FMI_3,
+}  # fmt: skip
+"""The capabilities that the standard names, by version and kind of FMU."""
+
 RUN = ("CoSimulation", "ModelExchange")
 """The kinds that the master runs, the one it prefers first."""
 
@@ -66,16 +103,29 @@ def kinds_of(root: Element, major: str) -> dict[str, Element]:
     return {kind: element for kind, element in found.items() if element is not None}
 
 
-def capabilities_of(kinds: Mapping[str, Element]) -> dict[str, Value | None]:
-    """Flag to value, as far as declared; where a later kind differs it has an entry of its own."""
-    found: dict[str, Value | None] = {}
+def capabilities_of(kinds: Mapping[str, Element], major: str) -> dict[str, Value | None]:
+    """All capabilities of the kinds; one that is not declared has the standard's default value.
+
+    Those of the first kind are under their names, those of a later one as 'FLAG (model exchange)'.
+    """
+    capabilities: dict[str, Value | None] = {}
     first = next(iter(kinds), "")
     for kind, element in kinds.items():
-        for flag, text in element.attrib.items():
-            value = typed(NUMBERS.get(flag, "Boolean"), text)
-            if flag != "modelIdentifier" and found.get(flag) != value:
-                found[flag if kind == first else f"{flag} ({KINDS[kind]})"] = value
-    return found
+        named = dict.fromkeys(CAPABILITIES.get((major, kind), ()))
+        for flag in named | element.attrib:
+            if flag == "modelIdentifier":
+                continue
+            text = element.get(flag)
+            value = _default(flag) if text is None else typed(NUMBERS.get(flag, "Boolean"), text)
+            capabilities[flag if kind == first else f"{flag} ({KINDS[kind]})"] = value
+    return capabilities
+
+
+def _default(flag: str) -> Value | None:
+    """The value of a capability that is not declared; None for a step that is not fixed."""
+    if flag not in NUMBERS:
+        return False
+    return 0 if NUMBERS[flag] == "Integer" else None
 
 
 def this_machine(version: str) -> str:

@@ -7,14 +7,15 @@ read_interface() refuses the FMU, but describe() does not.
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from ..base.checks import real
+from ..base.checks import integer, real
+from ..base.collector import without_collector
 from ..base.errors import InputError
 from ..base.files import check_fmu_file
 from ..base.si_units import BASE, Unit, known_unit
@@ -27,6 +28,7 @@ from .interface import (
     Enumeration,
     Interface,
     ModelExchange,
+    Value,
     Variable,
     kind_of,
     limits,
@@ -35,7 +37,6 @@ from .interface import (
 from .obstacles import capabilities_of, kinds_of, of_binary, of_kind, platform_of
 
 NUMERIC = ("Real", "Integer")
-WHOLE = re.compile(r"\s*[+-]?[0-9]+\s*")
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 """Characters that end a line of a message or table, or move the cursor of a terminal."""
 LONGEST_NAME = 2000
@@ -53,25 +54,18 @@ Names = tuple[str, ...] | None
 
 
 def read_interface(path: Path) -> Interface:
-    """The interface of the FMU at `path`, for a master; InputError where it cannot run it.
-
-    An input has one source, so its aliases are left out.
-    """
-    if not path.is_file():  # which is asked some hundred times a run
-        check_fmu_file(path)
-    found = path.stat()
-    return _for_master(path, (found.st_dev, found.st_ino, found.st_mtime_ns))
+    """The interface of the FMU at `path`, for a master; InputError where it cannot run it."""
+    return _for_master(path, _identity(path))
 
 
 @lru_cache(maxsize=64)
 def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
-    found = describe(path)
+    found = _described(path, identity)
     if obstacle := of_kind(found):
         raise InputError(f"{path}: {obstacle}")
     if found.flaw:
         raise unreadable(path, found.flaw)
-    sources = tuple(v for v in found.variables if not (v.alias and v.causality == "input"))
-    return replace(found, variables=sources, path=path.resolve(), given=path)
+    return replace(found, path=path.resolve(), given=path)
 
 
 def check_runs(path: Path) -> None:
@@ -86,6 +80,24 @@ def describe(path: Path) -> Interface:
 
     InputError where there is no FMU, or what it declares makes no sense.
     """
+    return _described(path, _identity(path))
+
+
+def _identity(path: Path) -> tuple[int, ...]:
+    """What tells the file at `path` from one that was there before; InputError if it is no FMU."""
+    if not path.is_file():  # which is asked some hundred times a run
+        check_fmu_file(path)
+    file = path.stat()
+    return file.st_dev, file.st_ino, file.st_mtime_ns
+
+
+@lru_cache(maxsize=64)
+def _described(path: Path, identity: tuple[int, ...]) -> Interface:
+    with without_collector():
+        return _read(path)
+
+
+def _read(path: Path) -> Interface:
     root, files = read_document(path)
     version = root.get("fmiVersion", "")
     try:
@@ -112,7 +124,7 @@ def describe(path: Path) -> Interface:
         version=version,
         units=units,
         kinds=tuple(kinds),
-        capabilities=capabilities_of(kinds),
+        capabilities=capabilities_of(kinds, reader.major),
         experiment={key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
         platforms=_platforms(files),
         sources=any(re.match(r"sources/.*\.c(c|pp|xx)?$", name) for name in files),
@@ -148,9 +160,11 @@ class _Reader:
             _whole(f"variable {_name(e)!r}: valueReference", e.get("valueReference"), 2**32 - 1)
             for e in self.elements
         ]
+        self.typed = [self.with_type(e) for e in self.elements]
         self.check_references()
         keys = self.references if major == "3" else range(1, len(self.elements) + 1)
         self.places = dict(zip(keys, self.elements, strict=True))
+        self.names = {str(key): _name(e) for key, e in self.places.items()}
         types = {n: t for t in root.iterfind("TypeDefinitions/*") if (n := t.get("name"))}
         self.types = types if major == "3" else {n: t[0] for n, t in types.items() if len(t)}
         self.enumerations = {name: self.enumeration(name, t) for name, t in self.types.items()}
@@ -161,12 +175,14 @@ class _Reader:
         In FMI 2.0 such are two names of one, and a flaw where an input could be set by both.
         """
         seen: dict[tuple[int, str], tuple[str, str | None]] = {}
-        for element, reference in zip(self.elements, self.references, strict=True):
+        for element, value, reference in zip(
+            self.elements, self.typed, self.references, strict=True
+        ):
             key, name, causality = (reference, ""), _name(element), element.get("causality")
             if self.major != "3":
                 if causality not in SETTABLE:
                     continue
-                key = (reference, next((kind_of(e.tag) for e in element if e.tag in TYPES), ""))
+                key = (reference, "" if value is None else kind_of(value.tag))
             if key in seen:
                 other, its = seen[key]
                 text = f"{other!r} and {name!r} have the valueReference {reference} both"
@@ -175,6 +191,15 @@ class _Reader:
                 if "input" in (causality, its):
                     self.flaws.append(f"variables {text}; one of them at most may be set")
             seen[key] = (name, causality)
+
+    def with_type(self, element: Element) -> Element | None:
+        """The element that says the type of a variable: in FMI 3.0 its own, else one within it."""
+        if self.major == "3":
+            return element if element.tag in TYPES_3 else None
+        for inner in element:
+            if inner.tag in TYPES:
+                return inner
+        return None
 
     @contextmanager
     def tolerated(self) -> Iterator[None]:
@@ -216,24 +241,30 @@ class _Reader:
         now, initially = self.unknowns("Output"), self.unknowns("InitialUnknown")
         inputs = tuple(_name(e) for e in self.elements if e.get("causality") == "input")
         initially = {name: inputs if n is None else n for name, n in initially.items()}
-        found = [
-            self.variable(e, reference, now.get(_name(e)), initially.get(_name(e)))
-            for e, reference in zip(self.elements, self.references, strict=True)
+        parts = zip(self.elements, self.typed, self.references, strict=True)
+        variables = [
+            self.variable(e, value, reference, now.get(name), initially.get(name))
+            for (e, value, reference), name in zip(parts, self.names.values(), strict=True)
         ]
-        found += [
-            replace(
-                v,
-                name=_name(e),
-                description=e.get("description") or v.description,
-                display_unit=e.get("displayUnit") or v.display_unit,
-                alias=True,
-            )
-            for v, element in zip(found, self.elements, strict=True)
-            for e in element.iterfind("Alias")
-        ]
-        names = Counter(_printable("variable", v.name) for v in found)
+        if self.major == "3":
+            variables += list(self.aliases(variables))
+        names = Counter(v.name for v in variables)
         self.ambiguous = tuple(name for name, count in names.items() if count > 1)
-        return tuple(v for v in found if v.name not in self.ambiguous)
+        if not self.ambiguous:
+            return tuple(variables)
+        return tuple(v for v in variables if names[v.name] == 1)
+
+    def aliases(self, variables: Sequence[Variable]) -> Iterator[Variable]:
+        """The other names of variables, which stand within their elements."""
+        for v, element in zip(variables, self.elements, strict=True):
+            for alias in element.iterfind("Alias"):
+                yield replace(
+                    v,
+                    name=_printable("variable", _name(alias)),
+                    description=alias.get("description") or v.description,
+                    display_unit=alias.get("displayUnit") or v.display_unit,
+                    alias=True,
+                )
 
     def unknowns(self, group: str) -> dict[str, Names]:
         """By name of an unknown what it depends on; FMI 1.0 has that at its variables."""
@@ -249,10 +280,12 @@ class _Reader:
             key, way = "valueReference", group
 
         def called(place: str, text: str | None) -> str:
-            found = self.places.get(_whole(place, text))
-            if found is None:
+            if text in self.names:
+                return self.names[text]
+            element = self.places.get(_whole(place, text))
+            if element is None:
                 raise ValueError(f"{place} = {text!r}: must be the {key} of a variable")
-            return _name(found)
+            return _name(element)
 
         found: dict[str, Names] = {}
         entries = self.root.findall(f"ModelStructure/{way}")
@@ -266,56 +299,96 @@ class _Reader:
             found[name] = None if parts is None else tuple(called(place, t) for t in parts)
         return found
 
-    def variable(self, element: Element, reference: int, now: Names, initially: Names) -> Variable:
-        """One variable, which depends on others now and in initialisation mode."""
-        name, types = _name(element), TYPES_3 if self.major == "3" else TYPES
+    def variable(
+        self,
+        element: Element,
+        value: Element | None,
+        reference: int,
+        now: Names,
+        initially: Names,
+    ) -> Variable:
+        """One variable, whose type is in value; it depends on others now and in initialisation."""
+        name = _name(element)
         place = f"variable {name!r}"
-        value = element if self.major == "3" else next((e for e in element if e.tag in types), None)
-        if value is None or value.tag not in types:
+        if value is None:
+            types = TYPES_3 if self.major == "3" else TYPES
             raise ValueError(f"{place}: has no type; must be one of {', '.join(types)}")
-        kind = kind_of(value.tag)
-        type_name = value.get("declaredType", "")
+        kind, attributes = kind_of(value.tag), value.attrib
+        type_name = attributes.get("declaredType", "")
         declared = self.types.get(type_name)
-        sources = (element, value) if declared is None else (declared, element, value)
-        said = {key: text for e in sources for key, text in e.attrib.items() if text}
-        bounds = {k: said[k] for k in ("min", "max", "nominal") if k in said and kind in NUMERIC}
-        for key, text in bounds.items():
-            with self.tolerated():
-                _real(f"{place}: {key}", text)
+        if declared is not None:
+            stated = {key: text for key, text in attributes.items() if text}
+            attributes = {**declared.attrib, **stated}
+        low = high = nominal = None
+        if kind in NUMERIC:
+            low, high, nominal = self.bounds(place, value.tag, attributes)
         causality, variability = self.nature(element, kind)
-        starts = tuple(e.get("value", "") for e in element.iterfind("Start"))
         start = value.get("start")
+        starts: tuple[str, ...] = ()
+        shape: tuple[int, ...] = ()
+        sizes: tuple[str | None, ...] = ()
+        if self.major == "3" and len(element):
+            starts = tuple(e.get("value", "") for e in element.iterfind("Start"))
+            dimensions = [self.dimension(place, e) for e in element.iterfind("Dimension")]
+            shape = tuple(size for size, _ in dimensions)
+            sizes = tuple(holder for _, holder in dimensions)
         if self.major == "3" and kind in ("String", "Binary"):
             start = starts[0] if starts else None
         if kind in NUMERIC and start is not None:
-            with self.tolerated():
-                for text in start.split() if element.find("Dimension") is not None else [start]:
-                    self.check_start(f"{place}: start", value.tag, text)
-        is_enumeration = value.tag == "Enumeration"
-        dimensions = [self.dimension(place, e) for e in element.iterfind("Dimension")]
+            texts = start.split() if shape else (start,)
+            self.check_starts(f"{place}: start", value.tag, texts)
         return Variable(
             name,
             kind,
             causality,
             reference,
-            said.get("unit"),
+            attributes.get("unit") or None,
             start,
-            typed(value.tag, bounds.get("min")),
-            typed(value.tag, bounds.get("max")),
+            low,
+            high,
             value.tag,
             variability=variability,
             dependencies=now,
             initial_dependencies=initially,
-            shape=tuple(size for size, _ in dimensions),
-            sizes=tuple(holder for _, holder in dimensions),
+            shape=shape,
+            sizes=sizes,
             description=element.get("description"),
-            magnitude=typed(value.tag, bounds.get("nominal")),
-            relative=said.get("relativeQuantity") in ("true", "1"),
-            enumeration=self.enumerations.get(type_name) if is_enumeration else None,
-            initial=element.get("initial"),
-            display_unit=said.get("displayUnit"),
+            magnitude=nominal,
+            relative=attributes.get("relativeQuantity") in ("true", "1"),
+            enumeration=self.enumerations.get(type_name) if value.tag == "Enumeration" else None,
+            initial=self.initial(element, causality, variability),
+            display_unit=attributes.get("displayUnit") or None,
             starts=starts,
         )
+
+    def bounds(
+        self, place: str, fmi_type: str, attributes: Mapping[str, str]
+    ) -> Iterator[Value | None]:
+        """Smallest, largest and nominal value of a variable; what is no number is a flaw."""
+        for key in ("min", "max", "nominal"):
+            text = attributes.get(key)
+            value = typed(fmi_type, text) if text else None
+            if isinstance(value, str):
+                with self.tolerated():
+                    _real(f"{place}: {key}", value)
+            yield value
+
+    def initial(self, element: Element, causality: str, variability: str) -> str | None:
+        """How the value at the start comes about, by the tables of the standard where it is not
+        declared (2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0); None where these have none.
+        """
+        declared = element.get("initial")
+        if declared or self.major == "1" or causality == "independent":
+            return declared
+        return "exact" if causality in SETTABLE or variability == "constant" else "calculated"
+
+    def check_starts(self, place: str, fmi_type: str, texts: Iterable[str]) -> None:
+        """Have a start value that is no number of its type be a flaw."""
+        try:
+            for text in texts:
+                self.check_start(place, fmi_type, text)
+        except ValueError as error:
+            self.flaws.append(str(error))
 
     def check_start(self, place: str, fmi_type: str, text: str) -> None:
         """ValueError where a start value is no number of its type."""
@@ -409,9 +482,12 @@ def _real(place: str, text: str) -> float:
 
 def _whole(place: str, text: str | None, high: int | None = None) -> int:
     """The whole number in a text, from 0 to high where that is given."""
-    if text is not None and WHOLE.fullmatch(text):
-        with suppress(ValueError):  # of a great many digits
-            number = int(text)
+    if text is not None:
+        try:
+            number = integer(text)
+        except ValueError:
+            pass
+        else:
             if high is None or 0 <= number <= high:
                 return number
     must = "a whole number" + ("" if high is None else f" from 0 to {high}")

@@ -19,9 +19,11 @@ import numpy.typing as npt
 
 from ..base.checks import exact
 from ..fmi.instance import Instance
-from ..interface.interface import Value, Variable
+from ..interface.expansion import values_of
+from ..interface.interface import Given, Value, Variable
 from ..system.description import System
 from ..system.faults import FAULTS, INITIAL, Act, Draws
+from ..system.names import main_port
 from ..system.parts import Condition, Event, Fault, Port, literal
 from ..system.scenario import check_setting
 from ..system.times import Time, first_step, seconds
@@ -120,14 +122,15 @@ class Scenario:
         """The first step from this one on at which something may be due."""
         return min((once.due(step) for once in self._pending), default=math.inf)
 
-    def set(self, name: str, value: Value, step: int) -> None:
-        """Set what an event could set, now, at communication point step.
+    def set(self, name: str, value: Given, step: int) -> None:
+        """Set what an event could set, now, at communication point step; of an array also all.
 
         InputError where there is none of that name, or where the value does not fit;
         SimulationError where the component refuses it.
         """
         component, _, variable = name.partition(".")
-        port, place = Port(component, variable), f"set: {name}"
+        interfaces = {n: instance.interface for n, instance in self._instances.items()}
+        port, place = main_port(interfaces, Port(component, variable)), f"set: {name}"
         if port not in self._settable:
             check_setting(self._system, port, value, place)
             self._settable.add(port)
@@ -161,14 +164,15 @@ class Scenario:
         placed: dict[int, float] = {}
         for port, value in event.set.items():
             interface = self._instances[port.component].interface
-            parsed = interface.parse(place, port.variable, value)
-            if port in self._passed:
-                exact(f"{place}: {port}", parsed)
-                placed[self._slots[port]] = float(parsed)
-            else:
-                variables, given = calls.setdefault(port.component, ([], []))
-                variables.append(interface.by_name[port.variable])
-                given.append(parsed)
+            for name, parsed in values_of(interface, place, port.variable, value).items():
+                element = Port(port.component, name)
+                if element in self._passed:
+                    exact(f"{place}: {element}", parsed)
+                    placed[self._slots[element]] = float(parsed)
+                else:
+                    variables, given = calls.setdefault(port.component, ([], []))
+                    variables.append(interface.by_name[name])
+                    given.append(parsed)
         reason = f" ({event.when})" if event.when else ""
         lines = [f"{port} = {literal(value)}{reason}" for port, value in event.set.items()]
 

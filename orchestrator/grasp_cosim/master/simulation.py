@@ -17,7 +17,7 @@ from ..base.text import counted
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener
 from ..fmi.process import load
-from ..interface.interface import Value
+from ..interface.interface import Given
 from ..metrics.in_si import in_si
 from ..metrics.metric import (
     Function,
@@ -247,9 +247,10 @@ class Session:
         value = float(self._master.values[slots[port]])
         return texts[port].listed[int(value)] if port in texts else value
 
-    def set(self, name: str, value: Value) -> None:
-        """Set a tunable parameter or an input without a connection, from now on.
+    def set(self, name: str, value: Given) -> None:
+        """Set a tunable parameter or an input without a connection, or a whole array of such.
 
+        It has the value from now on.
         InputError where there is none of that name, or where the value does not fit; errors of
         FMUs as of step().
         """

@@ -200,10 +200,9 @@ def _connections(network: Connectors, called: Mapping[Path, Called]) -> Iterator
             continue
         hops = network.trace(target)
         carried = _carried(network, hops)
-        source, sink = (
-            Port(called[node.path].name, called[node.path].names[node.name])
-            for node in (hops[0].source, target)
-        )
+        first, last = hops[0].source, called[target.path]
+        source = Port(called[first.path].name, called[first.path].names[first.name])
+        sink = Port(last.name, last.names[last.part.interface.main_name(target.name)])
         if network.decided_by_units(hops, carried):
             yield Connection(source, sink)
         else:
@@ -246,7 +245,8 @@ def _components(
     """The components with the archive's values, and start values of inputs not among sourced."""
     settings = read_settings(network)
     for path, (name, names, units, beside, part) in called.items():
-        values = {names[own]: value for own, value in settings.get(path, {}).items()}
+        set_here = part.interface.by_main_names(settings.get(path, {}), f"{file}: {name}.".__add__)
+        values = {names[own]: value for own, value in set_here.items()}
         solver = beside.solver
         if part.element.exchange and "CoSimulation" in part.interface.kinds:
             solver = solver or Solver()

@@ -3,7 +3,8 @@
 As the standard has it: names in the sets are those of variables, after those of the elements they
 are in and a dot, or those of connectors of a system, from which the value follows the connections.
 With a mapping only what is mapped is applied. Later bindings go before earlier ones, those of an
-outer system before those of an inner one. What fits nothing is not applied, and said.
+outer system before those of an inner one. What fits nothing is not applied, and said; so is a value
+for what an FMU calculates itself, or for a constant.
 
 A connection that brings a value goes before all bindings at where it leads to. SSP 1.0.1 says that
 bindings set start values (5.2.3, ParameterBindings), and that of the data flow along connections
@@ -21,7 +22,7 @@ from typing import Any
 from ..base.checks import known
 from ..base.errors import InputError, choices
 from ..base.si_units import Unit
-from ..interface.interface import SETTABLE, Value
+from ..interface.interface import Value
 from .connectors import OTHERWISE, Carried, Connectors
 from .document import Origin, at, child, children, is_true, same, short
 from .elements import Element, Hop, Node, Path, linear, transformation
@@ -75,6 +76,10 @@ def read_settings(network: Connectors, causality: str = "") -> dict[Path, dict[s
     for end, parameter in _settled(network):
         variable = network.parts[end.path].interface.by_name.get(end.name)
         if causality and (variable is None or variable.causality != causality):
+            continue
+        if variable is not None and not variable.settable:
+            text = f"{end} {variable.unsettable}; not used"
+            parameter.origin.notes.add(parameter.place, text)
             continue
         value, source = _value(network, end, parameter), network.output(end)
         if source:
@@ -246,10 +251,6 @@ def _mapped(given: Parameter, element: Any) -> Parameter:
 def _value(network: Connectors, node: Node, given: Parameter) -> Value:
     part = network.parts[node.path]
     variable = part.interface.by_name[node.name]
-    if variable.causality not in SETTABLE:
-        raise InputError(
-            f"{given.place}: {node} is {variable.causality}; only inputs and parameters are set"
-        )
     fits = given.type == variable.kind or (given.type, variable.kind) == ("Integer", "Real")
     if not fits and not (given.type == "Enumeration" and variable.items):
         said = f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"

@@ -40,7 +40,8 @@ def with_given(
         own = values_of(component.interface, place(name), name, value, text)
         component = replace(component, values={**component.values, **own})
     interface = component.interface
-    arrays = [before.arrays[name] for name in given if name in before.arrays]
+    names = map(before.main_name, given)
+    arrays = [before.arrays[name] for name in names if name in before.arrays]
     dropped = {element for array in arrays for element in array.names}
     values = {name: value for name, value in component.values.items() if name not in dropped}
     for lost in values:
@@ -51,10 +52,11 @@ def with_given(
                 f"{place(name)} = {value!r}: there is then no {lost}, which has a value; {array} "
                 "must be given anew, too"
             )
+    new: dict[str, Value] = {}
     for name, value in given.items():
         if name not in sizes:
-            values |= values_of(interface, place(name), name, value, text)
-    return replace(component, values=values)
+            new |= values_of(interface, place(name), name, value, text)
+    return replace(component, values=values | interface.by_main_names(new, place))
 
 
 def replaced(
@@ -97,14 +99,17 @@ def with_old_values(
     arrays = before.arrays
     anew = {v for name in anew for v in (arrays[name].names if name in arrays else (name,))}
     _check_ends(system, was, after, place)
-    given = {name: value for name, value in was.values.items() if name in after.by_name}
+    given = {
+        name: value
+        for name, value in was.values.items()
+        if name in after.by_name and after.by_name[name].settable
+    }
     kept = {name: value for name, value in given.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:
         if reason := _lost(before, after, name, name in kept):
             raise InputError(f"{place}: {name} {reason}")
     notes = [
-        f"{place}: {now.fmu.name} has no {before.by_name[name].causality} {name}: its value "
-        f"{literal(value)} is left out"
+        f"{place}: {_no_place(before, now, name)}: its value {literal(value)} is left out"
         for name, value in was.values.items()
         if name not in given
     ]
@@ -128,6 +133,14 @@ def with_old_values(
                 f"{choices(new)}"
             )
     return replace(now, values=given), notes
+
+
+def _no_place(before: Interface, now: Component, name: str) -> str:
+    """Why a value of the former FMU cannot be given to the new one."""
+    variable = now.interface.by_name.get(name)
+    if variable is None:
+        return f"{now.fmu.name} has no {before.by_name[name].causality} {name}"
+    return f"{name} {variable.unsettable}, {now.fmu.name}"
 
 
 def _check_ends(system: Structure, was: Component, after: Interface, place: str) -> None:
@@ -156,7 +169,8 @@ def stated(system: Structure, name: str) -> frozenset[str]:
         if (c.factor, c.offset) != (None, None) or c.target in faulty
     ]
     for event in system.events:
-        ports += event.set
+        for port in event.set:
+            ports += system.elements(port)
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
     ports += [condition.port for condition in conditions if condition]
     columns = system.input.columns if system.input else {}

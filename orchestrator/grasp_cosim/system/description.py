@@ -10,6 +10,7 @@ from ..base.errors import InputError, nearest
 from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
+from .names import in_main_names
 from .native import natives
 from .parts import Component
 from .record import Record
@@ -41,6 +42,8 @@ class System(Structure):
 
     def __post_init__(self) -> None:
         check_steps(self)
+        for name, part in in_main_names(self).items():
+            object.__setattr__(self, name, part)
         connections = by_element(self.name, self.components, self.connections)
         object.__setattr__(self, "connections", connections)
         for component in self.components:

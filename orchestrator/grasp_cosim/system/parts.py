@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 from ..base.checks import choice, number, whole
 from ..base.errors import InputError
 from ..interface.expansion import expanded
-from ..interface.interface import Interface, Value
+from ..interface.interface import Given, Interface, Nested, Value
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from .times import LONGEST, NANOSECONDS, Time, in_seconds
@@ -29,11 +29,18 @@ FINEST, COARSEST = 1e-13, 0.1
 """Relative tolerances of a solver: beyond the first one there is rounding alone."""
 
 
-def literal(value: Value) -> str:
-    """A value as the system file writes it."""
+def literal(value: Given) -> str:
+    """A value, or those of an array, as the system file writes it."""
+    if not isinstance(value, float | int | bool | str):
+        return f"[{', '.join(map(literal, as_lists(value)))}]"
     if isinstance(value, bool):
         return str(value).lower()
     return float.__repr__(value) if isinstance(value, float) else repr(value)
+
+
+def as_lists(given: Given) -> Any:
+    """A value as it is, and those of an array as lists, which fit into JSON."""
+    return given.tolist() if isinstance(given, Nested) else given
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,14 +201,14 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Sets tunable parameters or unconnected inputs, once, before the step from a moment.
+    """Sets tunable parameters or unconnected inputs, also whole arrays, once, before a step.
 
-    That is the first communication point at or after at_ns, or the first one where the condition
-    holds; exactly one of the two is given. Of components with a step of their own only their own
-    points count.
+    The step begins at the first communication point at or after at_ns, or the first one where the
+    condition holds; exactly one of the two is given. Of components with a step of their own only
+    their own points count.
     """
 
-    set: Mapping[Port, Value]
+    set: Mapping[Port, Given]
     at_ns: Time | None = None
     when: Condition | None = None
 

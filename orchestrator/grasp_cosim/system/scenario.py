@@ -22,9 +22,9 @@ from ..base.checks import (
 )
 from ..base.errors import InputError, choices, nearest
 from ..interface.expansion import values_of
-from ..interface.interface import Value
+from ..interface.interface import SETTABLE, Given, Interface, Value, Variable
 from .faults import FAULTS, RANDOM
-from .parts import RELATIONS, Condition, Connection, Event, Fault, Port, as_port
+from .parts import RELATIONS, Condition, Connection, Event, Fault, Port, as_lists, as_port
 from .structure import Structure
 from .times import Time, first_step, in_nanoseconds, in_seconds, seconds, written
 from .validity import driven
@@ -72,7 +72,7 @@ def event_entry(event: Event) -> dict[str, Any]:
     """The entry that reads as this event; it fits into JSON."""
     at = {} if event.at_ns is None else {"at": in_seconds(event.at_ns)}
     when = {"when": str(event.when)} if event.when else {}
-    return {**at, **when, "set": {str(port): value for port, value in event.set.items()}}
+    return {**at, **when, "set": {str(port): as_lists(v) for port, v in event.set.items()}}
 
 
 def fault_entry(fault: Fault) -> dict[str, Any]:
@@ -154,33 +154,48 @@ def check_scenario(system: Structure) -> None:
         _check_fault(system, fault, f"{system.name}: faults[{i}]")
 
 
-def _settable(system: Structure) -> list[Port]:
-    """Return the ports an event may set: tunable parameters and inputs without a source."""
+def _settable(system: Structure) -> dict[Port, Variable]:
+    """The ports an event may set: tunable parameters and inputs without a source."""
     connected = {*(connection.target for connection in system.connections), *driven(system)}
-    return [
-        port
+    return {
+        port: v
         for component in system.components
         for v in component.interface.of("input", "parameter")
         if v.supported
         and (port := Port(component.name, v.name)) not in connected
         and (v.causality == "input" or v.variability == "tunable")
-    ]
+    }
 
 
-def check_setting(system: Structure, port: Port, value: Value, place: str) -> None:
-    """InputError where the value cannot be set at the port during a run."""
+def check_setting(system: Structure, port: Port, value: Given, place: str) -> dict[Port, Value]:
+    """The value that is set at a port in the run, of a whole array those of its elements.
+
+    InputError where it cannot be set then.
+    """
     interface = system.component(port.component, place).interface
     settable = _settable(system)
-    if port not in settable:
-        v = interface.by_name.get(port.variable)
-        found = f"is a {v.variability} {v.causality}" if v else "not there"
+    if not settable.keys() >= {*system.elements(port)}:
         own = [p for p in settable if p.component == port.component]
         raise InputError(
-            f"{place}: {found}; must be a tunable parameter, or an input without a column or a "
-            "connection, on which a fault of kind 'stuck' puts a value; "
+            f"{place}: {_why_not(interface, port)}; must be a tunable parameter, or an input "
+            "without a column or a connection, on which a fault of kind 'stuck' puts a value; "
             f"{nearest(port, own or settable, interface.listing)}"
         )
-    values_of(interface, place, port.variable, value)
+    values = values_of(interface, place, port.variable, value)
+    return {Port(port.component, name): v for name, v in values.items()}
+
+
+def _why_not(interface: Interface, port: Port) -> str:
+    """Why a variable, or a whole array, cannot be set in the run."""
+    v = interface.sample(port.variable)
+    if v is None:
+        return "not there"
+    if v.causality == "structuralParameter":
+        return "is a structural parameter: it decides on sizes, and is set before the run alone"
+    nature = f"is a {v.variability} {v.causality}"
+    if v.causality not in SETTABLE and v.settable:
+        return f"{nature}: its initial value is set before the run alone"
+    return nature
 
 
 def _check_condition(system: Structure, condition: Condition | None, place: str) -> None:

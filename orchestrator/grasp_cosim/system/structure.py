@@ -121,6 +121,13 @@ class Structure:
         own = self.component(name, name).step_ns
         return 1 if own is None else int(own // self.step_ns)
 
+    def elements(self, port: Port) -> tuple[Port, ...]:
+        """The ports of the elements of a whole array; that of any other variable alone."""
+        array = self.component(port.component, port).interface.arrays.get(port.variable)
+        if array is None:
+            return (port,)
+        return tuple(Port(port.component, name) for name in array.names)
+
     def component(self, name: str, place: object) -> Component:
         """The component of that name; place says who asks, for the error message."""
         if name not in self.by_name:

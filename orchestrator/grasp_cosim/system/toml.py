@@ -26,7 +26,6 @@ from ..base.checks import (
     toml_table,
 )
 from ..base.errors import InputError, nearest
-from ..interface.interface import SETTABLE
 from ..interface.read import read_interface
 from .changes import replaced, with_given, with_old_values
 from .parts import ISOLATIONS, Component, Connection, Initialisation, Realtime, Solver, as_port
@@ -255,8 +254,13 @@ def as_file(system: Structure, settings: Mapping[str, Any], place: Place) -> dic
     for key, value in settings.items():
         if "." not in key:
             entries = [f"{section}.{e}" for section, found in PLACES.items() for e in found]
-            of = [(c.name, v) for c in system.components for v in c.interface.of(*SETTABLE)]
-            near = nearest(key, entries + [f"{name}.{v.name}" for name, v in of])
+            values = [
+                f"{c.name}.{v.name}"
+                for c in system.components
+                for v in c.interface.variables
+                if v.settable
+            ]
+            near = nearest(key, entries + values)
             raise InputError(f"{place(key)}: no place in a system file; {near}")
         *tables, name = place_of(names, key, place(key))
         table = root

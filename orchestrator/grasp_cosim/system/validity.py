@@ -124,6 +124,8 @@ def check_arrays(system: Structure) -> None:
     for c in system.components:
         given = {*c.values, *(p.variable for p in stimuli if p.component == c.name)}
         for name, whole in c.interface.arrays.items():
+            if name in c.interface.main_names:
+                continue
             silent = [n for n in whole.names if c.interface.by_name[n].start is None]
             missing = [n for n in silent if n not in given and n not in fed[c.name]]
             if missing and not given.isdisjoint(whole.names):
@@ -287,6 +289,8 @@ def _of_components(system: Structure) -> Iterator[str]:
         free: list[str] = []
         for name, whole in c.interface.arrays.items():
             without = [n for n in whole.names if n not in fed[c.name] and n not in c.values]
+            if name in c.interface.main_names:
+                continue
             if without and c.interface.by_name[without[0]].causality == "input":
                 free += [name] if len(without) == len(whole.names) else without
         if free:
@@ -336,7 +340,8 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
         return
     sources = {c.target: f"a connection, from {c.source}" for c in system.connections}
     for event in system.events:
-        sources |= dict.fromkeys(event.set, "an event")
+        for port in event.set:
+            sources |= dict.fromkeys(system.elements(port), "an event")
     for port in stimuli.columns if whole else driven(system):
         place, column = stimuli.place(port), stimuli.columns[port]
         interface = system.component(port.component, place).interface
