@@ -75,6 +75,17 @@ def test_what_is_not_known_to_be_left_stays(folder):
     sweep(str(folder / "missing"))
 
 
+@pytest.mark.parametrize("theirs", ["grasp_scratch_", "grasp_cosim_scratch_3_"])
+def test_those_of_a_version_that_locks_otherwise_stay(folder, theirs):
+    """And it leaves ours: it takes what begins as its own do."""
+    assert not PREFIX.startswith(theirs)
+    other = folder / f"{theirs}0123456789abcdef"
+    other.mkdir()
+    sweep.cache_clear()
+    sweep(str(folder))
+    assert other.exists()
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root gives folders away")
 def test_those_of_others_stay(folder):
     theirs = Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder))

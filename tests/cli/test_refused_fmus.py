@@ -5,6 +5,7 @@ import zipfile
 
 import fmpy
 import pytest
+from grasp_cosim.base.scratch import PREFIX
 from support.compiled import binary
 from support.native_fmus import build, library_of, needs_gcc, starts_text
 
@@ -71,7 +72,7 @@ def one_line(run, what, ask):
     assert "x.fmu" in line
     assert what in line
     assert ask in line
-    assert "grasp_scratch" not in err
+    assert PREFIX not in err
     assert "Traceback" not in err
 
 

@@ -20,8 +20,12 @@ from .system_calls import is_mine
 SUFFIX = ".lock"
 """So the names of such files end."""
 
-PREFIX = "grasp_scratch_"
-"""So the names of our folders begin."""
+PREFIX = "grasp_cosim_scratch_2_"
+"""So the names of our folders begin.
+
+The number is that of the way they are locked: who changes that counts it up. A version that locks
+otherwise would take our folders for left behind, and so would we take its.
+"""
 
 
 class Lock:
