@@ -156,8 +156,16 @@ def _origin(module: str) -> str:
 
 
 def package_folder(package: str) -> Path:
-    """Return the folder of a package, which is not imported for that; ImportError without one."""
-    return Path(_origin(package)).parent
+    """Return the folder of a package, which is not imported for that; ImportError without one.
+
+    It is that which is installed: a foreign FMU may have imported a copy of its own, as one of
+    pythonfmu does, whose files go with the FMU.
+    """
+    for finder in sys.meta_path:  # and not in sys.modules
+        spec = finder.find_spec(package, None)
+        if spec is not None and spec.origin is not None:
+            return Path(spec.origin).parent
+    raise ImportError(f"{package}: no such package; must be installed")
 
 
 def card_file(package: str) -> Path:
