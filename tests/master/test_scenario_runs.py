@@ -126,6 +126,7 @@ def test_values_are_those_of_fmpy(engine, version, tmp_path):
     kinds = [np.double, np.bool_, np.int32]
     rows = np.array(ROWS, dtype=[("time", np.double), *zip(names, kinds, strict=True)])
     outputs = [name.replace("u_", "y_") for name in names]
+    build(tmp_path, version=version, complete=True)  # FMPy wants all functions
     theirs = simulate_fmu(
         str(tmp_path / "native.fmu"), stop_time=1.0, output_interval=0.1, step_size=0.1,
         input=rows, output=[*outputs, "x"], fmi_type="CoSimulation",

@@ -131,6 +131,12 @@ class Mock:
     def failure(self, status, time):
         return SimulationError(f"{self.name}: status {status} at {time!r}")
 
+    def remarks(self, returned=0, first=0.0):
+        return [f"{self.name}: {returned} warnings since {first!r}"] if returned else []
+
+    def quieten(self):
+        pass
+
     def close(self):
         self.calls.append("close")
 

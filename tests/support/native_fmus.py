@@ -8,7 +8,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -94,7 +94,7 @@ class Variable(NamedTuple):
 class Model:
     """What the model description says: variables, and event indicators by name.
 
-    completed says that the solver has to tell of each of its steps.
+    completed says that the solver has to tell of each of its steps, categories are of its log.
     """
 
     variables: Sequence[Variable]
@@ -103,6 +103,8 @@ class Model:
     stop: float | None = 1.0
     step: float = 0.01
     choices: tuple[str, str] = ("one", "two")
+    tolerance: float | None = None
+    categories: Sequence[str] = ()
 
 
 _TIME = Variable("time", causality="independent")
@@ -338,7 +340,7 @@ def build(
     variables = [v._replace(unit=units.get(v.name)) for v in model.variables]
     xml = description("native", version, Model(variables, stop=None), ["CoSimulation"],
                       CAPABLE if capabilities is None else capabilities, token)  # fmt: skip
-    library = library_of("native", version, complete=complete or version == "2.0")
+    library = library_of("native", version, complete=complete)
     return pack(folder / f"{name}.fmu", version, "native", xml, library)
 
 
@@ -348,6 +350,28 @@ def build_model(name, folder, version="2.0", kinds=KINDS, file=""):
     library = library_of(name, version, "CoSimulation" in kinds)
     xml = description(name, version, model, kinds)
     return pack(folder / f"{file or name}.fmu", version, name, xml, library)
+
+
+TALKER = Model(
+    (
+        _TIME,
+        Variable("y", causality="output", depends=()),
+        Variable("tolerance", causality="output", depends=()),
+        Variable("lines", "Int32", "output", "discrete", depends=()),
+    ),
+    categories=("logEvents", "logSecrets", "logStatusWarning", "logStatusError"),
+)
+
+
+def talker(folder, *options, version="2.0", kinds=("CoSimulation",), name="talker", **more):
+    """The FMU of models/talker.c as folder/NAME.fmu, compiled with options such as -DDEAF.
+
+    more are other fields of its Model.
+    """
+    xml = description("talker", version, replace(TALKER, **more), kinds)
+    options = ("-lm", *options)
+    library = library_of("talker", version, "CoSimulation" in kinds, False, options)
+    return pack(folder / f"{name}.fmu", version, "talker", xml, library)
 
 
 def state_space(
@@ -408,8 +432,12 @@ def description(name, version, model, kinds, capabilities=CAPABLE, token=None, m
         choice = _add(_add(types, "SimpleType", name="Choice"), "Enumeration")
     for value, item in enumerate(model.choices, 1):
         _add(choice, "Item", name=item, value=value)
+    if model.categories:
+        categories = _add(root, "LogCategories")
+        for name_ in model.categories:
+            _add(categories, "Category", name=name_)
     if model.stop is not None:
-        experiment = {"stopTime": model.stop, "stepSize": model.step}
+        experiment = {"stopTime": model.stop, "tolerance": model.tolerance, "stepSize": model.step}
         _add(root, "DefaultExperiment", startTime=0.0, **experiment)
     variables = _add(root, "ModelVariables")
     keys = [v.reference if three and v.reference is not None else place + (not three)

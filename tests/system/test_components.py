@@ -175,9 +175,12 @@ def test_a_mistake_is_one_line(tmp_path, solver, message):
 
 @needs_gcc
 def test_a_solver_for_co_simulation_alone(tmp_path):
-    message = "x: solver: dahlquist.fmu is for co-simulation alone; must be left out"
+    """It gets the tolerance, and is not integrated here."""
+    (component,) = solved(tmp_path, "solver = {}", "CoSimulation").components
+    assert component.integrated is None
+    message = "x: solver: maximum_step: dahlquist.fmu is for co-simulation alone, with a solver of"
     with pytest.raises(InputError, match=message):
-        solved(tmp_path, "solver = {}", "CoSimulation")
+        solved(tmp_path, "solver = { maximum_step = 0.1 }", "CoSimulation")
 
 
 @needs_gcc

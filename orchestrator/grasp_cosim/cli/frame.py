@@ -134,7 +134,7 @@ EVERYWHERE = (
     _flag(
         ["-v", "--verbose"],
         callback=_set_verbose,
-        help="Say which FMUs and engine run, and how long each phase takes.",
+        help="Say which FMUs and engine run, how long each phase takes, and what FMUs warn of.",
     ),
 )
 """Options that stand before a command as well as on it."""

@@ -223,7 +223,7 @@ def _facts(run: Result) -> Iterator[tuple[str, str]]:
         twin = ", native" if "native_twin_of" in ran else ""
         guid = f" {ran['guid']}" if "guid" in ran else ""
         yield f"FMU of {name}", f"{component['fmu']}{guid}{twin}"
-        for key in ("step", "isolation", "solver", "rename", "units"):
+        for key in ("step", "isolation", "solver", "tolerance", "rename", "units"):
             if isinstance(entry := component.get(key), Mapping):
                 yield from _nested(f"{key} of {name} ", entry)
             elif entry is not None:

@@ -16,13 +16,12 @@ import platform
 import re
 import struct
 import sys
-from collections import defaultdict, deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import fmpy
 import numpy as np
@@ -37,14 +36,16 @@ from fmpy.fmi2 import (
     fmi2LastSuccessfulTime,
     fmi2Terminated,
 )
-from fmpy.fmi3 import _FMU3, FMU3Slave
+from fmpy.fmi3 import FMU3Slave
 
 from ..base.calls import STEP_2, STEP_3, Call, Native
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import c_library
 from ..interface.interface import Interface, Value
+from ..system.parts import Logging
 from .instance import EARLY, WARNING
-from .loaded import KEPT, LoadedInstance, keep_message
+from .loaded import Lenient, LoadedInstance, MissingFunctionError
+from .messages import Messages
 
 _NAMED = c_void_p, c_char_p, c_int, c_char_p, c_char_p
 """Environment, instance, status, category and the format."""
@@ -110,40 +111,45 @@ def _vsnprintf() -> Any:
     return found
 
 
-_messages: defaultdict[str, deque[str]] = defaultdict(lambda: deque(maxlen=KEPT))
-"""Messages that FMUs logged, by instance: all have one logger."""
+def callbacks_for(messages: Messages) -> fmi2CallbackFunctions:
+    """The functions that an FMU may call: its logger, which is its own, and memory."""
+
+    def log(
+        _: Any,
+        instance: Any,
+        status: int,
+        category: bytes | None,
+        message: bytes | None,
+        *arguments: float,
+    ) -> None:
+        if messages.wants(status, category):
+            messages.take(status, formatted(message or b"", arguments))
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = ctypes.cast(logger_type()(log), fmi2CallbackLoggerTYPE)
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    return callbacks
 
 
-def _log(
-    _: Any,
-    instance: bytes | None,
-    status: int,
-    category: Any,
-    message: bytes | None,
-    *arguments: float,
-) -> None:
-    text = formatted(message or b"", arguments)
-    keep_message(_messages[(instance or b"").decode(errors="replace")], status, text)
-
-
-_callbacks = fmi2CallbackFunctions()
-_callbacks.logger = ctypes.cast(logger_type()(_log), fmi2CallbackLoggerTYPE)
-_callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-_callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+class FMU2Part(Lenient, FMU2Slave):  # type: ignore[misc]  # FMPy has no types
+    """FMPy's slave; by the beginning of its name FMPy tells the version."""
 
 
 class FmuInstance(LoadedInstance):
     """One instance of an FMI 2.0 FMU, for co-simulation."""
 
-    SLAVE = FMU2Slave
+    SLAVE = FMU2Part
+    NEEDS: ClassVar[Sequence[str]] = (
+        *("Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode"),
+        *("ExitInitializationMode", "DoStep", "Terminate"),
+    )
 
     def _instantiate(self, folder: Path) -> FMU2Slave:
         slave = self._opened(folder)
-        slave.instantiate(callbacks=_callbacks, loggingOn=True)
+        callbacks = callbacks_for(self._messages)
+        slave.instantiate(callbacks=callbacks, loggingOn=self._logs_at_once)
         return slave
-
-    def _read_log(self) -> list[str]:
-        return list(_messages.pop(self.name, ()))
 
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         for name, value in values.items():
@@ -164,13 +170,11 @@ class FmuInstance(LoadedInstance):
 
     def _status(self, inquire: Callable[[int], float], kind: int) -> float | None:
         """The status of that kind; None where the FMU does not say. It may log that it does not."""
-        self._unread += self._read_log()
-        try:
-            return inquire(kind)
-        except FMICallException:
-            return None
-        finally:
-            self._read_log()
+        with self._messages.ignored():
+            try:
+                return inquire(kind)
+            except (FMICallException, MissingFunctionError):
+                return None
 
 
 _libraries: dict[tuple[Path, int], tuple[FMU2Slave, ScratchFolder | None]] = {}
@@ -192,7 +196,7 @@ class SharedInstance(FmuInstance):
             _libraries[self._key] = super()._opened(folder), self._folder
         self._folder = None  # stays, with the library
         slave = copy(_libraries[self._key][0])
-        slave.instanceName = self.name
+        slave.instanceName, slave.messages = self.name, self._messages
         return slave
 
     @property
@@ -210,24 +214,24 @@ TERMINATE, SHORT = 1, 2
 """Places in the flags of a step, after that of an event."""
 
 
-class Lenient(_FMU3):  # type: ignore[misc]  # FMPy has no types
-    """FMPy's, but for an FMU without the functions of other kinds of FMUs."""
-
-    def __dir__(self) -> Iterable[str]:
-        """FMPy loads the functions by these names; it raises where one is missing."""
-        return [n for n in super().__dir__() if n[:4] != "fmi3" or hasattr(self.dll, n)]
+class Texts3:
+    """Mixed into FMPy's classes of FMI 3.0."""
 
     def getString(self, references: Sequence[int]) -> list[bytes | None]:
         """As they are: FMPy's raises at what is no UTF-8, and at NULL."""
         count = len(references)
         texts = (ctypes.c_char_p * count)()
-        self.fmi3GetString(
-            self.component, (ctypes.c_uint * count)(*references), count, texts, count
+        self.fmi3GetString(  # type: ignore[attr-defined]
+            self.component,  # type: ignore[attr-defined]
+            (ctypes.c_uint * count)(*references),
+            count,
+            texts,
+            count,
         )
         return list(texts)
 
 
-class _Slave(Lenient, FMU3Slave):  # type: ignore[misc]
+class _Slave(Texts3, Lenient, FMU3Slave):  # type: ignore[misc]
     pass
 
 
@@ -235,31 +239,36 @@ class Fmi3Instance(LoadedInstance):
     """One instance of an FMI 3.0 co-simulation FMU."""
 
     SLAVE = _Slave
+    NEEDS: ClassVar[Sequence[str]] = (
+        *("InstantiateCoSimulation", "FreeInstance", "EnterInitializationMode"),
+        *("ExitInitializationMode", "DoStep", "Terminate"),
+    )
 
-    def __init__(self, name: str, interface: Interface) -> None:
-        """Extract and instantiate; InputError where the FMU does not load."""
-        self._said: deque[str] = deque(maxlen=KEPT)
+    def __init__(
+        self,
+        name: str,
+        interface: Interface,
+        tolerance: float | None = None,
+        logging: Logging = False,
+    ) -> None:
+        """As LoadedInstance."""
         self._flags = np.zeros(3, np.bool_)
         self._last = np.zeros(1)
-        super().__init__(name, interface)
+        super().__init__(name, interface, tolerance, logging)
 
     def _instantiate(self, folder: Path) -> FMU3Slave:
         slave = self._opened(folder)
         early_return = self.interface.capability("mightReturnEarlyFromDoStep") is True
         slave.instantiate(
-            loggingOn=True,
+            loggingOn=self._logs_at_once,
             earlyReturnAllowed=early_return and self.interface.can_vary_step,
             logMessage=self._log,
         )
         return slave
 
-    def _log(self, _: Any, status: int, category: Any, message: bytes | None) -> None:
-        keep_message(self._said, status, message)
-
-    def _read_log(self) -> list[str]:
-        said = list(self._said)
-        self._said.clear()
-        return said
+    def _log(self, _: Any, status: int, category: bytes | None, message: bytes | None) -> None:
+        if self._messages.wants(status, category):
+            self._messages.take(status, message)
 
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
         given = [(self.interface.by_name[name], value) for name, value in values.items()]

@@ -93,6 +93,16 @@ class Instance(Protocol):
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned a bad status at time in s."""
 
+    def remarks(self, returned: int = 0, first: float = 0.0) -> list[str]:
+        """Lines for the log of the run: the first of the FMU's warnings, and how many followed.
+
+        So many calls of the loop have returned a warning, the first in the step from that time in
+        s on.
+        """
+
+    def quieten(self) -> None:
+        """Stop a log that nobody asked for; called between steps."""
+
     def close(self) -> None:
         """End and free the instance as far as FMI permits after what it returned."""
 

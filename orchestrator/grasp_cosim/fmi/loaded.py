@@ -9,13 +9,10 @@ import ctypes
 import inspect
 import logging
 import os
-import re
 import sys
-import warnings
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -32,14 +29,13 @@ from ..base.files import FULL
 from ..base.scratch import ScratchFolder, without_scratch
 from ..interface.interface import Element, Interface, Value, Variable
 from ..interface.obstacles import of_binary, of_loading, this_machine
-from .instance import EARLY, ERROR, FATAL, OK, STATUS, Inputs
+from ..system.parts import Logging
+from .instance import EARLY, ERROR, FATAL, OK, STATUS, WARNING, Inputs
+from .messages import SEVERE, Messages
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
 """Calls of a Python FMU keep the GIL, which it would have to take back at once."""
-
-_PYTHONFMU_PREFIX = re.compile(r"Fatal py exception encountered: \[\w+\] \w+\s")
-"""Begins a message of pythonfmu about an exception; kept only if the FMU logged nothing else."""
 
 _TRACEBACK = "Traceback (most recent call last)"
 _OF_KIND: Mapping[str, Callable[[Any], Value]] = {
@@ -52,40 +48,85 @@ _OF_THIS_MACHINE = tuple(f"binaries/{name}/" for name in map(this_machine, ("2.0
 _UNUSED = ("documentation/", "sources/", "binaries/")
 
 LOGGER = logging.getLogger(__name__)
-"""Gets what FMUs log, too; the process of a component prints it."""
+"""Gets what goes wrong where an FMU is terminated."""
 
-KEPT = 12
-"""The last messages of an FMU that are kept for the error: it may log some at every step."""
+_never_freed: list[Any] = []
+"""Slaves that FMI does not let us free: what they call back must stay, too."""
+
+
+class Lenient:
+    """Mixed into FMPy's classes: the binary may lack functions, until one of these is called.
+
+    FMPy looks for all functions of the standard, and raises where one is missing.
+    """
+
+    messages: Messages
+    """Gets a warning that a call returns without having logged why."""
+
+    def __dir__(self) -> Iterable[str]:
+        """FMPy loads the functions by these names."""
+        names = super().__dir__()
+        return [n for n in names if not n.startswith(("fmi2", "fmi3")) or hasattr(self.dll, n)]  # type: ignore[attr-defined]
+
+    def _call(self, function: str, *arguments: Any) -> Any:
+        """As FMPy's; MissingFunctionError where the binary has no such function."""
+        if function not in self._functions:  # type: ignore[attr-defined]
+            raise MissingFunctionError(function)
+        before = self.messages.count
+        answer = super()._call(function, *arguments)  # type: ignore[misc]
+        has_status = self._functions[function].restype is ctypes.c_int  # type: ignore[attr-defined]
+        if has_status and answer == WARNING and self.messages.count == before:
+            self.messages.returned(function)
+        return answer
+
+
+class MissingFunctionError(Exception):
+    """The binary of an FMU lacks functions that are needed."""
+
+    def __init__(self, *functions: str) -> None:
+        super().__init__(f"its binary lacks {', '.join(functions)}; must have what is called")
 
 
 class LoadedInstance(ABC):
     """One instance of an FMU in this process."""
 
-    tolerance: float | None = None
-    """The relative tolerance of the solver, where the FMU has none of its own."""
-
     SLAVE: ClassVar[type]
-    """FMPy's class."""
+    """FMPy's class, made Lenient."""
 
-    def __init__(self, name: str, interface: Interface) -> None:
-        """Extract and instantiate; InputError where the FMU does not load."""
+    NEEDS: ClassVar[Sequence[str]]
+    """The functions without which an FMU cannot run, by their names without fmi2 or fmi3."""
+
+    def __init__(
+        self,
+        name: str,
+        interface: Interface,
+        tolerance: float | None = None,
+        logging: Logging = False,
+    ) -> None:
+        """Extract and instantiate; InputError where the FMU does not load.
+
+        The FMU is told the relative `tolerance`, unless that is None. `logging` is what it is to
+        log beside warnings and errors.
+        """
         self.name = name
         self.interface = interface
+        self.tolerance = tolerance
+        self._logging = logging
+        self._messages = Messages(name, logging, self._time)
+        self._restrained = False
         self._major = interface.version[0]
         self._worst = FATAL  # until it is instantiated
         self._keep: list[Any] = []
         self._inputs = Inputs()
         self._arrays: dict[int, list[Any]] = {}
         self._clock: npt.NDArray[np.float64] | None = None
-        self._unread: deque[str] = deque(maxlen=KEPT)
-        self._read_log()  # forgets what an earlier instance of this name said
         self._folder: ScratchFolder | None = None
         self._python = False
         self._slave: Any = None
         if obstacle := of_binary(interface):
             raise InputError(f"{name}: {interface.called} {obstacle}")
         try:
-            self._slave = self._load(self._unpacked())
+            self._load(self._unpacked())
         except BaseException:
             self.close()
             raise
@@ -95,17 +136,69 @@ class LoadedInstance(ABC):
         """FMPy's slave, instantiated from the folder it was extracted to."""
 
     def _opened(self, folder: Path) -> Any:
-        """FMPy's slave with the library from the folder, not instantiated yet."""
-        return know_signatures(self.SLAVE)(
+        """FMPy's slave with the library from the folder, not instantiated yet.
+
+        MissingFunctionError where that lacks a function that is needed.
+        """
+        slave = know_signatures(self.SLAVE)(
             guid=self.interface.guid,
             unzipDirectory=str(folder),
             modelIdentifier=self._identifier,
             instanceName=self.name,
         )
+        slave.messages = self._messages
+        names = [f"fmi{self._major}{name}" for name in self.NEEDS]
+        missing = [name for name in names if not hasattr(slave.dll, name)]
+        if missing:
+            raise MissingFunctionError(*missing)
+        return slave
 
-    @abstractmethod
-    def _read_log(self) -> list[str]:
-        """Return the messages logged since the last call."""
+    @property
+    def _logs_at_once(self) -> bool:
+        """True if logging is on from the instantiation.
+
+        It is for pythonfmu, too, which else drops the exceptions that the Python code raises. What
+        it logs of a call that goes well is what that code wants logged.
+        """
+        return self._python or self._logging is True
+
+    def _choose_categories(self) -> None:
+        """Have the FMU log warnings, errors, and the categories that were asked for.
+
+        Some log no warning without that. InputError where it has to be, and the FMU refuses.
+        """
+        severe = set(SEVERE.values()).intersection(self.interface.log_categories)
+        asked = () if isinstance(self._logging, bool) else self._logging
+        if self._logs_at_once or not (severe or asked):
+            return
+        try:
+            with self._messages.ignored():
+                self._slave.setDebugLogging(True, sorted({*severe, *asked}))
+        except (FMICallException, MissingFunctionError) as error:
+            fatal = isinstance(error, FMICallException) and error.status >= FATAL
+            if asked or fatal:
+                self._worst = FATAL if fatal else self._worst
+                raise InputError(
+                    f"{self.name}: {self.interface.called} does not take log categories: "
+                    f"{self._reason(error)}"
+                ) from error
+        else:
+            self._restrained = not asked
+
+    def quieten(self) -> None:
+        """Switch logging off again in an FMU that takes no notice of the categories it was told.
+
+        It would format each call, which may take fifty times as long as the call.
+        """
+        if self._restrained and self._messages.unasked:
+            self._restrained = False
+            with suppress(FMICallException), self._messages.ignored():
+                self._slave.setDebugLogging(False, [])
+            LOGGER.info("%s: logs more than its warnings; its log is off", self.name)
+
+    def remarks(self, returned: int = 0, first: float = 0.0) -> list[str]:
+        """As Instance.remarks."""
+        return self._messages.remarks(returned, first)
 
     @abstractmethod
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
@@ -139,7 +232,7 @@ class LoadedInstance(ABC):
             raise InputError(f"{self.name}: {self.interface.called} is damaged: {error}") from error
         return folder
 
-    def _load(self, folder: Path) -> Any:
+    def _load(self, folder: Path) -> None:
         self._python = (folder / "resources/slavemodule.txt").exists()
         plain = str(folder).replace(" ", "")
         if self._python and quote(plain) != plain:
@@ -149,7 +242,7 @@ class LoadedInstance(ABC):
             )
         here = Path.cwd()
         try:
-            slave = self._instantiate(folder)
+            self._slave = self._instantiate(folder)
         except Exception as error:  # FMPy raises plain Exception
             reason = self._reason(error)
             obstacle = of_loading(self.interface, reason)
@@ -159,8 +252,8 @@ class LoadedInstance(ABC):
             ) from error
         finally:
             os.chdir(here)  # where loading fails, FMPy stays in the library's folder
-        self._worst = 0
-        return slave
+        self._worst = OK
+        self._choose_categories()
 
     def close(self) -> None:
         """Terminate and free the FMU as far as it permits; remove what was extracted."""
@@ -169,12 +262,15 @@ class LoadedInstance(ABC):
                 self._slave.terminate()
             except FMICallException as error:
                 self._worst = error.status
-                said = as_reason(self._messages())
-                warnings.warn(f"{self.name}: {error}{said}", stacklevel=2)
+                reason = as_reason(self._messages.reasons())
+                LOGGER.warning("%s: %s%s", self.name, error, reason)
         # fmi2Fatal is what pythonfmu makes of any call refused: our Python FMUs outlive it
         ours = self._python and (self.interface.tool or "").startswith("grasp-cosim")
-        if self._slave is not None and (self._worst < FATAL or ours):
-            self._free()
+        if self._slave is not None:
+            if self._worst < FATAL or ours:
+                self._free()
+            else:
+                _never_freed.append(self._slave)
         if self._folder:
             resources = str(Path(self._folder.name, "resources"))
             if resources in sys.path:  # pythonfmu puts it there and leaves it
@@ -301,23 +397,31 @@ class LoadedInstance(ABC):
         self._worst = OK if status == EARLY else status
         if status == EARLY:
             return self._error("ended a step early", time)
-        return self._error(f"returned {STATUS[status] if status < len(STATUS) else status}", time)
+        known = status < len(STATUS)
+        what = f"returned {STATUS[status] if known else status}"
+        return self._error(what, time, advice=self._advice(status))
 
-    def _error(self, what: str, time: float, must: str = "") -> SimulationError:
-        """The error for what the FMU did, with what it said of it, and its inputs."""
-        said = self._messages()
+    def _error(self, what: str, time: float, must: str = "", advice: str = "") -> SimulationError:
+        """The error for what the FMU did, with what it logged of it, and its inputs.
+
+        Where it logged nothing, with the `advice`.
+        """
+        reasons = self._messages.reasons()
         error = SimulationError(
             f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{must}"
-            f"{as_reason(said)}{self._inputs}"
+            f"{as_reason(reasons) or advice}{self._inputs}"
         )
-        for text in said:
+        for text in reasons:
             error.add_note(text)
         return error
 
     def _function(self, name: str, *arguments: Any) -> tuple[Callable[[], int], int]:
         """The bound function for Python, and its address."""
         prototype = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
-        function = prototype((f"fmi{self._major}{name}", self._slave.dll))
+        full = f"fmi{self._major}{name}"
+        if not hasattr(self._slave.dll, full):
+            raise self._incomplete(MissingFunctionError(full))
+        function = prototype((full, self._slave.dll))
         bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
         return bound, ctypes.cast(function, ctypes.c_void_p).value or 0
 
@@ -336,10 +440,14 @@ class LoadedInstance(ABC):
             yield
         except FMICallException as error:
             self._worst = error.status
+            reason = as_reason(self._messages.reasons())
+            why = reason or f": {error}{self._advice(error.status)}"
             raise InputError(
-                f"{self.name}: {self.interface.path.name} refused its initialisation: "
-                f"{self._reason(error)}{self._inputs}"
+                f"{self.name}: {self.interface.path.name} refused its initialisation"
+                f"{why}{self._inputs}"
             ) from error
+        except MissingFunctionError as error:
+            raise self._incomplete(error) from error
 
     @contextmanager
     def _failures(self) -> Iterator[None]:
@@ -348,22 +456,27 @@ class LoadedInstance(ABC):
             yield
         except FMICallException as error:
             raise self.failure(error.status, self._time()) from error
+        except MissingFunctionError as error:
+            raise self._incomplete(error) from error
+
+    def _incomplete(self, error: MissingFunctionError) -> InputError:
+        """The error for a binary that lacks a function."""
+        return InputError(f"{self.name}: {self.interface.called}: {error}")
 
     def _time(self) -> float:
         """The time in s of the step that was begun last."""
         return 0.0 if self._clock is None else float(self._clock[0])
 
     def _reason(self, error: Exception) -> str:
-        said = as_reason(self._messages()).removeprefix(": ")
-        return said or without_scratch(" ".join(str(error).split()))
+        """What the FMU logged, or else the error itself."""
+        logged = as_reason(self._messages.reasons()).removeprefix(": ")
+        return logged or without_scratch(" ".join(str(error).split()))
 
-    def _messages(self) -> list[str]:
-        """Return the logged messages that have not been read yet."""
-        said = [*self._unread, *self._read_log()]
-        self._unread.clear()
-        said = [text for text in said if not _PYTHONFMU_PREFIX.match(text)] or said
-        own = re.compile(rf"\A{re.escape(self.name)}, t = \S+ s: ")  # so our FMUs begin
-        return [own.sub("", _PYTHONFMU_PREFIX.sub("", text), count=1) for text in said]
+    def _advice(self, status: int) -> str:
+        """How to have an FMU say more that failed without a word; the end of a line."""
+        if status < ERROR or self._logs_at_once:
+            return ""
+        return f"; components.{self.name}.logging = true may have it say why"
 
 
 @cache
@@ -378,21 +491,13 @@ def know_signatures(slave: type) -> type:
     return slave
 
 
-def keep_message(kept: deque[str], status: int, message: bytes | None) -> None:
-    """Keep a message that an FMU logged, unless its status is OK, and log it here."""
-    if status > OK:
-        text = without_scratch((message or b"").decode(errors="replace"))
-        LOGGER.info(" ".join(text.split()))
-        kept.append(text)
-
-
 def _used_here(member: str) -> bool:
     """Return True if an instance here may need this file of the FMU: no binary for others."""
     return member.startswith(_OF_THIS_MACHINE) or not member.startswith(_UNUSED)
 
 
-def as_reason(said: list[str]) -> str:
+def as_reason(messages: Sequence[str]) -> str:
     """Messages, each once, as the end of a one-line error; of a traceback what it comes to."""
-    last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in said]
+    last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in messages]
     text = " ".join(" ".join(dict.fromkeys(last)).split())
     return f": {text}" if text else ""

@@ -22,11 +22,11 @@ from fmpy.fmi3 import FMU3Model
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
 from ..interface.interface import Interface, Value, Variable
-from ..system.parts import Solver
-from .co_simulation import Fmi3Instance, FmuInstance, Lenient
+from ..system.parts import Logging, Solver
+from .co_simulation import Fmi3Instance, FmuInstance, Texts3
 from .cvode import Cvode, CvodeError, Function
 from .instance import DISCARD, EARLY, OK, WARNING
-from .loaded import LoadedInstance
+from .loaded import Lenient, LoadedInstance, MissingFunctionError
 
 AT_POINT = 1e-10
 """s, a tenth of the unit of time: an event so near to a communication point is at that."""
@@ -56,12 +56,11 @@ class ModelInstance(LoadedInstance):
     Again, the end of the simulation, new nominals, new states, a next event, and its time in s.
     """
 
-    NEEDS: ClassVar[Sequence[str]] = ()
-    """Functions that FMPy loads only if they are there."""
-
-    def __init__(self, name: str, interface: Interface, chosen: Solver) -> None:
+    def __init__(
+        self, name: str, interface: Interface, chosen: Solver, logging: Logging = False
+    ) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
-        self._chosen, self.tolerance = chosen, chosen.relative_tolerance
+        self._chosen = chosen
         self._solver: Cvode | None = None
         self._now = 0.0
         self._next = math.inf
@@ -75,7 +74,7 @@ class ModelInstance(LoadedInstance):
         self._started = False
         self._step = 0.0
         self._zero: npt.NDArray[np.bool_] | None = None
-        super().__init__(name, interface)
+        super().__init__(name, interface, chosen.relative_tolerance, logging)
 
     @property
     def _identifier(self) -> str:
@@ -257,8 +256,6 @@ class ModelInstance(LoadedInstance):
     def _bind(self) -> None:
         """Bind the functions that are called in the steps of the solver, and make that."""
         number, place, size = ctypes.c_double, ctypes.c_void_p, ctypes.c_size_t
-        for name in self.NEEDS:
-            self._bound(name)
         if self._major == "3":
             self._states = self._slave.getNumberOfContinuousStates()
             self._indicators = self._slave.getNumberOfEventIndicators()
@@ -287,10 +284,10 @@ class ModelInstance(LoadedInstance):
     def _bound(self, name: str, *kinds: Any) -> Any:
         """A function of the FMU, for its instance; InputError where it has none such."""
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
-        try:
-            function = prototype((f"fmi{self._major}{name}", self._slave.dll))
-        except AttributeError as error:
-            raise InputError(f"{self.name}: {self.interface.path} is damaged: {error}") from None
+        full = f"fmi{self._major}{name}"
+        if not hasattr(self._slave.dll, full):
+            raise self._incomplete(MissingFunctionError(full))
+        function = prototype((full, self._slave.dll))
         return partial(function, self._slave.component)
 
     def _evaluation(self, get: Callable[[int, int], int], size: int) -> Function:
@@ -345,15 +342,24 @@ class _Buffer:
         return self._call.python()
 
 
+class FMU2Equations(Lenient, FMU2Model):  # type: ignore[misc]  # FMPy has no types
+    """FMPy's model; by the beginning of its name FMPy tells the version."""
+
+
 class Fmi2Model(ModelInstance, FmuInstance):
     """One instance of an FMI 2.0 FMU for model exchange."""
 
-    SLAVE = FMU2Model
+    SLAVE = FMU2Equations
     SLOPES = "GetDerivatives"
     UPDATE = "newDiscreteStates"
+    NEEDS: ClassVar[Sequence[str]] = (
+        *("Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode"),
+        *("ExitInitializationMode", "EnterEventMode", "NewDiscreteStates"),
+        *("EnterContinuousTimeMode", "SetTime", "Terminate"),
+    )
 
 
-class _Model(Lenient, FMU3Model):  # type: ignore[misc]  # FMPy has no types
+class _Model(Texts3, Lenient, FMU3Model):  # type: ignore[misc]  # FMPy has no types
     pass
 
 
@@ -363,15 +369,14 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
     SLAVE = _Model
     SLOPES = "GetContinuousStateDerivatives"
     UPDATE = "updateDiscreteStates"
-    NEEDS = (
-        "EnterEventMode",
-        "UpdateDiscreteStates",
-        "EnterContinuousTimeMode",
-        "GetNumberOfContinuousStates",
-        "GetNumberOfEventIndicators",
+    NEEDS: ClassVar[Sequence[str]] = (
+        *("InstantiateModelExchange", "FreeInstance", "EnterInitializationMode"),
+        *("ExitInitializationMode", "EnterEventMode", "UpdateDiscreteStates"),
+        *("EnterContinuousTimeMode", "SetTime", "Terminate"),
+        *("GetNumberOfContinuousStates", "GetNumberOfEventIndicators"),
     )
 
     def _instantiate(self, folder: Path) -> FMU3Model:
         model = self._opened(folder)
-        model.instantiate(loggingOn=True, logMessage=self._log)
+        model.instantiate(loggingOn=self._logs_at_once, logMessage=self._log)
         return model

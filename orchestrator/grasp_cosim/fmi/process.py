@@ -5,7 +5,8 @@ of the connection for commands, of the shared memory and of a pipe that is close
 process ends, whereupon this one ends, too. A macro step is one round trip. The master puts inputs
 and the time into the shared memory, sends STEP and waits for the status; the component's process
 passes the inputs on that are pending, steps, fetches all outputs into the shared memory and
-answers. All else is a method with its arguments, and answered by its value or error with warnings.
+answers. All else is a method with its arguments, and answered by its value or error. What is logged
+there comes with the answer, also with that of a step, and is logged here.
 
 What the FMU prints does not get out, but for the last lines, as notes of the error when the process
 is lost.
@@ -35,11 +36,15 @@ from ..base import interruption
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError, ended
 from ..base.scratch import ScratchFolder
-from ..base.system_calls import end_group, listener
+from ..base.system_calls import end_fork, end_group, listener
 from ..interface.interface import Interface, Value, Variable
-from ..system.parts import Component, Solver
+from ..system.parts import Component, Logging, Solver
 from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
 from .instance import CLOCK, EARLY, OK, WARNING, Inputs, Instance, dtype
+from .messages import Message, Messages
+
+LOGGER = logging.getLogger(__name__)
+"""Gets what is logged in the process of a component, but for the messages of its FMU."""
 
 POSIX = os.name == "posix"
 """Elsewhere a process is not handed open files."""
@@ -74,18 +79,28 @@ def load(component: Component) -> Instance:
 
     InputError where the FMU does not load. The caller closes it.
     """
+    name, interface = component.name, component.loaded
     if component.isolation == "process":
-        return ProcessInstance(component.name, component.loaded, component.solver)
-    if component.native and component.loaded.version == "2.0":
-        return SharedInstance(component.name, component.loaded)
-    return load_here(component.name, component.loaded, component.solver)
+        return ProcessInstance(name, interface, component.solver, component.logging)
+    if component.native and interface.version == "2.0":
+        return SharedInstance(name, interface, logging=component.logging)
+    return load_here(name, interface, component.solver, component.logging)
 
 
-def load_here(name: str, interface: Interface, solver: Solver | None = None) -> Instance:
-    """The instance of an FMU in this process; by model exchange with a solver, or if it has to."""
+def load_here(
+    name: str, interface: Interface, solver: Solver | None = None, logging: Logging = False
+) -> Instance:
+    """The instance of an FMU in this process.
+
+    By model exchange where it has to be, or where there is a `solver` and the FMU is for that, too.
+    The solver of a co-simulation FMU gets the relative tolerance of this one, or else that of the
+    FMU's default experiment.
+    """
     three = interface.version.startswith("3")
-    if not solver and "CoSimulation" in interface.kinds:
-        return (Fmi3Instance if three else FmuInstance)(name, interface)
+    exchanged = "CoSimulation" not in interface.kinds or (solver and interface.exchange)
+    if not exchanged:
+        tolerance = solver.relative_tolerance if solver else interface.tolerance
+        return (Fmi3Instance if three else FmuInstance)(name, interface, tolerance, logging)
     try:
         from .model_exchange import Fmi2Model, Fmi3Model  # loads the solver's libraries
     except OSError as error:
@@ -93,7 +108,7 @@ def load_here(name: str, interface: Interface, solver: Solver | None = None) -> 
             f"{name}: {interface.path.name} is for model exchange, and FMPy has no CVode for "
             f"this machine: {error}; must be a co-simulation FMU"
         ) from error
-    return (Fmi3Model if three else Fmi2Model)(name, interface, solver or Solver())
+    return (Fmi3Model if three else Fmi2Model)(name, interface, solver or Solver(), logging)
 
 
 class _SharedMemory:
@@ -126,10 +141,18 @@ class _SharedMemory:
 class ProcessInstance:
     """One instance of an FMU in a process of its own, which ends with this one, however it ends."""
 
-    def __init__(self, name: str, interface: Interface, solver: Solver | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        interface: Interface,
+        solver: Solver | None = None,
+        logging: Logging = False,
+    ) -> None:
         """Start the process and instantiate; InputError where the FMU does not load."""
         self.name = name
         self.interface = interface
+        self._owner = os.getpid()
+        self._messages = Messages(name, logging, lambda: float(self._shared.clock[0]))
         self._fresh = False
         self._inputs = Inputs()
         if not POSIX:
@@ -166,7 +189,7 @@ class ProcessInstance:
         self._reader = threading.Thread(target=self._read_output, daemon=True)
         self._reader.start()
         try:
-            self._prepare("load", name, interface, solver)
+            self._prepare("load", name, interface, solver, logging)
         except BaseException:
             self._end()
             raise
@@ -182,7 +205,7 @@ class ProcessInstance:
             if self._lost is None:
                 self._ask("close", timeout=END_TIMEOUT)
         except SimulationError as error:
-            warnings.warn(f"{error}, while it was closed", stacklevel=2)
+            LOGGER.warning("%s, while it was closed", error)
         finally:
             self._end()
 
@@ -246,7 +269,14 @@ class ProcessInstance:
         time: float | None = self._ask("the_end")
         return time
 
+    def remarks(self, returned: int = 0, first: float = 0.0) -> list[str]:
+        return self._messages.remarks(returned, first)
+
+    def quieten(self) -> None:
+        """The other process does so itself."""
+
     def failure(self, status: int, time: float) -> SimulationError:
+        self._messages.reasons()  # the error there has them
         try:
             return self._ask("failure", status, time)  # type: ignore[no-any-return]
         except SimulationError as error:
@@ -279,6 +309,7 @@ class ProcessInstance:
     def _request(self, command: bytes, timeout: float) -> Any:
         if self._lost is not None:
             raise self._lost
+        end_fork(self._owner)
         try:
             self._connection.send_bytes(command)
             if not self._answers(timeout):
@@ -293,12 +324,21 @@ class ProcessInstance:
             raise
         if len(answer) == 1:
             return answer[0]
-        value, notes = pickle.loads(answer)  # noqa: S301
+        value, notes, records = pickle.loads(answer)  # noqa: S301
+        for record in records:
+            self._take(*record)
         if isinstance(value, Exception):
             raise value
         for text in notes:
             warnings.warn(text, stacklevel=3)
         return value
+
+    def _take(self, level: int, text: str, message: Message | None) -> None:
+        """Log here what was logged in the other process."""
+        if message is None:
+            LOGGER.log(level, "%s", text)
+        else:
+            self._messages.keep(message)
 
     def _lose(self, what: str = "") -> SimulationError:
         """The error for a process that has ended, or is about to."""
@@ -324,12 +364,36 @@ class ProcessInstance:
         self._reader.join(OUTPUT_TIMEOUT)
 
 
+class _Log(logging.Handler):
+    """Keeps what is logged for the next answer: level, text, and the message of the FMU.
+
+    Prints it, too: this may be the last that comes of the process.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.records: list[tuple[int, str, Message | None]] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text, message = record.getMessage(), getattr(record, "fmu_message", None)
+        self.records.append((record.levelno, text, message))
+        sys.stdout.write(f"{LOGGED}{' '.join((message.text if message else text).split())}\n")
+        sys.stdout.flush()
+
+    def taken(self) -> list[tuple[int, str, Message | None]]:
+        """The records since the last call."""
+        records, self.records = self.records, []
+        return records
+
+
 class _Worker:
     """The other end: serves commands on one instance."""
 
-    def __init__(self, connection: Connection, shared: _SharedMemory) -> None:
+    def __init__(self, connection: Connection, shared: _SharedMemory, log: _Log) -> None:
         self._connection = connection
         self._shared = shared
+        self._log = log
+        self._owner = os.getpid()
         self._instance: Instance
         self._inputs: list[tuple[Any, Call]] = []
         self._outputs: list[Call] = []
@@ -343,15 +407,22 @@ class _Worker:
             command = self._connection.recv_bytes()
             try:
                 if len(command) == 1:
-                    answer = bytes([self._exchange(command)])
+                    status = self._exchange(command)
+                    self._instance.quieten()
+                    answer = bytes([status])
+                    if self._log.records:
+                        answer = pickle.dumps((status, [], self._log.taken()))
                 else:
                     method, arguments = pickle.loads(command)  # noqa: S301
                     with warnings.catch_warnings(record=True) as caught:
                         warnings.simplefilter("always")
                         value = self._call(method, arguments)
-                    answer = pickle.dumps((value, [str(w.message) for w in caught]))
+                        self._instance.quieten()
+                    notes = [str(w.message) for w in caught]
+                    answer = pickle.dumps((value, notes, self._log.taken()))
             except (InputError, SimulationError) as error:
-                answer = pickle.dumps((error, []))
+                answer = pickle.dumps((error, [], self._log.taken()))
+            end_fork(self._owner)
             self._connection.send_bytes(answer)
 
     def _exchange(self, command: bytes) -> int:
@@ -399,10 +470,11 @@ class _Worker:
 def main(connection: int, memory: int, lifeline: int) -> None:
     """Serve until the instance is closed."""
     faulthandler.enable()
-    logging.basicConfig(format=f"{LOGGED}%(message)s", level=logging.INFO)
+    log = _Log()
+    logging.basicConfig(handlers=[log], level=logging.INFO)
     interruption.worker(lifeline)
     with suppress(EOFError):  # where the master wants no more of it
-        _Worker(Connection(connection), _SharedMemory(memory)).serve()
+        _Worker(Connection(connection), _SharedMemory(memory), log).serve()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(0)  # without what the FMU's library might do at exit

@@ -258,9 +258,10 @@ class Interface:
     kinds are CoSimulation, ModelExchange, ScheduledExecution. capabilities are all of the first
     kind, then all of a later one as 'FLAG (model exchange)'; see obstacles.capabilities_of().
     experiment is the default one: start_time, stop_time, tolerance and step_size, as typed() gives
-    them. platforms are those it has a binary for, sources says that it has C. flaw is the first
-    number that could not be read, for which no master takes the FMU. arrays are those that were
-    taken apart, by name: see expansion.py. exchange is there where it is for model exchange, too.
+    them. log_categories are what its messages are sorted by. platforms are those it has a binary
+    for, sources says that it has C. flaw is the first number that could not be read, for which no
+    master takes the FMU. arrays are those that were taken apart, by name: see expansion.py.
+    exchange is there where it is for model exchange, too.
     """
 
     path: Path
@@ -272,6 +273,7 @@ class Interface:
     kinds: tuple[str, ...] = ("CoSimulation",)
     capabilities: Mapping[str, Value | None] = field(default_factory=dict)
     experiment: Mapping[str, Value | None] = field(default_factory=dict)
+    log_categories: tuple[str, ...] = ()
     platforms: tuple[str, ...] = ()
     sources: bool = False
     python: bool = False
@@ -333,6 +335,12 @@ class Interface:
         """The communication step in s that its default experiment names."""
         step = self.experiment.get("step_size")
         return None if step is None else float(step)
+
+    @property
+    def tolerance(self) -> float | None:
+        """The relative tolerance that its default experiment names."""
+        tolerance = self.experiment.get("tolerance")
+        return tolerance if isinstance(tolerance, float) and tolerance > 0.0 else None
 
     def unit(self, variable: Variable) -> Unit | None:
         """The unit that is declared for a variable, if it is defined, or known by its name."""

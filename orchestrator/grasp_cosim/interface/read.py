@@ -126,6 +126,7 @@ def _read(path: Path) -> Interface:
         kinds=tuple(kinds),
         capabilities=capabilities_of(kinds, reader.major),
         experiment={key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
+        log_categories=tuple(e.get("name", "") for e in root.iterfind("LogCategories/Category")),
         platforms=_platforms(files),
         sources=any(re.match(r"sources/.*\.c(c|pp|xx)?$", name) for name in files),
         python="resources/slavemodule.txt" in files,

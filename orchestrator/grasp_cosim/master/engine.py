@@ -98,10 +98,10 @@ class CompiledLoop:
             *(np.array(table, np.int64) for table in (plan.casts, buffers, drives)),
             np.array(calls, _CALL),
         ]
-        operations, *others, values, clock = (
-            table.ctypes.data for table in (*tables, plan.values, plan.clock)
+        operations, *others, values, clock, warned = (
+            table.ctypes.data for table in (*tables, plan.values, plan.clock, plan.warned)
         )
-        whole = operations, len(plan.operations), *others, values, len(plan.values), clock
+        whole = operations, len(plan.operations), *others, values, len(plan.values), clock, warned
         words = np.array(whole, np.int64)
         self._kept = plan, callbacks, tables, words
         self.shared = _Shared()
@@ -141,6 +141,7 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     InputError where it is to be compiled and cannot be.
     """
     choice("engine", engine, ENGINES)
+    plan.warned.resize(2 * len(plan.calls), refcheck=False)
     long, auto = steps is None or steps >= LONG, engine == "auto"
     if engine == "compiled" or (auto and (is_there() or (long and has_compiler()))):
         try:
@@ -159,8 +160,10 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
 def _interpreted(plan: Plan) -> Loop:
     buffers = [memoryview(b) for b in plan.buffers]  # type: ignore[arg-type]
     values, clock = memoryview(plan.values), memoryview(plan.clock)  # type: ignore[arg-type]
+    warned = memoryview(plan.warned)  # type: ignore[arg-type]
     tables = plan.operations, plan.connections, plan.casts, plan.drives
-    over = partial(loop.run, *tables, [c.python for c in plan.calls], buffers, values, clock)
+    calls = [call.python for call in plan.calls]
+    over = partial(loop.run, *tables, calls, buffers, values, clock, warned)
     return lambda rows, *where: over(memoryview(rows.reshape(-1)), *where)
 
 

@@ -61,6 +61,7 @@ typedef struct {
     double *values;
     int64_t width;
     double *clock;
+    double *warned; /* of each call, how many warnings it returned, and the time of the first */
 } Plan;
 
 typedef struct { /* of system/times.py, in ticks: point k is at start + k * step */
@@ -220,6 +221,12 @@ static double point(const Clock *clock, int64_t k) {
     return (double)(clock->start + k * clock->step) / (double)clock->per_second;
 }
 
+/* Count a warning; of the first one the time of the step is kept. */
+static void note_warning(double *warned, double time) {
+    if (!warned[0]) warned[1] = time;
+    warned[0] += 1.0;
+}
+
 /* Do one operation in step k; 0, or the status that ends the loop. */
 static int operate(const Plan *plan, const Operation *operation, int64_t k, const Clock *clock,
                    const Shared *shared) {
@@ -232,7 +239,9 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, cons
         /* fall through */
     case CALL: {
         int status = invoke(&plan->calls[begin], plan->clock, shared);
-        return status > WORST ? status : 0;
+        if (status > WORST) return status;
+        if (status) note_warning(plan->warned + 2 * begin, plan->clock[0]);
+        return 0;
     }
     case COPY:
         for (i = begin; i < end; i++) {

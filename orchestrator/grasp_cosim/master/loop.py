@@ -41,6 +41,7 @@ def run(
     buffers: Sequence[Any],
     values: Any,
     clock: Any,
+    warned: Any,
     rows: Any,
     operation: int,
     start: int,
@@ -51,11 +52,11 @@ def run(
 ) -> tuple[int, int, int]:
     """Do the steps from start to stop, the first from the given operation on.
 
-    The tables are those of a plan; values, clock, buffers and rows are memory views. Step 0 begins
-    at start_ticks, and there are per_second of these. After step k the values go into rows, one row
-    of len(values) after the other. clock holds the time in s at which the component that steps now
-    begins, the step number, and the time at which the step ends. Returns the step reached, and
-    where a call's status is a bad one, the operation and the status (else 0 and 0).
+    The tables are those of a plan; values, clock, buffers, warned and rows are memory views. Step 0
+    begins at start_ticks, and there are per_second of these. After step k the values go into rows,
+    one row of len(values) after the other. clock holds the time in s at which the component that
+    steps now begins, the step number, and the time at which the step ends. Returns the step
+    reached, and where a call's status is a bad one, the operation and the status (else 0 and 0).
     """
     width, size, ticks = len(values), len(operations), float(per_second)
     for k in range(start, stop):
@@ -68,8 +69,10 @@ def run(
                     if what == STEP:
                         clock[0] = (start_ticks + (k + 1 - period) * step_ticks) / ticks
                     status = calls[begin]()
-                    if status > WORST:
-                        return k, operation, status
+                    if status:
+                        if status > WORST:
+                            return k, operation, status
+                        note_warning(warned, begin, clock[0])
                 elif what == COPY:
                     for source, target, _, _ in connections[begin:end]:
                         values[target] = values[source]
@@ -94,6 +97,13 @@ def run(
         row = (k - start) * width
         rows[row : row + width] = values
     return stop, 0, 0
+
+
+def note_warning(warned: Any, call: int, time: float) -> None:
+    """Count a warning that a call returned; of the first one the time of the step is kept."""
+    if not warned[2 * call]:
+        warned[2 * call + 1] = time
+    warned[2 * call] += 1.0
 
 
 def store(buffer: Any, index: int, value: float) -> None:

@@ -111,6 +111,7 @@ class Master:
         mode, and inputs that agree with them.
         """
         start = in_seconds(self.system.start_ns)
+        self.plan.clock[0] = start
         for component, instance in zip(self.system.components, self.instances, strict=True):
             driven = at_start(self.system, self._drives, component.name)
             stop = told_stop(self.system, component)
@@ -136,6 +137,8 @@ class Master:
             if port in self._used:
                 exact(str(port), value, f"{value} at step 0")
             self.values[slot] = float(value)
+        for instance in self.instances:
+            instance.quieten()
         self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
         self._handed_on_at = time.monotonic()
 
@@ -164,6 +167,21 @@ class Master:
             line += f"; its values there are in the last row, that of t = {seconds(row)}"
         self.ends.append(line)
 
+    def warnings(self) -> list[str]:
+        """Lines for the log on what the FMUs warned of, in the order of the components."""
+        lines = []
+        for instance in self.instances:
+            returned = [
+                (count, first)
+                for owner, (count, first) in zip(
+                    self.plan.owners, self.plan.warned.reshape(-1, 2).tolist(), strict=True
+                )
+                if owner is instance and count
+            ]
+            total = sum(int(count) for count, _ in returned)
+            lines += instance.remarks(total, min((first for _, first in returned), default=0.0))
+        return lines
+
     @property
     def runs_alone(self) -> bool:
         """True if the loop of a run in real time needs nothing of Python's until it ends."""
@@ -185,6 +203,8 @@ class Master:
         except OverrunError:
             assert self._pacer is not None  # noqa: S101 - who else has raised it
             raise SimulationError(self._pacer.meter.verdict()) from None
+        for instance in self.instances:
+            instance.quieten()
         fresh = self._waiting()[max(first - self._handed_on, 0) :]
         wraps = len(self._waiting()) < self.steps_done - self._handed_on
         if self._enough() or wraps or not np.isfinite(fresh).all():

@@ -39,7 +39,8 @@ class Plan:
     """Everything the loop works on.
 
     operations refer to connections (source, target, factor, offset), casts (buffer, index, slot),
-    drives and calls. clock is the loop's.
+    drives and calls. clock is the loop's. warned has two numbers for each call: how many warnings
+    it has returned, and the time in s of the step in which it returned the first.
     """
 
     values: npt.NDArray[np.float64]
@@ -52,6 +53,7 @@ class Plan:
     calls: list[Call] = field(default_factory=list)
     owners: list[Instance | None] = field(default_factory=list)
     """By call, the instance that it is made to; None for a call of the master's own."""
+    warned: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     raised: list[BaseException] = field(default_factory=list)
     """Errors of the Python calls that returned RAISED: they must not pass through compiled code."""
 

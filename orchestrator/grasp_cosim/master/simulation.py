@@ -48,6 +48,9 @@ LOGGER = logging.getLogger(__name__)
 MOST = 2**62
 """The highest number of steps, far beyond the longest run."""
 
+Finish = Callable[[Result, SimulationError | None], object]
+"""Takes the result of a run that ended, and the error that ended it."""
+
 LOOK = 0.1
 """s of wall time between two looks at the progress bar and at Ctrl-C."""
 
@@ -75,6 +78,7 @@ class Session:
         metrics: Sequence[Metric | Function | str] = (),
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
+        finish: Finish | None = None,
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors."""
         system = system.with_experiment(step, stop, scheme, diverging)
@@ -95,8 +99,10 @@ class Session:
             self._whole = EveryRow(needs)
         self._wall_time = 0.0
         self._failed = False
+        self._failure: SimulationError | None = None
+        self._initialised = False
         self._closed = False
-        self._note = note
+        self._note, self._finish = note, finish
         self._noted = len(system.notes)  # known to who has read it
         self.halt = threading.Event()
         """Set, it ends the waiting of a run in real time, at a communication point."""
@@ -132,9 +138,11 @@ class Session:
         self._dispatch = Dispatcher(self.system, slots, receivers, every, texts, self._whole)
         if self.pacer:
             self.pacer.spare = self._dispatch.spare
+        self._stack.callback(self._hand_over)  # before the FMUs are ended, and after:
         self._stack.callback(self._end)
         with phase("initialising"), self._failures():  # where the row of t = 0 is not finite
             self._master.initialise()
+        self._initialised = True
 
     def _ask_for_privileges(self, realtime: Realtime, pacer: Pacer) -> None:
         """What a run in real time asks of the system; what that refuses is a warning."""
@@ -149,19 +157,33 @@ class Session:
         try:
             yield
         except SimulationError as error:
-            self._failed = True
+            self._failed, self._failure = True, error
             error.result = error.result or self.result()
             raise
 
     def _end(self) -> None:
         """Hand on what is left, and end the listeners, even where that fails."""
-        try:
-            self._master.hand_on()
-        except BaseException:
-            self._failed = True
-            raise
-        finally:
-            self._dispatch.end(self.complete)
+        with self._failures():
+            try:
+                self._master.hand_on()
+            except BaseException:
+                self._failed = True
+                raise
+            finally:
+                self._dispatch.end(self.complete)
+
+    def _hand_over(self) -> None:
+        """Tell the log and hand the result on: an FMU may take the process along as it ends."""
+        if not self._initialised and self._failure is None:
+            return
+        if self._note is not None:
+            self._tell(self._log())
+        if self._finish is None:
+            return
+        if self._failure is not None and self._failure.result is not None:
+            self._finish(self._failure.result, self._failure)
+        elif not self._failed:
+            self._finish(self.result(), None)
 
     def __enter__(self) -> "Session":
         return self
@@ -171,12 +193,10 @@ class Session:
         self.close()
 
     def close(self) -> None:
-        """End the listeners, terminate and free the FMUs. A closed session cannot step.
+        """End the listeners, then terminate and free the FMUs. A closed session cannot step.
 
         SimulationError, with the result, where a listener fails at its end.
         """
-        if self._note and not self._closed:
-            self._tell(self._log())
         self._closed = True
         with _folder_kept(), self._failures():
             self._stack.close()
@@ -324,6 +344,7 @@ class Session:
             *self._early(),
             *self._dispatch.log,
             *master.scenario.log,
+            *master.warnings(),
             *rejected,
             *master.ends,
             *pending,
@@ -350,6 +371,7 @@ class Simulate:
         metrics: Sequence[Metric | Function | str] = (),
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
+        finish: Finish | None = None,
     ) -> Result:
         """Run a system to its stop time and return what it records at every communication point.
 
@@ -366,27 +388,38 @@ class Simulate:
         own name; a name among them says that the result must have that metric. diverging, "stop" or
         "continue", replaces that of the system. note gets the lines of the log but for
         system.notes: what is known of the system and of t = 0 before the first step, the others at
-        the end, also after a failure.
+        the end, also after a failure. finish gets the result, and the error that ended the run if
+        there is one, before the FMUs are terminated and freed, in which they may crash.
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way, or a signal runs away.
         """
-        with Session(
-            system,
-            step=step,
-            stop=stop,
-            scheme=scheme,
-            every=every,
-            listeners=listeners,
-            engine=engine,
-            realtime=realtime,
-            metrics=metrics,
-            diverging=diverging,
-            note=note,
-        ) as session:
-            with phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"):
-                _drive(session, progress)
-            return session.result()
+        results: list[Result] = []
+
+        def keep(result: Result, error: SimulationError | None) -> None:
+            results.append(result)
+            if finish is not None:
+                finish(result, error)
+
+        with (
+            Session(
+                system,
+                step=step,
+                stop=stop,
+                scheme=scheme,
+                every=every,
+                listeners=listeners,
+                engine=engine,
+                realtime=realtime,
+                metrics=metrics,
+                diverging=diverging,
+                note=note,
+                finish=keep,
+            ) as session,
+            phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"),
+        ):
+            _drive(session, progress)
+        return results[0]
 
     session = Session
 

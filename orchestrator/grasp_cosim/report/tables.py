@@ -244,6 +244,8 @@ def _how(component: Mapping[str, Any]) -> str:
         parts.append(f"isolation: {component['isolation']}")
     if solver := component.get("solver"):
         parts.append(f"integrated by CVode to {number(solver['relative_tolerance'])}")
+    if tolerance := component.get("tolerance"):
+        parts.append(f"tolerance {number(tolerance)}")
     if component["rename"]:
         parts.append("renamed: " + ", ".join(f"{k} is {v}" for k, v in component["rename"].items()))
     return "; ".join(parts)

@@ -82,8 +82,15 @@ def replaced(
         for name, unit in was.units.items()
         if (now := found.sample(name)) and now.unit in (None, getattr(ours.sample(name), "unit", 0))
     }
-    solver, units = was.solver if theirs.exchange else None, {**kept, **units}
-    return replace(was, fmu=fmu, native=None, rename=names, units=units, solver=solver)
+    alike = (ours.exchange is None) == (theirs.exchange is None)
+    return replace(
+        was,
+        fmu=fmu,
+        native=None,
+        rename=names,
+        units={**kept, **units},
+        solver=was.solver if alike else None,
+    )
 
 
 def with_old_values(

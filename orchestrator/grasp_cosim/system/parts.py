@@ -25,6 +25,9 @@ Relation = Literal["<", "<=", ">", ">=", "==", "!="]
 RELATIONS: tuple[str, ...] = get_args(Relation)
 Overrun = Literal["catch-up", "continue", "stop"]
 Loops = Literal["iterate", "refuse"]
+Logging = bool | tuple[str, ...]
+"""What an FMU is to log beside warnings and errors: all, nothing, or some of its categories."""
+
 FINEST, COARSEST = 1e-13, 0.1
 """Relative tolerances of a solver: beyond the first one there is rounding alone."""
 
@@ -46,6 +49,8 @@ def as_lists(given: Given) -> Any:
 @dataclass(frozen=True, slots=True)
 class Solver:
     """The tolerances that CVode keeps to where it integrates an FMU of model exchange.
+
+    An FMU for co-simulation alone has a solver of its own, which gets relative_tolerance.
 
     The local error of a state in a step of the solver is below relative_tolerance times the state
     plus absolute_tolerance times its nominal value, by default a hundredth of the former.
@@ -73,8 +78,8 @@ class Component:
     of structural parameters say. rename maps the system's name of a variable to the FMU's; all else
     goes by the system's. step_ns is its own communication step, None for the system's. units are of
     variables that the FMU declares without one, or wrongly. native is the FMU that runs in the
-    place of fmu, its twin with the same bits. With a solver its equations are integrated here, by
-    model exchange, though it may have a co-simulation of its own.
+    place of fmu, its twin with the same bits. With a solver the equations of an FMU that is for
+    model exchange, too, are integrated here, though it may have a co-simulation of its own.
     """
 
     name: str
@@ -86,13 +91,15 @@ class Component:
     units: Mapping[str, str] = field(default_factory=dict)
     native: Path | None = None
     solver: Solver | None = None
+    logging: Logging = False
 
     @property
     def integrated(self) -> Solver | None:
         """The solver of its equations; None where it runs by co-simulation."""
-        if self.solver is None and "CoSimulation" in self.loaded.kinds:
-            return None
-        return self.solver or Solver()
+        fmu = self.loaded
+        if "CoSimulation" not in fmu.kinds:
+            return self.solver or Solver()
+        return self.solver if fmu.exchange else None
 
     @cached_property
     def interface(self) -> Interface:

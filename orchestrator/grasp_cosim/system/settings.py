@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from .parts import Realtime
+from .parts import Component, Realtime
 from .scenario import event_entry, fault_entry
 from .stimuli import input_entry
 from .structure import Structure
@@ -36,7 +36,8 @@ def settings(system: Structure) -> dict[str, Any]:
                 "isolation": c.isolation,
                 "rename": dict(c.rename),
                 "units": dict(c.units),
-                **({"solver": asdict(solver)} if (solver := c.integrated) else {}),
+                **_solver(c),
+                **({"logging": c.logging} if c.logging else {}),
             }
             for c in system.components
         },
@@ -52,6 +53,15 @@ def settings(system: Structure) -> dict[str, Any]:
         **({"realtime": asdict(system.realtime)} if system.realtime != Realtime() else {}),
         **({"input": input_entry(system.input)} if system.input else {}),
     }
+
+
+def _solver(component: Component) -> dict[str, Any]:
+    """What solves the equations of a component, or the tolerance that its own solver is given."""
+    if solver := component.integrated:
+        return {"solver": asdict(solver)}
+    if solver := component.solver:
+        return {"tolerance": solver.relative_tolerance}
+    return {}
 
 
 def given_values(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,7 +28,16 @@ from ..base.checks import (
 from ..base.errors import InputError, nearest
 from ..interface.read import read_interface
 from .changes import replaced, with_given, with_old_values
-from .parts import ISOLATIONS, Component, Connection, Initialisation, Realtime, Solver, as_port
+from .parts import (
+    ISOLATIONS,
+    Component,
+    Connection,
+    Initialisation,
+    Logging,
+    Realtime,
+    Solver,
+    as_port,
+)
 from .record import Record
 from .scenario import read_events, read_faults
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
@@ -62,7 +71,7 @@ NAMES = {"rename": "a variable of the FMU, a string", "units": "the name of a un
 """The tables of names that a component has, and what these must be."""
 
 TABLES = ("values", *NAMES, "solver")
-ENTRIES = ("fmu", "step", "isolation", *TABLES)
+ENTRIES = ("fmu", "step", "isolation", "logging", *TABLES)
 """The entries of a component, of which some are tables."""
 
 TODO = re.compile(r"""(?:[^#"']|"(?!TODO\b)(?:[^"\\]|\\.)*"|'(?!TODO\b)[^']*')*["']TODO\b""")
@@ -210,12 +219,26 @@ def with_entries(
     if "isolation" in table:
         chosen = choice(place(f"{own}.isolation"), table["isolation"], ISOLATIONS)
         now = replace(now, isolation=chosen)
+    if "logging" in table:
+        now = replace(now, logging=_logging(place(f"{own}.logging"), table["logging"]))
     if "solver" in table:
         solver = _changed(place(f"{own}.solver"), now.solver or Solver(), table["solver"])
         now = replace(now, solver=solver)
     if values:
         now = with_given(now, lambda n: place(f"{was.name}.{n}"), values, text=system is not None)
     return now, notes
+
+
+def _logging(place: str, entry: Any) -> Logging:
+    """What an FMU is to log: true or false, a category, or several, in a list or with commas."""
+    if isinstance(entry, bool):
+        return entry
+    names = entry.split(",") if isinstance(entry, str) else entry
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
+        raise InputError(
+            f"{place} = {entry!r}: must be true, false, the name of a category, or a list of such"
+        )
+    return tuple(name.strip() for name in names)
 
 
 def check_filled_in(path: Path) -> None:

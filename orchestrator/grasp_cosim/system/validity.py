@@ -21,7 +21,7 @@ from ..interface.expansion import shape_text
 from ..interface.interface import SUPPORTED, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion, conversion
-from .parts import Component, Connection, Port
+from .parts import Component, Connection, Port, Solver
 from .stimuli import Column, Stimuli
 from .structure import Structure, unit_of
 from .times import NANOSECONDS, written
@@ -79,10 +79,27 @@ def check_components(system: Structure) -> None:
                     'process can have once; must have isolation = "process" but for one'
                 )
         if component.solver and fmu.exchange is None:
+            _check_own_solver(f"{system.name}: {name}: solver", fmu, component.solver)
+        if not isinstance(component.logging, bool):
+            _check_categories(f"{system.name}: {name}: logging", fmu, component.logging)
+
+
+def _check_own_solver(place: str, fmu: Interface, solver: Solver) -> None:
+    """InputError where the solver of a co-simulation FMU would need what it is not told."""
+    for entry in ("absolute_tolerance", "maximum_step"):
+        if getattr(solver, entry) is not None:
             raise InputError(
-                f"{system.name}: {name}: solver: {fmu.path.name} is for "
-                f"{choices(KINDS[k] for k in fmu.kinds)} alone; must be left out"
+                f"{place}: {entry}: {fmu.path.name} is for {choices(KINDS[k] for k in fmu.kinds)} "
+                "alone, with a solver of its own, which gets relative_tolerance; must be left out"
             )
+
+
+def _check_categories(place: str, fmu: Interface, asked: Sequence[str]) -> None:
+    """InputError at the first category of messages that an FMU does not declare."""
+    if not fmu.log_categories:
+        raise InputError(f"{place}: {fmu.path.name} declares no categories; must be true or false")
+    for category in asked:
+        known(f"{place}: {fmu.path.name} has no category", category, fmu.log_categories)
 
 
 def check_connections(system: Structure) -> None:

@@ -1,8 +1,21 @@
 /* Makes an FMU of a model, for co-simulation and model exchange, that minds the call order.
  *
  * FMI is 2 or 3, NAME in braces is its GUID or token. An FMU with NO_STEPS is for model exchange
- * alone; one with NO_LICENCE finds none.
+ * alone; one with NO_LICENCE finds none. AT_INITIALISATION, AT_STEP, AT_TERMINATE and AT_FREE are
+ * statements that it does there.
  */
+#ifndef AT_INITIALISATION
+#define AT_INITIALISATION (void)0
+#endif
+#ifndef AT_STEP
+#define AT_STEP (void)0
+#endif
+#ifndef AT_TERMINATE
+#define AT_TERMINATE (void)0
+#endif
+#ifndef AT_FREE
+#define AT_FREE (void)0
+#endif
 #if FMI == 2
 #include "fmi2Functions.h"
 #define F(name) fmi2##name
@@ -65,7 +78,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *host, fmi2Boolean visible,
                               fmi2Boolean logging) {
     Model *m = calloc(1, sizeof(Model));
-    (void)visible; (void)logging;
+    (void)visible;
+    m->logging = logging;
     m->exchange = type == fmi2ModelExchange;
     m->early = true;
     m->host = (void *)host;
@@ -78,8 +92,9 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real tolerance,
                                fmi2Real begin, fmi2Boolean stops, fmi2Real stop) {
     Model *m = c;
-    (void)tolerant; (void)tolerance; (void)stops; (void)stop;
+    (void)stops; (void)stop;
     NEEDS(IN(INSTANTIATED));
+    m->tolerance = tolerant ? tolerance : 0.0;
     set_time(m, begin);
     return fmi2OK;
 }
@@ -93,9 +108,10 @@ fmi3Instance fmi3InstantiateCoSimulation(
     fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
     Model *m = calloc(1, sizeof(Model));
     (void)visible; (void)event_mode; (void)required; (void)n; (void)update;
+    m->logging = logging;
     m->early = early;
     m->host = host;
-    m->log = logging ? (void *)log : NULL;
+    m->log = (void *)log;
     return made(m, name, token, resources);
 }
 
@@ -128,13 +144,15 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerant, fmi3Float64 tolerance,
                                        fmi3Float64 begin, fmi3Boolean stops, fmi3Float64 stop) {
-    (void)tolerant; (void)tolerance; (void)stops; (void)stop;
+    (void)stops; (void)stop;
+    ((Model *)c)->tolerance = tolerant ? tolerance : 0.0;
     set_time(c, begin);
 #endif
     Model *m = c;
     NEEDS(IN(INSTANTIATED));
     if (refusal(m)) return fail(m, F(Error), refusal(m));
     m->mode = INITIALIZATION;
+    AT_INITIALISATION;
     return F(OK);
 }
 
@@ -151,10 +169,14 @@ Status F(Terminate)(void *c) {
     Model *m = c;
     NEEDS(RUNNING);
     m->mode = TERMINATED;
+    AT_TERMINATE;
     return F(OK);
 }
 
-void F(FreeInstance)(void *c) { free(c); }
+void F(FreeInstance)(void *c) {
+    AT_FREE;
+    free(c);
+}
 
 /* Values: to and from are what is done with the element e. */
 
@@ -243,7 +265,8 @@ static Status step_to(Model *m, double time, double step) {
     m->status = F(OK);
     equations(m);
     advance(m, time + step);
-    return m->status ? fail(m, m->status, m->reason) : F(OK);
+    AT_STEP;
+    return m->status && m->reason ? fail(m, m->status, m->reason) : (Status)m->status;
 }
 
 #if FMI == 2

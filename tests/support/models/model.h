@@ -72,7 +72,9 @@ typedef struct {
     bool early;                       /* a step may end early */
     double nominal[ROOM];             /* of the states */
     int status;                       /* of the equations, or of a step, as FMI has it, */
-    const char *reason;               /* and why */
+    const char *reason;               /* and why, NULL where it is not logged */
+    double tolerance;                 /* that it was told, 0 where none */
+    bool logging;                     /* asked for at the instantiation */
     int steps;                        /* of the solver */
     Mode mode;
     bool exchange;                    /* model exchange, else co-simulation */
