@@ -19,7 +19,7 @@ import click
 from ..base import interruption
 from ..base.errors import InputError, SimulationError
 from ..base.files import FULL
-from ..base.system_calls import flush_c, when_c_exits
+from ..base.system_calls import end_fork, flush_c, when_c_exits
 from ..base.text import printable
 from .frame import FAILED, INTERRUPTED, TERMINATED, WRONG, fail
 from .group import cli
@@ -61,9 +61,7 @@ def main(arguments: list[str]) -> int:
     debug = "--debug" in arguments
     with harmless_streams():
         try:
-            return int(
-                cli.main(arguments, "grasp-cosim", standalone_mode=False, obj=arguments) or 0
-            )
+            return _commanded(arguments)
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.ctx.get_help(), err=True)
             return WRONG
@@ -82,6 +80,15 @@ def main(arguments: list[str]) -> int:
             if interruption.came():  # and a module that was being imported made this error of it
                 return fail("interrupted", INTERRUPTED)
             return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
+
+
+def _commanded(arguments: list[str]) -> int:
+    """The exit code of a command; what it raises is raised. A fork of an FMU ends here."""
+    owner = os.getpid()
+    try:
+        return int(cli.main(arguments, "grasp-cosim", standalone_mode=False, obj=arguments) or 0)
+    finally:
+        end_fork(owner)
 
 
 def _exited(_: object) -> None:

@@ -116,24 +116,24 @@ def run(
     chosen = system if native is None and given["system"] else natively(system, native)
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
     with RunFolder(out, chosen, command, realtime, form=form) if out else nullcontext() as folder:
-        try:
-            result = simulate(
-                chosen,
-                progress=not is_quiet(),
-                every=every,
-                listeners=[folder] if folder else (),
-                realtime=realtime,
-                metrics=metrics,
-                note=say,
-            )
-        except SimulationError as error:
-            if error.result:
-                _write(error.result, folder, out, plot, mdf)
-                if out:
-                    say(f"kept what was recorded, in {out}")
-            raise
-        _write(result, folder, out, plot, mdf)
-    show(as_json, terminal.as_json(result), terminal.as_text(result))
+
+        def finish(result: Result, error: SimulationError | None) -> None:
+            _write(result, folder, out, plot, mdf)
+            if error is None:
+                show(as_json, terminal.as_json(result), terminal.as_text(result))
+            elif out:
+                say(f"kept what was recorded, in {out}")
+
+        result = simulate(
+            chosen,
+            progress=not is_quiet(),
+            every=every,
+            listeners=[folder] if folder else (),
+            realtime=realtime,
+            metrics=metrics,
+            note=say,
+            finish=finish,
+        )
     if not result.complete:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)

@@ -7,6 +7,7 @@ A jump passes decades in one step; a ramp takes ten times as long for each, a po
 root of ten times; a stable response ends.
 """
 
+import os
 import time
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 from ..base.checks import EXACT
 from ..base.errors import SimulationError
+from ..base.system_calls import end_fork
 from ..interface.interface import limits
 from ..system.description import System
 from ..system.parts import Port
@@ -62,6 +64,7 @@ class Dispatcher:
 
         whole gets every row, of all signals that are observed.
         """
+        self._owner = os.getpid()
         self._listeners, self._whole = tuple(listeners), whole
         self._leisurely = [one for one in listeners if isinstance(one, Leisurely)]
         self.took = 0.0
@@ -115,6 +118,7 @@ class Dispatcher:
 
         Its row is the last that is kept.
         """
+        end_fork(self._owner)
         if len(rows) > self._block.shape[1]:
             self._block = np.empty((len(self._block), len(rows)))
         columns = self._block[:, : len(rows)].T  # each of them in one piece, which is fast
@@ -161,6 +165,7 @@ class Dispatcher:
 
     def end(self, complete: bool) -> None:
         """Hand the last row on and end the listeners, each of them even where another fails."""
+        end_fork(self._owner)
         with ExitStack() as stack:
             for listener in reversed(self._listeners):
                 stack.callback(listener.end, complete)

@@ -40,7 +40,7 @@ class ArrowListener:
     def __init__(self, path: str | Path, place: Path | None = None) -> None:
         """InputError without pyarrow."""
         self._path, self._arrow = Path(path), pyarrow()
-        self._place = place or self._path
+        self._place = (place or self._path).absolute()  # an FMU may go elsewhere
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the schema; InputError where the file cannot be written."""

@@ -40,8 +40,12 @@ class CsvListener:
     """
 
     def __init__(self, path: str | Path, place: Path | None = None) -> None:
-        """Where a `place` is given, that is written from the start, by whoever sees to the rest."""
-        self._path, self._place = Path(path), place
+        """Where a `place` is given, that is written from the start, by whoever sees to the rest.
+
+        Both are in the folder that is the current one now, wherever an FMU goes later.
+        """
+        self._path, self._at_once = Path(path), place is not None
+        self._place = (place or self._path).absolute()
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the line of names; InputError where the file cannot be written."""
@@ -49,7 +53,7 @@ class CsvListener:
         self._whole = [i for i, s in enumerate(signals, 1) if s.kind in ("Integer", "Boolean")]
         self._texts = {i: s.texts for i, s in enumerate(signals, 1) if s.kind == "String"}
         names = ("time", *(s.name for s in signals))
-        named = nullcontext(self._place) if self._place else in_one_piece(self._path)
+        named = nullcontext(self._place) if self._at_once else in_one_piece(self._place)
         with writing(self._path, InputError), ExitStack() as stack:
             self._file = stack.enter_context(FileIO(stack.enter_context(named), "w"))
             self._append(",".join(map(quoted, names)) + "\n")

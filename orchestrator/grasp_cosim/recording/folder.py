@@ -72,16 +72,18 @@ class RunFolder:
         that needs it.
         """
         self._folder, self._paced = folder, paced
+        self._place = folder.absolute()  # an FMU may go elsewhere
         self._origin = origin(system, command)
         conversions = in_si(system, ()).conversions
         recorded = {str(port) for port in system.recorded}
         self._to_si = {name: c for name, c in conversions.items() if name in recorded}
-        place = folder / (ARROW if form == "arrow" else SIGNALS)
-        self._file: Listener = (ArrowListener if form == "arrow" else CsvListener)(place, place)
+        name = ARROW if form == "arrow" else SIGNALS
+        kind = ArrowListener if form == "arrow" else CsvListener
+        self._file: Listener = kind(folder / name, self._place / name)
         self._begun, self._broken = False, False
         self._waiting: deque[Rows] = deque()
         self._row_ns, self._at_last_ns = FIRST_GUESS, 0.0
-        self._lock = Lock(folder / SUFFIX)
+        self._lock = Lock(self._place / SUFFIX)
 
     def __enter__(self) -> Self:
         return self
@@ -132,7 +134,7 @@ class RunFolder:
     def finish(self, result: Result) -> None:
         """Write the run.json of a result that ended, in whatever way; not if rows are missing."""
         if self._begun and not self._broken:
-            replace(result, origin=self._origin).to_json(self._folder / SETTINGS)
+            replace(result, origin=self._origin).to_json(self._place / SETTINGS)
 
     def _write(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         if not self._signals:
@@ -143,19 +145,19 @@ class RunFolder:
 
     def _take_the_folder(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Remove the older run and begin ours; a kill leaves one of them, or no run.json."""
-        settings = self._folder / SETTINGS
+        settings = self._place / SETTINGS
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            self._place.mkdir(parents=True, exist_ok=True)
             if not self._lock.taken():  # for as long as this process lives
                 raise InputError(
                     f"{self._folder}: another process records a run in it; must end first, or --out"
                     " be another folder"
                 )
             if settings.is_file() and any(
-                (self._folder / name).is_file() for name in (SIGNALS, ARROW)
+                (self._place / name).is_file() for name in (SIGNALS, ARROW)
             ):
-                remove(self._folder, *DRAWN, *of_any_format(OF_ANY.stem, *groups()))
-            remove(self._folder, SETTINGS, SIGNALS, ARROW)
+                remove(self._place, *DRAWN, *of_any_format(OF_ANY.stem, *groups()))
+            remove(self._place, SETTINGS, SIGNALS, ARROW)
             if self._signals:
                 self._file.begin(self._experiment, self._signals)
             self._begun = True
@@ -169,7 +171,10 @@ class RunFolder:
             )  # fmt: skip
             self.finish(begun)
         except OSError as error:
-            raise InputError(unwritable(Path(error.filename or self._folder), error)) from error
+            path = Path(error.filename or self._place)
+            if path.is_relative_to(self._place):
+                path = self._folder / path.relative_to(self._place)
+            raise InputError(unwritable(path, error)) from error
 
 
 def now() -> datetime:

@@ -42,7 +42,7 @@ class MdfListener:
         """Written into another `place`, messages name path. InputError without asammdf."""
         check_mdf()
         self._path = Path(path)
-        self._place = place or self._path
+        self._place = (place or self._path).absolute()  # an FMU may go elsewhere
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """InputError where there are no signals, or no such folder can be made."""
@@ -50,7 +50,7 @@ class MdfListener:
             raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
         self._experiment, self._signals, self._batch = experiment, signals, Batch()
         with writing(self._path, InputError):
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._place.parent.mkdir(parents=True, exist_ok=True)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Keep the rows."""
@@ -75,7 +75,7 @@ class MdfListener:
                 Channel(own, times, unit, signal.name, shown or None, signal.description)
             )
         # the first version with compressed blocks; every tool of today reads it
-        folder = str(self._path.parent)
+        folder = str(self._place.parent)
         with writing(self._path), closing(MDF(version="4.10", temporary_folder=folder)) as mdf:
             mdf.append(channels, comment="", common_timebase=True)
             mdf.header.comment = self._described(complete)
