@@ -182,8 +182,8 @@ def test_an_mdf_file_is_read_with_its_units(run, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("time,plant.gap[1]\n0,1\n1,abc\n", "has texts; must be numbers, as in "),
-        ("time,plant.gap[1]\n1,1\n0,1\n", "must not fall"),
+        ("time,plant.gap[1]\n0,1\n1,abc\n", "line 3, column 2, plant.gap[1] = 'abc': must be a"),
+        ("time,plant.gap[1]\n1,1\n0,1\n", "the time falls; must grow from row to row"),
         ("time,plant.gap[1] [kg]\n0,1\n1,1\n", "must have a signal of one name and quantity"),
         ("time,plant.gap[1]\n0,nan\n1,1\n", "must be a finite number"),
         ("time,plant.gap[1]\n5,1\n7,1\n", "run: 0 to 2 s; {}: 5 to 7 s: must have some time in"),
@@ -202,7 +202,7 @@ def test_no_run_and_no_log(tmp_path):
     with pytest.raises(InputError, match="no such run; must be a folder"):
         read_side(tmp_path / "nothing")
     (tmp_path / "page.html").write_text("")
-    with pytest.raises(InputError, match=r"must be a folder .* a .csv or an .mf4 file"):
+    with pytest.raises(InputError, match=r"must be a folder .*, or a .csv, .mf4, .*file"):
         read_side(tmp_path / "page.html")
 
 

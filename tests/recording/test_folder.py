@@ -16,7 +16,10 @@ MADE = {
     "system": "made.toml", "scheme": "sequential", "step": 0.1, "stop": 0.1,
     "initialisation": {}, "components": {}, "connections": [], "events": [], "faults": [],
 }  # fmt: skip
-RUN = {**MADE, "wall_time": 0.5, "complete": True, "log": [], "rejections": {}}
+RUN = {
+    **MADE, "wall_time": 0.5, "complete": True, "steps": 1, "rows": 2, "measured": {}, "log": [],
+    "rejections": {},
+}  # fmt: skip
 JSON = {**RUN, "units": {"a.x": "m", "a.on": None}, "types": {"a.on": "bool"}}
 
 DRAWN = ("grasp.png", "timing.png", "report.html", "signals.mf4")
@@ -167,12 +170,12 @@ def written(path, csv=CSV, **more):
 
 def test_columns_have_their_types_and_real_is_the_default(tmp_path):
     """Values that are not finite are kept: a run that failed ends with them."""
-    run = load_run(written(tmp_path, CSV + "0.2,nan,1\n0.3,-inf,1\n"))
+    run = load_run(written(tmp_path, CSV + "0.2,nan,1\n0.3,-inf,1\n", steps=3, rows=4))
     np.testing.assert_array_equal(run.signals["a.x"], [1.5, 2.5e-300, np.nan, -np.inf])
     assert run.signals["a.on"].dtype == np.bool_
     assert run.signals["a.on"].tolist() == [True, False, True, True]
     assert run.descriptions == {}
-    run = load_run(written(tmp_path, '"time"\n0.0\n', units={}))
+    run = load_run(written(tmp_path, '"time"\n0.0\n', units={}, steps=0, rows=1))
     assert (run.time.tolist(), run.signals) == ([0.0], {})
     (tmp_path / "signals.csv").unlink()
     with pytest.raises(InputError, match=r"run\.json: this run recorded no signal; must"):
@@ -182,17 +185,21 @@ def test_columns_have_their_types_and_real_is_the_default(tmp_path):
 @pytest.mark.parametrize(
     ("csv", "reason"),
     [
-        ("", "the first column is 'nothing'; must be \"time\""),
+        ("", "is empty; must have names in its first line"),
         ('"t","a.x"\n0.0,1.5\n', "the first column is 't'; must be \"time\""),
-        ('"time","a.x","a.on"\n', "the last row is cut off, or there is none"),
-        (CSV + "0.2,1,1", "the last row is cut off, or there is none"),
-        (CSV + "0.2,1\n", "damaged: the first line names 3 columns but 2 were found at row 3"),
-        (CSV + "0.2,1,x\n", "damaged: could not convert string 'x' to float64"),
+        ('"time","a.x","a.on"\n', "it has no whole row; must have one"),
+        (CSV[:-1], "has 1 row, the last of step 0; must have 2, the last of step 1, as run.json"),
+        (CSV[:-10], "has 1 row, the last of step 0; must have 2, the last of step 1, as run.json"),
+        (CSV + "0.2,1,1\n", "has 3 rows, the last of step 2; must have 2, the last of step 1"),
+        (CSV.replace("0.1,", "0.2,"), "has 2 rows, the last of step 2; must have 2, the last of"),
+        (CSV + "0.2,1\n", "line 4 has 2 cells; must have 3, as line 1"),
+        (CSV + "0.2,1,x\n", "line 4, column 3, a.on = 'x': must be a number"),
         (CSV + "0.1,1,1\n", "the time must grow from row to row"),
+        (CSV + "1e300,1,1\n", "the time must grow from row to row, to at most 1e+09 s"),
         (CSV + "nan,1,1\n", "the time must grow from row to row"),
         (CSV.replace("a.on", "a.x"), "two columns have the same name"),
-        ('"time","a.x\n0.0,1\n', "is damaged: unexpected end of data"),
-        (CSV.encode("utf-16"), "is damaged: 'utf-8' codec can't decode byte"),
+        ('"time","a.x\n0.0,1\n', "unexpected end of data; must be a CSV file"),
+        (CSV.replace("x", "\xe9").encode("latin-1"), "'utf-8' codec can't decode byte"),
     ],
 )
 def test_signals_that_are_damaged_are_refused_in_one_line(tmp_path, csv, reason):
@@ -210,17 +217,18 @@ def test_signals_that_are_damaged_are_refused_in_one_line(tmp_path, csv, reason)
         (b"{", "is damaged, not JSON in UTF-8: "),
         (b"\xff", "is damaged, not JSON in UTF-8: "),
         (b"[]", "is list; must be a JSON object"),
-        (b"{}", "no entry 'system'; must be a string, as `grasp-cosim run --out` writes"),
+        (b"{}", "no entry 'system'; must have one, as `grasp-cosim run --out` writes it"),
         ({"units": 1}, "units = 1; must be a JSON object"),
         ({"step": True}, "step = True; must be a number"),
         ({"wall_time": "3"}, "wall_time = '3'; must be a number or null"),
         ({"complete": 1}, "complete = 1; must be true or false"),
         ({"log": {}}, "log = {}; must be a list"),
-        ({"rejections": {"a": {"count": 1}}}, "a = {'count': 1}; must be count and first"),
-        ({"types": {"a.on": []}}, "type of a.on = []: must be one of float64,"),
+        ({"rejections": {"a": {"count": 1}}}, "rejections: a: no entry 'first'; must have"),
+        ({"types": {"a.on": []}}, "types: a.on = []; must be a string"),
+        ({"types": {"a.on": "bit"}}, "type of a.on = 'bit': must be one of float64,"),
         ({"types": {"a.x": "int64"}}, "a.x = int64: must be a type of its values, like 1.5"),
         ({"units": {"a.x": "m"}}, "those of the recorded columns: a.x, a.on"),
-        ({"to_si": {"a.x": 1.0}}, "to_si: a.x = 1.0; must be factor and offset"),
+        ({"to_si": {"a.x": 1.0}}, "to_si: a.x = 1.0; must be a JSON object"),
     ],
 )
 def test_a_run_json_that_is_damaged_is_refused_in_one_line(tmp_path, content, reason):

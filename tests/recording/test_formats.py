@@ -14,19 +14,20 @@ import pytest
 from grasp_cosim import InputError, Result, SimulationError
 from grasp_cosim.exchange.listener import Experiment, Signal, Texts
 from grasp_cosim.recording import arrow
-from grasp_cosim.recording import csv as csv_module
-from grasp_cosim.recording.arrow import ArrowListener, read_arrow
-from grasp_cosim.recording.csv import CsvListener, read_csv
+from grasp_cosim.recording.arrow import ArrowListener
+from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.mdf import MdfListener, read_mdf
+from grasp_cosim.recording.signals import read_signals
 from grasp_cosim.system.settings import settings
+from grasp_cosim.tables import text
 from hypothesis import given
 from hypothesis import strategies as st
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, play, rows
 from support.marks import examples, slow
 
 FORMATS = {
-    "csv": (CsvListener, lambda path: read_csv(path, {"a.s"})),
-    "arrow": (ArrowListener, read_arrow),
+    "csv": (CsvListener, lambda path: read_signals(path, {"a.s"})),
+    "arrow": (ArrowListener, lambda path: read_signals(path, {"a.s"})),
     "mf4": (MdfListener, lambda path: read_mdf(path)[:2]),
 }
 MODULES = {"arrow": "pyarrow", "mf4": "asammdf"}
@@ -156,15 +157,15 @@ def test_of_an_arrow_file_that_was_cut_off_whole_batches_are_read(tmp_path, monk
     monkeypatch.setattr(arrow, "BATCH", 10)
     path = tmp_path / "s.arrow"
     play(listener("arrow", path), rows(500), block=10)
-    whole, _ = read_arrow(path)
+    whole, _ = read_signals(path, ())
     os.truncate(path, path.stat().st_size - lost)
-    found, columns = read_arrow(path)
+    found, columns = read_signals(path, ())
     assert 400 < len(found) <= 500
     assert found.tolist() == whole[: len(found)].tolist()
     assert columns["a.x[1]"].tolist() == rows(500)[: len(found), 0].tolist()
     path.write_bytes(b"ARROW1\0\0 and no more")
-    with pytest.raises(InputError, match=r"s\.arrow: is damaged, or no Arrow file of a run: "):
-        read_arrow(path)
+    with pytest.raises(InputError, match=r"s\.arrow: is damaged, or no Arrow file: "):
+        read_signals(path, ())
 
 
 def test_a_large_csv_has_the_same_bits_whoever_reads_it(tmp_path, monkeypatch):
@@ -173,16 +174,16 @@ def test_a_large_csv_has_the_same_bits_whoever_reads_it(tmp_path, monkeypatch):
     signals = (*SIGNALS, Signal("a.s", None, "String", texts=texts))
     texts.listed += ['a "b",\n', "", "\\"]
     play(CsvListener(path), np.column_stack((rows(200), np.arange(200) % 3)), signals=signals)
-    plain = read_csv(path, {"a.s"})[1]
-    monkeypatch.setattr(csv_module, "LARGE", 0)
+    plain = read_signals(path, {"a.s"})[1]
+    monkeypatch.setattr(text, "LARGE", 0)
     with monkeypatch.context() as only:
-        only.setattr(np, "loadtxt", None)
-        fast = read_csv(path, {"a.s"})[1]
+        only.setattr(text, "Numbers", None)
+        fast = read_signals(path, {"a.s"})[1]
     assert {n: c.tolist() for n, c in fast.items()} == {n: c.tolist() for n, c in plain.items()}
     with path.open("a") as file:
         file.write("3.001,1\n")
-    with pytest.raises(InputError, match=r"s\.csv: is damaged: the first line names 5 columns but"):
-        read_csv(path)
+    with pytest.raises(InputError, match=r"s\.csv: line 202 has 2 cells; must have 5, as line 1"):
+        read_signals(path, {"a.s"})
 
 
 @formats

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, load_run, simulate
 from grasp_cosim.recording.mdf import read_mdf
-from grasp_cosim.recording.result import Rejection
+from grasp_cosim.recording.result import UNITS, Rejection
 from grasp_cosim.system.settings import run_settings
 from report.runs import grasp_run, ring_run, write_run
 
@@ -51,7 +51,9 @@ def test_json_has_the_metrics_and_what_led_to_them(grasp, result, tmp_path):
     )
     told.to_json(tmp_path / "run.json")
     assert json.loads((tmp_path / "run.json").read_text()) == {
-        **json.loads(json.dumps(dict(result.metrics))),
+        **{name: result.metrics[name] for name in UNITS},
+        "measured": json.loads(json.dumps(dict(result.measured.values))),
+        "rows": len(result.time),
         **run_settings(grasp.with_experiment(stop=0.1)),
         "units": dict(result.units),
         "to_si": {},

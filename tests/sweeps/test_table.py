@@ -214,8 +214,10 @@ def test_a_unit_in_the_head_is_converted(tmp_path):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("", "not enough values"),
-        ("a.b\n1,2\n", "line 2 has 2 cells; must be 1"),
+        ("", "is empty; must have names in its first line"),
+        ("a.b\n1,2\n", "line 2 has 2 cells; must have 1, as line 1"),
+        ("a.b,a.b\n1,2\n", "line 1, column 2 = 'a.b': appears twice; must appear once"),
+        ("a.b [mm]\n1\none\n", "line 3, column 1, a.b = 'one': must be a number"),
         ("a.b [furlong]\n1\n", "'furlong' is no known unit"),
         ("a.b\n", "0 rows; must be 1 to"),
         ([], "0 rows; must be 1 to"),

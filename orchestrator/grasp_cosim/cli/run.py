@@ -15,7 +15,7 @@ from ..recording.result import Result
 from ..report import terminal
 from ..report.timing import draw_result
 from ..sweeps.pictures import draw_sweep
-from ..sweeps.rows import as_rows, grid, varied
+from ..sweeps.rows import grid, varied
 from ..sweeps.sweep import cluster
 from ..sweeps.sweep import sweep as run_sweep
 from ..sweeps.table import as_json as in_json
@@ -208,7 +208,7 @@ def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: 
         if place in pairs or place in fixed:
             raise InputError(f"--vary {place}: is given twice; must be given once")
         pairs[place] = values
-    rows = as_rows(given["table"] or grid(pairs))
+    rows = given["table"] or grid(pairs)
     system = chosen_system(given)
     try:
         with cluster(scheduler) if scheduler else nullcontext() as executor:

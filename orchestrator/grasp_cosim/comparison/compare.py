@@ -210,10 +210,9 @@ def _overlap(a: Side, b: Side) -> tuple[float, float]:
 def _changes(a: Side, b: Side) -> dict[str, Conversion | None]:
     """The conversion of each signal that both have to the unit of a; None where there is none."""
     for side, other in ((a, b), (b, a)):
-        for name in side.texts:
+        for name in (*side.signals, *side.texts):
             if name in other.signals:
-                said = f"has texts; must be numbers, as in {other.name}"
-                raise InputError(f"{side.name}: {name}: {said}")
+                side.check_shared(name, other)
     found = {name: a.change(name, b) for name in a.signals if name in b.signals}
     if not any(found.values()):
         names = [f"{side.name} has {choices(side.signals, 3)}" for side in (a, b)]

@@ -10,17 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import InputError
+from ..base.errors import InputError, choices
 from ..base.files import check_nature
 from ..base.si_units import known_unit
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals, measure
 from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run
-from ..recording.mdf import read_mdf
 from ..recording.result import Result
+from ..recording.signals import LOGS, Log, read_log
 from ..system.settings import given_values
-from ..system.stimuli import read_stimuli
-from ..system.times import NANOSECONDS
 from .tube import ROUNDING, Curve
 
 AS_IT_STARTS, NONE = "as the FMU starts", "none"
@@ -44,6 +42,8 @@ class Side:
     texts: Sequence[str] = ()
     result: Result | None = None
     """The run; None of a log from elsewhere."""
+    log: Log | None = None
+    """That log; None of a run."""
     roles: Mapping[str, str] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
     groups: Sequence[str] = ()
@@ -79,6 +79,19 @@ class Side:
             if c
         }
         return replace(self, signals=signals)
+
+    def check_shared(self, name: str, other: Side) -> None:
+        """InputError where a signal that the other has as numbers is none of finite ones here."""
+        if name in self.texts:
+            if self.log is not None:
+                self.log[name]  # which says what is no number, by its line
+            raise InputError(f"{self.name}: {name}: has texts; must be numbers, as in {other.name}")
+        if self.log is None:
+            return
+        wrong = np.flatnonzero(~np.isfinite(self.signals[name]))
+        if len(wrong):
+            at = self.time[int(wrong[0])]
+            raise InputError(f"{self.name}: {name} at t = {at:.9g} s: must be a finite number")
 
     def curves(self) -> dict[str, Curve]:
         """The signals as curves; Booleans and integers are held between samples."""
@@ -125,62 +138,39 @@ def side_of(run: Result, called: str) -> Side:
     """The side of a result, which is `called` so."""
     texts = [name for name in run if name not in run.numbers]
     return Side(
-        called, run.time, run.numbers, run.units, run.to_si, texts, run, run.roles, run.given,
+        called, run.time, run.numbers, run.units, run.to_si, texts, run, None, run.roles, run.given,
         run.groups,
     )  # fmt: skip
 
 
 def read_side(path: Path) -> Side:
-    """The run in a folder, of its signals.csv or run.json; or the log in a .csv or .mf4 file.
+    """The run in a folder, of its signals.csv or run.json; or the log in a file of LOGS.
 
     InputError where it is missing, damaged or none of these.
     """
     one_of_its = path.name in (SIGNALS, ARROW, SETTINGS) and path.with_name(SETTINGS).is_file()
     if path.is_dir() or one_of_its:
         return side_of(load_run(path), str(path))
-    what = "a folder that `run --out` wrote, a .csv or an .mf4 file"
+    what = f"a folder that `run --out` wrote, or a {choices(LOGS)} file"
     if not path.is_file():
         raise InputError(f"{path}: no such run; must be {what}")
-    if path.suffix.lower() == ".mf4":
-        return _log(path, *read_mdf(path))
-    if path.suffix.lower() == ".csv":
-        return _csv(path)
+    if path.suffix.lower() in LOGS:
+        return _of_log(read_log(path))
     check_nature(path, "run")
     raise InputError(f"{path}: must be {what} of signals")
 
 
-def _csv(path: Path) -> Side:
-    read = read_stimuli(path)
-    numbers: dict[str, npt.NDArray[Any]] = {}
-    for port, column in read.columns.items():
-        samples = np.asarray(column.samples, np.float64)
-        names = [text.lower() for text in column.texts]
-        if not names:
-            numbers[str(port)] = samples
-        elif set(names) <= {"true", "false"}:
-            numbers[str(port)] = np.array([name == "true" for name in names])[samples.astype(int)]
-    units = {str(port): c.unit for port, c in read.columns.items() if str(port) in numbers}
-    texts = [name for name in map(str, read.columns) if name not in numbers]
-    return _log(path, np.asarray(read.times, np.float64) / NANOSECONDS, numbers, units, texts)
-
-
-def _log(
-    path: Path,
-    time: npt.NDArray[np.float64],
-    columns: Mapping[str, npt.NDArray[Any]],
-    units: Mapping[str, str | None],
-    texts: Sequence[str] = (),
-) -> Side:
-    """A log from elsewhere; InputError where a number is not finite, or the time falls."""
-    for name, column in columns.items():
-        if not np.isfinite(column).all():
-            at = time[int(np.flatnonzero(~np.isfinite(column))[0])]
-            raise InputError(f"{path}: {name} at t = {at:.9g} s: must be a finite number")
-    if not np.isfinite(time).all() or (np.diff(time) < 0.0).any():
-        raise InputError(f"{path}: the time falls; must grow from row to row")
+def _of_log(log: Log) -> Side:
+    """A log from elsewhere; InputError where the time falls."""
+    if not np.isfinite(log.time).all() or (np.diff(log.time) < 0.0).any():
+        raise InputError(f"{log.path}: the time falls; must grow from row to row")
+    readable = [name for name in log if log.readable(name)]
+    texts = [name for name in log if name not in readable]
+    units = {name: log.units[name] for name in readable}
     known = {name: known_unit(unit or "1") for name, unit in units.items()}
     to_si = {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
-    return Side(str(path), time, columns, units, to_si, texts)
+    signals = {name: log[name] for name in readable}
+    return Side(str(log.path), log.time, signals, units, to_si, texts, log=log)
 
 
 def _typed(column: npt.NDArray[Any], like: npt.NDArray[Any] | None) -> npt.NDArray[Any]:

@@ -33,13 +33,10 @@ from ..interface.units import Conversion
 
 Value = float | bool | None
 RESERVED = frozenset((
-    "changed", "command", "complete", "components", "connections", "date", "descriptions",
-    "diverging", "error", "events", "faults", "fmus", "index", "initialisation", "log",
-    "metric_units", "metrics", "missing_metrics", "proxies", "real_time_factor", "realtime",
-    "record", "rejections", "roles", "scheme", "step", "steps", "stop", "system", "title", "to_si",
-    "types", "units", "versions", "wall_time",
+    "complete", "error", "index", "missing_metrics", "proxies", "real_time_factor", "realtime",
+    "scheme", "step", "steps", "stop", "units", "wall_time",
 ))  # fmt: skip
-"""Names beside metrics in run.json and in the table of a sweep."""
+"""Names beside metrics in what `run --json` prints, and in the table of a sweep."""
 
 
 ALL = "[*]"

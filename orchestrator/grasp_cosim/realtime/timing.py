@@ -111,7 +111,7 @@ class Timing:
         """Read what as_dict() gave; InputError, naming the `place`, if it is something else."""
         try:
             overruns, parts, bars = (found[key] for key in ("overruns", "parts", "histograms"))
-            return cls(
+            read = cls(
                 **{key: kind(found[key]) for key, kind in PLAIN.items()},
                 overruns=int(overruns["count"]),
                 listed=tuple(
@@ -128,10 +128,20 @@ class Timing:
                 },
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(
-                f"{place}: is damaged ({type(error).__name__}: {error}); "
-                "must be what `grasp-cosim run --realtime --out` wrote"
-            ) from error
+            raise _damaged(place, f"{type(error).__name__}: {error}") from error
+        if read.overruns and not (read.listed and STEP in read.parts and read.steps):
+            raise _damaged(place, "it has overruns, and does not say of which step")
+        if any(len(h.edges) != len(h.counts) + 1 for h in read.histograms.values()):
+            raise _damaged(place, "a histogram has not one edge more than counts")
+        if not read.histograms.keys() <= read.parts.keys():
+            raise _damaged(place, "there are histograms of other parts")
+        return read
+
+
+def _damaged(place: str, why: str) -> InputError:
+    return InputError(
+        f"{place}: is damaged ({why}); must be what `grasp-cosim run --realtime --out` wrote"
+    )
 
 
 HEAD = 4

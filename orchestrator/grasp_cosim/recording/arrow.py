@@ -1,21 +1,20 @@
-"""Apache Arrow: a listener that writes columns while the run goes on, and the reader of its files.
+"""Apache Arrow: a listener that writes columns while the run goes on.
 
 The file is of the IPC format (Feather 2): a signal is a field with its unit and description in the
-metadata. Until its end is written it is a stream of whole batches behind eight bytes; so a file is
-read that a kill left behind.
+metadata. Until its end is written it is a stream of whole batches; so a file can be read that a
+kill left behind, as far as the last of them (tables/arrow.py).
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..base.checks import extra_module
 from ..base.errors import InputError
 from ..exchange.listener import Experiment, Signal
+from ..tables.arrow import pyarrow
 from .memory import TYPES, Batch, typed, writing
 
 BATCH = 4096
@@ -23,15 +22,6 @@ BATCH = 4096
 
 LONG = 0.5
 """s of wall time."""
-
-MAGIC = 8
-"""Bytes before the first batch."""
-
-
-def pyarrow() -> Any:
-    """The library; InputError where it is not installed."""
-    extra_module("pyarrow.ipc", "it writes and reads Arrow", "arrow")
-    return extra_module("pyarrow", "it writes and reads Arrow", "arrow")
 
 
 class ArrowListener:
@@ -54,7 +44,7 @@ class ArrowListener:
             kind = "Real" if s.wide else s.kind
             fields.append(arrow.field(s.name, types[kind], metadata=about))
         self._schema = arrow.schema(fields)
-        self._batch, self._since = Batch(), time.monotonic()
+        self._batch, self._since = Batch(), -LONG  # the first rows are written as they come
         with writing(self._path, InputError):
             self._file = self._place.open("wb")
             self._writer = arrow.ipc.new_file(self._file, self._schema)
@@ -63,7 +53,7 @@ class ArrowListener:
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Take the rows; SimulationError where writing fails, the batches until then are whole."""
         self._batch.add(steps, rows)
-        if self._batch.count >= BATCH or time.monotonic() - self._since > LONG:
+        if self._batch.count >= BATCH or time.monotonic() - self._since >= LONG:
             self._flush()
 
     def end(self, complete: bool) -> None:
@@ -84,31 +74,3 @@ class ArrowListener:
         with writing(self._path):
             self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
             self._file.flush()
-
-
-def read_arrow(path: Path) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:
-    """The time and the columns by name, of a file that was cut off those of its whole batches.
-
-    InputError without pyarrow, or where the file is missing or damaged.
-    """
-    arrow = pyarrow()
-    try:
-        with path.open("rb") as file:
-            file.seek(MAGIC)
-            stream = arrow.ipc.open_stream(file)
-            table = arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
-        columns = {
-            name: column.to_numpy() for name, column in zip(table.column_names, table, strict=True)
-        }
-        return columns.pop("time"), columns
-    except (OSError, arrow.ArrowInvalid, KeyError) as error:
-        said = " ".join(f"{error}".split())
-        raise InputError(f"{path}: is damaged, or no Arrow file of a run: {said}") from error
-
-
-def _whole_batches(arrow: Any, stream: Any) -> Iterator[Any]:
-    while True:
-        try:
-            yield stream.read_next_batch()
-        except (StopIteration, OSError, arrow.ArrowInvalid):  # the last one is not whole
-            return

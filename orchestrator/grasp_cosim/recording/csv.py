@@ -1,33 +1,21 @@
-"""Signals as CSV, in the form of the FMI cross-check: written while a run goes on, and read."""
+"""Signals as CSV, in the form of the FMI cross-check, written while a run goes on."""
 
-import csv
-import os
-import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from io import FileIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..base.checks import extra_module
 from ..base.errors import InputError
 from ..base.one_piece import in_one_piece
-from ..base.text import from_cell, to_cell
+from ..base.text import to_cell
 from ..exchange.listener import Experiment, Signal
-from .arrow import pyarrow
 from .memory import writing
 
 PIECE = 1024
 """Rows turned into text at once; a block may be long."""
-
-LARGE = 20_000_000
-"""Bytes of a file that is worth another reader."""
-
-NUMBER = re.compile(r"\s*[-+]?(\.?\d|nan|inf)", re.IGNORECASE)
-"""How a cell begins that is no text."""
 
 
 class CsvListener:
@@ -95,78 +83,3 @@ class CsvListener:
 def quoted(text: str) -> str:
     """Return a text as a cell of a CSV that is neither a formula nor a line break."""
     return '"{}"'.format(to_cell(text).replace('"', '""'))
-
-
-def read_csv(
-    path: Path, texts: Collection[str] | None = None, torn: bool = False
-) -> tuple[npt.NDArray[np.float64], dict[str, npt.NDArray[Any]]]:
-    """The time, and the other columns by name: objects where they are texts, else float64.
-
-    `texts` are the names of those, by default of all that begin with something else than a number.
-    A last row that is `torn` does not count. InputError where it is missing or damaged.
-    """
-    count = None
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = csv.reader(file, strict=True)
-            names = [*map(from_cell, next(rows, []))] or ["nothing"]
-            cells = next(filter(None, rows), [])
-        if torn:
-            count = path.read_bytes().count(b"\n") - 1
-        if names[0] != "time":
-            raise ValueError(f'the first column is {names[0]!r}; must be "time"')
-        if len({*names}) != len(names):
-            raise ValueError("two columns have the same name")
-        with path.open("rb") as file:
-            file.seek(-1, os.SEEK_END)
-            whole = bool(count) if torn else file.read() == b"\n"
-        if not cells or not whole:
-            raise ValueError("the last row is cut off, or there is none")
-        if texts is None:
-            found = zip(names, cells, strict=False)
-            texts = [name for name, cell in found if not NUMBER.match(cell)]
-        kinds: list[Any] = [object if name in texts else np.float64 for name in names]
-        table = None if torn else _fast(path, kinds)
-        if table is None:
-            read = np.loadtxt(
-                path, [("", kind) for kind in kinds], encoding="utf-8", delimiter=",",
-                quotechar='"', comments=None, skiprows=1, max_rows=count, ndmin=1,
-            )  # fmt: skip
-            table = [read[f"f{i}"] for i in range(len(kinds))]
-        if not (np.diff(table[0], prepend=-np.inf) > 0.0).all():
-            raise ValueError("the time must grow from row to row")
-    except OSError as error:
-        raise unreadable(path, error) from error
-    except (ValueError, csv.Error) as error:  # also where it is no UTF-8
-        said = str(error).replace("the dtype passed requires", "the first line names")
-        raise InputError(f"{path}: is damaged: {said.partition('; use ')[0]}") from error
-    columns = {
-        name: np.array([*map(from_cell, column)], object) if kind is object else column
-        for name, kind, column in zip(names, kinds, table, strict=True)
-    }
-    return columns.pop("time"), columns
-
-
-def _fast(path: Path, kinds: Sequence[Any]) -> list[npt.NDArray[Any]] | None:
-    """The columns of a large file in a tenth of the time, if pyarrow is here and they are good."""
-    if path.stat().st_size < LARGE:
-        return None
-    with suppress(InputError):
-        arrow, reader = pyarrow(), extra_module("pyarrow.csv", "it reads CSV", "arrow")
-        of = {np.float64: arrow.float64(), object: arrow.string()}
-        types = {str(i): of[kind] for i, kind in enumerate(kinds)}
-        with suppress(arrow.ArrowInvalid):  # which the other reader says better
-            table = reader.read_csv(
-                path,
-                reader.ReadOptions(skip_rows=1, column_names=[*types]),
-                convert_options=reader.ConvertOptions(column_types=types, null_values=[]),
-            )
-            return [column.to_numpy() for column in table]
-    return None
-
-
-def unreadable(path: Path, error: OSError) -> InputError:
-    """The error for a file of a run that cannot be read."""
-    return InputError(
-        f"{path}: {error.strerror}; must be a folder that `grasp-cosim run --out` wrote"
-    )

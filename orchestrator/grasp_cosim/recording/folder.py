@@ -1,6 +1,5 @@
 """The folder of a run, on disk while it runs, its rows and run.json beside them, and read back."""
 
-import json
 import os
 import platform
 import time
@@ -15,23 +14,25 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 import numpy.typing as npt
 
-from ..base.checks import choice, is_number
+from ..base.checks import choice
 from ..base.errors import InputError, choices
 from ..base.files import check_nature, of_any_format, remove, unwritable
 from ..base.higher import groups
 from ..base.scratch import SUFFIX, Lock
 from ..base.si_units import known_unit
+from ..base.text import counted
 from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.in_si import in_si
-from ..metrics.metric import Measured, Metric, Signals, metrics_of
+from ..metrics.metric import ALL, Measured, Metric, Signals, metrics_of, resolved
 from ..realtime.timing import Timing
 from ..system.description import System
-from .arrow import ArrowListener, read_arrow
-from .csv import CsvListener, read_csv, unreadable
-from .mdf import read_mdf
+from .arrow import ArrowListener
+from .csv import CsvListener
 from .memory import Rows, typed
-from .result import OF_ANY, UNITS, Known, Rejection, Result
+from .result import OF_ANY, Known, Rejection, Result
+from .run_json import MADE, MADE_BESIDE, ORIGIN, read_run_json, unreadable
+from .signals import LOGS, Log, read_log, read_signals
 
 SIGNALS, ARROW, SETTINGS = "signals.csv", "signals.arrow", "run.json"
 """The files of a run's folder, of which it has one of the former two."""
@@ -212,29 +213,6 @@ def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
 
 # ------------------------------------------------------------------ read back
 
-ENTRIES: Mapping[str, tuple[Any, str, str]] = {
-    "a string": (str, "system scheme", "diverging title date"),
-    "a number": ((int, float), "step stop", "start"),
-    "a number or null": ((int, float, type(None)), "wall_time", ""),
-    "true or false": (bool, "complete", ""),
-    "a list": (list, "connections events faults log", "metrics command record"),
-    "a JSON object": (
-        dict,
-        "initialisation components rejections units",
-        "roles input changed versions fmus types descriptions metric_units to_si",
-    ),
-}
-"""What entries of run.json must be besides metrics: those that are needed, and others."""
-
-MADE = (
-    "system", "scheme", "step", "stop", "initialisation", "components", "connections", "events",
-    "faults", "roles", "input", "changed", "metrics", "diverging", "start", "record",
-)  # fmt: skip
-"""Those that say how the run was made."""
-
-ORIGIN = ("title", "date", "versions", "fmus", "command")
-"""Those that say when it was made, and with what."""
-
 TEXT = "str"
 TYPES = ("float64", "int32", "int64", "bool", TEXT)
 """The element types of recorded columns, the last that of Strings."""
@@ -259,23 +237,23 @@ def load_run(folder: str | Path) -> Result:
     """
     folder = run_folder(Path(folder))
     path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS
-    written = _settings(path)
-    units, types, realtime = written["units"], written.get("types", {}), written.get("realtime")
-    if arrow.exists():
-        time, columns = read_arrow(arrow)
-    elif not units and not signals.exists():
+    written = read_run_json(path)
+    units, types, timing = written["units"], written.get("types", {}), written.get("timing")
+    if not units and not arrow.exists() and not signals.exists():
         raise InputError(f"{path}: this run recorded no signal; must have recorded one")
-    else:
-        unfinished = not written["complete"] and written["wall_time"] is None
-        texts = {name for name, kind in types.items() if kind == TEXT}
-        time, columns = read_csv(signals, texts, unfinished)
+    rows = arrow if arrow.exists() else signals
+    try:
+        rows.stat()
+    except OSError as error:
+        raise unreadable(rows, error) from error
+    time, columns = read_signals(rows, [name for name, kind in types.items() if kind == TEXT])
     if list(units) != list(columns):
         raise InputError(
             f"{path}: units are those of {choices(units)}; "
             f"must be those of the recorded columns: {choices(columns)}"
         )
     read = Result(
-        settings={k: written[k] for k in MADE if k in written},
+        settings={k: written[k] for k in (*MADE, *MADE_BESIDE) if k in written},
         time=time,
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
@@ -285,22 +263,39 @@ def load_run(folder: str | Path) -> Result:
         wall_time=written["wall_time"],
         complete=written["complete"],
         descriptions=written.get("descriptions", {}),
-        rejections=_records(path, written, "rejections", Rejection),
+        rejections={name: Rejection(**r) for name, r in written["rejections"].items()},
         log=tuple(written["log"]),
-        timing=None if realtime is None else Timing.from_dict(f"{path}: realtime", realtime),
+        timing=None if timing is None else Timing.from_dict(f"{path}: timing", timing),
         more_metrics=_as_recorded(written),
         origin={key: written[key] for key in ORIGIN if key in written},
-        to_si=_records(path, written, "to_si", Conversion),
+        to_si={name: Conversion(**c) for name, c in written.get("to_si", {}).items()},
         folder=folder,
     )
+    _check_rows(rows, read, written)
     in_part = read.every > 1 or "record" in written
     return _with_known(read, written) if in_part else read
 
 
+def _check_rows(path: Path, read: Result, written: Mapping[str, Any]) -> None:
+    """InputError where rows are missing of a run that came to its end, whatever end that was."""
+    if read.wall_time is None and not read.complete:  # it goes on, or was killed
+        return
+    if read.wall_time is None:
+        raise InputError(
+            f"{path.with_name(SETTINGS)}: wall_time = None; must be a number, as it is complete"
+        )
+    there, last = len(read.time), read.last_step
+    if (there, last) != (written["rows"], written["steps"]):
+        raise InputError(
+            f"{path}: is damaged: has {counted(there, 'row')}, the last of step {last}; must have "
+            f"{written['rows']}, the last of step {written['steps']}, as {SETTINGS} says"
+        )
+
+
 def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
     """A result of some rows or signals with the metrics that run.json has, which are of all."""
-    asked = metrics_of(read.groups, read.more_metrics)
-    there = tuple(m for m in asked if m.name in written)
+    asked, measured = metrics_of(read.groups, read.more_metrics), written["measured"]
+    there = tuple(m for m in asked if m.name in measured)
     if not asked:
         return read
     if not there and read.every > 1:  # it did not come to its end
@@ -308,35 +303,39 @@ def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
         return replace(read, log=(*read.log, line))
     if not there:
         return read
-    values = {m.name: written[m.name] for m in there}
-    measured = Measured(values, there, tuple(written.get("missing_metrics", ())))
-    return replace(read, known=Known(measured, written.get("proxies", {})))
+    place = read.folder / SETTINGS if read.folder else SETTINGS
+    values = {m.name: measured[m.name] for m in there}
+    sized = tuple(_sized(m, values[m.name], read.roles) for m in there)
+    for m in (m for m in sized if m not in read.more_metrics):
+        value = values[m.name]
+        several = isinstance(value, list)
+        if several != bool(m.entries) or (several and len(value) != len(m.entries)):
+            count = counted(len(m.entries) or 1, "value")
+            raise InputError(f"{place}: measured: {m.name} = {value!r}; must be {count}")
+    known = Measured(values, sized, tuple(written.get("missing_metrics", ())))
+    return replace(read, known=Known(known, written.get("proxies", {})))
+
+
+def _sized(m: Metric, value: Any, roles: Mapping[str, str]) -> Metric:
+    """The metric of as many elements of its arrays as it has values."""
+    places = range(1, len(value) + 1) if isinstance(value, list) else ()
+    arrays = [need for need in m.needs if need.endswith(ALL)]
+    return m.of({resolved(n.replace("*", str(j)), roles) for n in arrays for j in places}, roles)
 
 
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
     """The metrics in run.json that nothing here would work out again, as they are there."""
-    known = {*UNITS, *(m.name for m in metrics_of(written.get("metrics", ())))}
+    of_groups = {m.name for m in metrics_of(written.get("metrics", ()))}
+    units = written.get("metric_units", {})
     return tuple(
-        Metric(name, partial(_constant, written[name]), unit)
-        for name, unit in written.get("metric_units", {}).items()
-        if name not in known and name in written
+        Metric(name, partial(_constant, value), units.get(name))
+        for name, value in written["measured"].items()
+        if name not in of_groups
     )
 
 
 def _constant(value: Any, _: Signals) -> Any:
     return value
-
-
-def _records(path: Path, written: Mapping[str, Any], key: str, make: type[Any]) -> dict[str, Any]:
-    """The objects by name in an entry of run.json, of a class whose fields are all numbers."""
-    fields, found = list(make.__annotations__), {}
-    for name, entry in written.get(key, {}).items():
-        numbers = [entry.get(field) for field in fields] if isinstance(entry, dict) else [None]
-        if not all(map(is_number, numbers)):
-            must = " and ".join(fields)
-            raise InputError(f"{path}: {key}: {name} = {entry!r}; must be {must}")
-        found[name] = make(*numbers)
-    return found
 
 
 def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
@@ -351,50 +350,36 @@ def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
     return typed
 
 
-def _settings(path: Path) -> dict[str, Any]:
-    """The object in run.json, whose entries have their types."""
-    try:
-        settings = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise unreadable(path, error) from error
-    except ValueError as error:
-        raise InputError(f"{path}: is damaged, not JSON in UTF-8: {error}") from error
-    if not isinstance(settings, dict):
-        raise InputError(f"{path}: is {type(settings).__name__}; must be a JSON object")
-    for must, (kind, needed, others) in ENTRIES.items():
-        for key in (*needed.split(), *others.split()):
-            there, value = key in settings, settings.get(key)
-            right = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-            if not (right if there else key in others.split()):
-                said = f"{key} = {value!r}" if there else f"no entry {key!r}"
-                must = f"{must}, as `grasp-cosim run --out` writes it"
-                raise InputError(f"{path}: {said}; must be {must}")
-    return settings
+def load_log(path: Path, note: Callable[[str], None] = lambda _: None) -> Signals:
+    """The numbers in a log of any tool, by the names of its columns.
 
-
-def load_log(path: Path, note: Callable[[str], None] | None = None) -> Signals:
-    """The numbers in a file, all float64: CSV with the column "time" and names, or ASAM MDF (.mf4).
-
-    They come in SI units where the run.json of the run beside it tells of others, or the channels
-    of an MDF do; else they are taken to be in SI, which `note` is told of a CSV. InputError where
-    it is missing, damaged or of another kind, or where asammdf is not installed.
+    They come in SI units where the run.json of the run beside it, or the units in the log, tell of
+    others; else they are taken to be in SI, which `note` is told. InputError where it is missing,
+    damaged or of another kind, or where what reads it is not installed; at a cell that is no
+    number once its column is asked for.
     """
-    kind = path.suffix.lower()
     if not path.is_file():
-        raise InputError(f"{path}: no such log; must be a .csv or .mf4 file")
-    if kind not in (".mf4", ".csv"):
-        raise InputError(f"{path}: must be a .csv or .mf4 file")
-    to_si: Mapping[str, Conversion] = {}
-    if kind == ".mf4":
-        time, columns, units = read_mdf(path)
-        known = {name: known_unit(unit) for name, unit in units.items()}
-        to_si = {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
-    else:
-        time, columns = read_csv(path)
+        raise InputError(f"{path}: no such log; must be a {choices(LOGS)} file")
+    if path.suffix.lower() not in LOGS:
+        raise InputError(f"{path}: must be a {choices(LOGS)} file")
+    log = read_log(path)
     beside = path.with_name(SETTINGS)
     if path.stem == Path(SIGNALS).stem and beside.is_file():
-        to_si = _records(beside, _settings(beside), "to_si", Conversion)
-    elif note and kind == ".csv":
-        note(f"{path}: there is no {SETTINGS} beside it; its values are taken to be in SI units")
-    numbers = {name: column for name, column in columns.items() if column.dtype != object}
-    return Signals(time, numbers, to_si=to_si)
+        to_si = {n: Conversion(**c) for n, c in read_run_json(beside).get("to_si", {}).items()}
+    else:
+        to_si = _units_to_si(log, note)
+    return Signals(log.time, log, to_si=to_si)
+
+
+def _units_to_si(log: Log, note: Callable[[str], None]) -> dict[str, Conversion]:
+    """The conversions of the columns that are in a unit that is not of SI."""
+    known = {name: known_unit(unit) for name, unit in log.units.items() if unit}
+    if not known and log.path.suffix.lower() != ".mf4":
+        note(
+            f"{log.path}: there is no {SETTINGS} beside it; its values are taken to be in SI units"
+        )
+    elif silent := [name for name in log if name not in known and log.readable(name)]:
+        note(f"{log.path}: {choices(silent, 6)}: no unit; taken to be in SI units")
+    for name in (name for name, unit in known.items() if unit is None):
+        note(f"{log.path}: {name} [{log.units[name]}]: not a known unit; taken to be in SI units")
+    return {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}

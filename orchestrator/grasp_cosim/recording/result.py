@@ -189,6 +189,11 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return int(self._steps[1] - self._steps[0]) if len(self.time) > 1 else 1
 
     @property
+    def last_step(self) -> int:
+        """The number of the step at whose end the last row is, counted from the start."""
+        return int(self._steps[-1])
+
+    @property
     def numbers(self) -> dict[str, npt.NDArray[Any]]:
         """The signals that are numbers or Booleans: all but Strings."""
         return {name: column for name, column in self.items() if column.dtype != object}
@@ -212,7 +217,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             **self.measured.values,
             "wall_time": took,
             "real_time_factor": simulated / took if took else took,
-            "steps": int(self._steps[-1]),
+            "steps": self.last_step,
             **{key: settings[key] for key in ("scheme", "step", "stop")},
             "complete": self.complete,
         }
@@ -236,16 +241,20 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         self._play(path, MdfListener)
 
     def to_json(self, path: str | Path) -> None:
-        """Write the metrics and the settings that led to them, then what is known by signal
-        (units, conversions to SI, types, descriptions), the units of the metrics, the log, the
-        rejections by component, as "realtime" the timing of a paced run, and its origin.
+        """Write the figures of the run and its settings, as "measured" the metrics, how many rows
+        there are, what is known by signal (units, conversions to SI, types, descriptions), the
+        units of the metrics, the log, the rejections by component, the timing of a paced run, and
+        its origin.
 
         A metric that fails is a line among the missing ones: the rest of the run is kept.
         """
         types = {name: str(column.dtype) for name, column in self.signals.items()}
+        measured = self.measured.values
         report = {
-            **self._figures,
+            **{name: figure for name, figure in self._figures.items() if name not in measured},
             **self.settings,
+            "measured": dict(measured),
+            "rows": len(self.time),
             "units": dict(self.units),
             "to_si": {name: c._asdict() for name, c in self.to_si.items()},
             "types": {n: "str" if kind == "object" else kind for n, kind in types.items()},
@@ -254,7 +263,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "missing_metrics": list(self.measured.missing),
             "log": list(self.log),
             "rejections": {name: asdict(r) for name, r in self.rejections.items()},
-            **({"realtime": self.timing.as_dict()} if self.timing else {}),
+            **({"timing": self.timing.as_dict()} if self.timing else {}),
             **self.origin,
         }
         write_json(Path(path), report)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import InputError, reason
+from ..base.errors import InputError
 from ..base.si_units import known_unit
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
@@ -18,6 +17,9 @@ from ..system.description import System
 from ..system.parts import Port
 from ..system.structure import parameter_in_si
 from ..system.toml import place_of, plain
+from ..tables.column import Column
+from ..tables.table import read_table
+from ..tables.text import is_number
 
 Row = Mapping[str, Value]
 
@@ -57,7 +59,7 @@ def varied(text: str) -> tuple[str, list[Value]]:
 
 
 def as_rows(given: Any) -> list[dict[str, Value]]:
-    """The rows of a CSV file by its path, of columns by place, of a pandas DataFrame, or of rows.
+    """The rows of a table in a file, of columns by place, of a pandas DataFrame, or of rows.
 
     A cell that is None, NaN or empty leaves that place as the system has it. InputError where
     nothing varies, or there are more than MOST rows.
@@ -79,23 +81,38 @@ def as_rows(given: Any) -> list[dict[str, Value]]:
 
 
 def read_rows(path: Path) -> list[dict[str, Value]]:
-    """The rows of a CSV file whose head has places, with a unit in brackets if it is not of SI."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            head, *lines = csv.reader(file)
-    except (OSError, UnicodeDecodeError, ValueError, csv.Error) as error:
-        said = f"--table {path}: {reason(error)}"
-        raise InputError(f"{said}; must be a CSV file whose first line has names") from error
-    columns = [_column(f"--table {path}: column", title.strip()) for title in head]
-    rows = []
-    for number, line in enumerate(lines, 2):
-        if len(line) not in (0, len(head)):
-            raise InputError(
-                f"--table {path}: line {number} has {len(line)} cells; must be {len(head)}"
-            )
-        cells = zip(columns, map(str.strip, line), strict=False)
-        rows.append({p: _converted(plain(text), to_si) for (p, to_si), text in cells if text})
+    """The rows of a table whose head has places, with a unit in brackets if it is not of SI.
+
+    A cell that is empty has no value. InputError at the first one that is not as it must be.
+    """
+    table = read_table(path, f"--table {path}")
+    rows: list[dict[str, Value]] = [{} for _ in range(table.count)]
+    columns = [column for column in table.columns if column.name]
+    for column in columns:
+        table.named(column.name)  # there is one alone
+        to_si = _to_si(column)
+        for row, cell in enumerate(column.texts()):
+            text = cell.strip()
+            if not text:
+                continue
+            if to_si == IDENTITY:
+                rows[row][column.name] = plain(text)
+            elif is_number(text):
+                rows[row][column.name] = to_si(float(text))
+            else:
+                raise InputError(f"{column.place(row)} = {text!r}: must be a number")
     return [row for row in rows if row]
+
+
+def check_units(system: System, path: Path) -> None:
+    """InputError at the first column of a table that is in a unit of something else than its place.
+
+    What has no unit in the system takes the values as they are in SI units.
+    """
+    for column in read_table(path, f"--table {path}").columns:
+        unit = unit_of(system, column.name) if column.unit else None
+        if unit and known_unit(unit):
+            column.to_unit(unit)
 
 
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
@@ -123,13 +140,17 @@ def unit_of(system: System, place: str) -> str | None:
     return variable.unit if variable else None
 
 
-def _column(where: str, title: str) -> tuple[str, Conversion]:
-    place, _, name = title.partition(" [")
-    name = name.removesuffix("]")
-    unit = known_unit(name) if name else None
-    if name and unit is None:
-        raise InputError(f"{where} {title!r}: {name!r} is no known unit")
-    return place, Conversion(unit.factor, unit.offset) if unit and not unit.si else IDENTITY
+def _to_si(column: Column) -> Conversion:
+    """The conversion of the values of a column to SI base units; InputError where it has none."""
+    if column.unit is None:
+        return IDENTITY
+    unit = known_unit(column.unit)
+    if unit is None:
+        raise InputError(
+            f"{column.heading} = {column.head!r}: {column.unit!r} is no known unit; must be one, "
+            "like mm"
+        )
+    return IDENTITY if unit.si else Conversion(unit.factor, unit.offset)
 
 
 def _number(value: Any) -> Value | None:

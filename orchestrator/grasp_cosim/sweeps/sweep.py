@@ -32,7 +32,7 @@ from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of
 from ..system.description import System
 from ..system.settings import settings
-from .rows import Row, as_rows, settings_of, unit_of
+from .rows import Row, as_rows, check_units, settings_of, unit_of
 from .table import Outcome, Table, check_format, made
 
 AHEAD = 100
@@ -74,6 +74,8 @@ def sweep(
     KeyboardInterrupt at Ctrl-C.
     """
     found = as_rows(rows)
+    if isinstance(rows, str | Path):
+        check_units(system, Path(rows))
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
     observed = {str(port) for port in system.observed}

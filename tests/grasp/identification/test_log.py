@@ -163,15 +163,57 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("log.txt", b"time\n", "must be a .csv or .mf4 file"),
-        ("log.csv", b"time,a\n0.0\n", "is damaged"),
+        ("log.txt", b"time\n", "must be a .csv, .mf4, .arrow, .feather, .parquet file"),
+        ("log.csv", b"time,a\n0.0\n", "line 2 has 1 cell; must have 2, as line 1"),
+        ("log.csv", b"t,a\n0,0\n", "no column of the name 'time'; must be one, in s or as in"),
+        ("log.csv", b"time,Time [ms],a\n0,0,0\n", "2 columns of the name 'time'; must be one"),
+        ("log.csv", b"time [V],a\n0,0\n", "'time .V.': must be in a unit of time, like ms"),
+        ("log.csv", b"time,a\n", "has no row below its names; must have one"),
+        ("log.parquet", b"PAR1 and no more", "is damaged, or no Parquet file: "),
         ("log.mf4", b"not an MDF file at all", "is damaged, not an MDF file"),
     ],
 )
 def test_a_file_that_is_no_log_is_refused(tmp_path, name, content, message):
     if name.endswith("mf4"):
         pytest.importorskip("asammdf")
+    if name.endswith("parquet"):
+        pytest.importorskip("pyarrow")
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=message) as caught:
         load_log(tmp_path / name)
     assert "\n" not in str(caught.value)
+
+
+def test_columns_that_nobody_uses_hold_whatever_they_like(grasp, recorded, tmp_path):
+    """As a spreadsheet writes it: a mark of the byte order, semicolons, ms, words, empty cells."""
+    units = {"velocity": (1e3, "mm/s"), "contact_force": (1.0, "N"), "force": (1e-3, "kN")}
+    used = [f"plant.{n}[{j}]" for n in ("velocity", "contact_force") for j in (1, 2)]
+    used += [f"controller.force[{j}]" for j in (1, 2)]
+    scaled = [units[name.partition(".")[2].partition("[")[0]] for name in used]
+    heads = [f"{name} [{unit}]" for name, (_, unit) in zip(used, scaled, strict=True)]
+    lines = [";".join(["operator", "time [ms]", *heads, "note", "note", "temperature"])]
+    columns = [factor * recorded[name] for name, (factor, _) in zip(used, scaled, strict=True)]
+    for row, values in enumerate(zip(1e3 * recorded.time, *columns, strict=True)):
+        numbers = [repr(float(value)) for value in values]
+        lines.append(";".join(["1st run", *numbers, "", "1_0", "21.5" if row else "n/a"]))
+    (tmp_path / "log.csv").write_text("\n".join(lines), "utf-8-sig")
+    told = []
+    log = load_log(tmp_path / "log.csv", told.append)
+    assert told == []
+    for e in identified(grasp, log).estimates:
+        assert e.value == pytest.approx(TRUE[e.name], rel=2e-3, abs=2e-3), e.name
+    with pytest.raises(InputError, match=r"log.csv: line 2, column 11, temperature = 'n/a': must"):
+        log["temperature"]
+    with pytest.raises(InputError, match=r"column 10 = 'note': appears twice; must be"):
+        log["note"]
+
+
+def test_what_a_log_is_taken_to_be_in_is_said(tmp_path):
+    (tmp_path / "log.csv").write_text("time,a.x [mm],b,c [raw],d\n0,1,2,3,word\n", "utf-8")
+    told = []
+    log = load_log(tmp_path / "log.csv", told.append)
+    assert (log["a.x"][0], log["b"][0], log["c"][0]) == (1e-3, 2.0, 3.0)
+    assert [line.partition(": ")[2] for line in told] == [
+        "b: no unit; taken to be in SI units",
+        "c [raw]: not a known unit; taken to be in SI units",
+    ]

@@ -5,7 +5,7 @@ is within 2 ms of that at 0.1 ms, a hundredth of what the published times scatte
 reflectances matter by their ratio alone, so that surfaces of equal colours are one grasp.
 """
 
-import csv
+import logging
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,11 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.checks import real
 from ...base.errors import InputError, SimulationError, choices
 from ...base.parallel import Crew
 from ...base.progress import Progress
+from ...interface.units import IDENTITY
 from ...system.description import System
+from ...tables.table import names_in, read_table
 from ..metrics import FINGERS
 from ..presets import CASES, start_in_si, with_case, with_si_values
 from ..published.compared import Setting, close, published_rows
@@ -33,6 +34,12 @@ RATIO = "sensor_2.reflectance"
 COLUMNS = ("x_m", "case", "finger", "time")
 OPTIONAL = ("alpha_1", "alpha_2")
 """Of a table of contact times."""
+
+UNITS = {"x_m": "m", "case": "1", "finger": "1", "time": "s", "alpha_1": "1", "alpha_2": "1"}
+"""The units of these columns, where the table names none."""
+
+LOGGER = logging.getLogger(__name__)
+"""Gets as a warning which columns are not used."""
 
 Times = Sequence[float]
 
@@ -74,29 +81,37 @@ def published_contacts() -> list[Contact]:
 
 def is_contacts(path: Path) -> bool:
     """True for a table of contact times, which its columns say; False for any other file."""
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            return {*COLUMNS[1:3]} <= {name.strip() for name in file.readline().split(",")}
-    except (OSError, UnicodeDecodeError):
-        return False
+    return {*COLUMNS[1:3]} <= {*names_in(path)}
 
 
 def read_contacts(path: Path) -> list[Contact]:
-    """A table of contact times: CSV with the columns x_m, case, finger, time, and, where the
-    surfaces are not alike, alpha_1 and alpha_2. InputError names the line that is wrong.
+    """A table of contact times: the columns x_m, case, finger, time, and, where the surfaces are
+    not alike, alpha_1 and alpha_2; in m and s, or in the units behind their names.
+
+    Others are not used, which is said. InputError names the line that is wrong.
     """
-    with path.open(encoding="utf-8-sig", newline="") as file:  # spreadsheets begin with a mark
-        reader = csv.DictReader(file, skipinitialspace=True)
-        names = reader.fieldnames or []
-        if not set(COLUMNS) <= set(names) <= {*COLUMNS, *OPTIONAL}:
-            raise InputError(
-                f"{path}: the columns are {choices(names)}; must be {choices(COLUMNS)}, "
-                f"and may be {choices(OPTIONAL)}"
-            )
-        found = [_read(f"{path}, line {reader.line_num}", line) for line in reader]
-    if not found:
+    table = read_table(path)
+    names = [column.name for column in table.columns if column.name]
+    if missing := [name for name in COLUMNS if name not in names]:
+        raise InputError(
+            f"{path}: the columns are {choices(names)}, without {choices(missing)}; must be "
+            f"{choices(COLUMNS)}, and may be {choices(OPTIONAL)}"
+        )
+    if not table.count:
         raise InputError(f"{path}: has no line below its columns; must have contact times")
-    return found
+    used = [name for name in UNITS if name in names]
+    if others := [name for name in names if name not in used]:
+        LOGGER.warning("%s: not used: the columns %s", path, choices(others, 6))
+    columns = [table.named(name) for name in used]
+    changes = [column.to_unit(UNITS[column.name]) for column in columns]
+    numbers = [
+        [change(float(value)) if change != IDENTITY else float(value) for value in column.numbers()]
+        for column, change in zip(columns, changes, strict=True)
+    ]
+    return [
+        _contact(columns[0].row_place(row), dict(zip(used, values, strict=True)))
+        for row, values in enumerate(zip(*numbers, strict=True))
+    ]
 
 
 def identify_from_times(
@@ -173,11 +188,8 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     return [STOP if t is None else float(t) for t in result.metrics["time_to_contact"]]
 
 
-def _read(place: str, line: Mapping[str, str]) -> Contact:
-    try:
-        numbers = {name: real(text) for name, text in line.items()}
-    except (AttributeError, ValueError):  # a cell is missing, or there is one too many
-        raise InputError(f"{place}: must be a number for each column") from None
+def _contact(place: str, numbers: Mapping[str, float]) -> Contact:
+    """The contact of a row; InputError where there can be none such."""
     for name, valid in (("case", CASES), ("finger", FINGERS)):
         if numbers[name] not in valid:
             raise InputError(

@@ -1,0 +1,1 @@
+"""Tables of numbers and texts, read from files of any tool."""

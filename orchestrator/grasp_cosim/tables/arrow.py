@@ -1,0 +1,80 @@
+"""Tables of Apache Arrow: files of the IPC format (Feather 2), and Parquet; by pyarrow.
+
+The unit of a column is in the metadata of its field, as ours have it, or behind its name. An IPC
+file is a stream of whole batches behind eight bytes, until its end is written; so a file is read
+that a kill left behind.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..base.checks import extra_module
+from ..base.errors import InputError
+
+MAGIC = 8
+"""Bytes before the first batch."""
+
+IPC, PARQUET = (".arrow", ".feather"), (".parquet",)
+"""Suffixes of their files."""
+
+
+def pyarrow() -> Any:
+    """The library; InputError where it is not installed."""
+    extra_module("pyarrow.ipc", "it writes and reads Arrow", "arrow")
+    return extra_module("pyarrow", "it writes and reads Arrow", "arrow")
+
+
+def arrow_table(path: Path, called: str) -> Any:
+    """The pyarrow.Table of a file, of an IPC file that was cut off that of its whole batches.
+
+    InputError without pyarrow, or where the file is missing or damaged.
+    """
+    arrow = pyarrow()
+    kind = "Parquet" if path.suffix.lower() in PARQUET else "Arrow"
+    try:
+        if kind == "Parquet":
+            parquet = extra_module("pyarrow.parquet", "it reads Parquet", "parquet")
+            return parquet.read_table(path)
+        with path.open("rb") as file:
+            file.seek(MAGIC)
+            stream = arrow.ipc.open_stream(file)
+            return arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
+    except (OSError, arrow.ArrowException) as error:
+        said = " ".join(f"{error}".split())
+        raise InputError(f"{called}: is damaged, or no {kind} file: {said}") from error
+
+
+def _whole_batches(arrow: Any, stream: Any) -> Iterator[Any]:
+    while True:
+        try:
+            yield stream.read_next_batch()
+        except (StopIteration, OSError, arrow.ArrowException):  # the last one is not whole
+            return
+
+
+def numbers_of(column: Any) -> Any:
+    """The values of a column of numbers or Booleans as an array of its type; None of any other.
+
+    A value that is missing is NaN.
+    """
+    types, kind = pyarrow().types, column.type
+    if not (types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind)):
+        return None
+    values = column.to_numpy()
+    if values.dtype == object:  # Booleans of which some are missing
+        return None
+    return values.astype("float64") if values.dtype.kind == "f" else values
+
+
+def texts_of(column: Any) -> list[str]:
+    """The values of a column as a CSV file would have them; empty where there is none."""
+    return [_text(value) for value in column.to_pylist()]
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, float) else str(value)
