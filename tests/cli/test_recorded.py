@@ -51,7 +51,7 @@ def test_json_another_place_and_no_matplotlib(runs, tmp_path, monkeypatch):
     [
         ("run.json", None, "run.json: No such file"),
         ("signals.csv", None, "signals.csv: No such file"),
-        ("run.json", '{"units": {}}', "run.json: no entry 'system'; must be a string, as"),
+        ("run.json", '{"units": {}}', "run.json: no entry 'system'; must have one, as"),
     ],
 )
 def test_a_folder_that_is_no_run_is_one_line(name, text, message, runs, tmp_path):

@@ -374,11 +374,13 @@ def load_log(path: Path, note: Callable[[str], None] = lambda _: None) -> Signal
 def _units_to_si(log: Log, note: Callable[[str], None]) -> dict[str, Conversion]:
     """The conversions of the columns that are in a unit that is not of SI."""
     known = {name: known_unit(unit) for name, unit in log.units.items() if unit}
-    if not known and log.path.suffix.lower() != ".mf4":
-        note(
-            f"{log.path}: there is no {SETTINGS} beside it; its values are taken to be in SI units"
-        )
-    elif silent := [name for name in log if name not in known and log.readable(name)]:
+    silent = [name for name in log.numeric if name not in known]
+    if log.path.suffix.lower() == ".mf4":
+        silent = []  # in which Booleans have no unit either
+    elif not known:
+        missing = f"there is no {SETTINGS} beside it"
+        note(f"{log.path}: {missing}; its values are taken to be in SI units")
+    elif silent:
         note(f"{log.path}: {choices(silent, 6)}: no unit; taken to be in SI units")
     for name in (name for name, unit in known.items() if unit is None):
         note(f"{log.path}: {name} [{log.units[name]}]: not a known unit; taken to be in SI units")
