@@ -138,7 +138,11 @@ OTHERS = {"binaries/linux64/Other.so": b"", LINUX64: None}
     ("changes", "text", "fix"),
     [
         ({LINUX64: None}, "has a binary for win64 only; this machine: linux64", "ask the vendor"),
-        ({LINUX64: None, "sources/all.c": b""}, "has a binary for win64", "-lm fmpy compile FMU"),
+        (
+            {LINUX64: None, "sources/all.c": b""},
+            "has a binary for win64",
+            "do not compile as they are: modelDescription.xml lists no source files",
+        ),
         (OTHERS, "Stock.so, but Other.so; there is: linux64, win64; this machine: ", "for linux64"),
     ],
 )
@@ -148,6 +152,7 @@ def test_no_binary_for_this_machine(changes, text, fix, opened):
     assert status == "problem"
     assert text in said
     assert fix in remedy
+    assert "build --native" not in remedy  # whose block only its maker has
     assert loading.trial(fmu)[0] == "warning"
 
 

@@ -265,7 +265,7 @@ class LoadedInstance(ABC):
                 reason = as_reason(self._messages.reasons())
                 LOGGER.warning("%s: %s%s", self.name, error, reason)
         # fmi2Fatal is what pythonfmu makes of any call refused: our Python FMUs outlive it
-        ours = self._python and (self.interface.tool or "").startswith("grasp-cosim")
+        ours = self._python and self.interface.ours
         if self._slave is not None:
             if self._worst < FATAL or ours:
                 self._free()

@@ -201,7 +201,7 @@ def host(fmu: Unpacked, linked: str) -> Verdict | None:
         return None
     beside = Path(sys.base_prefix, "lib", LIBPYTHON)
     fix = f"LD_PRELOAD={quote(str(beside) if beside.is_file() else LIBPYTHON)} HOST"
-    if "grasp-cosim" in (fmu.declared.tool or ""):
+    if fmu.declared.ours:
         fix += ", or grasp-cosim build --native"
     text = "bound to no libpython: hosts that are not Python miss the symbol _Py_NoneStruct"
     return "warning", text, fix

@@ -13,9 +13,10 @@ from xml.parsers import expat
 
 from ..base.errors import InputError
 from ..base.files import check_fmu_file
-from .obstacles import HEAD
 
 NAME = "modelDescription.xml"
+HEAD = 20
+"""Bytes of an ELF file that say which processor it is for."""
 LARGEST = 100_000_000
 """Bytes of a modelDescription.xml: some 300,000 variables, more than the largest FMUs have."""
 LARGEST_UNPACKED, MOST_EXPANSION = 500_000_000, 50
@@ -55,7 +56,7 @@ def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
             if description > LARGEST:
                 raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")
             check_size(archive, path)
-            root = _parsed(archive.read(NAME))
+            root = parsed(archive.read(NAME))
             files = dict.fromkeys(entries, b"")
             for name in filter(_BINARY.fullmatch, entries):
                 with archive.open(entries[name]) as file:
@@ -81,7 +82,7 @@ def unreadable(path: Path, error: Exception | str) -> InputError:
     return InputError(f"{path}: not a readable FMU: {reason}")
 
 
-def _parsed(text: bytes) -> ElementTree.Element:
+def parsed(text: bytes) -> ElementTree.Element:
     """The root; of all at once, since expat reads a long name anew with each piece."""
     if text.count(b"<") - text.count(b"</") > MOST_ELEMENTS:  # as cheap as can be
         raise ValueError(f"{NAME} has more than {MOST_ELEMENTS} elements")

@@ -289,6 +289,11 @@ class Interface:
     """The path by which the user knows it, where that is not `path`."""
 
     @property
+    def ours(self) -> bool:
+        """True if it was made here."""
+        return (self.tool or "").startswith("grasp-cosim")
+
+    @property
     def called(self) -> str:
         """The FMU as messages name it."""
         return without_scratch(str(self.given or self.path))

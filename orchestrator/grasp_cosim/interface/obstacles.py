@@ -14,7 +14,9 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from ..base.errors import choices
+from .document import HEAD
 from .interface import Interface, Value, typed
+from .sources import why_not_compiled
 
 KINDS = {
     "CoSimulation": "co-simulation",
@@ -68,9 +70,6 @@ CAPABILITIES: Mapping[tuple[str, str], tuple[str, ...]] = {
 
 RUN = ("CoSimulation", "ModelExchange")
 """The kinds that the master runs, the one it prefers first."""
-
-HEAD = 20
-"""Bytes of an ELF file that say which processor it is for."""
 
 _PROCESSORS = {3: "x86", 40: "ARM", 62: "x86-64", 183: "AArch64", 243: "RISC-V"}
 """By their number in ELF."""
@@ -182,10 +181,14 @@ def of_binary(fmu: Interface) -> Obstacle | None:
     if not fmu.platforms:
         what = "is source-only, C without a binary" if fmu.sources else "has no binary at all"
     remedy = f"ask the vendor for an FMU with a binary for {here}"
-    if fmu.python:
+    if fmu.python and fmu.ours:
         remedy += ", or make a native one of its block: grasp-cosim build --native"
     if fmu.sources:
-        remedy += ", or compile its sources: LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
+        lacking = why_not_compiled(fmu)
+        way = f"; its sources do not compile as they are: {lacking}"
+        if not lacking:
+            way = ", or compile its sources: LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
+        remedy += way
     return Obstacle(f"{what}; this machine: {here}", remedy)
 
 
