@@ -57,12 +57,21 @@ def test_a_ring_without_direct_feedthrough_is_no_loop(mock):
     assert started.master.log == []
 
 
-def test_a_loop_that_any_value_solves_keeps_its_start_and_says_so(mock):
-    started = run([mock("a", through), mock("b", through)], ["ab", "ba"])
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        (2.0, "its start values solve it and are kept, to a relative residual of 0"),
+        (0.0, "all its values are 0 and are kept, which solves it if its FMUs work out their"),
+    ],
+)
+def test_a_loop_that_any_value_solves_keeps_its_start_and_says_so(mock, start, said):
+    first = mock("a", through)
+    first.u = start
+    started = run([first, mock("b", through)], ["ab", "ba"])
     started.master.initialise()
-    assert started.signals()["a.y"] == [0.0]
+    assert started.signals()["a.y"] == [start]
     (line,) = started.master.log
-    assert "a.u: its start values solve it and are kept, to a relative residual of 0" in line
+    assert f"a.u: {said}" in line
 
 
 def test_two_loops_are_solved_together(mock):

@@ -125,6 +125,7 @@ class Propagation:
         self.system = system
         self._ports, loops = system.once(order_ports)
         self._cuts = [loop[0] for loop in loops]
+        self._in_loops = {port for loop in loops for port in loop}
         paths = "; ".join(" -> ".join(map(str, path)) for path in loops)
         self._loops = f"{system.name}: algebraic loop at t = 0: {paths}"
         self.values: dict[Port, Value] = {}
@@ -155,6 +156,11 @@ class Propagation:
         solution = f"solved in {counted(count, 'iteration')}"
         if not count:
             solution = "its start values solve it and are kept"
+            if not any(self.values[port] for port in self._in_loops):
+                solution = (
+                    "all its values are 0 and are kept, which solves it if its FMUs work out "
+                    "their outputs before the first step"
+                )
         loops = "algebraic loop" if len(cuts) == 1 else f"{len(cuts)} algebraic loops"
         line = (
             f"{loops} at t = 0 through {choices(cuts, NAMED)}: {solution}, to a relative residual "
