@@ -31,12 +31,16 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Input:
-    """An input; `nominal` is the size that a real one usually has."""
+    """An input; `nominal` is the size that a real one usually has.
+
+    `infinite` if inf is a value of it, as of a distance to nothing.
+    """
 
     description: str
     _: KW_ONLY
     unit: str = ""
     nominal: float | None = None
+    infinite: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from block_variables import Parameter
 
 from . import electronics, optics
 from . import noise as random_noise
+from .optics import check_inputs as check_inputs
 from .optics import outputs as seen
 
 Inputs = optics.Inputs
@@ -130,7 +131,7 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 def _light(p: Params, u: Inputs) -> float:
     """The intensity xi in V, of a striped surface if it is one."""
     xi = seen(p, u).intensity
-    if not p.pattern.enabled:
+    if not p.pattern.enabled or u.gap > optics.FARTHEST:
         return xi
     return xi * optics.striped(p.pattern, 0.0 if u.gap < 0.0 else u.gap)
 

@@ -61,7 +61,12 @@ class Inputs(NamedTuple):
 
     gap: Annotated[
         float,
-        Input("l, distance from the sensor face to the object surface", unit="m", nominal=0.1),
+        Input(
+            "l, distance from the sensor face to the object surface; inf: nothing in range",
+            unit="m",
+            nominal=0.1,
+            infinite=True,
+        ),
     ] = 0.1
 
 
@@ -73,8 +78,23 @@ class Outputs(NamedTuple):
     ]
 
 
+FARTHEST = 1e6
+"""m; what is further away is nothing in range, be it inf or the largest double."""
+
+
+def check_inputs(p: Params, u: Inputs) -> None:
+    """Refuse a gap of more than l_0 below zero: no object is behind the sensing element."""
+    if u.gap < -p.offset_distance:
+        raise ValueError(
+            f"gap = {u.gap!r} m: must be from {-p.offset_distance:g} m on, where the sensing "
+            "element is; a ray that hit nothing? Nothing in range is inf"
+        )
+
+
 def outputs(p: Params, u: Inputs) -> Outputs:
     """Eq. (9). The spacer keeps the object off the element: a gap below zero reads as zero."""
+    if u.gap > FARTHEST:
+        return Outputs(0.0)
     l = 0.0 if u.gap < 0.0 else u.gap
     return Outputs(p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent)
 

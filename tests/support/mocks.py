@@ -25,6 +25,7 @@ Function = Callable[[float, float], float]
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{name}">
   <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="{vary}"/>
+  <VendorAnnotations>{annotation}</VendorAnnotations>
   <ModelVariables>
     <ScalarVariable name="u" valueReference="0" causality="input" variability="{variability}">
       <{kind} start="{zero}"{nominal}/></ScalarVariable>
@@ -41,17 +42,20 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
+INFINITE_U = '<Tool name="grasp-cosim"><Infinite variable="u"/></Tool>'
+
+
 class Mock:
     """y = output(u, time), where time only moves with a step.
 
     direct says whether y is declared to depend on u, initially the same at the start where that
-    differs, nominal is that of u. rejects, if given, is
-    asked at each step for the time reached: the step is discarded where that is before its end.
+    differs, infinite that u takes inf, nominal is that of u. rejects, if given, is asked at each
+    step for the time reached: the step is discarded where that is before its end.
     """
 
     def __init__(
         self, folder, name, output, kind="Real", direct=True, vary=True, nominal=None, rejects=None,
-        initially=None,
+        initially=None, infinite=False,
     ):  # fmt: skip
         self.name = name
         self.output = output
@@ -69,6 +73,7 @@ class Mock:
             initially=declared[direct if initially is None else initially],
             variability="continuous" if kind == "Real" else "discrete",
             nominal="" if nominal is None else f' nominal="{nominal}"',
+            annotation=INFINITE_U if infinite else "",
             zero={"Boolean": "false", "String": ""}.get(kind, "0"),
         )  # fmt: skip
         with zipfile.ZipFile(self.path, "w") as archive:

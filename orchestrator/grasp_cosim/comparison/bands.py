@@ -20,11 +20,9 @@ from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from ..base.checks import known, number, toml_table
 from ..base.errors import InputError, choices, nearest
-from .tube import Curve, deviation
+from .tube import FAR, Curve, deviation
 
 SHARE = 1e-3
 """The smallest derived width as a share of the range, and time as a share of the duration."""
@@ -143,9 +141,11 @@ def signal_band(
     None stands for 1, as in FMI. A held curve (Booleans, integers) has the derived width 0.
     """
     apart = [float(deviation(reference, other, time).values.max()) for other in again]
-    width, span = BOTH * max(apart, default=0.0), float(np.ptp(reference.values))
+    apart = [distance for distance in apart if distance < SMALL * FAR]
+    low, high = reference.range
+    width, span = BOTH * max(apart, default=0.0), high - low
     if not reference.held:
-        size = max(float(np.abs(reference.values).max()), 1.0 if nominal is None else abs(nominal))
+        size = max(abs(low), abs(high), 1.0 if nominal is None else abs(nominal))
         width = max(SHARE * span, SMALL * size, width)
     derived = Band(width, time, "derived")
     return given.band(span, derived) if given else derived

@@ -147,8 +147,8 @@ def judge(
         apart = deviation(reference.until(float(other.time[-1])), other, band.time)
         worst = apart.values.argmax()
         time, distance, was, now = (float(column[worst]) for column in apart)
-        span = float(np.ptp(reference.values))
-        signals.append(Compared(name, unit, band, distance, was, now, time, span))
+        low, high = reference.range
+        signals.append(Compared(name, unit, band, distance, was, now, time, high - low))
     metrics, own, measured = [], values[0], [run.measured(asked) for run in again]
     by_name = {m.name: m for m in asked}
     for name in dict.fromkeys((*own, *values[1])):

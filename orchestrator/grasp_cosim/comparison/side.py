@@ -19,7 +19,7 @@ from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run
 from ..recording.result import Result
 from ..recording.signals import LOGS, Log, read_log
 from ..system.settings import given_values
-from .tube import ROUNDING, Curve
+from .tube import FAR, ROUNDING, Curve
 
 AS_IT_STARTS, NONE = "as the FMU starts", "none"
 """In place of a value that was not given, and of what one run has not."""
@@ -94,9 +94,14 @@ class Side:
             raise InputError(f"{self.name}: {name} at t = {at:.9g} s: must be a finite number")
 
     def curves(self) -> dict[str, Curve]:
-        """The signals as curves; Booleans and integers are held between samples."""
+        """The signals as curves; Booleans and integers are held between samples.
+
+        All that is FAR from zero is the same: inf or the largest double, a distance to nothing.
+        """
         return {
-            name: Curve(self.time, column.astype(np.float64), column.dtype.kind != "f")
+            name: Curve(
+                self.time, np.clip(column.astype(np.float64), -FAR, FAR), column.dtype.kind != "f"
+            )
             for name, column in self.signals.items()
         }
 

@@ -14,12 +14,22 @@ ROUNDING = 0.5e-9
 """s; times are whole nanoseconds, so a sample this close to the end of a window is at its end."""
 
 
+FAR = 1e300
+"""As far from zero as a value counts: inf and the largest double, a distance to nothing."""
+
+
 class Curve(NamedTuple):
     """Samples values over time in s, rising; between them linear, or held where held is true."""
 
     time: Array
     values: Array
     held: bool = False
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The lowest and the highest value that is not FAR from zero; 0 where there is none."""
+        near = self.values[np.abs(self.values) < FAR]
+        return (float(near.min()), float(near.max())) if len(near) else (0.0, 0.0)
 
     def at(self, time: Array) -> Array:
         """The values at other times; before the first and after the last sample those of it."""

@@ -5,6 +5,9 @@ size |x| the moments count at which it first reaches its scale, ten times that, 
 diverges takes no longer for each decade than for the one before: it grows exponentially, or faster.
 A jump passes decades in one step; a ramp takes ten times as long for each, a power t^n the n-th
 root of ten times; a stable response ends.
+
+A distance may be that to nothing: inf, or the largest double. Where every input that a signal goes
+to says that it takes inf, its size is not looked at.
 """
 
 import os
@@ -41,6 +44,11 @@ FAR = 1e15
 """Times its scale, or 1, from which a signal has run away however it came there: of what it should
 be, a float64 has no digit left.
 """
+
+NEVER = np.nan
+"""A size that no value reaches, not even inf."""
+
+ON = 'or let it go on: diverging = "continue"'
 
 
 class Dispatcher:
@@ -85,9 +93,11 @@ class Dispatcher:
         watched = {port: observed[port] for port in system.watched}
         self._watched = _places(observed.values(), watched.values())
         self._watched_signals = tuple(watched.values())
-        self._divergence = Divergence(system, watched)
+        open_ended = to_open_ends(system)
+        self._divergence = Divergence(system, watched, open_ended)
         self._unwatched = Unwatched(system, observed)
         self._goes_on = system.diverging == "continue"
+        self._may_be_infinite = np.array([self._goes_on or port in open_ended for port in watched])
         self._runaways: list[str] = []
         self._energy = ExchangeEnergy(system.once(bonds), slots, system.once(transforms))
         every_signal = (*observed.values(), *self._energy.signals)
@@ -146,18 +156,21 @@ class Dispatcher:
         """The number of rows to keep, and what is wrong in the last of them, if anything is."""
         good, sizes = len(steps), largest(outputs)
         if not np.isfinite(sizes).all():
-            good = int(np.isfinite(outputs).all(axis=1).argmin())
-            sizes = largest(outputs[:good])
+            valid = np.isfinite(outputs) | (np.isinf(outputs) & self._may_be_infinite)
+            if not valid.all():
+                good = int(valid.all(axis=1).argmin())
+                sizes = largest(outputs[:good])
         runaway = self._divergence(steps[:good], outputs[:good], sizes)
         if runaway and not self._goes_on:
-            return runaway[0] + 1, f'{runaway[1]}; or let it go on: diverging = "continue"'
+            return runaway[0] + 1, f"{runaway[1]}; {ON}"
         if runaway:
             self._runaways.append(f"{runaway[1]}; the run went on")
         if good == len(steps):
             return good, ""
-        i = int(np.isfinite(outputs[good]).argmin())
+        i = int(valid[good].argmin())
         name, value = self._watched_signals[i].name, outputs[good, i]
-        return good + 1, f"{name} = {value} at step {steps[good]}: must be finite"
+        line = f"{name} = {value} at step {steps[good]}: must be finite"
+        return good + 1, line if np.isnan(value) else f"{line}, {ON}"
 
     def spare(self, ns: float) -> bool:
         """Give a listener that puts work off so many ns for it; False if none had any to do."""
@@ -249,6 +262,17 @@ def _is_long(system: System, port: Port) -> bool:
     return isinstance(high, int) and high >= EXACT
 
 
+def to_open_ends(system: System) -> frozenset[Port]:
+    """The outputs that go to inputs alone that take inf, as the distance to nothing in range."""
+    sources: dict[Port, bool] = {}
+    for connection in system.connections:
+        target = connection.target
+        interface = system.component(target.component, str(target)).interface
+        takes_it = interface.by_name[target.variable].infinite
+        sources[connection.source] = takes_it and sources.get(connection.source, True)
+    return frozenset(port for port, all_take_it in sources.items() if all_take_it)
+
+
 def largest(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """The largest magnitude in each column; not finite where one of its values is not."""
     if not len(rows):
@@ -264,11 +288,21 @@ class Divergence:
     Without a nominal value it is 1, in the signal's unit or in the SI unit, whichever is greater.
     """
 
-    def __init__(self, system: System, outputs: Mapping[Port, Signal]) -> None:
-        """Over the columns of the outputs; only those that are Real count."""
+    def __init__(
+        self,
+        system: System,
+        outputs: Mapping[Port, Signal],
+        open_ended: Collection[Port] = (),
+    ) -> None:
+        """Over the columns of the outputs; only those that are Real, and have an end, count."""
         self._system, self._signals = system, tuple(outputs.values())
         self._scales = np.array([_scale(system, port) for port in outputs])
-        self._limits = np.array([0.0 if s.kind == "Real" else np.inf for s in self._signals])
+        self._limits = np.array(
+            [
+                0.0 if signal.kind == "Real" and port not in open_ended else NEVER
+                for port, signal in outputs.items()
+            ]
+        )
         self._reached: list[list[int]] = [[] for _ in outputs]
         self._over = False
 
@@ -278,7 +312,7 @@ class Divergence:
         rows: npt.NDArray[np.float64],
         sizes: npt.NDArray[np.float64],
     ) -> tuple[int, str] | None:
-        """The first signal that runs away in a block of finite rows, (len(steps), len(outputs)).
+        """The first signal that runs away in a block of rows, (len(steps), len(outputs)).
 
         Its row, and a line that says so. None where there is none, and after the first. sizes are
         largest(rows). Blocks of any length come to the same.
@@ -290,12 +324,12 @@ class Divergence:
         if not found:
             return None
         self._over = True
-        row, i = min(found, key=lambda f: (f[0], -abs(rows[f]) / self._scales[f[1]]))
+        row, i = min(found, key=lambda f: (f[0], -abs(float(rows[f])) / float(self._scales[f[1]])))
         signal, time = self._signals[i], seconds(self._system.time_ns(int(steps[row])))
         size = f"{rows[row, i]:.3g} {signal.unit or ''}".rstrip()
-        decade = (self._reached[i][-1] - self._reached[i][-4]) / 3
         text = f"{signal.name} ran away: {size} at t = {time}"
         if _grows(self._reached[i]):
+            decade = (self._reached[i][-1] - self._reached[i][-4]) / 3
             length = decade * in_seconds(self._system.step_ns)
             text += f", ten times as much every {length:.2g} s"
         return row, f"{text}; look at the signs and gains, or try a shorter step"
@@ -310,9 +344,10 @@ class Divergence:
             self._limits[i] = self._scales[i] = max(self._scales[i], first)
         while (row := int(np.searchsorted(peaks, self._limits[i]))) < len(peaks):
             self._reached[i].append(int(steps[row]))
-            if self._limits[i] >= FAR * max(1.0, self._scales[i]) or _grows(self._reached[i]):
+            limit, scale = float(self._limits[i]), float(self._scales[i])
+            if limit >= FAR * max(1.0, scale) or _grows(self._reached[i]):
                 return row
-            self._limits[i] *= 10.0
+            self._limits[i] = 10.0 * limit
         return None
 
 

@@ -31,8 +31,9 @@ class Enumeration(NamedTuple):
 class Variable:
     """A scalar variable; its value reference is its place among all.
 
-    limits are what a host may set; dependencies, by name, what reaches an output without a step,
-    and in initialisation mode. To a relative one the offset of its unit does not apply.
+    limits are what a host may set, and infinite says that inf is a value as well; dependencies, by
+    name, what reaches an output without a step, and in initialisation mode. To a relative one the
+    offset of its unit does not apply.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Variable:
     dependencies: tuple[str, ...] = ()
     initial_dependencies: tuple[str, ...] = ()
     enumeration: Enumeration | None = None
+    infinite: bool = False
 
     @property
     def type(self) -> str:
@@ -62,7 +64,11 @@ class Variable:
     def check(self, value: Any) -> None:
         """Raise ValueError where it may not have this value; the limits of a text are its bytes."""
         low, high = self.limits or (-inf, inf)
-        if not isinstance(value, str):
+        if self.infinite:
+            if not value > -inf:  # or NaN
+                must = "must be a finite number, or inf"
+                raise ValueError(f"{self.name} = {value!r}{self.in_unit}: {must}")
+        elif not isinstance(value, str):
             check_value(self.name, value, self.unit, low, high)
         elif not low <= len(value.encode()) <= high:
             valid = f"must have {low:g} to {high:g} bytes in UTF-8"
@@ -70,7 +76,11 @@ class Variable:
 
 
 class Block(Protocol):
-    """The shape of a block module; it may have LONGEST_STEP, in s, too."""
+    """The shape of a block module.
+
+    It may have LONGEST_STEP, in s, and check_inputs(p, u), which raises ValueError for inputs that
+    the block cannot take, too.
+    """
 
     Params: type[Any]
     Inputs: type[Any]
@@ -116,6 +126,12 @@ def longest_step(block: Block) -> float:
     return float(longest)
 
 
+def input_check(block: Block) -> Callable[[Any, Any], None] | None:
+    """What raises ValueError for inputs that a block cannot take, its check_inputs(p, u)."""
+    check: Callable[[Any, Any], None] | None = getattr(block, "check_inputs", None)
+    return check
+
+
 def declared(block: Block) -> list[Field]:
     """The fields of a block: inputs, outputs, parameters, each in the order of declaration."""
     inputs = list(_fields(block.Inputs, "input", block.Inputs._field_defaults))
@@ -151,7 +167,8 @@ def variables(fields: list[Field]) -> list[Variable]:
             now = tuple(chosen(f.dependencies, index))
             initially = *chosen(f.initial_dependencies, index), *always
             about = f.variability, f.limits, f.description, f.nominal, False, now, initially
-            found.append(Variable(name, f.kind, f.causality, f.unit, start, *about, f.enumeration))
+            more = f.enumeration, f.infinite
+            found.append(Variable(name, f.kind, f.causality, f.unit, start, *about, *more))
     return found
 
 
@@ -259,6 +276,7 @@ def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
         if declared.nominal is None:
             raise TypeError(f"{name}: must have a nominal value, nominal=...")
         nominal = float(declared.nominal)
+    infinite = isinstance(declared, Input) and declared.infinite
     if isinstance(declared, Output):
         if declared.depends_on is None:
             must = "must have the inputs that reach it without a step, depends_on={...}"
@@ -271,4 +289,5 @@ def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
         enumeration = Enumeration(kind.__name__, items)
         limits, kind, start = (min(kind), max(kind)), int, int(start)
     about = variability, limits, declared.description, nominal, False, now, initially
-    return Field(name, kind, causality, declared.unit, start, *about, enumeration, size)
+    more = enumeration, infinite
+    return Field(name, kind, causality, declared.unit, start, *about, *more, size)

@@ -30,6 +30,9 @@ _WORD = r"(?:[A-Za-z_]\w*|'(?:[^'\\]|\\.)+')(?:\[\d+(?:,\d+)*\])?"
 _STRUCTURED = re.compile(rf"{_WORD}(?:\.{_WORD})*", re.ASCII)
 """Names of FMI's structured naming convention, but for der(), which proxy.hold. cannot precede."""
 
+ANNOTATION = "grasp-cosim"
+"""The tool of our annotations: what FMI has no attribute for."""
+
 DISPLAY = {"m": "mm", "m/s": "mm/s", "V": "mV"}
 """Units to show values in, a thousand times as many."""
 
@@ -91,6 +94,10 @@ def model_description(
     times = zip(("startTime", "stopTime", "tolerance", "stepSize"), d.experiment, strict=True)
     if experiment := {key: repr(time) for key, time in times if time is not None}:
         SubElement(root, "DefaultExperiment", experiment)
+    infinite = [v.name for v in d.variables if v.infinite]
+    if infinite and fmi == 2:
+        annotations = SubElement(root, "VendorAnnotations")
+        _add_infinite(SubElement(annotations, "Tool", name=ANNOTATION), infinite)
     variables = SubElement(root, "ModelVariables")
     for reference, v in enumerate(d.variables):
         _add_variable(variables, v, reference, DISPLAY if d.units is None else {}, fmi)
@@ -102,6 +109,9 @@ def model_description(
         time |= {"variability": "continuous", "description": "t", "unit": "s"}
         SubElement(variables, "Float64", time)
     _add_structure(root, d.variables, fmi)
+    if infinite and fmi == 3:
+        annotations = SubElement(root, "Annotations")
+        _add_infinite(SubElement(annotations, "Annotation", type=ANNOTATION), infinite)
     return _document(root)
 
 
@@ -150,6 +160,12 @@ def _add_interface(root: Element, d: Description, fmi: Version, native: bool) ->
     interface = SubElement(root, "CoSimulation", {"modelIdentifier": d.name, **able})
     if native and fmi == 2:
         SubElement(SubElement(interface, "SourceFiles"), "File", name=f"{d.name}.c")
+
+
+def _add_infinite(annotation: Element, names: Sequence[str]) -> None:
+    """Say which inputs have inf as a value, for which FMI has no attribute."""
+    for name in names:
+        SubElement(annotation, "Infinite", variable=name)
 
 
 def _add_units(root: Element, d: Description, *more: str) -> None:

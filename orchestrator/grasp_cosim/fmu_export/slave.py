@@ -48,11 +48,13 @@ class Snapshot(NamedTuple):
 @cache
 def _shape(block: contract.Block) -> tuple[list[contract.Field], list[Variable], tuple[Any, ...]]:
     """What all instances share, as it takes longer to make than all the rest of one: fields,
-    variables, and the functions to step, give outputs, pack inputs and unpack outputs.
+    variables, and the functions to step, give outputs, pack inputs, check them (None where the
+    block has none) and unpack outputs.
     """
     fields = contract.declared(block)
     pack, unpack = contract.packer(block.Inputs, fields), contract.unpacker(fields)
-    return fields, contract.variables(fields), (block.step, block.outputs, pack, unpack)
+    functions = block.step, block.outputs, pack, contract.input_check(block), unpack
+    return fields, contract.variables(fields), functions
 
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -176,9 +178,13 @@ class Slave:
             raise ValueError(f"step from {current_time} s: must be from {self._time} s")
         if step_size > self._longest_step:
             raise ValueError(f"step of {step_size} s: must be at most {self._longest_step:g} s")
-        step, outputs, pack, unpack = self._functions
+        step, outputs, pack, check, unpack = self._functions
         params = self._read_params()
-        inputs = self._inputs = self._inputs or pack(self._values)
+        inputs = self._inputs
+        if inputs is None:
+            inputs = self._inputs = pack(self._values)
+            if check:
+                check(params, inputs)
         try:
             state = step(params, self._state, inputs, step_size)
             values = unpack(outputs(params, state, inputs))
@@ -234,9 +240,11 @@ class Slave:
 
     def _refresh(self) -> None:
         """Work out the outputs; before the end of initialisation the initial state as well."""
-        _, outputs, pack, unpack = self._functions
+        _, outputs, pack, check, unpack = self._functions
         params = self._read_params()
         self._inputs = inputs = pack(self._values)
+        if check:
+            check(params, inputs)
         if self._phase < STEPPING:
             self._state = self._block.initial_state(params, inputs)
         values = unpack(outputs(params, self._state, inputs))

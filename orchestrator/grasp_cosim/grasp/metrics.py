@@ -336,7 +336,8 @@ def _surface_speed(signals: Signals, finger: int, k: int) -> float:
     changed = np.zeros(k + 1, bool)  # the rows with other outputs of the plant than before
     changed[0] = True
     for name in (f"plant.{q}[{j}]" for q in QUANTITIES for j in fingers_of(signals)):
-        changed[1:] |= np.diff(signals[name][: k + 1]) != 0
+        values = signals[name][: k + 1]
+        changed[1:] |= values[1:] != values[:-1]
     given = np.flatnonzero(changed)
     if len(given) < 2:
         return 0.0

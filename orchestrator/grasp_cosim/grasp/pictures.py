@@ -45,6 +45,7 @@ BEFORE, AFTER, NEAR = 0.015, 0.03, 0.05
 """s before and after a contact in a close-up; contacts that are nearer than NEAR share one."""
 
 
+@np.errstate(over="ignore")  # of what is not drawn
 def draw_grasp(run: Result, path: Path | None = None) -> Figure:
     """Gaps, contact forces, target and closing speed; on the right around the contacts.
 

@@ -39,6 +39,7 @@ Points = npt.NDArray[np.complex128]
 """In the plane, x + i·y."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of what is not drawn
 def draw_hand(run: Result, path: Path | None = None) -> Figure:
     """Gaps, contact forces and closing speeds by finger; beside them the hand at the end.
 

@@ -144,7 +144,7 @@ class Variable:
     variable that holds its length, None where that is fixed. element is its place in an array that
     was taken apart. relative says that it is a difference, to which the offset of a unit does not
     apply. enumeration is the type of an Enumeration. alias says that it is another name of a
-    variable that comes before.
+    variable that comes before, infinite that inf is a value of it, as of a distance to nothing.
     """
 
     name: str
@@ -168,6 +168,7 @@ class Variable:
     display_unit: str | None = None
     starts: tuple[str, ...] = ()
     alias: bool = False
+    infinite: bool = False
     sizes: tuple[str | None, ...] = ()
     element: Element | None = None
 

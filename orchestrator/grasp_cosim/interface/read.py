@@ -49,6 +49,11 @@ EXPERIMENT = {
     "start_time": "startTime", "stop_time": "stopTime", "tolerance": "tolerance",
     "step_size": "stepSize",
 }  # fmt: skip
+INFINITE = {
+    "2": "VendorAnnotations/Tool[@name='grasp-cosim']/Infinite",
+    "3": "Annotations/Annotation[@type='grasp-cosim']/Infinite",
+}
+"""Where FMUs of ours name the inputs of which inf is a value, by version of FMI."""
 Names = tuple[str, ...] | None
 """The variables that one depends on; None where that is not declared."""
 
@@ -169,6 +174,8 @@ class _Reader:
         types = {n: t for t in root.iterfind("TypeDefinitions/*") if (n := t.get("name"))}
         self.types = types if major == "3" else {n: t[0] for n, t in types.items() if len(t)}
         self.enumerations = {name: self.enumeration(name, t) for name, t in self.types.items()}
+        place = INFINITE.get(major, INFINITE["2"])
+        self.infinite = frozenset(e.get("variable") for e in root.iterfind(place))
 
     def check_references(self) -> None:
         """ValueError where two variables of FMI 3.0 have the same: it says what depends on what.
@@ -360,6 +367,7 @@ class _Reader:
             initial=self.initial(element, causality, variability),
             display_unit=attributes.get("displayUnit") or None,
             starts=starts,
+            infinite=name in self.infinite,
         )
 
     def bounds(

@@ -338,7 +338,8 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     failures = []
     for m in there:
         try:
-            value = _plain(m, m.function(signals))
+            with np.errstate(over="ignore", invalid="ignore"):  # a result must be finite anyway
+                value = _plain(m, m.function(signals))
             some = value if isinstance(value, list) else [value]
             if not m.reason or any(v is not None for v in some):
                 values[m.name] = value

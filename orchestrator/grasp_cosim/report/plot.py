@@ -63,6 +63,11 @@ LINE_HEIGHT, LETTER = 11.5 / 72.0, 4.4 / 72.0
 """In inches: a line of what a picture says below its title, and the width of a letter there."""
 
 
+FAR = 1e300
+"""What is further from zero is not drawn: inf and the largest double, a distance to nothing."""
+
+
+@np.errstate(over="ignore")  # of what is not drawn
 def plot_signals(run: Result, path: Path | None = None, of: Sequence[str] = ()) -> Figure:
     """Draw signals of any run but Strings over time, those of the same unit together, at most
     MOST_LINES in a panel.
@@ -162,9 +167,13 @@ def kept(figure: Figure, path: Path | None) -> Figure:
 
 
 def drawn(time: Times, values: npt.NDArray[Any]) -> tuple[Times, npt.NDArray[Any]]:
-    """A line as it is drawn: of many points the lowest and the highest of those side by side."""
+    """A line as it is drawn: of many points the lowest and the highest of those side by side.
+
+    Where it is FAR from zero it is broken.
+    """
     line = fit(time, {"": values}, 2 * MOST_POINTS)
-    return line.time, line.signals[""]
+    kept = line.signals[""]
+    return line.time, np.where(np.abs(kept) < FAR, kept, np.nan)
 
 
 def save(figure: Figure, path: Path) -> None:

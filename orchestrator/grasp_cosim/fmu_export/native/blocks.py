@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from ..contract import Field, declared, longest_step, variables
+from ..contract import Field, declared, input_check, longest_step, variables
 from .statements import Check, translated_function
 from .text import UntranslatableError, comment, identifier, number, string, wrapped
 from .types import BOOLEAN, REAL, SCALARS, Function, Program, Type, fields, parts, said
@@ -44,6 +44,7 @@ def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
     step = _part(program, block, "step", [p, x, u, REAL], x)
     evaluate = _part(program, block, "outputs", [p, x, u], block.Outputs)
     checks = [*_checks(program, block.Params, "p")]
+    input_checks = [*_input_checks(program, block)]
     scalars = [*_scalars(program, x, "x->")]
     described = declared(block)
     types: dict[str, Type] = {"Params": p, "Inputs": u, "State": x}
@@ -54,6 +55,8 @@ def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
     yield from (program.structs(), "".join(program.constants.values()), *program.bodies, named)
     yield from _conversions(program, described)
     yield _function("int block_check(const BlockParams *p, Text *why)", [*checks, "return 1;"])
+    head = "int block_check_inputs(const BlockParams *p, const BlockInputs *u, Text *why)"
+    yield _function(head, [*input_checks, "return 1;"])
     head = "void block_initial_state(const BlockParams *p, const BlockInputs *u, BlockState *x)"
     yield _function(head, [f"*x = {_call(first, 'pu')};"])
     head = f"void block_step({PXU}, double h, BlockState *after)"
@@ -108,6 +111,7 @@ def _table(block: Any, described: list[Field], states: int) -> str:
         cells = [string(v.name), string(v.in_unit), f"KIND_{kind}", v.causality.upper()]
         cells += [str(int(v.variability == "fixed")), str(int(v.limits is not None))]
         cells += map(number, (*(v.limits or (0.0, 0.0)), float(v.start or 0.0)))
+        cells += [str(int(v.infinite))]
         rows.append(f"    {{{', '.join(cells)}}},\n")
     return (
         f"enum {{ {', '.join(f'N_{kind.upper()} = {n}' for kind, n in counts.items())} }};\n\n"
@@ -152,6 +156,18 @@ def _checks(program: Program, cls: type[Any], path: str) -> Iterator[str]:
                 program.bodies.append(text)
                 of = path if path == "p" else f"&{path}"
                 yield f"if (!{name}({of}, why)) {{\n        return 0;\n    }}"
+
+
+def _input_checks(program: Program, block: Any) -> Iterator[str]:
+    """What says no where the block refuses its inputs."""
+    check = input_check(block)
+    if check is not None:
+        name = program.unique(check.__module__, check.__name__, (check, block.Params))
+        body = Check(program, check)
+        text = body.definition(name, [block.Params, block.Inputs])
+        program.bodies.append(text)
+        u = "u" if body.by_address[1] else "*u"
+        yield f"if (!{name}(p, {u}, why)) {{\n        return 0;\n    }}"
 
 
 def _scalars(program: Program, t: Type, path: str) -> Iterator[tuple[str, Type]]:

@@ -37,20 +37,25 @@ class Body(Expressions):
 
     def definition(self, name: str, types: Sequence[Type]) -> str:
         """The text of the function in C."""
-        heads, given = [], self.node.args
+        heads = self._heads(types, [a.arg for a in self.node.args.args])
+        self.block(self.node.body)
+        if not _leaves(self.node.body, ast.Return):
+            self.refuse(self.node, f"{self.node.name}: must return a value on every way")
+        return self._text(name, heads, self.program.c(cast(Type, self.returns), self.names))
+
+    def _heads(self, types: Sequence[Type], names: Sequence[str]) -> list[str]:
+        """The declarations in C of the arguments, which have these names there."""
+        heads, arguments = [], self.node.args.args
         changed = {*_names(self.node, ast.Store)}
-        for argument, kind in zip(given.args, types, strict=True):
-            c_name, is_copy = self.fresh(argument.arg, own=True), argument.arg in changed
+        for argument, kind, name in zip(arguments, types, names, strict=True):
+            c_name, is_copy = self.fresh(name, own=True), argument.arg in changed
             large = is_record(kind) and size(kind) > LARGE and not is_copy
             self.by_address += (large,)
             text, level = (f"*{c_name}", SIGN) if large else (c_name, WORD)
             self.bound[argument.arg] = Value(text, kind, level)
             star = "const {} *{}" if is_dataclass(kind) or large else "{} {}"
             heads.append(star.format(self.program.c(kind, self.names), c_name))
-        self.block(self.node.body)
-        if not _leaves(self.node.body, ast.Return):
-            self.refuse(self.node, f"{self.node.name}: must return a value on every way")
-        return self._text(name, heads, self.program.c(cast(Type, self.returns), self.names))
+        return heads
 
     def _text(self, name: str, heads: Sequence[str], returns: str) -> str:
         text = "\n".join(self.lines)
@@ -218,17 +223,16 @@ class Body(Expressions):
 
 
 class Check(Body):
-    """A __post_init__ as a function that says why parameters do not go together."""
+    """A function that raises ValueError, of parameters and inputs, as one that says why."""
 
     def definition(self, name: str, types: Sequence[Type]) -> str:
         """The text of the function in C; "" where it checks nothing but ranges."""
-        self.bound[self.node.args.args[0].arg] = Value("p", types[0])
+        heads = self._heads(types, "pu"[: len(types)])
         self.block(self.node.body)
         if not any("text_put(" in line for line in self.lines):
             return ""
         self._say("return 1;")
-        heads = [f"const {self.program.c(types[0], self.names)} *p", "Text *why"]
-        return self._text(name, heads, "int")
+        return self._text(name, [*heads, "Text *why"], "int")
 
     def _on_expr(self, node: ast.Expr) -> None:
         """Ranges are checked from the declaration; those of a base class are there already."""

@@ -36,6 +36,18 @@ static Status slave_read_params(Slave *s)
     return s->params_are_read ? SLAVE_OK : slave_refuse(s, "%s", why.at);
 }
 
+/* Inputs that the block cannot take are refused */
+static Status slave_read_inputs(Slave *s)
+{
+    Text why;
+    text_clear(&why);
+    block_inputs(s->values, &s->model.inputs);
+    if (block_check_inputs(&s->model.params, &s->model.inputs, &why)) {
+        return SLAVE_OK;
+    }
+    return slave_refuse(s, "%s", why.at);
+}
+
 static int slave_outputs_are_finite(const double *outputs)
 {
     double sum = 0.0;
@@ -68,7 +80,9 @@ static Status slave_refresh(Slave *s)
     if (!s->params_are_read && slave_read_params(s) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
-    block_inputs(s->values, &s->model.inputs);
+    if (slave_read_inputs(s) != SLAVE_OK) {
+        return SLAVE_ERROR;
+    }
     if (s->phase < STEPPING) {
         block_initial_state(&s->model.params, &s->model.inputs, slave_state(s));
     }
@@ -155,7 +169,9 @@ static Status slave_do_step(Slave *s, double time, double h)
         if (!s->params_are_read && slave_read_params(s) != SLAVE_OK) {
             return SLAVE_ERROR;
         }
-        block_inputs(s->values, &s->model.inputs);
+        if (slave_read_inputs(s) != SLAVE_OK) {
+            return SLAVE_ERROR;
+        }
     }
     block_step(&s->model.params, slave_state(s), &s->model.inputs, h, after);
     block_outputs(&s->model.params, after, &s->model.inputs, &y);

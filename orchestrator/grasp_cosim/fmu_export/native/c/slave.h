@@ -294,6 +294,9 @@ static Status slave_write(Slave *s, const uint32_t *vrs, size_t n, int kind)
 
 static int slave_in_range(const Variable *v, double value)
 {
+    if (v->infinite) {
+        return value >= -DBL_MAX;
+    }
     return slave_finite(value) && (!v->limited || (v->low <= value && value <= v->high));
 }
 
@@ -305,6 +308,7 @@ static Status slave_refuse_value(Slave *s, const Variable *v, double value)
         text_say(said, ": must be from %g to %g%s", v->low, v->high, v->in_unit);
     } else {
         text_put(said, ": must be a finite number");
+        text_put(said, v->infinite ? ", or inf" : "");
     }
     return slave_refused(s);
 }

@@ -20,6 +20,7 @@ typedef struct {
     int limited;          /* from low to high; for a String, the bytes it has at most are high */
     double low, high;
     double start;         /* of a String, its place among the texts */
+    int infinite;         /* inf is a value, too */
 } Variable;
 
 #ifndef TEXT_CAPACITY
