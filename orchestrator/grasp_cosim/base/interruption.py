@@ -1,11 +1,16 @@
 """Ctrl-C and SIGTERM: the first ends in good order what goes on, the second ends it at once.
 
 SIGTERM, with which systemd and Docker stop a command, does there what Ctrl-C does.
+
+A KeyboardInterrupt that is raised where nothing can take it, in the callback of a weak reference, a
+`__del__` or a callback from C, is only printed by Python. The command then raises it once more.
 """
 
+import ctypes
 import os
 import signal
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +28,12 @@ AT_ONCE = 0.1
 _came: list[int] = []
 """The signals that came since command(); 0 where none came before over()."""
 
+_lost = threading.Event()
+"""Set once the KeyboardInterrupt of a signal was lost."""
+
+LOST = 0
+"""What stands for a KeyboardInterrupt that was lost, where signals stand by their numbers."""
+
 
 def command() -> None:
     """Have SIGTERM do what Ctrl-C does from now on, and a second signal end the process at once.
@@ -34,14 +45,20 @@ def command() -> None:
             signal.signal(number, _raise)
     reader, writer = socket.socketpair()
     writer.setblocking(False)
-    signal.set_wakeup_fd(writer.detach())
-    threading.Thread(target=_end_at_second, args=(reader,), daemon=True).start()
+    signal.set_wakeup_fd(writer.fileno())
+    sys.unraisablehook = _noting_what_is_lost(writer, sys.unraisablehook)
+    threading.Thread(target=_follow_signals, args=(reader,), daemon=True).start()
 
 
 def over() -> int:
     """The first signal that this command got, else 0; from here on a signal changes nothing."""
     _came.append(0)
     return _came[0]
+
+
+def lost() -> bool:
+    """True if the KeyboardInterrupt of a signal was lost, and perhaps never taken."""
+    return _lost.is_set()
 
 
 def came() -> bool:
@@ -96,12 +113,16 @@ def interrupts(end: Callable[[], object]) -> Iterator[threading.Event]:
         restore()
 
 
+class _RaisedAgainError(KeyboardInterrupt):
+    """One that may be lost, as another follows it at the end of its context."""
+
+
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Ctrl-C is a KeyboardInterrupt here, even where a Python FMU makes an error of it."""
 
     def end() -> NoReturn:
-        raise KeyboardInterrupt
+        raise _RaisedAgainError
 
     with interrupts(end) as came:
         try:
@@ -118,12 +139,45 @@ def _raise(number: int, _: FrameType | None) -> None:
 
 def _is_first(number: int) -> bool:
     _came.append(number)
-    return len(_came) == 1  # after that _end_at_second() ends the process
+    return len(_came) == 1  # after that _follow_signals() ends the process
 
 
-def _end_at_second(reader: socket.socket) -> None:
-    """End the process by a signal that does not come at once with the first."""
+def _noting_what_is_lost(
+    writer: socket.socket, before: Callable[["sys.UnraisableHookArgs"], object]
+) -> Callable[["sys.UnraisableHookArgs"], None]:
+    """What Python calls for an exception that nothing can take; of others it calls `before`."""
+
+    def note(unraisable: "sys.UnraisableHookArgs") -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            before(unraisable)
+        elif unraisable.exc_type is not _RaisedAgainError:
+            _lost.set()
+            writer.send(bytes([LOST]))
+
+    return note
+
+
+def _follow_signals(reader: socket.socket) -> None:
+    """End the process by a signal that does not come at once with the first.
+
+    Where the KeyboardInterrupt was lost, raise it anew in the main thread: later, as it would be
+    lost again where that is still about the first. No signal tells of it, which would be a second.
+    """
     reader.recv(1, socket.MSG_PEEK)
     time.sleep(AT_ONCE)
-    reader.recv(64)
-    os._exit(128 + reader.recv(1)[0])
+    news = bytes([LOST]) if LOST in reader.recv(64) else b""
+    while True:
+        for number in news:
+            if number != LOST:
+                os._exit(128 + number)
+            time.sleep(AT_ONCE)
+            _raise_in_main_thread()
+        news = reader.recv(64)
+
+
+def _raise_in_main_thread() -> None:
+    main = threading.main_thread().ident
+    if main is not None and 0 not in _came:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(main), ctypes.py_object(KeyboardInterrupt)
+        )

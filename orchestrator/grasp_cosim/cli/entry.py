@@ -44,8 +44,8 @@ def entry() -> NoReturn:
     came = interruption.over()
     if came == signal.SIGTERM:
         code = TERMINATED
-    elif came and code in (WRONG, FAILED):  # what an FMU made of it
-        code = INTERRUPTED
+    elif came and (code in (WRONG, FAILED) or interruption.lost()):
+        code = INTERRUPTED  # an FMU made an error of it, or Python lost it
     try:
         sys.stdout.close()
     except OSError as error:
