@@ -200,9 +200,15 @@ def dependencies(root, section):
 DELTAS = (1e-9, -1e-9, 1e-3, -0.02, 0.3, -5.0, 40.0)
 """Small and large, so that neither rounding nor a saturation hides what depends on what."""
 
+LOWEST = {"gap": -0.005}
+"""What a block refuses is below that."""
+
 
 def responses(instance):
-    """Which inputs change which outputs between two steps; the inputs are left as they were."""
+    """Which inputs change which outputs between two steps; the inputs are left as they were.
+
+    A value that the block refuses tells nothing.
+    """
     fmu = instance.fmu
     names = [n for n in fmu.names("output") if n not in fmu.booleans]
     flags = [n for n in fmu.names("output") if n in fmu.booleans]
@@ -218,6 +224,8 @@ def responses(instance):
         (start,) = instance.get(source)
         for delta in DELTAS:
             assert instance.set({source: start + delta}) == OK
+            if start + delta < LOWEST.get(source, -10.0):
+                continue
             for n, was, now in zip([*names, *flags], before, outputs(), strict=True):
                 if was != now:
                     seen[n].add(source)
@@ -247,7 +255,9 @@ def test_the_fmu_depends_on_the_inputs_that_it_declares_and_on_no_others(load, n
             note("InitialUnknown", instance)
             assert instance.exit() == OK
             for k in range(60):
-                assert instance.set({n: rng.uniform(-0.2, 0.3) for n in inputs}) == OK
+                assert (
+                    instance.set({n: rng.uniform(LOWEST.get(n, -0.2), 0.3) for n in inputs}) == OK
+                )
                 assert instance.step(k * 1e-3, 1e-3) == OK
                 if k % 20 == 19:
                     note("Output", instance)
