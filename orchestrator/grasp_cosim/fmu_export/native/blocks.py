@@ -109,9 +109,9 @@ def _table(block: Any, described: list[Field], states: int) -> str:
     for v in found:
         kind = "INTEGER" if v.enumeration else v.type.upper()
         cells = [string(v.name), string(v.in_unit), f"KIND_{kind}", v.causality.upper()]
-        cells += [str(int(v.variability == "fixed")), str(int(v.limits is not None))]
+        limited = "INFINITE" if v.infinite else str(int(v.limits is not None))
+        cells += [str(int(v.variability == "fixed")), limited]
         cells += map(number, (*(v.limits or (0.0, 0.0)), float(v.start or 0.0)))
-        cells += [str(int(v.infinite))]
         rows.append(f"    {{{', '.join(cells)}}},\n")
     return (
         f"enum {{ {', '.join(f'N_{kind.upper()} = {n}' for kind, n in counts.items())} }};\n\n"

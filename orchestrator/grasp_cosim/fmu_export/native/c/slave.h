@@ -294,7 +294,7 @@ static Status slave_write(Slave *s, const uint32_t *vrs, size_t n, int kind)
 
 static int slave_in_range(const Variable *v, double value)
 {
-    if (v->infinite) {
+    if (v->limited == INFINITE) {
         return value >= -DBL_MAX;
     }
     return slave_finite(value) && (!v->limited || (v->low <= value && value <= v->high));
@@ -304,11 +304,11 @@ static Status slave_refuse_value(Slave *s, const Variable *v, double value)
 {
     Text *said = slave_say(s);
     slave_put_value(said, v, value);
-    if (v->limited) {
+    if (v->limited == LIMITED) {
         text_say(said, ": must be from %g to %g%s", v->low, v->high, v->in_unit);
     } else {
         text_put(said, ": must be a finite number");
-        text_put(said, v->infinite ? ", or inf" : "");
+        text_put(said, v->limited == INFINITE ? ", or inf" : "");
     }
     return slave_refused(s);
 }

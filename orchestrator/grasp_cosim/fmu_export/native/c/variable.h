@@ -10,6 +10,7 @@
 
 enum { KIND_REAL, KIND_BOOLEAN, KIND_INTEGER, KIND_STRING };
 enum { INPUT, OUTPUT, PARAMETER };
+enum { UNLIMITED, LIMITED, INFINITE };
 
 typedef struct {
     const char *name;
@@ -18,9 +19,9 @@ typedef struct {
     int causality;
     int fixed;            /* 0: it may change at run time */
     int limited;          /* from low to high; for a String, the bytes it has at most are high */
+                          /* INFINITE: any number, and inf */
     double low, high;
     double start;         /* of a String, its place among the texts */
-    int infinite;         /* inf is a value, too */
 } Variable;
 
 #ifndef TEXT_CAPACITY
