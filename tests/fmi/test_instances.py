@@ -22,8 +22,7 @@ from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.system.parts import Component, Connection, Port
 from support.compiled import shared_library
 from support.marks import engines, slow
-from support.native_fmus import CAPABLE, TYPES, build, needs_gcc, starts
-from support.native_fmus import EARLY as MIGHT_RETURN_EARLY
+from support.native_fmus import CAPABLE, EVENT_MODE, TYPES, build, needs_gcc, starts
 
 KINDS = [("2.0", "none"), slow("2.0", "process"), ("3.0", "none"), ("3.0", "process")]
 """Every version, in this process and in one of its own."""
@@ -144,8 +143,9 @@ def test_a_discarded_step_got_nowhere(tmp_path, version, isolation):
     assert str(error) == "part: native.fmu returned discard at t = 0.2 s: the step is too long"
 
 
-def test_a_step_ends_early_only_where_its_length_may_vary(tmp_path):
-    fixed = {"mightReturnEarlyFromDoStep": "true"}
+@pytest.mark.parametrize("lacks", ["hasEventMode", "canHandleVariableCommunicationStepSize"])
+def test_a_step_ends_early_only_with_event_mode_and_where_its_length_may_vary(tmp_path, lacks):
+    fixed = {**EVENT_MODE, lacks: "false"}
     with running(tmp_path, "3.0", values={"early_at": 0.1}, capabilities=fixed) as part:
         assert Bound(part, 0.2).step() == OK
 
@@ -256,9 +256,7 @@ DISCARDED = (
 
 def alone(folder, version, isolation, **values):
     """A native FMU that integrates 2.0 for a second in steps of 0.1 s."""
-    fmu = build(
-        folder, version=version, capabilities=CAPABLE if version == "2.0" else MIGHT_RETURN_EARLY
-    )
+    fmu = build(folder, version=version, capabilities=CAPABLE if version == "2.0" else EVENT_MODE)
     given = {**starts(version), f"u_{real(version)}": 2.0, **values}
     component = Component("part", fmu, given, isolation=isolation)
     return System("alone", (component,), (), 100_000_000, 1_000_000_000, "sequential")

@@ -55,7 +55,8 @@ UNITS = {
 """The units the FMUs define, in SI base units; and one that is none of these."""
 
 CAPABLE = {"canHandleVariableCommunicationStepSize": "true"}
-EARLY = {**CAPABLE, "mightReturnEarlyFromDoStep": "true"}
+EVENT_MODE = {**CAPABLE, "mightReturnEarlyFromDoStep": "true", "hasEventMode": "true"}
+"""Of an FMU for FMI 3.0 that handles its events with its host."""
 
 
 def starts(version):
@@ -247,6 +248,25 @@ MODELS = {
             _parameter("gain", 1.0),
         ),
     ),
+    "sampled": Model(
+        (
+            _TIME,
+            Variable("x", causality="output", start=1.0),
+            Variable("der(x)", derivative="x"),
+            Variable("held", causality="output", start=0.0),
+            Variable("ticks", "Int32", "output", "discrete", 0),
+            Variable("last", causality="output", start=-1.0),
+            Variable("events", "Int32", "output", "discrete", 0),
+            Variable("offset", causality="input", start=0.0),
+            Variable("trigger", "Float64", "input", "discrete", 0.0),
+            _parameter("gain", 1.0),
+            _parameter("period", 0.1, tunable=True),
+            _parameter("first", 0.0),
+            _parameter("delay", 0.0),
+            _parameter("factor", 1.0),
+            _parameter("named", 0.0),
+        ),
+    ),
     "sine": Model(
         (_TIME, Variable("count", "Int32", "output", "discrete", -1), _parameter("f", 1.0)),
         indicators=("count",),
@@ -344,11 +364,16 @@ def build(
     return pack(folder / f"{name}.fmu", version, "native", xml, library)
 
 
-def build_model(name, folder, version="2.0", kinds=KINDS, file=""):
-    """The FMU of one of MODELS, for the kinds given, as folder/FILE.fmu (by default NAME.fmu)."""
+def build_model(
+    name, folder, version="2.0", kinds=KINDS, file="", capabilities=CAPABLE, more="", options=()
+):  # fmt: skip
+    """The FMU of one of MODELS, for the kinds given, as folder/FILE.fmu (by default NAME.fmu).
+
+    More are further variables of its description, options further ones of the compiler.
+    """
     model = MODELS[name] or _feedthrough(version)
-    library = library_of(name, version, "CoSimulation" in kinds)
-    xml = description(name, version, model, kinds)
+    library = library_of(name, version, "CoSimulation" in kinds, more=("-lm", *options))
+    xml = description(name, version, model, kinds, capabilities, more=more)
     return pack(folder / f"{file or name}.fmu", version, name, xml, library)
 
 

@@ -15,7 +15,8 @@ class Native(NamedTuple):
     there are: more than references where some are of arrays.
     STEP_2: f(instance, time, step, 1). STEP_3: f(instance, time, step, 1, &event, &terminate,
     &early, &last), where flags is the address of three bytes for the first three, last that of a
-    double for the last. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait
+    double for the last; no call where the end of the step is not before the time in s at the
+    address limit. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait
     for the beginning of a step; instance is what realtime/pacer.py keeps for it, data its times.
     """
 
@@ -29,6 +30,7 @@ class Native(NamedTuple):
     flags: int = 0
     last: int = 0
     values: int = 0
+    limit: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,8 @@
 """An instance of a co-simulation FMU, of FMI 2.0 or 3.0.
 
-Of FMI 3.0 without event mode and intermediate update. A step may end early where the FMU declares
-that it might and that its step may vary; the master then does the rest. Clocks and binaries are
-left alone.
+Of FMI 3.0 without intermediate update; event mode, and clocks, are in event_mode.py. Without event
+mode an FMU is not allowed to end a step early: it handles its events itself. Binaries are left
+alone.
 
 The logger of FMI 2.0 is called like printf: a format, then arguments. Python cannot define such a
 function. On Linux, with the processors below, the arguments lie where those of a function would
@@ -43,7 +43,7 @@ from ..base.scratch import ScratchFolder
 from ..base.system_calls import c_library
 from ..interface.interface import Interface, Value
 from ..system.parts import Logging
-from .instance import EARLY, WARNING
+from .instance import DUE, EARLY, EVENT, WARNING
 from .loaded import Lenient, LoadedInstance, MissingFunctionError
 from .messages import Messages
 
@@ -210,8 +210,10 @@ class SharedInstance(FmuInstance):
 
 # ------------------------------------------------------------------ FMI 3.0
 
-TERMINATE, SHORT = 1, 2
-"""Places in the flags of a step, after that of an event."""
+NEEDED, TERMINATE, SHORT = range(3)
+"""Places in the flags of a step: an event is to be handled; the end of the simulation is asked for;
+the step ended early.
+"""
 
 
 class Texts3:
@@ -254,14 +256,17 @@ class Fmi3Instance(LoadedInstance):
         """As LoadedInstance."""
         self._flags = np.zeros(3, np.bool_)
         self._last = np.zeros(1)
+        self._limit = np.full(1, np.inf)
+        """A step that does not end before this time, in s, has an event that is known already."""
         super().__init__(name, interface, tolerance, logging)
 
     def _instantiate(self, folder: Path) -> FMU3Slave:
         slave = self._opened(folder)
-        early_return = self.interface.capability("mightReturnEarlyFromDoStep") is True
+        events = self.interface.event_mode
         slave.instantiate(
             loggingOn=self._logs_at_once,
-            earlyReturnAllowed=early_return and self.interface.can_vary_step,
+            eventModeUsed=events,
+            earlyReturnAllowed=events and self.interface.can_vary_step,
             logMessage=self._log,
         )
         return slave
@@ -282,17 +287,43 @@ class Fmi3Instance(LoadedInstance):
         self._slave.enterInitializationMode(self.tolerance, startTime=start, stopTime=stop)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
-        flags, last = self._flags.ctypes.data, self._last.ctypes.data
-        places = (ctypes.c_void_p(place) for place in (flags, flags + 1, flags + 2, last))
-        bound, address = self._stepping(clock, step, ctypes.c_bool(True), *places)
-        said = memoryview(self._flags)  # type: ignore[arg-type]
+        bound, address = self._stepping(clock, step, ctypes.c_bool(True), *self._places())
+        time = memoryview(clock)  # type: ignore[arg-type]
+        limit = memoryview(self._limit)  # type: ignore[arg-type]
 
         def advance() -> int:
-            status = bound()
-            return EARLY if status <= WARNING and (said[TERMINATE] or said[SHORT]) else status
+            return DUE if time[2] >= limit[0] else self._outcome(bound())
 
-        native = Native(STEP_3, address, self._slave.component, step=step, flags=flags, last=last)
+        flags, last, until = (a.ctypes.data for a in (self._flags, self._last, self._limit))
+        component = self._slave.component
+        native = Native(STEP_3, address, component, step=step, flags=flags, last=last, limit=until)
         return Call(advance, native, self._python)
+
+    def _places(self) -> list[ctypes.c_void_p]:
+        """Where DoStep puts its flags and the time that it came to."""
+        flags, last = self._flags.ctypes.data, self._last.ctypes.data
+        return [ctypes.c_void_p(place) for place in (flags, flags + 1, flags + 2, last)]
+
+    def _do_step(self, time: float, step: float) -> int:
+        """A step from a time over `step`, both in s; the FMI status."""
+        self._flags[:] = False
+        size = ctypes.c_double(time), ctypes.c_double(step), ctypes.c_bool(True)
+        call, _ = self._function("DoStep", *size, *self._places())
+        logged = self._messages.count
+        status = call()
+        if status == WARNING and self._messages.count == logged:
+            self._messages.returned("fmi3DoStep")
+        return status
+
+    def _outcome(self, status: int) -> int:
+        """What came of a step that returned a status."""
+        if status > WARNING:
+            return status
+        if self._flags[TERMINATE]:
+            return EARLY
+        if self._flags[NEEDED]:
+            return EVENT
+        return EARLY if self._flags[SHORT] else status
 
     def _wants_the_end(self) -> bool:
         return bool(self._flags[TERMINATE])

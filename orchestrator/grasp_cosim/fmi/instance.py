@@ -19,8 +19,14 @@ STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = 0, 1, 2, 3, 4
 """FMI statuses. Up to WARNING a simulation goes on; after FATAL no call is allowed."""
 
-EARLY = 6
-"""No FMI status: a step that returned OK, but before its end (FMI 3.0)."""
+EARLY, EVENT, DUE = 6, 7, 8
+"""No FMI statuses, of steps of FMI 3.0: one that returned OK, but before its end; one that did so
+at an event which has to be handled with the master; one that was not taken, since an event within
+it, or at its end, is known already.
+"""
+
+AT_POINT = 1e-10
+"""s, a tenth of the unit of time: an event so near to a communication point is at that."""
 
 
 CLOCK = ("begin", "number", "end")
@@ -54,7 +60,13 @@ class Instance(Protocol):
         """
 
     def exit_initialization(self) -> None:
-        """Leave initialisation mode."""
+        """Leave initialisation mode; one with interface.event_mode is then in event mode."""
+
+    def enter_step_mode(self) -> None:
+        """Handle the event of the start; of an instance with interface.event_mode alone.
+
+        SimulationError where the FMU fails.
+        """
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         """The values of the variables now, one by one. For use outside the loop.
@@ -79,6 +91,13 @@ class Instance(Protocol):
         """The call that advances by step seconds from the time in clock; EARLY is a status.
 
         clock has the parts of CLOCK.
+        """
+
+    def through_events(self, status: int, begin: float, end: float) -> tuple[int, float]:
+        """Go on to the end, in s, with a step from begin that returned EVENT or DUE.
+
+        Handles the events on the way; the status, and how far it came. SimulationError where there
+        is an event that cannot be handled.
         """
 
     def last_successful_time(self) -> float | None:
@@ -136,6 +155,10 @@ class Inputs:
         """Note a value that is about to be set; one of a parameter is not kept."""
         if variable.causality == "input":
             self._given[variable] = value
+
+    def last(self, variable: Variable) -> Value | None:
+        """The value that was set last, one by one; None where there is none."""
+        return self._given.get(variable)
 
     def bind(self, variables: Sequence[Variable], data: npt.NDArray[Any]) -> None:
         """Note the buffer from which the variables are set in the run."""

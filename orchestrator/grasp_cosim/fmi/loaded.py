@@ -292,6 +292,15 @@ class LoadedInstance(ABC):
             self._slave.exitInitializationMode()
         self._inputs.running = True
 
+    def enter_step_mode(self) -> None:
+        """It is in step mode already: without event mode it leaves initialisation for that."""
+        return
+
+    def through_events(self, status: int, begin: float, end: float) -> tuple[int, float]:
+        """It is not to return for an event."""
+        must = "; must handle its events itself, or have event mode and a step that may vary"
+        raise self._error("returned for an event", self.last_successful_time() or begin, must)
+
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         """As Instance.get(), by one call for the scalars of a type and one for each array."""
         scalars: dict[str, list[int]] = {}
@@ -401,6 +410,11 @@ class LoadedInstance(ABC):
         what = f"returned {STATUS[status] if known else status}"
         return self._error(what, time, advice=self._advice(status))
 
+    def _refusal(self, what: str, status: int) -> SimulationError:
+        """The error for what the FMU did, now, when it returned a status. It is not used again."""
+        self._worst = max(self._worst, status)
+        return self._error(what, self._time())
+
     def _error(self, what: str, time: float, must: str = "", advice: str = "") -> SimulationError:
         """The error for what the FMU did, with what it logged of it, and its inputs.
 
@@ -424,6 +438,18 @@ class LoadedInstance(ABC):
         function = prototype((full, self._slave.dll))
         bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
         return bound, ctypes.cast(function, ctypes.c_void_p).value or 0
+
+    def _bound(self, name: str, *kinds: Any) -> Callable[..., int]:
+        """A function of the FMU, for its instance, by the types of its arguments.
+
+        InputError where it has none such.
+        """
+        prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
+        full = f"fmi{self._major}{name}"
+        if not hasattr(self._slave.dll, full):
+            raise self._incomplete(MissingFunctionError(full))
+        function = prototype((full, self._slave.dll))
+        return partial(function, self._slave.component)
 
     def _stepping(
         self, clock: npt.NDArray[np.float64], step: float, *arguments: Any

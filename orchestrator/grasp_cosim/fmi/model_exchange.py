@@ -3,14 +3,13 @@ communication points.
 
 At a communication point inputs may jump, so what was set is handed over in event mode and the
 solver begins anew; where nothing changed it goes on. It stops at each event, be it that an
-indicator leaves or enters z > 0, that the FMU has named the time, or that it wants one after a step
-of the solver; the discrete states are then iterated until they settle.
+indicator leaves or enters z > 0, that the FMU has named the time, that a clock ticks, or that it
+wants one after a step of the solver; the discrete states are then iterated until they settle.
 """
 
 import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,25 +19,18 @@ from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 
 from ..base.calls import Call
-from ..base.errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError, choices
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Logging, Solver
+from .clocks import Clocks
 from .co_simulation import Fmi3Instance, FmuInstance, Texts3
 from .cvode import Cvode, CvodeError, Function
-from .instance import DISCARD, EARLY, OK, WARNING
-from .loaded import Lenient, LoadedInstance, MissingFunctionError
-
-AT_POINT = 1e-10
-"""s, a tenth of the unit of time: an event so near to a communication point is at that."""
+from .event_mode import DENSE, ITERATIONS, MOST_DENSE
+from .instance import AT_POINT, DISCARD, EARLY, OK, WARNING
+from .loaded import Lenient, LoadedInstance
 
 ROUNDED = 16
 """The smallest numbers in which a time can change, over which nothing is integrated."""
-
-ITERATIONS = 1000
-"""The most iterations of one event."""
-
-DENSE, MOST_DENSE = 0.01, 1000
-"""So many events, each within this part of a communication step after the one before, end a run."""
 
 MOST_STATES = 20_000
 """The solver has a matrix of their square."""
@@ -61,6 +53,7 @@ class ModelInstance(LoadedInstance):
     ) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
         self._chosen = chosen
+        self._clocks = Clocks(interface, self._bound, self._refusal)
         self._solver: Cvode | None = None
         self._now = 0.0
         self._next = math.inf
@@ -105,8 +98,9 @@ class ModelInstance(LoadedInstance):
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode; settle the discrete states, and prepare the solver."""
-        super().exit_initialization()
         try:
+            self._clocks.initialise(self._now)
+            super().exit_initialization()
             with self._refusals():
                 self._bind()
                 self._settle(first=True)
@@ -209,19 +203,23 @@ class ModelInstance(LoadedInstance):
     def _settle(self, first: bool = False) -> None:
         """Iterate an event until nothing changes, and begin the continuous time after it."""
         nominals = first
+        self._clocks.begin(self._now)
+        ticked = self._clocks.tick()
         for _ in range(ITERATIONS):
             again, ended, renominated, _, defined, time = getattr(self._slave, self.UPDATE)()
             nominals = nominals or renominated
             if ended:
                 self._ended = self._now
                 return
-            if not again:
+            self._clocks.schedule(ticked)
+            ticked = self._clocks.tick()
+            if not again and not ticked:
                 break
         else:
             raise self._error(f"does not settle an event in {ITERATIONS} iterations", self._now)
         if defined and math.isnan(time):
             raise self._error("names nan as the time of its next event", self._now)
-        self._next = time if defined else math.inf
+        self._next = min(time if defined else math.inf, self._clocks.next)
         self._slave.enterContinuousTimeMode()
         if self._solver:
             self._begin(self._solver, nominals)
@@ -280,15 +278,6 @@ class ModelInstance(LoadedInstance):
             sizes = max(self._states, 1), self._indicators  # CVode needs a state; it stays 0
             self._solver = Cvode(*sizes, slopes, crossings, self._chosen)
             self._x = self._solver.x.ctypes.data
-
-    def _bound(self, name: str, *kinds: Any) -> Any:
-        """A function of the FMU, for its instance; InputError where it has none such."""
-        prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
-        full = f"fmi{self._major}{name}"
-        if not hasattr(self._slave.dll, full):
-            raise self._incomplete(MissingFunctionError(full))
-        function = prototype((full, self._slave.dll))
-        return partial(function, self._slave.component)
 
     def _evaluation(self, get: Callable[[int, int], int], size: int) -> Function:
         """For the solver: what to get at the time and states that it tries."""
@@ -375,6 +364,17 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
         *("EnterContinuousTimeMode", "SetTime", "Terminate"),
         *("GetNumberOfContinuousStates", "GetNumberOfEventIndicators"),
     )
+
+    def __init__(
+        self, name: str, interface: Interface, chosen: Solver, logging: Logging = False
+    ) -> None:
+        """Extract and instantiate; InputError where the FMU does not load."""
+        if clocked := [v.name for v in interface.of("input") if v.clocks]:
+            raise InputError(
+                f"{name}: {interface.called}: {choices(clocked, 1)} is an input of a clock; must "
+                "run by co-simulation, as model exchange has no such inputs here"
+            )
+        super().__init__(name, interface, chosen, logging)
 
     def _instantiate(self, folder: Path) -> FMU3Model:
         model = self._opened(folder)

@@ -40,6 +40,7 @@ from ..base.system_calls import end_fork, end_group, listener
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Component, Logging, Solver
 from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
+from .event_mode import EventInstance
 from .instance import CLOCK, EARLY, OK, WARNING, Inputs, Instance, dtype
 from .messages import Message, Messages
 
@@ -100,6 +101,8 @@ def load_here(
     exchanged = "CoSimulation" not in interface.kinds or (solver and interface.exchange)
     if not exchanged:
         tolerance = solver.relative_tolerance if solver else interface.tolerance
+        if interface.event_mode:
+            return EventInstance(name, interface, tolerance, logging)
         return (Fmi3Instance if three else FmuInstance)(name, interface, tolerance, logging)
     try:
         from .model_exchange import Fmi2Model, Fmi3Model  # loads the solver's libraries
@@ -219,6 +222,14 @@ class ProcessInstance:
     def exit_initialization(self) -> None:
         self._prepare("exit_initialization")
         self._inputs.running = True
+
+    def enter_step_mode(self) -> None:
+        self._prepare("enter_step_mode")
+
+    def through_events(self, status: int, begin: float, end: float) -> tuple[int, float]:
+        self._fresh = False
+        outcome: tuple[int, float] = self._ask("through_events", status, begin, end)
+        return outcome
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         values: list[Value] = self._ask("get", list(variables))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.errors import InputError, SimulationError, nearest
-from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, clock_of, dtype
+from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of, dtype
 from ..fmi.process import load_here
 from ..fmu_export.link import (
     END,
@@ -295,6 +295,8 @@ class DrivenFmu:
         instance = self._required()
         if not self._stepping:
             instance.exit_initialization()
+            if self.interface.event_mode:
+                instance.enter_step_mode()
             self._stepping = True
         for places, data, call in self._inputs:
             data[:] = [values[i] for i in places]
@@ -310,7 +312,7 @@ class DrivenFmu:
         if step not in self._steppers:
             self._steppers = {step: instance.stepper(self._clock, step).python}
         status = self._steppers[step]()
-        if status in (DISCARD, EARLY):
+        if status in (DISCARD, EARLY, EVENT, DUE):
             ended = finish_step(instance, status, time, time + step)
             if ended is not None:
                 raise SimulationError(

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cache, cached_property
 from itertools import product
 from pathlib import Path
@@ -65,6 +66,21 @@ class Array:
 
     shape: tuple[int, ...]
     names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """When a clock of FMI 3.0 ticks.
+
+    variability is that of its interval: constant, fixed, calculated, tunable, changing, countdown,
+    or triggered where it has none. interval and shift, from the start to the first tick, are in s,
+    None where that is not declared. fractions says that the FMU gives them as fractions.
+    """
+
+    variability: str
+    interval: Fraction | None = None
+    shift: Fraction = Fraction(0)
+    fractions: bool = False
 
 
 def size_of(shape: Sequence[int]) -> int:
@@ -145,6 +161,8 @@ class Variable:
     was taken apart. relative says that it is a difference, to which the offset of a unit does not
     apply. enumeration is the type of an Enumeration. alias says that it is another name of a
     variable that comes before, infinite that inf is a value of it, as of a distance to nothing.
+    clock is there for a Clock, and clocks are the references of those with which the variable
+    changes, where that is declared.
     """
 
     name: str
@@ -171,6 +189,8 @@ class Variable:
     infinite: bool = False
     sizes: tuple[str | None, ...] = ()
     element: Element | None = None
+    clock: Clock | None = None
+    clocks: tuple[int, ...] = ()
 
     @property
     def low(self) -> float:
@@ -335,6 +355,21 @@ class Interface:
     def can_vary_step(self) -> bool:
         """True if the communication step may vary."""
         return self.capability("canHandleVariableCommunicationStepSize") is True
+
+    @cached_property
+    def input_clocks(self) -> tuple[Variable, ...]:
+        """The clocks that a master has to tick."""
+        return tuple(v for v in self.of("input") if v.clock)
+
+    @property
+    def event_mode(self) -> bool:
+        """True if its events are handled with the master, where it runs co-simulation.
+
+        It then may end a step at one. An FMU that cannot vary its step handles events itself, but
+        for those of clocks.
+        """
+        has = self.version.startswith("3") and self.capability("hasEventMode") is True
+        return has and (self.can_vary_step or bool(self.input_clocks))
 
     @property
     def step(self) -> float | None:

@@ -71,6 +71,11 @@ CAPABILITIES: Mapping[tuple[str, str], tuple[str, ...]] = {
 RUN = ("CoSimulation", "ModelExchange")
 """The kinds that the master runs, the one it prefers first."""
 
+CLOCKS = ("constant", "fixed", "calculated", "tunable", "changing", "countdown")
+"""The variabilities of the interval of a clock that ticks by time."""
+
+TIME_BASED = choices(CLOCKS, len(CLOCKS))
+
 _PROCESSORS = {3: "x86", 40: "ARM", 62: "x86-64", 183: "AArch64", 243: "RISC-V"}
 """By their number in ELF."""
 
@@ -161,7 +166,7 @@ def this_platform(version: str) -> str:
 
 
 def of_kind(fmu: Interface) -> Obstacle | None:
-    """The obstacle that no machine removes: a version of FMI or a kind that no master here runs."""
+    """The obstacle that no machine removes: a version of FMI, a kind or a clock not supported."""
     wanted = " or ".join(KINDS[kind] for kind in RUN)
     wanted = f"ask the vendor for an export as FMI 2.0 or 3.0, for {wanted}"
     kinds = " and ".join(KINDS[kind] for kind in fmu.kinds)
@@ -169,6 +174,32 @@ def of_kind(fmu: Interface) -> Obstacle | None:
         return Obstacle(f"is FMI 1.0, for {kinds}", wanted)
     if not set(RUN) & set(fmu.kinds):
         return Obstacle(f"is for {kinds} only" if kinds else "declares no kind of FMU", wanted)
+    return of_clocks(fmu)
+
+
+def of_clocks(fmu: Interface) -> Obstacle | None:
+    """The obstacle that is an input clock which the master cannot tick."""
+    for v in fmu.input_clocks:
+        variability = v.clock.variability if v.clock else ""
+        what = f"has the input clock {v.name!r}"
+        if v.shape:
+            return Obstacle(f"{what}, an array", "must have scalar clocks")
+        if variability == "triggered":
+            return Obstacle(
+                f"{what}, which another FMU has to tick (intervalVariability = 'triggered')",
+                f"must have clocks that tick by time, as clocks are not connected: {TIME_BASED}",
+            )
+        if variability not in CLOCKS:
+            return Obstacle(
+                f"{what} with intervalVariability = {variability!r}", f"must be {TIME_BASED}"
+            )
+        if variability in ("constant", "fixed") and v.clock and v.clock.interval is None:
+            return Obstacle(
+                f"{what}, {variability}, without an interval",
+                "must declare intervalDecimal, or intervalCounter and resolution",
+            )
+        if "ModelExchange" not in fmu.kinds and fmu.capability("hasEventMode") is not True:
+            return Obstacle(f"{what}, which ticks in event mode", "must declare hasEventMode")
     return None
 
 

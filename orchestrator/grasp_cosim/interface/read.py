@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -25,6 +26,7 @@ from .interface import (
     SETTABLE,
     TYPES,
     TYPES_3,
+    Clock,
     Enumeration,
     Interface,
     ModelExchange,
@@ -368,7 +370,31 @@ class _Reader:
             display_unit=attributes.get("displayUnit") or None,
             starts=starts,
             infinite=name in self.infinite,
+            clock=self.clock(place, attributes) if kind == "Clock" else None,
+            clocks=_references(place, attributes["clocks"]) if "clocks" in attributes else (),
         )
+
+    def clock(self, place: str, said: Mapping[str, str]) -> Clock:
+        """When a clock ticks, by its attributes and those of its type."""
+        interval, shift, resolution = None, Fraction(0), 0
+        with self.tolerated():
+            if "resolution" in said:
+                resolution = _whole(f"{place}: resolution", said["resolution"])
+            if resolution and "intervalCounter" in said:
+                counter = _whole(f"{place}: intervalCounter", said["intervalCounter"])
+                interval = Fraction(counter, resolution)
+            elif "intervalDecimal" in said:
+                interval = _decimal(f"{place}: intervalDecimal", said["intervalDecimal"])
+            if resolution and "shiftCounter" in said:
+                shift = Fraction(_whole(f"{place}: shiftCounter", said["shiftCounter"]), resolution)
+            elif "shiftDecimal" in said:
+                shift = _decimal(f"{place}: shiftDecimal", said["shiftDecimal"])
+            if interval is not None and interval <= 0:
+                raise ValueError(f"{place}: interval = {float(interval):g} s: must be above 0")
+            if shift < 0:
+                raise ValueError(f"{place}: shift = {float(shift):g} s: must be at least 0")
+        fractions = said.get("supportsFraction") in ("true", "1")
+        return Clock(said.get("intervalVariability", ""), interval, shift, fractions)
 
     def bounds(
         self, place: str, fmi_type: str, attributes: Mapping[str, str]
@@ -487,6 +513,20 @@ def _real(place: str, text: str) -> float:
         return real(text)
     except ValueError:
         raise ValueError(f"{place} = {text!r}: must be a number") from None
+
+
+def _references(place: str, clocks: str) -> tuple[int, ...]:
+    """The value references of the clocks that a variable is of."""
+    return tuple(_whole(f"{place}: clocks", text) for text in clocks.split())
+
+
+def _decimal(place: str, text: str) -> Fraction:
+    """The number that a text is, exactly."""
+    _real(place, text)
+    try:
+        return Fraction(text.strip())
+    except ValueError:
+        raise ValueError(f"{place} = {text!r}: must be a finite number") from None
 
 
 def _whole(place: str, text: str | None, high: int | None = None) -> int:

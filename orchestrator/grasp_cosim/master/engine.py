@@ -28,7 +28,7 @@ from ..base.checks import choice
 from ..base.errors import InputError
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import be_ordinary
-from ..fmi.instance import EARLY
+from ..fmi.instance import DUE, EARLY, EVENT
 from ..realtime import pacer, timing
 from ..system.times import NANOSECONDS
 from . import loop
@@ -230,6 +230,8 @@ def _constants() -> list[str]:
     shared = {
         **{n: getattr(module, n) for module, names in where.items() for n in names.split()},
         "EARLY": EARLY,
+        "EVENT": EVENT,
+        "DUE": DUE,
         "SLICE": pacer.SLICE_NS,
         "NAP": round(pacer.NAP * NANOSECONDS),
         **{name.upper(): code for code, name in enumerate(ELEMENTS)},

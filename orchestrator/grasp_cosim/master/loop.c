@@ -48,6 +48,7 @@ typedef struct { /* of fmi/instance.py, Native */
     uint8_t *flags;
     double *last;
     int64_t values; /* of all references, where some are of arrays */
+    double *limit;  /* s, before which a step must end that is taken at once */
 } Call;
 
 typedef struct {
@@ -141,7 +142,7 @@ static int pace(Pace *p, int64_t step, double *head, const volatile int64_t *hal
     return 0;
 }
 
-/* Make a call; its FMI status. clock: the time of the step, its number. */
+/* Make a call; its FMI status. clock: the time of the step, its number, its end. */
 static int invoke(const Call *call, const double *clock, const Shared *shared) {
     double time = clock[0];
     uint8_t *said = call->flags;
@@ -157,9 +158,12 @@ static int invoke(const Call *call, const double *clock, const Shared *shared) {
         return ((Transfer3 *)call->function)(call->instance, call->references, (size_t)call->size,
                                              call->data, (size_t)call->values);
     case STEP_3:
+        if (clock[2] >= *call->limit) return DUE;
         status = ((Step3 *)call->function)(call->instance, time, call->step, true, said, said + 1,
                                            said + 2, call->last);
-        return status <= WORST && (said[1] || said[2]) ? EARLY : status;
+        if (status > WORST) return status;
+        if (said[0] && !said[1]) return EVENT;
+        return said[1] || said[2] ? EARLY : status;
     case CLOCK:
         *(double *)call->data = (double)(monotonic() - call->size);
         return 0;

@@ -1,6 +1,7 @@
 """The fixed-step master: initialise, then run the loop in chunks and hand its rows on.
 
-A step that an FMU rejects, since it discards it or ends it early, is finished in parts.
+A step that an FMU rejects, since it discards it or ends it early, is finished in parts, as is one
+with events that the FMU handles with its master.
 
 The schemes, components with a longer step and time are in docs/system_files.md.
 """
@@ -17,7 +18,7 @@ from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
 from ..base.system_calls import cpus
 from ..exchange.listener import Texts
-from ..fmi.instance import DISCARD, EARLY, WARNING, Instance, clock_of
+from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.result import Rejection
@@ -117,17 +118,24 @@ class Master:
             stop = told_stop(self.system, component)
             instance.enter_initialization({**component.values, **driven}, stop, start)
         propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
+        pairs = list(zip(self.system.components, self.instances, strict=True))
+        in_event_mode = [i for c, i in pairs if c.loaded.event_mode and not c.integrated]
         try:
             self.log += propagation.run()
             for instance in self.instances:
                 instance.exit_initialization()
             self.log += propagation.after_exit()
+            for instance in in_event_mode:
+                instance.enter_step_mode()
+            if in_event_mode:
+                self.log += propagation.after_exit()
         except SimulationError as error:
             raise InputError(str(error)) from error
         values = propagation.values
         self._fetch_others(values)
-        for component, instance in zip(self.system.components, self.instances, strict=True):
-            if component.integrated and (ended := instance.the_end()) is not None:
+        for component, instance in pairs:
+            has_had_event = instance in in_event_mode or component.integrated
+            if has_had_event and (ended := instance.the_end()) is not None:
                 self._end(instance, ended, 0)
         for port, slot in self.slots.items():
             drive = self._drives.get(port)
@@ -312,7 +320,7 @@ class Master:
             self.steps_done = shared.done
 
     def _resolve(self, step: int, operation: int, status: int) -> None:
-        """Make good for a step that was rejected; any other bad status ends the run."""
+        """Finish a step that was rejected, or has events; any other bad status ends the run."""
         kind, call, _, period, _ = self.plan.operations[operation]
         if status == loop.TOO_LONG:
             self._too_long(step, operation)
@@ -321,12 +329,14 @@ class Master:
         instance = self.plan.owners[call]
         assert instance is not None  # noqa: S101 - the master's own calls return no bad status
         begin = in_seconds(self.system.time_ns(step + 1 - period))
-        if kind != loop.STEP or status not in (DISCARD, EARLY):
+        if kind != loop.STEP or status not in (DISCARD, EARLY, EVENT, DUE):
             raise instance.failure(status, begin)
         end = in_seconds(self.system.time_ns(step + 1))
         ended = finish_step(instance, status, begin, end)
         if ended is not None:
             self._end(instance, ended, step + 1)
+            return
+        if status in (EVENT, DUE):
             return
         known = self.rejections.get(instance.name, Rejection(0, begin))
         self.rejections[instance.name] = Rejection(known.count + 1, known.first)
@@ -354,7 +364,7 @@ def told_stop(system: System, component: Component) -> float:
 
 
 def finish_step(instance: Instance, status: int, begin: float, end: float) -> float | None:
-    """Bring an instance to end, in s, that rejected the step from begin to there.
+    """Bring an instance to end, in s, that rejected the step from begin to there, or has events.
 
     Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
     1/1024 of the step; a rest below half of that is none. The time in s where the FMU asked for the
@@ -363,6 +373,10 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
     clock, length = clock_of(begin, end), end - begin
     smallest = length / SMALLEST
     for _ in range(4 * SMALLEST):
+        if status in (EVENT, DUE):
+            stop = float(clock[0]) + length
+            stop = end if stop >= end - smallest / 2 else stop
+            status, clock[0] = instance.through_events(status, float(clock[0]), stop)
         if status in (DISCARD, EARLY):
             if (ended := instance.the_end()) is not None:
                 return ended

@@ -18,7 +18,7 @@ from ..base.errors import InputError, choices
 from ..base.si_units import known_unit
 from ..base.text import counted
 from ..interface.expansion import shape_text
-from ..interface.interface import SUPPORTED, Interface, Value, Variable, limits
+from ..interface.interface import SUPPORTED, Clock, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion, conversion
 from .parts import Component, Connection, Port, Solver
@@ -297,7 +297,9 @@ def _of_components(system: Structure) -> Iterator[str]:
                 "are left alone"
             )
         for v in c.interface.of("input", "output"):
-            if not v.supported:
+            if v.clock and v.causality == "input":
+                yield f"{Port(c.name, v.name)} is a clock that ticks by time: {_of_clock(v.clock)}"
+            elif not v.supported:
                 left = "keeps its start value" if v.causality == "input" else "not recorded"
                 yield f"{Port(c.name, v.name)} is of type {v.nature}: {left}"
         if of_locals[c.name]:
@@ -317,6 +319,14 @@ def _of_components(system: Structure) -> Iterator[str]:
             f"{system.name}: nothing is recorded; must have an output or a local that is a Real, "
             "Integer, Boolean or String, or name another such signal under [record]"
         )
+
+
+def _of_clock(clock: Clock) -> str:
+    """When a clock ticks, in words."""
+    if clock.variability in ("constant", "fixed") and clock.interval is not None:
+        shift = f", the first {float(clock.shift):g} s after the start" if clock.shift else ""
+        return f"every {float(clock.interval):g} s{shift}"
+    return f"when the FMU says ({clock.variability})"
 
 
 def _of_connections(system: Structure) -> Iterator[str]:

@@ -1,8 +1,8 @@
 /* Makes an FMU of a model, for co-simulation and model exchange, that minds the call order.
  *
  * FMI is 2 or 3, NAME in braces is its GUID or token. An FMU with NO_STEPS is for model exchange
- * alone; one with NO_LICENCE finds none. AT_INITIALISATION, AT_STEP, AT_TERMINATE and AT_FREE are
- * statements that it does there.
+ * alone; one with NO_LICENCE finds none; one that is NEEDY has an event in each step, used or not.
+ * AT_INITIALISATION, AT_STEP, AT_TERMINATE and AT_FREE are statements that it does there.
  */
 #ifndef AT_INITIALISATION
 #define AT_INITIALISATION (void)0
@@ -15,6 +15,9 @@
 #endif
 #ifndef AT_FREE
 #define AT_FREE (void)0
+#endif
+#ifndef NEEDY
+#define NEEDY false
 #endif
 #if FMI == 2
 #include "fmi2Functions.h"
@@ -107,9 +110,10 @@ fmi3Instance fmi3InstantiateCoSimulation(
     const fmi3ValueReference required[], size_t n, fmi3InstanceEnvironment host,
     fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
     Model *m = calloc(1, sizeof(Model));
-    (void)visible; (void)event_mode; (void)required; (void)n; (void)update;
+    (void)visible; (void)required; (void)n; (void)update;
     m->logging = logging;
     m->early = early;
+    m->events = event_mode;
     m->host = host;
     m->log = (void *)log;
     return made(m, name, token, resources);
@@ -160,8 +164,8 @@ Status F(ExitInitializationMode)(void *c) {
     Model *m = c;
     NEEDS(IN(INITIALIZATION));
     equations(m);
-    m->mode = m->exchange ? EVENT : STEP;
-    if (!m->exchange) settle(m);
+    m->mode = m->exchange || m->events ? EVENT : STEP;
+    if (m->mode == STEP) settle(m);
     return F(OK);
 }
 
@@ -295,6 +299,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Bo
     (void)no_set;
     *needed = *terminate = *early = false;
     if (status) return status;
+    *needed = m->needed || NEEDY;
     *terminate = m->ended;
     *early = m->time < time + step;
     *last = m->time;
@@ -303,14 +308,25 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Bo
 #endif
 #endif
 
-/* Model exchange */
+/* Model exchange, and events of co-simulation */
 
 Status F(EnterEventMode)(void *c) {
     Model *m = c;
-    NEEDS(IN(CONTINUOUS));
+    NEEDS(IN(CONTINUOUS) | (m->events ? IN(STEP) : 0));
     m->mode = EVENT;
+    m->needed = false;
     return F(OK);
 }
+
+#if FMI == 3
+fmi3Status fmi3EnterStepMode(fmi3Instance c) {
+    Model *m = c;
+    NEEDS(IN(EVENT));
+    if (m->again) return fail(m, fmi3Error, "the event is not done");
+    m->mode = STEP;
+    return fmi3OK;
+}
+#endif
 
 Status F(EnterContinuousTimeMode)(void *c) {
     Model *m = c;
@@ -325,6 +341,7 @@ static Status iterate(Model *m) {
     m->again = m->states_changed = m->nominals_changed = false;
     equations(m);
     event(m);
+    m->ticking = 0;
     return F(OK);
 }
 
@@ -354,6 +371,50 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
     *next = m->next;
     return status;
 }
+
+#ifdef CLOCKS
+fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference r[], size_t n,
+                        const fmi3Clock active[]) {
+    Model *m = c;
+    NEEDS(IN(EVENT));
+    for (size_t i = 0; i < n; i++)
+        if (active[i]) m->ticking = r[i];
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference r[], size_t n,
+                                  fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]) {
+    Model *m = c;
+    NEEDS(IN(INITIALIZATION) | IN(EVENT));
+    for (size_t i = 0; i < n; i++) {
+        int qualifier = 0;
+        intervals[i] = interval(m, r[i], &qualifier);
+        qualifiers[i] = (fmi3IntervalQualifier)qualifier;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference r[], size_t n,
+                                   fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+                                   fmi3IntervalQualifier qualifiers[]) {
+    for (size_t i = 0; i < n; i++) {
+        double value;
+        fmi3Status status = fmi3GetIntervalDecimal(c, &r[i], 1, &value, &qualifiers[i]);
+        if (status) return status;
+        counters[i] = (fmi3UInt64)(value * 3000.0 + 0.5);
+        resolutions[i] = 3000;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetShiftDecimal(fmi3Instance c, const fmi3ValueReference r[], size_t n,
+                               fmi3Float64 shifts[]) {
+    Model *m = c;
+    NEEDS(IN(INITIALIZATION));
+    for (size_t i = 0; i < n; i++) shifts[i] = shift(m, r[i]);
+    return fmi3OK;
+}
+#endif
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
     Model *m = c;

@@ -4,7 +4,7 @@
  * VARIABLES last; its number of STATES, which come first, each with its derivative behind it; which
  * variables are INPUTs or TUNABLE; and the functions start() and equations(). It includes this header
  * between the numbers and the functions, and fmi.c at its end. A model may have INDICATORS, EVENTS,
- * COMPLETED, REFUSAL or OWN_STEPS as well, see below: it defines these, then the function.
+ * CLOCKS, COMPLETED, REFUSAL or OWN_STEPS as well, see below: it defines these, then the function.
  *
  * Model exchange integrates nothing here. Co-simulation takes Runge-Kutta steps of SUBSTEP at most,
  * and halves them at an event.
@@ -46,6 +46,9 @@ typedef enum { INSTANTIATED, CONFIGURING, INITIALIZATION, EVENT, CONTINUOUS, STE
 #ifndef INPUT
 #define INPUT(r) false
 #endif
+#ifndef DISCRETE
+#define DISCRETE(r) false   /* inputs that change at events alone */
+#endif
 #ifndef TUNABLE
 #define TUNABLE(r) false
 #endif
@@ -70,6 +73,8 @@ typedef struct {
     bool again;                       /* the event needs another iteration */
     bool states_changed, nominals_changed, ended;
     bool early;                       /* a step may end early */
+    bool events, needed;              /* its events are handled with the host; one is to be now */
+    unsigned ticking;                 /* the clock that ticks in this event, or 0 */
     double nominal[ROOM];             /* of the states */
     int status;                       /* of the equations, or of a step, as FMI has it, */
     const char *reason;               /* and why, NULL where it is not logged */
@@ -100,6 +105,11 @@ static void indicators(Model *m, double z[]) { (void)m; (void)z; }
 static void event(Model *m); /* one iteration of an event */
 #else
 static void event(Model *m) { (void)m; }
+#endif
+#ifdef CLOCKS
+/* s to the next tick of a clock, or the first one; what FMI calls its qualifier, 2 for a new one. */
+static double interval(Model *m, unsigned clock, int *qualifier);
+static double shift(Model *m, unsigned clock);
 #endif
 #ifdef COMPLETED
 static bool completed(Model *m); /* a step of the solver; true for an event there */
@@ -167,11 +177,13 @@ static bool crossed(Model *m, const double z[]) {
     return false;
 }
 
-/* Co-simulation: go on to a time, or to where the model asks for the end. */
+/* Co-simulation: go on to a time, or to where the model asks for the end, or has an event that is
+ * handled with the host.
+ */
 static void advance(Model *m, double end) {
     double x[ROOM], z[ROOM];
 
-    while (m->time < end && !m->ended) {
+    while (m->time < end && !m->ended && !m->needed) {
         double begin = m->time, stop = fmin(fmin(end, m->next), begin + SUBSTEP);
         double low = 0.0, high = stop - begin;
         bool at_event;
@@ -188,7 +200,9 @@ static void advance(Model *m, double end) {
         }
         if (at_event) integrate(m, begin, x, high);
         else set_time(m, stop);
-        if (at_event || m->time >= m->next) settle(m);
+        if (!at_event && m->time < m->next) continue;
+        if (m->events && (m->early || m->time >= end)) m->needed = true;
+        else settle(m);
     }
 }
 #endif
@@ -199,6 +213,7 @@ static bool may_set(Model *m, unsigned variable, bool continuous) {
     if (STRUCTURAL(variable) || m->mode == CONFIGURING)
         return STRUCTURAL(variable) && m->mode == CONFIGURING;
     if (m->mode == INSTANTIATED || m->mode == INITIALIZATION) return true;
-    if (m->mode == CONTINUOUS) return INPUT(variable) && continuous;
+    if (m->mode == CONTINUOUS || (m->mode == STEP && m->events))
+        return INPUT(variable) && !DISCRETE(variable) && continuous;
     return (m->mode == EVENT || m->mode == STEP) && (INPUT(variable) || TUNABLE(variable));
 }

@@ -1,0 +1,262 @@
+"""An instance of an FMI 3.0 co-simulation FMU that handles its events with the master.
+
+A step ends at an event: where the FMU returns for one, at the time that it has named for the next
+one, and where a clock ticks. The FMU is then in event mode: clocks tick, discrete inputs arrive,
+the discrete states are updated until they settle, and the step goes on. What comes at the end of a
+step is handled before its outputs are read.
+
+A discrete input that a connection changed arrives by an event as the next step begins; one that is
+bound to a clock arrives with its ticks.
+"""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.calls import Call
+from ..base.errors import InputError, SimulationError
+from ..interface.interface import Interface, Value, Variable
+from ..system.parts import Logging
+from .clocks import Clocks
+from .co_simulation import NEEDED, SHORT, TERMINATE, Fmi3Instance
+from .instance import AT_POINT, EARLY, EVENT, OK, WARNING
+
+ITERATIONS = 1000
+"""The most iterations of one event."""
+
+DENSE, MOST_DENSE = 0.01, 1000
+"""So many events, each within this part of a communication step after the one before, end a run."""
+
+
+class EventInstance(Fmi3Instance):
+    """One instance of an FMI 3.0 co-simulation FMU with event mode."""
+
+    def __init__(
+        self,
+        name: str,
+        interface: Interface,
+        tolerance: float | None = None,
+        logging: Logging = False,
+    ) -> None:
+        """As LoadedInstance."""
+        self._clocks = Clocks(interface, self._bound, self._refusal)
+        self._point = 0.0
+        """The time that the FMU has come to, in s, at its events."""
+        self._next = math.inf
+        """The time in s that it has named for the next event."""
+        self._in_step_mode = False
+        self._started = False
+        self._pending: dict[Variable, Value] = {}
+        """What was set one by one, and has not arrived."""
+        self._inputs_at_events: list[_Inputs] = []
+        self._dense, self._last_event = 0, -math.inf
+        super().__init__(name, interface, tolerance, logging)
+
+    def enter_initialization(
+        self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
+    ) -> None:
+        """As Instance.enter_initialization()."""
+        self._point = start
+        super().enter_initialization(values, stop, start)
+
+    def exit_initialization(self) -> None:
+        """Leave initialisation mode for event mode, which ends with enter_step_mode()."""
+        try:
+            self._clocks.initialise(self._point)
+        except SimulationError as error:
+            raise InputError(str(error)) from error
+        super().exit_initialization()
+
+    def enter_step_mode(self) -> None:
+        """Handle the event of the start, in which clocks may tick."""
+        with self._failures():
+            self._settle()
+
+    def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
+        """As Instance.set; but in step mode only continuous inputs change at once.
+
+        The others do by an event, as the next step begins, or now if there was none yet; those of
+        clocks with a tick.
+        """
+        if not self._inputs.running:
+            super().set(variables, values)
+            return
+        given = dict(zip(variables, values, strict=True))
+        at_once = {
+            v: x
+            for v, x in given.items()
+            if _is_continuous(v) or not (self._in_step_mode or v.clocks)
+        }
+        waiting = {v: x for v, x in given.items() if v not in at_once}
+        self._pending |= waiting
+        with self._failures():
+            self._assign(at_once.items())
+            if self._in_step_mode and not all(v.clocks for v in waiting):
+                if self._started:
+                    self._limit[0] = -math.inf
+                else:
+                    self._event()
+
+    def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
+        """As Instance.transfer: inputs that are not continuous arrive by an event."""
+        if action == "get" or all(_is_continuous(v) for v in variables):
+            return super().transfer(action, variables, data)
+        by_clocks: dict[tuple[int, ...], list[int]] = {}
+        continuous: list[int] = []
+        for place, v in enumerate(variables):
+            places = continuous if _is_continuous(v) else by_clocks.setdefault(v.clocks, [])
+            places.append(place)
+
+        def bind(places: list[int], clocks: tuple[int, ...]) -> _Inputs:
+            part, bound = np.zeros(len(places), data.dtype), [variables[p] for p in places]
+            call = super(EventInstance, self).transfer("set", bound, part)
+            return _Inputs(data, np.array(places), part, call, clocks)
+
+        at_events = [bind(places, clocks) for clocks, places in by_clocks.items()]
+        at_once = [bind(continuous, ())] if continuous else []
+        self._inputs_at_events += at_events
+
+        def put() -> int:
+            if not self._started:
+                for inputs, places in zip(at_events, by_clocks.values(), strict=True):
+                    inputs.expect([self._inputs.last(variables[p]) for p in places])
+            if any(inputs.changed() for inputs in at_events if not inputs.clocks):
+                self._limit[0] = -math.inf
+            return max((inputs.pass_on() for inputs in at_once), default=OK)
+
+        return Call(put)
+
+    def through_events(self, status: int, begin: float, end: float) -> tuple[int, float]:
+        """As Instance.through_events()."""
+        self._started, self._point = True, begin
+        near = DENSE * (end - begin)
+        with self._failures():
+            if status == EVENT:
+                self._point = self._reached(end)
+                self._event(near)
+            while not self._flags[TERMINATE]:
+                if self._limit[0] <= self._point:
+                    self._event()
+                    continue
+                if self._point >= end:
+                    return OK, end
+                due = min(self._next, self._clocks.next)
+                stop = due if due < end - AT_POINT else end
+                before = self._point
+                status = self._do_step(before, stop - before)
+                if status > WARNING:
+                    return status, before
+                if self._flags[TERMINATE]:
+                    break
+                self._point = self._reached(stop)
+                if self._flags[NEEDED]:
+                    self._event(near)
+                elif self._point <= before:
+                    return EARLY, before
+        return EARLY, self._point
+
+    def _reached(self, stop: float) -> float:
+        """The time in s that a step came to which was to go to `stop`."""
+        last = float(self._last[0])
+        return last if self._flags[SHORT] and last < stop - AT_POINT else stop
+
+    def _event(self, near: float = AT_POINT) -> None:
+        """Event mode, now; it counts as close upon another that was less than `near` s before."""
+        close = self._point - self._last_event <= near
+        self._dense = self._dense + 1 if close else 0
+        self._last_event = self._point
+        if self._dense >= MOST_DENSE:
+            raise self._error(
+                f"chatters, or does not come to rest ({MOST_DENSE} events in a row, each within "
+                f"{DENSE:.0%} of the step after the one before)",
+                self._point,
+            )
+        self._slave.fmi3EnterEventMode(self._slave.component)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Have clocks tick and inputs arrive, update the discrete states until they settle."""
+        self._clocks.begin(self._point)
+        ticked = self._clocks.tick()
+        self._take_inputs(ticked)
+        for _ in range(ITERATIONS):
+            again, ended, _, _, defined, next_event = self._slave.updateDiscreteStates()
+            if ended:
+                self._flags[TERMINATE], self._last[0] = True, self._point
+                return
+            self._clocks.schedule(ticked)
+            ticked = self._clocks.tick()
+            self._take_inputs(ticked)
+            if not again and not ticked:
+                break
+        else:
+            text = f"does not settle an event in {ITERATIONS} iterations"
+            raise self._error(text, self._point)
+        if defined and math.isnan(next_event):
+            raise self._error("names nan as the time of its next event", self._point)
+        self._next = next_event if defined else math.inf
+        self._slave.enterStepMode()
+        self._in_step_mode = True
+        self._limit[0] = min(self._next, self._clocks.next) - AT_POINT
+
+    def _take_inputs(self, ticked: Collection[int]) -> None:
+        """Have the inputs arrive that wait for an event, and those of the clocks that tick."""
+        arriving = {v: x for v, x in self._pending.items() if _arrives(v.clocks, ticked)}
+        for variable in arriving:
+            del self._pending[variable]
+        self._assign(arriving.items())
+        for inputs in self._inputs_at_events if self._started else ():
+            if _arrives(inputs.clocks, ticked) and inputs.changed():
+                status = inputs.pass_on()
+                if status > WARNING:
+                    raise self.failure(status, self._point)
+
+    def _time(self) -> float:
+        return max(self._point, super()._time())
+
+
+class _Inputs:
+    """Connected inputs that arrive together: a part of the values that come over connections."""
+
+    def __init__(
+        self,
+        data: npt.NDArray[Any],
+        places: npt.NDArray[np.int64],
+        part: npt.NDArray[Any],
+        call: Call,
+        clocks: tuple[int, ...],
+    ) -> None:
+        """Places are those of the values in data that the call passes on, which takes them from
+        part; clocks are the references of those with whose ticks they arrive, if any.
+        """
+        self.clocks = clocks
+        self._data, self._places, self._part, self._call = data, places, part, call
+        self._passed = b""
+
+    def expect(self, values: Sequence[Value | None]) -> None:
+        """The FMU has these values now, as far as they are known."""
+        if None not in values:
+            self._passed = np.array(values, self._part.dtype).tobytes()
+
+    def changed(self) -> bool:
+        """True if the FMU has other values."""
+        return self._data[self._places].tobytes() != self._passed
+
+    def pass_on(self) -> int:
+        """Set them; the FMI status."""
+        self._part[:] = self._data[self._places]
+        self._passed = self._part.tobytes()
+        return self._call.python()
+
+
+def _is_continuous(variable: Variable) -> bool:
+    """True if it may be set in step mode."""
+    return variable.causality == "input" and variable.variability == "continuous"
+
+
+def _arrives(clocks: Collection[int], ticked: Collection[int]) -> bool:
+    """True if an input of these clocks, or of none, may be set while those have ticked."""
+    return not clocks or any(clock in ticked for clock in clocks)
