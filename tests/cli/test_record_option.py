@@ -2,7 +2,10 @@
 
 import csv
 import json
+import re
+import shlex
 import shutil
+from pathlib import Path
 
 import pytest
 from grasp_cosim import load_run
@@ -28,6 +31,17 @@ def test_what_is_named_is_recorded_and_the_metrics_stay_the_same(command, tmp_pa
     }
     assert json.loads((tmp_path / "r/run.json").read_text("utf-8"))["record"] == names[::-1]
     assert load_run(tmp_path / "r").metrics["smallest_gap"] == json.loads(out)["smallest_gap"]
+
+
+def test_the_example_of_the_page_runs(command, tmp_path):
+    page = (Path(__file__).parents[2] / "docs/system_files.md").read_text("utf-8")
+    (example,) = re.findall("\n    grasp-cosim (run --stop 0.1 --record .*)", page)
+    assert command(*shlex.split(example))[0] == 0
+    assert header(tmp_path / "results")[1:5] == [
+        *("plant.position[1]", "plant.position[2]", "plant.velocity[1]", "plant.velocity[2]"),
+    ]
+    assert "controller.contact_force.stiffness" in header(tmp_path / "results")
+    assert not any("force" in name for name in header(tmp_path / "results") if "plant" in name)
 
 
 def test_what_is_worked_out_of_others_is_recorded_by_its_name(command, tmp_path):

@@ -49,6 +49,16 @@ def by_name(compared):
     return {c.name: c for c in compared}
 
 
+def test_what_is_recorded_besides_is_compared_with_the_outputs(short, copied):
+    """A parameter that the candidate has as well; the outputs are compared in any case."""
+    found = qualify(
+        short.with_record("plant.object_width"), "plant", own_plant(short), isolation="none"
+    )
+    assert found.qualified
+    names = {s.name for s in copied.signals if not s.name.startswith("plant.exchange_energy")}
+    assert {s.name for s in found.signals} == {*names, "plant.object_width"}
+
+
 def own_plant(system):
     return system.component("plant", "test").fmu
 

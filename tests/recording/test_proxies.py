@@ -30,6 +30,12 @@ def test_of_a_quiet_one_there_is_a_line():
         assert proxy_lines(time, signals, 0.1) == []
 
 
+def test_of_one_that_is_recorded_in_part_there_are_no_figures():
+    signals = diagnostics()
+    del signals["arm.proxy.age"]
+    assert proxy_figures(TIME, signals) == {}
+
+
 def test_a_loss_and_a_return_are_named():
     signals = diagnostics(
         state=[1, 2, 3, 3, 1, 3], missed=[0, 1, 2, 3, 3, 4], consecutive_missed=[0, 1, 2, 3, 0, 1],

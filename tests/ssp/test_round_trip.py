@@ -324,3 +324,10 @@ def test_run_says_what_was_decided(tmp_path, command):
     assert code == 2
     assert "order of execution: a" in err
     assert "a.fmu has no binary at all" in err
+
+
+def test_what_is_recorded_comes_back(grasp, tmp_path):
+    original = grasp.with_record("plant.*", "!plant.force*")
+    again = round_trip(original, tmp_path)
+    assert again == original
+    assert [*again.recorded] == [*original.recorded]

@@ -234,6 +234,7 @@ def prepare_swap(
     own |= {extra[key]: value for key, value in values.items() if key in extra}
     common = {key: value for key, value in values.items() if key not in extra}
     system = system.with_settings(common, "--set ".__add__)
+    system = replace(system, record=system.record.with_outputs(system.components))
     use = use_of(system, component)
     differences = interface_differences(ours, theirs, use, own)
     swapped = None
@@ -245,21 +246,21 @@ def prepare_swap(
             given |= values_of(theirs, text, name, value, text=True)
         place = replace(now, name=component, values=given, isolation=isolation)
         try:
-            components = [place if c.name == component else c for c in system.components]
-            swapped = replace(system, components=tuple(components))
+            parts = tuple(place if c.name == component else c for c in system.components)
+            record, _ = system.record.without_missing(system.components, parts)
+            swapped = replace(system, components=parts, record=record)
         except InputError as error:
             differences.append(Difference("blocks", "system", component, str(error)))
     differences.sort(key=lambda d: SEVERITIES.index(d.severity))
     back = {}
-    for v in ours.of("output"):
+    for v in (v for port, v in system.recorded.items() if port.component == component):
         if new := theirs.by_name.get(v.name):
             start, end = unit_of(theirs, new), unit_of(ours, v)
             both = conversion(start, end) if start and end else theirs.conversion(v.name, ours)
             back[f"{component}.{v.name}"] = both
     nominals = {
-        f"{c.name}.{v.name}": v.magnitude if isinstance(v.magnitude, float) else None
-        for c in system.components
-        for v in c.interface.of("output")
+        str(port): v.magnitude if isinstance(v.magnitude, float) else None
+        for port, v in system.recorded.items()
     }
     return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
 

@@ -18,6 +18,7 @@ from ..base.text import on_one_line
 from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable
 from ..system.changes import converted, stated
 from ..system.parts import Component
+from ..system.record import by_default
 from ..system.structure import Structure
 from ..system.times import (
     LONGEST,
@@ -51,6 +52,9 @@ connections = [
 step = {step}  # s, communication step
 stop = {stop}  # s, a whole number of steps
 {start}scheme = "sequential"  # in the order of the components below; or "jacobi", all at once
+
+# [record]  # in the place of the outputs
+# signals = ["{name}.*"]
 """
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -211,7 +215,7 @@ def _listed(name: str, interface: Interface, path: str) -> str:
     said = [
         f"# {_line(v.name, _start(v), _told(v))}" for v in variables if v.causality in PARAMETERS
     ]
-    said += [f"# {v.name}, recorded: {_told(v)}" for v in variables if v.causality == "output"]
+    said += [f"# {v.name}, recorded: {_told(v)}" for v in by_default(interface)]
     lines += said[:MOST]
     if len(said) > MOST:
         lines.append(f"# and {len(said) - MOST} more: grasp-cosim inspect {path}")

@@ -296,12 +296,10 @@ def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
     """A result of some rows or signals with the metrics that run.json has, which are of all."""
     asked, measured = metrics_of(read.groups, read.more_metrics), written["measured"]
     there = tuple(m for m in asked if m.name in measured)
-    if not asked:
-        return read
-    if not there and read.every > 1:  # it did not come to its end
+    if not there and asked and read.every > 1:  # it did not come to its end
         line = f"one row in {read.every} was recorded: the metrics are of these"
         return replace(read, log=(*read.log, line))
-    if not there:
+    if not there and "proxies" not in written:
         return read
     place = read.folder / SETTINGS if read.folder else SETTINGS
     values = {m.name: measured[m.name] for m in there}

@@ -15,6 +15,9 @@ LOST = 3
 
 COUNTS = ("missed", "late", "out_of_order", "duplicated", "rejected", "sessions")
 
+NEEDED = (*COUNTS, "consecutive_missed", "round_trip_time", "age")
+"""The diagnostics that figures are made of, beside the state."""
+
 LISTED, AHEAD = 5, 10
 """The most losses that are named; steps that a peer's clock may be ahead without a word."""
 
@@ -25,12 +28,16 @@ def of_proxies(names: Iterable[object]) -> frozenset[str]:
 
 
 def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:
-    """The figures of each proxy by component: counts at the end, and times in s.
+    """The figures of each proxy of which all diagnostics are there: counts at the end, times in s.
 
     lost and back are the communication points at which the peer was lost, and answered again;
     ahead is how far its outputs were from the future at most.
     """
-    names = [name.removesuffix(STATE) for name in signals if name.endswith(STATE)]
+    names = [
+        name
+        for name in (signal.removesuffix(STATE) for signal in signals if signal.endswith(STATE))
+        if all(f"{name}.proxy.{needed}" in signals for needed in NEEDED)
+    ]
     return {name: _figures(time, signals, f"{name}.proxy.") for name in names if len(time)}
 
 

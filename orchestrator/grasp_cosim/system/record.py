@@ -120,6 +120,11 @@ class Record:
         wanted = not taken_in or any(p.matches([name]) for p in taken_in)
         return wanted and not any(p.matches([name]) for p in left_out)
 
+    def with_outputs(self, components: Sequence[Component]) -> Record:
+        """The record that has all outputs besides, but for those that are left out."""
+        outputs = [str(port) for port in self.watched(components)] if self.takes_in else []
+        return Record((*self.signals, *outputs))
+
     def check(self, place: str, components: Sequence[Component]) -> None:
         """InputError at the first pattern that matches no signal, or none that can be recorded."""
         for text in self.signals:
