@@ -271,6 +271,16 @@ MODELS = {
         (_TIME, Variable("count", "Int32", "output", "discrete", -1), _parameter("f", 1.0)),
         indicators=("count",),
     ),
+    "rigid": Model(
+        (
+            _TIME,
+            Variable("count", "Int32", "output", "discrete", 0),
+            Variable("begin", causality="output", variability="discrete", start=0.0),
+            Variable("length", causality="output", variability="discrete", start=0.0),
+            _parameter("inside", 0.01),
+            _parameter("longest", 1e9),
+        )
+    ),
     "feedthrough": None,
 }
 """By the name of their C file; the feedthrough has u_T and y_T for each type T of its version."""
@@ -365,13 +375,16 @@ def build(
 
 
 def build_model(
-    name, folder, version="2.0", kinds=KINDS, file="", capabilities=CAPABLE, more="", options=()
+    name, folder, version="2.0", kinds=KINDS, file="", capabilities=CAPABLE, more="", options=(),
+    step=None,
 ):  # fmt: skip
     """The FMU of one of MODELS, for the kinds given, as folder/FILE.fmu (by default NAME.fmu).
 
-    More are further variables of its description, options further ones of the compiler.
+    More are further variables of its description, options further ones of the compiler. With a step
+    its default experiment recommends that one.
     """
     model = MODELS[name] or _feedthrough(version)
+    model = model if step is None else replace(model, step=step)
     library = library_of(name, version, "CoSimulation" in kinds, more=("-lm", *options))
     xml = description(name, version, model, kinds, capabilities, more=more)
     return pack(folder / f"{file or name}.fmu", version, name, xml, library)

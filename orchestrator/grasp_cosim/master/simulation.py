@@ -33,6 +33,7 @@ from ..realtime.pacer import Pacer, Privileges, privileges
 from ..recording.memory import EveryRow, MemoryListener
 from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.result import Known, Result
+from ..system.declared_steps import check_declared_steps
 from ..system.description import System
 from ..system.native import needed_twins
 from ..system.parts import Component, Port, Realtime
@@ -110,6 +111,7 @@ class Session:
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
         self._stack = ExitStack()
+        check_declared_steps(system)
         self._remarks = (*system.notes, *system.once(remarks))
         self._tell(self._remarks)
         try:

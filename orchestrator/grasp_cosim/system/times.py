@@ -107,13 +107,25 @@ def step_of(value: float) -> Time:
     """
     time = _meant(value)
     if time is None and (near := _simple(value, NEAR * value)):
-        time = _whole(near)
+        time = _plain(near * NANOSECONDS)
     return max(1, math.ceil(value * NANOSECONDS)) if time is None else time
 
 
 def first_step(time: Time, step: Time, start: Time = 0) -> int:
     """Return the number of the first communication point at or after a time."""
     return max(0, -int((start - time) // step))
+
+
+def common(*times: Time) -> Time:
+    """The longest time of which all of these are whole numbers."""
+    per_ns = math.lcm(*(time.denominator for time in times))
+    return _plain(Fraction(math.gcd(*(int(time * per_ns) for time in times)), per_ns))
+
+
+def multiple(*times: Time) -> Time:
+    """The shortest time that is a whole number of each of these."""
+    per_ns = math.lcm(*(time.denominator for time in times))
+    return _plain(Fraction(math.lcm(*(int(time * per_ns) for time in times)), per_ns))
 
 
 class Clock(NamedTuple):
@@ -170,11 +182,11 @@ def _meant(value: float) -> Time | None:
         return whole
     fraction = _simple(value, math.ulp(value))
     if fraction is not None and float(fraction) == value:
-        return _whole(fraction)
+        return _plain(fraction * NANOSECONDS)
     if abs(whole / NANOSECONDS - value) <= DIGITS * abs(value):
         return whole
     fraction = _simple(value, DIGITS * abs(value))
-    return None if fraction is None else _whole(fraction)
+    return None if fraction is None else _plain(fraction * NANOSECONDS)
 
 
 def _simple(value: float, error: float) -> Fraction | None:
@@ -184,7 +196,6 @@ def _simple(value: float, error: float) -> Fraction | None:
     return near if near and abs(near - Fraction(value)) <= error else None
 
 
-def _whole(fraction: Fraction) -> Time:
-    """A fraction of a second in ns, as an int where it is a whole number."""
-    time = fraction * NANOSECONDS
+def _plain(time: Fraction) -> Time:
+    """A time as an int where it is a whole number of ns."""
     return int(time) if time.denominator == 1 else time

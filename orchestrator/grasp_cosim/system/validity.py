@@ -21,6 +21,7 @@ from ..interface.expansion import shape_text
 from ..interface.interface import SUPPORTED, Clock, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion, conversion
+from .declared_steps import of_declared_steps
 from .parts import Component, Connection, Port, Solver
 from .stimuli import Column, Stimuli
 from .structure import Structure, unit_of
@@ -277,7 +278,7 @@ def _check_exact(system: Structure) -> None:
 
 def remarks(system: Structure) -> tuple[str, ...]:
     """Remarks on a system that is valid, a line each."""
-    return (*_of_connections(system), *_of_components(system))
+    return (*_of_connections(system), *_of_components(system), *of_declared_steps(system))
 
 
 def _of_components(system: Structure) -> Iterator[str]:

@@ -95,9 +95,9 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real tolerance,
                                fmi2Real begin, fmi2Boolean stops, fmi2Real stop) {
     Model *m = c;
-    (void)stops; (void)stop;
     NEEDS(IN(INSTANTIATED));
     m->tolerance = tolerant ? tolerance : 0.0;
+    m->stop = stops ? stop : INFINITY;
     set_time(m, begin);
     return fmi2OK;
 }
@@ -148,8 +148,8 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerant, fmi3Float64 tolerance,
                                        fmi3Float64 begin, fmi3Boolean stops, fmi3Float64 stop) {
-    (void)stops; (void)stop;
     ((Model *)c)->tolerance = tolerant ? tolerance : 0.0;
+    ((Model *)c)->stop = stops ? stop : INFINITY;
     set_time(c, begin);
 #endif
     Model *m = c;
@@ -267,6 +267,7 @@ static Status step_to(Model *m, double time, double step) {
     if (m->ended) return fail(m, F(Error), "a step after it asked for the end");
     set_time(m, time);
     m->status = F(OK);
+    m->length = step;
     equations(m);
     advance(m, time + step);
     AT_STEP;

@@ -70,6 +70,7 @@ typedef enum { INSTANTIATED, CONFIGURING, INITIALIZATION, EVENT, CONTINUOUS, STE
 typedef struct {
     Value v[VARIABLES][LARGEST];
     double time, next;                /* s; of the next time event, INFINITY where there is none */
+    double stop, length;              /* s; the stop time, INFINITY without one, and of this step */
     bool again;                       /* the event needs another iteration */
     bool states_changed, nominals_changed, ended;
     bool early;                       /* a step may end early */
