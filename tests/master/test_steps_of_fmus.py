@@ -6,9 +6,10 @@ import pytest
 from grasp_cosim import InputError, System, load_run, simulate
 from grasp_cosim.ssp.to_archive import write_ssp
 from support.marks import engines
-from support.native_fmus import EARLY, build_model, needs_cvode, needs_gcc
+from support.native_fmus import CAPABLE, build_model, needs_cvode, needs_gcc
 
 pytestmark = needs_gcc
+EARLY = {**CAPABLE, "mightReturnEarlyFromDoStep": "true"}
 KIND = ["CoSimulation"]
 RIGID = {"canHandleVariableCommunicationStepSize": "false"}
 INSIDE = {**RIGID, "fixedInternalStepSize": "0.005"}
