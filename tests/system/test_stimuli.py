@@ -91,9 +91,12 @@ def test_what_is_no_such_file_is_said(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("time,a.u_Real,a.w\n0,1,1\n", "line 1, column 3, a.w: no input 'a.w'; valid: a.u_Real"),
+        (
+            "time,a.u_Real,a.w\n0,1,1\n",
+            "column 3, a.w: no input or tunable parameter 'a.w'; valid: ",
+        ),
         ("time,a.u_Real,b.w\n0,1,1\n", "line 1, column 3, b.w: no component 'b'; valid: a"),
-        ("time,a.u_Real,a.x\n0,1,1\n", "column 3, a.x: no input 'a.x'"),
+        ("time,a.u_Real,a.x\n0,1,1\n", "column 3, a.x: is a continuous output"),
         ("time,a.u_Real\n0,1\n1,one\n", "line 3, column 2, a.u_Real: u_Real = 'one': must be"),
         ("time,a.u_Real [m]\n0,1\n", "a.u_Real [m]: cannot be converted into N"),
         ("time,a.u_Integer\n0,1\n1,1.5\n", "line 3, column 2, a.u_Integer: u_Integer = '1.5'"),

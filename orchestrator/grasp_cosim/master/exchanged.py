@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ..interface.interface import Variable
 from ..system.description import System
 from ..system.parts import Port
-from ..system.validity import driven
+from ..system.validity import driven_inputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def exchanged(system: System) -> Exchanged:
 def sourced(system: System) -> frozenset[Port]:
     """The inputs that have a source, and the other elements of an array that has some."""
     targets = {connection.target for connection in system.connections}
-    return _with_whole_arrays(system, {*targets, *driven(system)})
+    return _with_whole_arrays(system, {*targets, *driven_inputs(system)})
 
 
 def used(system: System) -> frozenset[Port]:

@@ -114,7 +114,10 @@ class Master:
         start = in_seconds(self.system.start_ns)
         self.plan.clock[0] = start
         for component, instance in zip(self.system.components, self.instances, strict=True):
-            driven = at_start(self.system, self._drives, component.name)
+            driven = {
+                **at_start(self.system, self._drives, component.name),
+                **self.scenario.tuned_at_start(component.name),
+            }
             stop = told_stop(self.system, component)
             instance.enter_initialization({**component.values, **driven}, stop, start)
         propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)

@@ -96,7 +96,7 @@ class Planner:
         """The program of a macro step in the scheme of the system, and what it works on."""
         if self.pacer is not None:
             self._python(self.pacer, 1, 0)
-        if self.system.events or self.system.faults:
+        if self.system.events or self.system.faults or self.scenario.tunings:
             self._python(self.scenario.before_step, 1, 0)
         names = list(self.instances)
         if self.system.scheme == "sequential":

@@ -12,6 +12,7 @@ from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import partial
 
 import numpy as np
@@ -27,7 +28,7 @@ from ..system.names import main_port
 from ..system.parts import Condition, Event, Fault, Port, literal
 from ..system.scenario import check_setting
 from ..system.times import Time, first_step, seconds
-from ..system.validity import driven, is_linear, samples_of
+from ..system.validity import driven_inputs, driven_parameters, is_linear, samples_of
 from .exchanged import sourced
 
 FaultFunction = Callable[[float, int], float]
@@ -92,6 +93,7 @@ class Scenario:
             windows.append(Window(numbers, system.step_ns, system.start_ns))
             self._pending += windows[-1].ends(f"faults[{i}]")
         self.fault_functions = fault_functions(windows, system.step_ns)
+        self.tunings = tunings_of(system)
         self._due = self._next_step(0)
         self._settable: set[Port] = set()
 
@@ -112,6 +114,7 @@ class Scenario:
         """
         if step < self._due:
             return
+        self._tune(step)
         for once in self._pending[:]:
             if once.due(step) == step and self._holds(once.when):
                 self._pending.remove(once)
@@ -120,7 +123,28 @@ class Scenario:
 
     def _next_step(self, step: int) -> float:
         """The first step from this one on at which something may be due."""
-        return min((once.due(step) for once in self._pending), default=math.inf)
+        due = [once.due(step) for once in self._pending]
+        due += [tuning.due for tuning in self.tunings]
+        return min(due, default=math.inf)
+
+    def _tune(self, step: int) -> None:
+        """Set the parameters that stimuli drive and that change now, those of an FMU together."""
+        changing: dict[str, list[Tuning]] = {}
+        for tuning in self.tunings:
+            if tuning.due == step:
+                changing.setdefault(tuning.port.component, []).append(tuning)
+        for name, tunings in changing.items():
+            variables = [tuning.variable for tuning in tunings]
+            values = [of_kind(tuning.variable.kind, tuning.take()) for tuning in tunings]
+            self._instances[name].set(variables, values)
+
+    def tuned_at_start(self, name: str) -> dict[str, Value]:
+        """The values at the start of the parameters of a component that stimuli drive."""
+        return {
+            tuning.port.variable: of_kind(tuning.variable.kind, tuning.at_start)
+            for tuning in self.tunings
+            if tuning.port.component == name
+        }
 
     def set(self, name: str, value: Given, step: int) -> None:
         """Set what an event could set, now, at communication point step; of an array also all.
@@ -261,14 +285,82 @@ class Drive:
         return share * samples[row] + (1.0 - share) * samples[row + 1]
 
 
+@dataclass(slots=True, eq=False)
+class Tuning:
+    """A tunable parameter that stimuli drive: before which steps it gets which value.
+
+    Only where the value changes, at communication points of its component. `taken` of them are set.
+    """
+
+    port: Port
+    variable: Variable
+    at_start: float
+    steps: Sequence[int]
+    values: Sequence[float]
+    taken: int = 0
+
+    @property
+    def due(self) -> float:
+        """The next step before which it gets another value."""
+        return self.steps[self.taken] if self.taken < len(self.steps) else math.inf
+
+    def take(self) -> float:
+        """The value that is due; it is taken to be set."""
+        self.taken += 1
+        return self.values[self.taken - 1]
+
+
+def tunings_of(system: System) -> list[Tuning]:
+    """The tunable parameters that stimuli drive."""
+    if system.input is None:
+        return []
+    times = np.asarray(ticks_of(system), np.int64)
+    tunings = []
+    for port in driven_parameters(system):
+        interval = system.period(port.component) * system.clock.step
+        points = np.maximum(-((system.clock.start - times) // interval), 0)
+        samples = np.asarray(samples_of(system, port), np.float64)
+        last = np.append(points[1:] != points[:-1], True)  # of the rows up to a point, its value
+        points, samples = points[last], samples[last]
+        at_start = float(samples[0])
+        changes = np.diff(samples, prepend=at_start) != 0.0
+        steps = points[changes] * system.period(port.component)
+        tunings.append(
+            Tuning(
+                port,
+                system.component(port.component, str(port)).interface.by_name[port.variable],
+                at_start,
+                steps.tolist(),
+                samples[changes].tolist(),
+            )
+        )
+    return tunings
+
+
+def ticks_of(system: System) -> array[int]:
+    """The times of the rows of stimuli in ticks of the run.
+
+    A row is taken to the nanosecond: one that is that near to a communication point is at it.
+    """
+    clock, rows = system.clock, system.input.times if system.input else ()
+    if clock.per_nanosecond == 1:
+        return array("q", rows)
+    ticks = array("q")
+    for time in rows:
+        exact_time = clock.per_nanosecond * time
+        nearest_point = round(Fraction(exact_time - clock.start, clock.step))
+        point = clock.start + nearest_point * clock.step
+        ticks.append(point if 2 * abs(point - exact_time) <= clock.per_nanosecond else exact_time)
+    return ticks
+
+
 def drives_of(system: System, slots: dict[Port, int]) -> dict[Port, Drive]:
     """The drive of each input that stimuli drive."""
     found: dict[Port, Drive] = {}
     if system.input is None:
         return found
-    ticks = system.clock.per_nanosecond
-    times = array("q", (ticks * time for time in system.input.times))
-    for port in driven(system):
+    times = ticks_of(system)
+    for port in driven_inputs(system):
         variable = system.component(port.component, str(port)).interface.by_name[port.variable]
         linear, samples = is_linear(system.input, variable), samples_of(system, port)
         found[port] = Drive(slots[port], times, samples, linear)

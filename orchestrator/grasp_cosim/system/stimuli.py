@@ -30,7 +30,7 @@ INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 @dataclass(frozen=True)
 class Column:
-    """The samples of one input, in its unit or in the one named.
+    """The samples of one input or parameter, in its unit or in the one named.
 
     With texts, such as the names of an enumeration, they are their places among these. Sequences
     are arrays, which take 8 bytes a number.
@@ -61,7 +61,8 @@ class Column:
 
 @dataclass(frozen=True)
 class Stimuli:
-    """Samples that drive inputs: columns, and the times of the rows in ns, which do not fall.
+    """Samples that drive inputs and tunable parameters: columns, and the times of the rows in ns,
+    which do not fall.
 
     "linear" interpolates continuous Reals and holds all others from row to row; "held" holds all.
     Before the first row and after the last one their values are held. lines are those of the rows

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..base.checks import exact, known, number
-from ..base.errors import InputError, choices
+from ..base.errors import InputError, choices, nearest
 from ..base.si_units import known_unit
 from ..base.text import counted
 from ..interface.expansion import shape_text
@@ -25,7 +25,10 @@ from .declared_steps import of_declared_steps
 from .parts import Component, Connection, Port, Solver
 from .stimuli import Column, Stimuli
 from .structure import Structure, unit_of
-from .times import NANOSECONDS, written
+from .times import NANOSECONDS, seconds, written
+
+LARGEST_TICKS = 2**62
+"""Ticks that the times of stimuli may be away from 0, so that their distances fit into 64 bits."""
 
 
 def as_written(system: Structure) -> tuple[Connection, ...]:
@@ -346,19 +349,51 @@ def _of_connections(system: Structure) -> Iterator[str]:
     if system.input:
         listed = f"{choices(driven(system), 6)} ({system.input.interpolation})"
         yield f"{system.input.file} drives {listed}, each step by the values at its beginning"
+        for port in driven(system):
+            unit = system.input.columns[port].unit
+            if unit is not None and _variable(system, port).unit is None:
+                yield f"{system.input.place(port)}: {port} has no unit, taken to be in {unit}"
 
 
 def driven(system: Structure) -> tuple[Port, ...]:
-    """The inputs that stimuli drive, in the order of their columns."""
+    """The inputs and tunable parameters that stimuli drive, in the order of their columns."""
     if system.input is None:
         return ()
-    there = {(c.name, v.name) for c in system.components for v in c.interface.of("input")}
     ports = system.input.columns
-    return tuple(p for p in ports if not system.input.partial or (p.component, p.variable) in there)
+    if not system.input.partial:
+        return tuple(ports)
+    there = {
+        (component.name, v.name)
+        for component in system.components
+        for v in component.interface.of("input", "parameter")
+        if is_drivable(v)
+    }
+    return tuple(p for p in ports if (p.component, p.variable) in there)
+
+
+def driven_inputs(system: Structure) -> tuple[Port, ...]:
+    """The inputs among these, which get a value for each step."""
+    return tuple(p for p in driven(system) if _variable(system, p).causality == "input")
+
+
+def driven_parameters(system: Structure) -> tuple[Port, ...]:
+    """The tunable parameters among these, which are set where their values change."""
+    return tuple(p for p in driven(system) if _variable(system, p).causality != "input")
+
+
+def is_drivable(variable: Variable) -> bool:
+    """True for an input, and for a parameter that may change in the run."""
+    tunable = variable.causality == "parameter" and variable.variability == "tunable"
+    return variable.causality == "input" or tunable
+
+
+def _variable(system: Structure, port: Port) -> Variable:
+    return system.component(port.component, str(port)).interface.by_name[port.variable]
 
 
 def check_stimuli(system: Structure, whole: bool = False) -> None:
-    """InputError at the first column that does not fit an input, or has one with another source.
+    """InputError at the first column that does not fit an input or a tunable parameter, or has one
+    with another source.
 
     A value is no source: the column goes before it. whole says that all columns count, also where
     FMUs may yet be swapped.
@@ -370,11 +405,29 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
     for event in system.events:
         for port in event.set:
             sources |= dict.fromkeys(system.elements(port), "an event")
+    longest = LARGEST_TICKS // system.clock.per_nanosecond
+    if stimuli.times[0] < -longest or stimuli.times[-1] > longest:
+        raise InputError(
+            f"{stimuli.file}: from {seconds(stimuli.times[0])} to {seconds(stimuli.times[-1])}; "
+            f"must be within {seconds(longest)}, in steps of {seconds(system.step_ns)}"
+        )
     for port in stimuli.columns if whole else driven(system):
         place, column = stimuli.place(port), stimuli.columns[port]
         interface = system.component(port.component, place).interface
-        inputs = [str(Port(port.component, v.name)) for v in interface.of("input")]
-        known(f"{place}: no input", str(port), inputs, see=interface.listing)
+        drivable = [
+            str(Port(port.component, v.name))
+            for v in interface.of("input", "parameter")
+            if is_drivable(v)
+        ]
+        v = interface.by_name.get(port.variable)
+        if v is None:
+            lacking = f"{place}: no input or tunable parameter"
+            known(lacking, str(port), drivable, see=interface.listing)
+        elif not is_drivable(v):
+            raise InputError(
+                f"{place}: is a {v.variability} {v.causality}, which cannot be set in the run; "
+                f"must be an input or a tunable parameter; {nearest(str(port), drivable)}"
+            )
         v = interface.by_name[port.variable]
         if not v.is_number or (column.unit is not None and v.kind != "Real"):
             must = "have no unit" if v.is_number else "be a Real, Integer, Boolean or Enumeration"
@@ -389,7 +442,7 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
 
 
 def samples_of(system: Structure, port: Port) -> array[float]:
-    """The samples of an input that is driven, in its unit."""
+    """The samples of what is driven, in its unit."""
     assert system.input is not None  # noqa: S101 - it drives
     column = system.input.columns[port]
     interface = system.component(port.component, str(port)).interface
