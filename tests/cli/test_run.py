@@ -206,7 +206,7 @@ def test_inputs_of_a_system_file(command, tmp_path):
         (None, [], "no source for a.u_Real"),
         ("a.u_Real", ["--set", "a.u_Real=1"], "--set a.u_Real: does nothing, as drive.csv drives"),
         ("a.u_Real,b.w", [], "drive.csv: line 1, column 3, b.w: no component 'b'; valid: a"),
-        ("a.u_Raal", [], "column 2, a.u_Raal: no input 'a.u_Raal'; did you mean a.u"),
+        ("a.u_Raal", [], "column 2, a.u_Raal: no input or tunable parameter 'a.u_Raal'; did"),
     ],
 )
 def test_columns_that_fit_no_input(command, tmp_path, columns, more, said):
