@@ -10,15 +10,25 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from grasp_cosim import InputError, sweep
+from grasp_cosim import InputError, System, sweep
 from grasp_cosim.metrics.metric import load_metrics
 from grasp_cosim.sweeps.rows import grid
 from grasp_cosim.sweeps.sweep import Task, cluster, packed, run_packed, run_row
-from support.native_fmus import needs_gcc
+from support.native_fmus import needs_gcc, talker
 from support.native_systems import integrator, write_integrator
 from support.processes import ends
 
 pytestmark = needs_gcc
+
+LAST = '''
+from grasp_cosim import metric
+
+
+@metric("last", unit="s", needs=["a.y"])
+def last(run):
+    """The last output."""
+    return float(run["a.y"][-1])
+'''
 
 FAILING = grid({"a.gain": [1.0, 2.0, 3.0], "a.error_at": [1e9, 0.055]})
 
@@ -59,6 +69,26 @@ def test_the_bytes_are_those_of_any_processes(system, mine, tmp_path):
     assert set(one.errors) == {1, 3, 5}
     assert all(e.startswith("a: ") and "\n" not in e for e in one.errors.values())
     assert one.units["end"] == "m"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_crash_as_an_fmu_is_freed_takes_no_result(tmp_path, fails):
+    failure = ['-DAT_STEP=if (time > 0.45) return fail(m, 3, "stuck")'] if fails else []
+    talker(tmp_path, "-DAT_FREE=abort()", *failure)
+    file = tmp_path / "talk.toml"
+    file.write_text(
+        '[experiment]\nstep = 0.1\nstop = 1.0\n[components.a]\nfmu = "talker.fmu"\n', "utf-8"
+    )
+    (tmp_path / "last.py").write_text(LAST, "utf-8")
+    rows = [{"experiment.step": step} for step in (0.1, 0.2, 0.5)]
+    table = sweep(System.load(file), rows, metrics=load_metrics(tmp_path / "last.py"), workers=1)
+    if fails:
+        assert [error.partition(" at t")[0] for error in table.errors.values()] == [
+            "a: talker.fmu returned error"
+        ] * 3
+    else:
+        assert (table["last"].tolist(), table.errors) == ([1.0] * 3, {})
 
 
 @pytest.mark.slow

@@ -37,6 +37,12 @@ class Lost(NamedTuple):
     end: str
 
 
+class _Early(NamedTuple):
+    """The result of a job that is not over yet."""
+
+    result: Any
+
+
 class Crew:
     """At most so many processes, for one batch of jobs after the other. Its context ends them."""
 
@@ -73,11 +79,13 @@ class Crew:
     ) -> Generator[tuple[Job, Run | Lost], None, None]:
         """Yield each job with its result, in the order in which they end.
 
-        `run` is a function of a module; where it raises, its process dies. Closing the iterator
-        ends the jobs. SimulationError where a process cannot start.
+        `run` is a function of a module; where it raises, its process dies; what it has delivered
+        before, see deliver(), is then its result. Closing the iterator ends the jobs.
+        SimulationError where a process cannot start.
         """
         left = iter(jobs)
         busy: dict[_Worker, Job] = {}
+        early: dict[_Worker, Any] = {}
         try:
             while True:
                 for job in islice(left, self._most - len(busy)):
@@ -88,11 +96,17 @@ class Crew:
                     break
                 heard = wait([worker.pipe for worker in busy])
                 for worker in [w for w in busy if w.pipe in heard and w.started()]:
-                    result, job = worker.received(), busy.pop(worker)
+                    result = worker.received()
+                    if isinstance(result, _Early):
+                        early[worker] = result.result
+                        continue
+                    job = busy.pop(worker)
                     if isinstance(result, Lost):
+                        result = early.get(worker, result)
                         _end([worker])
                     else:
                         self._idle.append(worker)
+                    early.pop(worker, None)
                     yield job, result
         finally:
             _end(busy)
@@ -182,8 +196,23 @@ def _end(workers: Iterable[_Worker]) -> None:
         sweep(gettempdir())
 
 
+_pipe: Connection | None = None
+"""In a process of a Crew, the way to its master."""
+
+
+def deliver(result: Any) -> None:
+    """Give away the result of the job that this process does, which may die before it is over.
+
+    Does nothing outside of a Crew.
+    """
+    if _pipe is not None:
+        _pipe.send(_Early(result))
+
+
 def _work(pipe: Connection) -> None:
     """The life of a process: say that it has started, then a job after the other."""
+    global _pipe
+    _pipe = pipe
     if starter := parent_process():
         interruption.worker(starter.sentinel)
     with suppress(EOFError, OSError):

@@ -23,13 +23,14 @@ from typing import Any, NamedTuple
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
-from ..base.parallel import Crew, Lost
+from ..base.parallel import Crew, Lost, deliver
 from ..base.progress import Progress, phase
 from ..base.scratch import SUFFIX, Lock, ScratchFolder
 from ..base.text import counted
 from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of
+from ..recording.result import Result
 from ..system.description import System
 from ..system.settings import settings
 from .rows import Row, as_rows, check_units, settings_of, unit_of
@@ -122,9 +123,20 @@ class Task:
 
 
 def run_row(task: Task, index: int, row: Row) -> Outcome:
-    """Run a row; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted."""
+    """Run a row; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted.
+
+    The outcome is delivered before the FMUs are ended, which may take the process along.
+    """
+
+    def finish(result: Result, error: SimulationError | None) -> None:
+        if error is not None:
+            deliver(Outcome(index, {}, str(error)))
+        elif result.complete:
+            deliver(Outcome(index, result.measured.flat()))
+
     try:
-        result = simulate(task.system.with_settings(row, "sweep: {}".format), metrics=task.metrics)
+        system = task.system.with_settings(row, "sweep: {}".format)
+        result = simulate(system, metrics=task.metrics, finish=finish)
         if not result.complete:
             raise KeyboardInterrupt
         return Outcome(index, result.measured.flat())
