@@ -5,6 +5,7 @@ import json
 import pytest
 from grasp_cosim.inspection.inspection import as_text, inspect_fmu
 from ssp.hand_made import described
+from support.native_fmus import needs_gcc, talker
 
 FMI_1 = """<?xml version="1.0" encoding="ISO-8859-1"?>
 <fmiModelDescription fmiVersion="1.0" modelName="Drive" modelIdentifier="drive" guid="{1}"
@@ -159,3 +160,11 @@ def test_a_sloppy_fmu_is_shown_all_the_same(archive, mistake):
 def test_a_start_that_is_no_number_is_shown_as_it_is(archive, text):
     report = inspect_fmu(archive(FMI_2.replace('min="1" start="3"', f'min="1" start="{text}"')))
     assert report["variables"][8]["start"] == text
+
+
+@needs_gcc
+def test_the_categories_of_its_log_are_listed(tmp_path):
+    report = inspect_fmu(talker(tmp_path))
+    names = ["logEvents", "logSecrets", "logStatusWarning", "logStatusError"]
+    assert report["log_categories"] == names
+    assert f"log categories      {', '.join(names)}\n" in as_text(report)

@@ -139,7 +139,7 @@ class Messages:
         return lines
 
     def _in_words(self, message: Message) -> str:
-        text = " ".join(self._bare(message.text).split())
+        text = " ".join(self._bare(message.text).split()) or "no text"
         return f"{STATUS[message.status]} at t = {message.time:.9g} s: {text}"
 
     def _bare(self, text: str) -> str:

@@ -37,6 +37,7 @@ def inspect_fmu(path: Path) -> dict[str, Any]:
         "sources": found.sources,
         "python": found.python,
         "capabilities": dict(found.capabilities),
+        "log_categories": list(found.log_categories),
         "ambiguous": list(found.ambiguous),
         "variables": [_variable(v) for v in found.variables],
     }
@@ -62,6 +63,7 @@ def as_text(report: Mapping[str, Any], width: int | None = None) -> str:
         "sources": "yes, in C" if report["sources"] else "no",
         "Python": "needed, made with pythonfmu" if report["python"] else "not needed",
         "capabilities": ", ".join(able) or "none",
+        "log categories": _shown(", ".join(report["log_categories"])) or "none",
         **({"several of one name": choices(several)} if (several := report["ambiguous"]) else {}),
     }
     lines = [f"{label:20s}{text}" for label, text in head.items()]
