@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grasp_cosim import SimulationError, System, simulate
+from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.cli import main
 from grasp_cosim.system.parts import Component, Connection, Event, Port
 from support.marks import engines, slow
@@ -192,6 +192,24 @@ def test_an_input_of_a_clock_arrives_with_its_ticks(tmp_path):
     assert session.result()["part.events"].tolist() == [1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6]
 
 
+def test_an_event_that_inner_steps_have_not_come_to_is_left_to_the_fmu(tmp_path):
+    """It names the same time again, then returns for it."""
+    lagging = ("-DGRID=0.1",)
+    result = run(sampled(tmp_path, values={"named": 0.25}, options=lagging), stop=0.5)
+    assert result["part.last"].tolist() == [-1.0, -1.0, -1.0, 0.3, 0.3, 0.5]
+
+
+def test_clocks_tick_at_the_points_of_a_step_that_cannot_vary(tmp_path):
+    fixed = {**EVENT_MODE, "canHandleVariableCommunicationStepSize": "false"}
+    more = clock(intervalDecimal="0.2")
+    fmu = build_model("sampled", tmp_path, "3.0", ["CoSimulation"], capabilities=fixed, more=more)
+    result = run(Component("part", fmu, INPUTS))
+    assert result["part.ticks"].tolist() == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6]
+    message = r"part: sampled.fmu: clock 'tick' ticks within steps of 0.15 s, which cannot vary; "
+    with pytest.raises(InputError, match=message):
+        run(Component("part", fmu, INPUTS), step=0.15, stop=0.3)
+
+
 def test_discrete_inputs_of_several_types_arrive_in_one_event(tmp_path):
     """The frame of the FMU refuses them in step mode; a continuous one is set in that."""
     fmu = build(tmp_path, capabilities=EVENT_MODE)
@@ -222,8 +240,14 @@ def test_an_event_that_cannot_be_handled_ends_the_run(tmp_path):
 
 
 def test_events_that_do_not_end_are_said(tmp_path):
-    with pytest.raises(SimulationError, match=r"part: sampled.fmu chatters, .* at t = 0 s"):
-        run(sampled(tmp_path, clock("countdown", COUNTDOWN), {"named": 1e-12}), step=0.2)
+    fmu = build_model("bouncing_ball", tmp_path, "3.0", ["CoSimulation"], capabilities=EVENT_MODE)
+    ball = Component("ball", fmu, {"e": 0.99, "v_min": 1e-4})
+    with pytest.raises(SimulationError, match=r"ball: bouncing_ball.fmu chatters, or does not com"):
+        run(ball, step=100.0, stop=100.0)
+    part = sampled(tmp_path, clock(intervalDecimal="1e-14", shiftDecimal="0.1"))
+    message = r"part: sampled.fmu does not settle an event in 1000 iterations at t = 0.1 s"
+    with pytest.raises(SimulationError, match=message):
+        run(part, step=0.2)
 
 
 REFUSED = {

@@ -11,7 +11,7 @@ bound to a clock arrives with its ticks.
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,11 @@ DENSE, MOST_DENSE = 0.01, 1000
 
 class EventInstance(Fmi3Instance):
     """One instance of an FMI 3.0 co-simulation FMU with event mode."""
+
+    NEEDS: ClassVar[Sequence[str]] = (
+        *Fmi3Instance.NEEDS,
+        *("EnterEventMode", "UpdateDiscreteStates", "EnterStepMode"),
+    )
 
     def __init__(
         self,
@@ -129,6 +134,26 @@ class EventInstance(Fmi3Instance):
 
         return Call(put)
 
+    def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
+        """As Instance.stepper; InputError where its clocks tick within a step that cannot vary."""
+        if not self.interface.can_vary_step:
+            for v in self.interface.input_clocks:
+                self._check_ticks(v, step)
+        return super().stepper(clock, step)
+
+    def _check_ticks(self, v: Variable, step: float) -> None:
+        """InputError where a clock whose ticks are declared has one within a step."""
+        if v.clock is None or v.clock.interval is None:
+            return
+        for time in (v.clock.interval, v.clock.shift):
+            steps = float(time) / step
+            if abs(steps - round(steps)) * step > AT_POINT:
+                raise InputError(
+                    f"{self.name}: {self.interface.path.name}: clock {v.name!r} ticks within steps "
+                    f"of {step:g} s, which cannot vary; must have a step that divides "
+                    f"{float(time):g} s"
+                )
+
     def through_events(self, status: int, begin: float, end: float) -> tuple[int, float]:
         """As Instance.through_events()."""
         self._started, self._point = True, begin
@@ -145,6 +170,8 @@ class EventInstance(Fmi3Instance):
                     return OK, end
                 due = min(self._next, self._clocks.next)
                 stop = due if due < end - AT_POINT else end
+                if stop < end and not self.interface.can_vary_step:
+                    raise self._error("has an event within a step, which cannot vary,", due)
                 before = self._point
                 status = self._do_step(before, stop - before)
                 if status > WARNING:
@@ -197,7 +224,12 @@ class EventInstance(Fmi3Instance):
             raise self._error(text, self._point)
         if defined and math.isnan(next_event):
             raise self._error("names nan as the time of its next event", self._point)
-        self._next = next_event if defined else math.inf
+        next_event = next_event if defined else math.inf
+        if next_event == self._next and next_event <= self._point + AT_POINT:
+            next_event = (
+                math.inf
+            )  # its inner steps are behind: it will return for that event itself
+        self._next = next_event
         self._slave.enterStepMode()
         self._in_step_mode = True
         self._limit[0] = min(self._next, self._clocks.next) - AT_POINT

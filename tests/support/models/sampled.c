@@ -2,7 +2,8 @@
  *
  * Its steps never end early, whatever comes. A change of the discrete input starts a countdown of delay s
  * to a tick; the bound input is read with ticks alone. With named > 0 it names the multiples of that, in s,
- * as the times of its events, which are as ticks are.
+ * as the times of its events, which are as ticks are. With a GRID, in s, it comes to them in steps of that,
+ * and returns for them.
  */
 enum { TIME, X, SLOPE, HELD, TICKS, LAST, EVENTS_DONE, OFFSET, TRIGGER, GAIN, PERIOD, FIRST, DELAY,
        FACTOR, NAMED, TICK, COUNTDOWN, BOUND, TAKEN, VARIABLES };
@@ -16,6 +17,9 @@ enum { TIME, X, SLOPE, HELD, TICKS, LAST, EVENTS_DONE, OFFSET, TRIGGER, GAIN, PE
 #define INPUT(r) ((r) == OFFSET || (r) == TRIGGER || (r) == BOUND)
 #define DISCRETE(r) ((r) == TRIGGER || (r) == BOUND)
 #define TUNABLE(r) ((r) == PERIOD)
+#ifndef GRID
+#define GRID 0.0
+#endif
 #include "model.h"
 
 static void start(Model *m) {
@@ -27,20 +31,29 @@ static void start(Model *m) {
 
 static void equations(Model *m) { *real(m, SLOPE) = *real(m, HELD); }
 
+/* True if it has come to the time that it named. */
+static bool due(Model *m) {
+    double time = GRID > 0.0 ? floor(m->time / GRID + 1e-9) * GRID : m->time;
+
+    return *real(m, NAMED) > 0.0 && time > m->next - 1e-12;
+}
+
 static void event(Model *m) {
     m->v[EVENTS_DONE]->Int32++;
-    if (m->ticking || (*real(m, NAMED) > 0.0 && m->time > 0.0)) {
+    if (m->ticking || due(m)) {
         *real(m, HELD) = *real(m, OFFSET) - *real(m, GAIN) * *real(m, X);
         *real(m, LAST) = m->time;
         *real(m, TAKEN) = *real(m, BOUND);
         m->v[TICKS]->Int32++;
     }
-    if (*real(m, NAMED) > 0.0) m->next = (round(m->time / *real(m, NAMED)) + 1.0) * *real(m, NAMED);
+    if (*real(m, NAMED) > 0.0 && (due(m) || isinf(m->next)))
+        m->next = isinf(m->next) ? *real(m, NAMED) : m->next + *real(m, NAMED);
 }
 
 static void advance(Model *m, double end) {
     *real(m, X) += *real(m, HELD) * (end - m->time);
     set_time(m, end);
+    m->needed = GRID > 0.0 && due(m);
 }
 
 /* Of a clock that is no countdown PERIOD, which grows by FACTOR with each tick. */
