@@ -133,6 +133,24 @@ def test_fmus_alone(fmus_here, tmp_path):
     assert f"drive.csv drives through.{name}" in err
 
 
+@needs_gcc
+@pytest.mark.parametrize(
+    ("step", "line", "steps"),
+    [
+        ("0.033333333333333333", 'step = "1/30"', 30),
+        ("0.0333333333", 'step = "1/30"', 30),
+        ("0.0333", "step = 0.0333", 30),
+        ("0.0009765625", 'step = "1/1024"', 1024),
+    ],
+)
+def test_the_step_that_an_fmu_recommends(fmus_here, tmp_path, step, line, steps):
+    """As it says, never a shorter one; with the next whole number of steps to its stop time."""
+    build_model("rigid", tmp_path, kinds=["CoSimulation"], step=step)
+    assert fmus_here("init", "rigid.toml", "--fmu", "a=rigid.fmu")[0] == 0
+    assert f"\n{line}  # s" in (tmp_path / "rigid.toml").read_text("utf-8")
+    assert System.load("rigid.toml").total_steps == steps
+
+
 def test_paths(tmp_path):
     """Relative below the folder of the file and beside it, else absolute."""
     here = tmp_path / "project/systems"

@@ -166,6 +166,14 @@ def test_what_the_fmu_refuses_is_said(sensor, clocked):
         it.proxy.step(0.0, 1e-10, starts(sensor))
 
 
+def test_its_own_clock_keeps_to_thirty_steps_a_second(sensor, clocked):
+    it = clocked(sensor, Service(watchdog_ns=10**13))
+    it.proxy.begin(1, starts(sensor))
+    it.proxy.step(0.0, 1 / 30, starts(sensor))
+    it.wait(1000_000.0)
+    assert it.served.counters()["own_steps"] == 30_000
+
+
 def test_by_its_own_clock_the_model_moves_between_requests(plant, clocked):
     it = clocked(plant, Service(watchdog_ns=10 * BACKLOG))
     it.proxy.begin(1, starts(plant))

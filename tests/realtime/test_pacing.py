@@ -226,16 +226,21 @@ def test_it_sleeps_in_slices_and_spins_at_the_end(tmp_path):
     assert fake.sleeps == []
 
 
-@pytest.mark.parametrize("factor", [3.0, 0.1, 1.7])
-def test_the_schedule_does_not_drift(tmp_path, factor):
+THIRTIETH = Fraction(1000 * MS, 30)
+
+
+@pytest.mark.parametrize(
+    ("factor", "step"), [(3.0, 1 * MS), (0.1, 1 * MS), (1.7, 1 * MS), (1.0, THIRTIETH)]
+)
+def test_the_schedule_does_not_drift(tmp_path, factor, step):
     """Where the period is no whole number of ns; and 0.1 is a tenth."""
     fake = Fake()
-    pace = make_pacer(tmp_path, fake, Realtime(factor=factor, overrun="stop"), 1 * MS)
+    pace = make_pacer(tmp_path, fake, Realtime(factor=factor, overrun="stop"), step)
     pace(0)
-    start = fake.time
-    fake.time = start + int(10**6 * MS / Fraction(str(factor))) - 3 * US
+    start, end = fake.time, float(10**6 * step / Fraction(str(factor)))
+    fake.time = start + int(end) - 3 * US
     pace(10**6)
-    assert fake.time - start == pytest.approx(10**6 * MS / Fraction(str(factor)), abs=1 * US)
+    assert fake.time - start == pytest.approx(end, abs=1 * US)
 
 
 def test_a_machine_that_wakes_us_late_is_to_blame(tmp_path):

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 from grasp_cosim.realtime.timing import Histogram, Overrun, Spread, Timing
 from grasp_cosim.recording.result import Rejection, Result
-from grasp_cosim.system.parts import NANOSECONDS
+from grasp_cosim.system.times import NANOSECONDS
 
 WIDTH, CENTRE = 0.07, 0.01
 TOUCH = {1: 1.0, 2: 1.2}

@@ -1,6 +1,7 @@
 """What varies becomes rows in SI units; the table of runs: types, units in files, text, orders."""
 
 import csv
+from fractions import Fraction
 
 import numpy as np
 import pandas as pd
@@ -202,6 +203,17 @@ def test_rows_are_the_same_however_they_are_given(tmp_path):
     columns = {"p.a": np.array([1.5, 2.5, 3.0]), "p.b": [True, None, False]}
     for table in (rows, tmp_path / "rows.csv", columns, pd.DataFrame(columns)):
         assert as_rows(table) == rows
+
+
+def test_times_may_be_fractions():
+    place = "experiment.step"
+    _, values = varied(f"{place}=1/30,1/60,1e-3")
+    rows = as_rows(grid({place: values, "p.note": ["1/2"]}))
+    assert [row[place] for row in rows] == [1 / 30, 1 / 60, 1e-3]
+    assert rows[0]["p.note"] == "1/2"
+    assert as_rows([{place: Fraction(1, 30)}]) == [{place: 1 / 30}]
+    with pytest.raises(InputError, match=r"sweep: experiment.step = '1/x' s: must be a number"):
+        as_rows([{place: "1/x"}])
 
 
 def test_a_unit_in_the_head_is_converted(tmp_path):

@@ -38,6 +38,10 @@ def test_another_step_must_suit_the_delays(grasp):
     delayed = replace(grasp, faults=(Fault(INTENSITY, "delay", {"time": 3e-4}),))
     with pytest.raises(InputError, match=r"must be a whole number of steps of 0\.0002 s"):
         delayed.with_experiment(step=2e-4)
+    with pytest.raises(InputError, match=r"of 0\.333333333 s; could be 0\.3333333333333333 s$"):
+        delayed.with_experiment(step="1/3")
+    fitting = replace(delayed.faults[0], parameters={"time": 0.3333333333333333})
+    assert replace(grasp.with_experiment(step="1/3"), faults=(fitting,)).total_steps == 9
 
 
 def test_an_input_without_a_connection_can_be_set(grasp):

@@ -22,7 +22,7 @@ from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Logging
 from .clocks import Clocks
 from .co_simulation import NEEDED, SHORT, TERMINATE, Fmi3Instance
-from .instance import AT_POINT, EARLY, EVENT, OK, WARNING
+from .instance import AT_POINT, EARLY, EVENT, OK, WARNING, length_until
 
 ITERATIONS = 1000
 """The most iterations of one event."""
@@ -173,7 +173,7 @@ class EventInstance(Fmi3Instance):
                 if stop < end and not self.interface.can_vary_step:
                     raise self._error("has an event within a step, which cannot vary,", due)
                 before = self._point
-                status = self._do_step(before, stop - before)
+                status = self._do_step(before, length_until(before, stop))
                 if status > WARNING:
                     return status, before
                 if self._flags[TERMINATE]:

@@ -4,7 +4,7 @@ And the inputs that an FMU was given last, as its failure names them.
 """
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from math import isfinite, nextafter
 from typing import Any, Protocol
 
 import numpy as np
@@ -38,6 +38,14 @@ it ends.
 def clock_of(begin: float, end: float) -> npt.NDArray[np.float64]:
     """The clock of a step alone, from begin to end in s."""
     return np.array([begin, 0.0, end])
+
+
+def length_until(begin: float, end: float) -> float:
+    """The longest step in s from begin that is not beyond end where both are added as floats."""
+    length = end - begin
+    while begin + length > end:
+        length = nextafter(length, 0.0)
+    return length
 
 
 class Instance(Protocol):

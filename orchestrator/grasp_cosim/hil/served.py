@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from math import isclose, isfinite
+from math import ceil, isclose, isfinite
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,7 @@ from ..fmu_export.link import (
 )
 from ..interface.interface import Interface, Value, Variable
 from ..master.master import finish_step
-from ..system.times import NANOSECONDS
+from ..system.times import NANOSECONDS, Time, in_seconds, nearest_time
 from .proxy import link_signature
 from .sockets import Address, EventLoop, received, text
 
@@ -96,8 +96,8 @@ class ServedFmu:
         self._fmu = DrivenFmu(interface, signature)
         self._values: list[Value] = []
         self._in_session = False
-        self._deadline: int | None = None  # of the next own step
-        self._step_ns = 0
+        self._deadline: Time | None = None  # of the next own step, exact
+        self._step_ns: Time = 0
         self._heard: int | None = None  # the last request, while the watchdog watches
         self._own_failure = ""
         self._unsaid = dict(DROPPED)
@@ -113,7 +113,8 @@ class ServedFmu:
     def due(self) -> int | None:
         """Return when `look` has something to do next; None: not before the next datagram."""
         watchdog = None if self._heard is None else self._heard + self._service.watchdog_ns
-        return min((m for m in (self._deadline, watchdog) if m is not None), default=None)
+        deadline = None if self._deadline is None else ceil(self._deadline)
+        return min((m for m in (deadline, watchdog) if m is not None), default=None)
 
     def answer(self, datagram: bytes, source: str, now: int) -> bytes | None:
         """Do what a datagram says, whatever it holds; return what to send back to its source."""
@@ -162,7 +163,7 @@ class ServedFmu:
             self._heard = now
             self._fmu.set(request.values)
             if self._deadline is None:
-                self._step_ns = round(request.step * NANOSECONDS)
+                self._step_ns = nearest_time(request.step)
                 self._deadline = now + self._step_ns
 
     def look(self, now: int) -> None:
@@ -177,11 +178,11 @@ class ServedFmu:
                     self._values[i] = value
                 self._fmu.set(self._values)
             if self._deadline is not None and now >= self._deadline:
-                self._fmu.advance(self._fmu.time, self._step_ns / NANOSECONDS)
+                self._fmu.advance(self._fmu.time, in_seconds(self._step_ns))
                 self._counts["own_steps"] += 1
                 self._deadline += self._step_ns
                 if now - self._deadline > BACKLOG:
-                    skipped = (now - self._deadline) // self._step_ns
+                    skipped = int((now - self._deadline) // self._step_ns)
                     self._counts["skipped"] += skipped
                     self._deadline += skipped * self._step_ns
         except (InputError, SimulationError) as error:

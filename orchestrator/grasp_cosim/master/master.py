@@ -6,7 +6,6 @@ with events that the FMU handles with its master.
 The schemes, components with a longer step and time are in docs/system_files.md.
 """
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -18,7 +17,7 @@ from ..base.checks import exact
 from ..base.errors import InputError, SimulationError
 from ..base.system_calls import cpus
 from ..exchange.listener import Texts
-from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of
+from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of, length_until
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer
 from ..recording.result import Rejection
@@ -400,11 +399,3 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
         if status <= WARNING:
             clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
     raise instance.failure(status, float(clock[0]))
-
-
-def length_until(begin: float, end: float) -> float:
-    """The longest step in s from begin that is not beyond end where both are added as floats."""
-    length = end - begin
-    while begin + length > end:
-        length = math.nextafter(length, 0.0)
-    return length

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,16 @@ from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
 from ..system.parts import Port
 from ..system.structure import parameter_in_si
+from ..system.times import LONGEST, in_nanoseconds, in_seconds
 from ..system.toml import place_of, plain
 from ..tables.column import Column
 from ..tables.table import read_table
 from ..tables.text import is_number
 
 Row = Mapping[str, Value]
+
+TIMES = tuple(f"experiment.{key}" for key in ("start", "step", "stop"))
+"""The places of times, which may be fractions like 1/30."""
 
 MOST = 100_000
 """Runs of a sweep at most."""
@@ -77,7 +82,8 @@ def as_rows(given: Any) -> list[dict[str, Value]]:
         raise InputError(f"sweep: {len(rows)} rows; must be 1 to {MOST}")
     if not any(rows):
         raise InputError("sweep: nothing varies; the rows must have at least one column")
-    return [{k: p for k, v in row.items() if (p := _number(v)) is not None} for row in rows]
+    plain_rows = [{place: _plain(place, value) for place, value in row.items()} for row in rows]
+    return [{k: value for k, value in row.items() if value is not None} for row in plain_rows]
 
 
 def read_rows(path: Path) -> list[dict[str, Value]]:
@@ -131,7 +137,7 @@ def unit_of(system: System, place: str) -> str | None:
     """The SI unit in which the values of a place are; None where they have none."""
     port = _port(system, place)
     if port is None:
-        return "s" if place in ("experiment.step", "experiment.stop") else None
+        return "s" if place in TIMES else None
     interface = system.component(port.component, place).interface
     variable = interface.by_name.get(port.variable)
     unit = interface.unit(variable) if variable else None
@@ -153,11 +159,15 @@ def _to_si(column: Column) -> Conversion:
     return IDENTITY if unit.si else Conversion(unit.factor, unit.offset)
 
 
-def _number(value: Any) -> Value | None:
-    """A value without NumPy's types; None where there is none."""
+def _plain(place: str, value: Any) -> Value | None:
+    """A value without NumPy's types, a time like "1/30" in s; None where there is none."""
     plain_value = value.item() if isinstance(value, np.generic) else value
-    missing = plain_value is None or plain_value == "" or plain_value != plain_value
-    return None if missing else plain_value
+    if plain_value is None or plain_value == "" or plain_value != plain_value:
+        return None
+    is_fraction = isinstance(plain_value, Fraction) or "/" in str(plain_value)
+    if is_fraction and place in TIMES:
+        return in_seconds(in_nanoseconds(f"sweep: {place}", plain_value, zero=True, low=-LONGEST))
+    return plain_value  # type: ignore[no-any-return]
 
 
 def _converted(value: Value, change: Any) -> Value:

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from ..base.errors import InputError
 from .parts import Fault
-from .times import LONGEST, NANOSECONDS, Time, seconds, written
+from .times import LONGEST, NANOSECONDS, Time, in_seconds, seconds
 
 INITIAL = -1
 """The step number of the exchanges in initialisation mode."""
@@ -126,7 +126,7 @@ def _check_delay(place: str, given: Parameters, step_ns: Time) -> None:
     if abs(count * step_ns - time * NANOSECONDS) > 1e-12 * time * NANOSECONDS:
         raise InputError(
             f"{place}: time = {time:.9g} s: must be a whole number of steps of "
-            f"{seconds(step_ns)}; could be {written(max(1, count) * step_ns)} s"
+            f"{seconds(step_ns)}; could be {in_seconds(max(1, count) * step_ns)!r} s"
         )
 
 
