@@ -62,6 +62,12 @@ def test_what_matches_nothing_is_refused_before_the_run(command, names, message)
     assert (code, err.startswith(f"grasp-cosim: {message}")) == (2, True), err
 
 
+def test_a_list_is_no_single_value(command):
+    code, _, err = command(*SHORT, "--set", "record.signals=plant.*")
+    said = "--set record.signals: is a list; must be given by --record, or with_record()"
+    assert (code, err) == (2, f"grasp-cosim: {said}\n")
+
+
 @pytest.fixture
 def file(tmp_path):
     inner(tmp_path, "2.0")

@@ -52,7 +52,7 @@ class Pattern:
 def pattern(text: str) -> Pattern:
     """The pattern of an entry."""
     plain = text.removeprefix(LEFT_OUT)
-    regex = "".join(_WILD.get(letter) or re.escape(letter) for letter in plain)
+    regex = "".join(_WILD.get(letter, re.escape(letter)) for letter in plain)
     return Pattern(plain, re.compile(regex, re.DOTALL), plain != text)
 
 
@@ -72,28 +72,27 @@ class Record:
         taken_in, left_out = self._patterns()
         chosen: dict[Port, Variable] = {}
         for component in components:
+            variables = by_default(component.interface)
             if taken_in:
-                variables = [
-                    v
-                    for v in component.interface.variables
-                    if v.supported and any(p.takes(component, v) for p in taken_in)
-                ]
-            else:
-                variables = by_default(component.interface)
+                variables = [v for v in component.interface.variables if v.supported]
+                variables = _taken(component, variables, taken_in)
+            unwanted = {v.name for v in _taken(component, variables, left_out)}
             for v in variables:
-                if not any(p.takes(component, v) for p in left_out):
+                if v.name not in unwanted:
                     chosen[Port(component.name, v.name)] = v
         return chosen
 
     def watched(self, components: Sequence[Component]) -> dict[Port, Variable]:
         """The outputs but those that are left out, whether they are recorded or not."""
         _, left_out = self._patterns()
-        return {
-            Port(component.name, v.name): v
-            for component in components
-            for v in component.interface.of("output")
-            if v.supported and not any(p.takes(component, v) for p in left_out)
-        }
+        watched: dict[Port, Variable] = {}
+        for component in components:
+            outputs = [v for v in component.interface.of("output") if v.supported]
+            unwanted = {v.name for v in _taken(component, outputs, left_out)}
+            for v in outputs:
+                if v.name not in unwanted:
+                    watched[Port(component.name, v.name)] = v
+        return watched
 
     @classmethod
     def listed(cls, texts: Iterable[str]) -> Record:
@@ -172,6 +171,13 @@ def missing(text: str, components: Sequence[Component]) -> str | None:
 
 
 _LISTINGS = "`grasp-cosim inspect FMU`"
+
+
+def _taken(
+    component: Component, variables: Sequence[Variable], patterns: Sequence[Pattern]
+) -> list[Variable]:
+    """The variables of a component that match any of the patterns."""
+    return [v for v in variables if any(p.takes(component, v) for p in patterns)]
 
 
 def _names(component: Component, variable: Variable) -> list[str]:

@@ -301,6 +301,8 @@ def place_of(names: Collection[str], key: str, said: str) -> tuple[str, ...]:
     section, _, rest = key.partition(".")
     if section in names:
         section, rest = "components", f"{section}.values.{rest}"
+    if section == RECORD:
+        raise InputError(f"{said}: is a list; must be given by --record, or with_record()")
     known(f"{said}: no component", section, [*names, *PLACES])
     if section != "components":
         known(f"{said}: no entry", rest, PLACES[section] or [rest], f" of [{section}]")
