@@ -129,3 +129,29 @@ def test_sources_in_folders_and_above_are_of_the_archive(tmp_path):
     data = entries_of(path)["resources/a.fmu"]
     loaded = rewritten(path, lambda name, old: (name, data if name in files else old))
     assert [c.fmu.name for c in loaded.components] == ["x y.fmu", "c.fmu"]
+
+
+SOURCES = {
+    "from the top": ("/resources/a.fmu", "resources/a.fmu"),
+    "other capitals": ("Resources/A.FMU", "resources/a.fmu"),
+}
+
+
+@pytest.mark.parametrize("form", SOURCES)
+def test_a_source_may_be_written_otherwise_if_only_one_can_be_meant(tmp_path, form):
+    source, entry = SOURCES[form]
+    ssd = structure(system("top", component("a", source=source)))
+    loaded = System.load(archive(tmp_path, ssd, {"a": FMU}))
+    assert loaded.components[0].fmu.name == "a.fmu"
+    said = f"component 'a': source '{source}' is taken to be {entry}"
+    assert any(note.endswith(said) for note in loaded.notes)
+
+
+def test_an_archive_in_an_archive_may_go_without_its_type(tmp_path):
+    (tmp_path / "inner").mkdir()
+    inner = archive(tmp_path / "inner", structure(TOP), {"a": FMU, "b": FMU}).read_bytes()
+    ssd = structure(system("top", component("sub", source="resources/sub.ssp")))
+    loaded = System.load(archive(tmp_path, ssd, {}, {"resources/sub.ssp": inner}))
+    assert [c.name for c in loaded.components] == ["sub_a", "sub_b"]
+    said = "names no type; resources/sub.ssp is taken as application/x-ssp-package"
+    assert any(note.endswith(said) for note in loaded.notes)

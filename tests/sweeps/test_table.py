@@ -179,7 +179,7 @@ def test_a_text_is_a_place_with_values(text, place, values):
 
 @pytest.mark.parametrize(
     "text",
-    ["a.b", "a=1", ".b=1", "a.b=", "a.b=1,,2", "a.b=1:2", "a.b=1:2:x", "a.b=0:inf:3", "a.b=0:1:1",
+    ["a.b", "=1", ".b=1", "a.b=", "a.b=1,,2", "a.b=1:2", "a.b=1:2:x", "a.b=0:inf:3", "a.b=0:1:1",
      "a.b=0:1:2:3", "a.b=0:1:100001"],
 )  # fmt: skip
 def test_another_text_is_refused_in_one_line(text):

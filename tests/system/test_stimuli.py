@@ -55,7 +55,7 @@ def test_numbers_are_read_as_they_are_written(values):
         ("a.u,time\n0,1\n", "column 1 = 'a.u': must be time, then component.variable, with commas"),
         ("time,a.u\n", "drive.csv: has no row below its names; must have one"),
         ("time [m],a.u\n0,0\n", "line 1, column 1 = 'time [m]': must be in a unit of time"),
-        ("time,u\n0,0\n", "line 1, column 2 = 'u': must be 'component.variable'"),
+        ("time,.u\n0,0\n", "line 1, column 2 = '.u': must be 'component.variable'"),
         ("time,a.u,a.u\n0,0,0\n", "line 1, column 3 = 'a.u': appears twice"),
         ("time,a.u\n0\n", "line 2 has 1 cell; must have 2, as line 1"),
         ("time,a.u\n0,\n", "line 2, column 2, a.u: missing"),

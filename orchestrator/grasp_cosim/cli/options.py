@@ -204,6 +204,6 @@ def chosen_system(given: Mapping[str, Any]) -> System:
         say(note)
     if given.get("record"):
         record = Record.listed(given["record"])
-        record.check("--record", changed.components)
+        record.check("--record", changed.components, changed.outputs)
         changed = replace(changed, record=record)
     return changed.with_input(replace(stimuli, partial=False)) if stimuli else changed

@@ -23,6 +23,8 @@ from ..base.checks import EXACT
 from ..base.errors import SimulationError
 from ..base.system_calls import end_fork
 from ..interface.interface import limits
+from ..interface.units import IDENTITY
+from ..system.connectors import taps
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import run_settings
@@ -99,10 +101,12 @@ class Dispatcher:
         self._goes_on = system.diverging == "continue"
         self._may_be_infinite = np.array([self._goes_on or port in open_ended for port in watched])
         self._runaways: list[str] = []
+        self._taps = Taps(system, slots, texts)
         self._energy = ExchangeEnergy(system.once(bonds), slots, system.once(transforms))
-        every_signal = (*observed.values(), *self._energy.signals)
+        worked_out = (*self._taps.signals, *self._energy.signals)
+        every_signal = (*observed.values(), *worked_out)
         recorded = [observed[port] for port in system.recorded]
-        recorded += [signal for signal in self._energy.signals if system.record.has(signal.name)]
+        recorded += [signal for signal in worked_out if system.record.has(signal.name)]
         self.signals = tuple(recorded)
         self._recorded = _places(every_signal, self.signals)
         self._block = np.empty((len(every_signal), 0))
@@ -137,7 +141,10 @@ class Dispatcher:
         count, wrong = self._check(steps, _chosen(observed, self._watched))
         self._unwatched(steps[:count], observed[:count])
         steps, columns = steps[:count], columns[:count]
-        columns[:, len(self._columns) :] = self._energy(rows[:count])
+        first = len(self._columns)
+        energies = first + len(self._taps.signals)
+        columns[:, first:energies] = self._taps(rows[:count])
+        columns[:, energies:] = self._energy(rows[:count])
         if self._whole:
             self._whole.block(steps, columns)
         columns = _chosen(columns, self._recorded)
@@ -191,6 +198,31 @@ class Dispatcher:
         for listener in self._listeners:
             listener.block(steps, rows)
         self.took += time.perf_counter() - start
+
+
+class Taps:
+    """The outputs of the system itself, from rows of all values."""
+
+    def __init__(
+        self, system: System, slots: Mapping[Port, int], texts: Mapping[Port, Texts]
+    ) -> None:
+        """Slots are the columns of the rows, texts those of Strings."""
+        found = system.once(taps)
+        self.signals = tuple(
+            Signal(name, tap.unit, tap.kind, tap.description, texts.get(tap.source, Texts()))
+            for name, tap in found.items()
+        )
+        self._columns = np.array([slots[tap.source] for tap in found.values()], np.intp)
+        changes = [tap.change for tap in found.values()]
+        self._changes = [(i, change) for i, change in enumerate(changes) if change != IDENTITY]
+
+    def __call__(self, rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """The outputs in the order of the signals; not finite where a value is beyond a float64."""
+        values: npt.NDArray[np.float64] = rows[:, self._columns]
+        with np.errstate(over="ignore", invalid="ignore"):
+            for i, change in self._changes:
+                values[:, i] = change(values[:, i])
+        return values
 
 
 def _places(of: Collection[Signal], some: Collection[Signal]) -> npt.NDArray[np.intp] | None:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from ..interface.interface import Variable
+from ..system.connectors import read_at, taps
 from ..system.description import System
 from ..system.parts import Port
 from ..system.validity import driven_inputs
@@ -37,6 +38,7 @@ def exchanged(system: System) -> Exchanged:
     """What a run of a system moves: arrays whole, as FMI does."""
     passed_on = system.once(sourced)
     sources = {connection.source for connection in system.connections}
+    sources |= {tap.source for tap in system.once(taps).values()}
     known = _with_whole_arrays(system, {*system.observed, *sources, *in_conditions(system)})
     fetched: dict[str, list[list[Variable]]] = {}
     passed: dict[str, list[list[Variable]]] = {}
@@ -70,7 +72,9 @@ def used(system: System) -> frozenset[Port]:
 def in_conditions(system: System) -> frozenset[Port]:
     """The signals that conditions of events and faults name."""
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
-    return frozenset(condition.port for condition in conditions if condition is not None)
+    return frozenset(
+        read_at(system, condition.port)[0] for condition in conditions if condition is not None
+    )
 
 
 def _with_whole_arrays(system: System, ports: set[Port]) -> frozenset[Port]:

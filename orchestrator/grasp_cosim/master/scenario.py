@@ -22,6 +22,8 @@ from ..base.checks import exact
 from ..fmi.instance import Instance
 from ..interface.expansion import values_of
 from ..interface.interface import Given, Value, Variable
+from ..interface.units import IDENTITY
+from ..system.connectors import read_at
 from ..system.description import System
 from ..system.faults import FAULTS, INITIAL, Act, Draws
 from ..system.names import main_port
@@ -170,8 +172,11 @@ class Scenario:
     def _holds(self, condition: Condition | None) -> bool:
         if condition is None:
             return True
-        value = float(self._values[self._slots[condition.port]])
-        return _COMPARE[condition.relation](value, self._number(condition.port, condition.value))
+        port, change = read_at(self._system, condition.port)
+        value = float(self._values[self._slots[port]])
+        if change != IDENTITY:
+            value = change(value)
+        return _COMPARE[condition.relation](value, self._number(port, condition.value))
 
     def _number(self, port: Port, value: Value) -> float:
         """The number of a constant for a port, which may be the name of an item."""

@@ -18,6 +18,7 @@ from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener
 from ..fmi.process import load
 from ..interface.interface import Given
+from ..interface.units import IDENTITY
 from ..metrics.in_si import in_si
 from ..metrics.metric import (
     Function,
@@ -33,10 +34,11 @@ from ..realtime.pacer import Pacer, Privileges, privileges
 from ..recording.memory import EveryRow, MemoryListener
 from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.result import Known, Result
+from ..system.connectors import given_by_connectors, read_at
 from ..system.declared_steps import check_declared_steps
 from ..system.description import System
 from ..system.native import needed_twins
-from ..system.parts import Component, Port, Realtime
+from ..system.parts import Component, Realtime, as_signal
 from ..system.settings import start_values
 from ..system.times import TimeInput, in_seconds
 from ..system.validity import remarks
@@ -87,7 +89,7 @@ class Session:
             system = replace(system, components=tuple(replace(c) for c in system.components))
         system = system.with_natives(needed_twins(system))
         _check_count("every", every)
-        observed = {str(port) for port in system.observed}
+        observed = system.shown
         self._metrics = chosen(metrics, system.metrics, observed, system.roles)
         self._asked = metrics_of(system.metrics, self._metrics)
         check_groups(system)
@@ -96,7 +98,7 @@ class Session:
         self._memory = MemoryListener(every, bool(realtime))
         self._whole: EveryRow | None = None
         needs = needed(self._asked, observed, system.roles) | of_proxies(observed)
-        if every > 1 or not needs <= {str(port) for port in system.recorded}:
+        if every > 1 or not needs <= system.kept:
             self._whole = EveryRow(needs)
         self._wall_time = 0.0
         self._failed = False
@@ -263,11 +265,14 @@ class Session:
         signal; connected inputs that are Strings are none.
         """
         slots, texts = self._master.slots, self._master.texts
-        port = Port(*name.split(".", 1)) if "." in name else None
+        port, change = read_at(self.system, as_signal(f"signal {name!r}", name))
         if port not in slots:
-            raise InputError(f"{name!r}: no such signal; {nearest(name, slots)}")
+            valid = nearest(name, [*self.system.outputs, *slots])
+            raise InputError(f"{name!r}: no such signal; {valid}")
         value = float(self._master.values[slots[port]])
-        return texts[port].listed[int(value)] if port in texts else value
+        if port in texts:
+            return texts[port].listed[int(value)]
+        return value if change == IDENTITY else change(value)
 
     def set(self, name: str, value: Given) -> None:
         """Set a tunable parameter or an input without a connection, or a whole array of such.
@@ -276,8 +281,10 @@ class Session:
         InputError where there is none of that name, or where the value does not fit; errors of
         FMUs as of step().
         """
+        values, _ = given_by_connectors(self.system, {name: value}, "set: ".__add__)
         with self._in_use():
-            self._master.scenario.set(name, value, self._master.steps_done)
+            for variable, own in values.items():
+                self._master.scenario.set(variable, own, self._master.steps_done)
 
     def result(self) -> Result:
         """Return the result recorded until now.

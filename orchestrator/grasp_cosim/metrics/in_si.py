@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 from ..base.errors import InputError, choices
 from ..base.si_units import known_unit
+from ..interface.interface import Variable
 from ..interface.units import Conversion
+from ..system.connectors import Tap, taps
 from ..system.structure import Structure, naming, signal_units
 from .metric import Metric, available, resolved
 
@@ -29,8 +31,12 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     InputError where a signal that one of those interprets which the system permits is of another
     quantity than it expects, or its unit is not defined. Signals without any unit are in SI.
     """
-    asked, observed = tuple(metrics), {str(port): v for port, v in system.observed.items()}
+    asked, of_system = tuple(metrics), system.once(taps)
+    observed: dict[str, Variable | Tap] = {str(port): v for port, v in system.observed.items()}
+    observed |= of_system
     units = {str(port): unit for port, unit in system.once(signal_units).items()}
+    numbers = (name for name, tap in of_system.items() if tap.kind in ("Real", "Integer"))
+    units |= {name: of_system[name].quantity for name in numbers}
     expected = set()
     for metric in available(asked, observed, system.roles)[0]:
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
@@ -49,10 +55,13 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
             if name in units and not fits:
                 undefined = "" if unit else ", which its FMU does not define in SI units"
                 component, _, variable = name.partition(".")
+                remedy = naming(component, variable)
+                if name in of_system:
+                    remedy = "its connector in the archive must name it"
                 raise InputError(
                     f"{system.name}: {name} is in {unit.name if unit else repr(declared)}"
                     f"{undefined}; {purpose} must know its unit, one like {wanted}: "
-                    f"{naming(component, variable)}"
+                    f"{remedy}"
                 )
     free = any(not m.expects for m in asked)
     silent = [n for n, v in observed.items() if v.kind == "Real" and v.unit is None]

@@ -383,8 +383,10 @@ def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, st
     for need in needs:
         if resolved(need, roles) in names:
             continue
-        role, _, variable = need.partition(".")
+        role, dot, variable = need.partition(".")
         component = roles.get(role, role)
+        if not dot:
+            return f"there is no signal {need}"
         there = {name.partition(".")[0] for name in names}
         if component in there:
             return f"{component} lacks {variable}"

@@ -76,8 +76,7 @@ class RunFolder:
         self._place = folder.absolute()  # an FMU may go elsewhere
         self._origin = origin(system, command)
         conversions = in_si(system, ()).conversions
-        recorded = {str(port) for port in system.recorded}
-        self._to_si = {name: c for name, c in conversions.items() if name in recorded}
+        self._to_si = {name: c for name, c in conversions.items() if name in system.kept}
         name = ARROW if form == "arrow" else SIGNALS
         kind = ArrowListener if form == "arrow" else CsvListener
         self._file: Listener = kind(folder / name, self._place / name)

@@ -287,7 +287,9 @@ def _choice(units: Mapping[str, str | None], texts: Mapping[str, str]) -> str:
     """A box to tick per signal, in groups by component."""
     groups: dict[str, str] = {}
     for name, unit in units.items():
-        component, _, variable = map(escape, name.partition("."))
+        component, dot, variable = map(escape, name.partition("."))
+        if not dot:  # an output of the system itself
+            component, variable = "system", component
         box = f'<input type="checkbox" data-component="{component}">{component}'
         groups.setdefault(component, f"<fieldset><legend><label>{box}</label></legend>")
         groups[component] += (

@@ -131,7 +131,8 @@ def _typed(kind: Any, value: Any) -> Any:
     if kind is Any:
         return value
     if kind is Port:
-        return Port(*_typed(str, value).split(".", 1))
+        component, dot, variable = _typed(str, value).partition(".")
+        return Port(component, variable) if dot else Port("", component)
     if kind is Fraction:
         return Fraction(_typed(str, value))
     if is_dataclass(kind) and isinstance(kind, type):

@@ -61,7 +61,7 @@ class Archive:
             raise InputError(f"{said}: no such system file") from None
         except Exception as error:  # zipfile raises whatever it likes
             raise InputError(f"{said}: not readable as an SSP archive: {error}") from error
-        self._said = said
+        self._said, self._notes = said, notes
         self._entries = _entries(self._file.namelist(), needs or STRUCTURE, self.place, notes)
         self._extracted: dict[str, Path] = {}
         if needs not in self._entries and (needs or not self.structures):
@@ -118,6 +118,11 @@ class Archive:
             entry = posixpath.normpath(posixpath.join(base, name))
             if entry in self._entries:
                 return entry
+        lenient = posixpath.normpath(posixpath.join(base, unquote(parts.path).lstrip("/")))
+        alike = [name for name in self.names if name.casefold() == lenient.casefold()]
+        if len(alike) == 1:
+            self._notes.add(place, f"source {uri!r} is taken to be {alike[0]}")
+            return alike[0]
         suffix = posixpath.splitext(parts.path)[1]
         valid = [n for n in self.names if n.endswith(suffix) and not n.endswith("/")]
         raise InputError(f"{place}: source {uri!r}: not in the archive; {nearest(uri, valid)}")

@@ -130,6 +130,34 @@ class Connectors:
         settled = target is not None or (carried.settled and transformation is None)
         return Carried(target or unit, factor, offset, settled)
 
+    def follow(self, hops: list[Hop]) -> tuple[str, Carried]:
+        """The kind of value, and what is carried, of an output at the end of the hops.
+
+        InputError where the way is not allowed.
+        """
+        carried = Carried(self.unit(hops[0].source))
+        variable = self.variable(hops[0].source)
+        kind: str = variable.kind
+        for hop in hops:
+            place = hop.place
+            causality, reached = self.nature(hop.target)
+            if variable.causality != "output" or causality == "parameter":
+                raise InputError(
+                    f"{place}: leads from {hops[0].source} to a parameter, or from one; "
+                    "only outputs are passed on to inputs, give the parameter a value"
+                )
+            reached = reached or kind
+            if reached != kind and (kind, reached) != ("Integer", "Real"):
+                raise InputError(
+                    f"{place}: from {kind} to {reached} at {hop.target}; must be the same, "
+                    "or from Integer to Real"
+                )
+            kind = reached
+            if hop.transformation and kind != "Real":
+                raise InputError(f"{place}: transforms a {kind}; must be Real")
+            carried = self.carry(hop, carried)
+        return kind, carried
+
     def decided_by_units(self, hops: list[Hop], carried: Carried) -> bool:
         """True if the units that the two FMUs declare say all about the way along the hops."""
         if any(h.suppress or h.transformation for h in hops):

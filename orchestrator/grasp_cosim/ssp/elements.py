@@ -7,6 +7,7 @@ that has only connectors: who is connected to an entry gives it its value, or ta
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from posixpath import splitext
 from typing import Any, TypeVar
 
 from ..base.checks import known
@@ -19,6 +20,7 @@ from .document import Origin, at, child, children, is_true, open_structure, qual
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
+_BY_SUFFIX = {".ssd": _DEFINITION, ".ssp": _PACKAGE}
 _SOURCES = ("output", "calculatedParameter")
 _CAUSALITIES = ("input", "parameter", *_SOURCES)
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
@@ -151,6 +153,12 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     if tag == "ssd:SignalDictionaryReference":
         return _reference(origin, entry, reachable)
     kind, place = entry.get("type", FMU), f"{place}: component {name!r}"
+    named = entry.get("source").partition("#")[0]
+    suffix = splitext(named)[1].lower()
+    if "type" not in entry.attrib and suffix in _BY_SUFFIX:
+        kind = _BY_SUFFIX[suffix]
+        entry.set("type", kind)
+        origin.notes.add(place, f"names no type; {named} is taken as {kind}")
     known(f"{place}: type", kind, (FMU, _PACKAGE, _DEFINITION), " is not supported")
     if kind != FMU:
         return _nested(origin, entry, path, place)

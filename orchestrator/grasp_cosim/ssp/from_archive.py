@@ -33,10 +33,11 @@ from ..system.times import (
 )
 from .annotations import FOREIGN, TYPE, Beside, Extras, read_extras, read_foreign
 from .archive import SSD, STRUCTURE, Archive, Notes
-from .connectors import Carried, Connectors, Part
+from .connectors import Connectors, Part
 from .document import at, child, children, open_structure, qualified, same
-from .elements import Element, Hop, Path, read_system
+from .elements import Element, Node, Path, read_system
 from .flow import flow_order
+from .outside import system_inputs, system_outputs
 from .parameters import read_settings
 
 
@@ -92,8 +93,16 @@ def read_ssp(
     network = Connectors(systems, {at: component.part for at, component in called.items()})
     network.check()
     connections = tuple(_connections(network, called))
+
+    def port(node: Node) -> Port:
+        return Port(called[node.path].name, called[node.path].names[node.name])
+
+    inputs, outputs = system_inputs(network, port), system_outputs(network, port)
     stimuli = stimuli or extras.input
-    sourced = {*(c.target for c in connections), *(stimuli.columns if stimuli else ())}
+    sourced = {c.target for c in connections}
+    for column in stimuli.columns if stimuli else ():
+        outside = inputs.get(str(column))
+        sourced |= {way.port for way in outside.ways} if outside else {column}
     decided: list[str] = []
     components = tuple(_components(file, network, called, sourced, decided))
     if annotated is None:
@@ -128,6 +137,8 @@ def read_ssp(
         extras.metrics,
         start_ns,
         extras.record,
+        inputs=inputs,
+        outputs=outputs,
     )
 
 
@@ -199,7 +210,7 @@ def _connections(network: Connectors, called: Mapping[Path, Called]) -> Iterator
         if target.path not in network.parts or network.output(target) is None:
             continue
         hops = network.trace(target)
-        carried = _carried(network, hops)
+        _, carried = network.follow(hops)
         first, last = hops[0].source, called[target.path]
         source = Port(called[first.path].name, called[first.path].names[first.name])
         sink = Port(last.name, last.names[last.part.interface.main_name(target.name)])
@@ -207,32 +218,6 @@ def _connections(network: Connectors, called: Mapping[Path, Called]) -> Iterator
             yield Connection(source, sink)
         else:
             yield Connection(source, sink, carried.factor, carried.offset)
-
-
-def _carried(network: Connectors, hops: list[Hop]) -> Carried:
-    """Follow a value from component to component; InputError where the way is not allowed."""
-    carried = Carried(network.unit(hops[0].source))
-    variable = network.variable(hops[0].source)
-    kind: str = variable.kind
-    for hop in hops:
-        place = hop.place
-        causality, reached = network.nature(hop.target)
-        if variable.causality != "output" or causality == "parameter":
-            raise InputError(
-                f"{place}: leads from {hops[0].source} to a parameter, or from one; "
-                "only outputs are passed on to inputs, give the parameter a value"
-            )
-        reached = reached or kind
-        if reached != kind and (kind, reached) != ("Integer", "Real"):
-            raise InputError(
-                f"{place}: from {kind} to {reached} at {hop.target}; must be the same, "
-                "or from Integer to Real"
-            )
-        kind = reached
-        if hop.transformation and kind != "Real":
-            raise InputError(f"{place}: transforms a {kind}; must be Real")
-        carried = network.carry(hop, carried)
-    return carried
 
 
 def _components(

@@ -16,6 +16,7 @@ from ..base.text import counted
 from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
+from ..system.connectors import change_along, taps
 from ..system.description import System
 from ..system.parts import Component, Connection, Port
 from ..system.times import in_seconds, written
@@ -133,15 +134,19 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
     root = new("ssd:SystemStructureDescription", PREFIXES, **attributes)
     top = add(root, "ssd:System", name=name)
     units = _units(system.components)
+    for unit in _outside_units(system):
+        units.setdefault(unit.name, unit)
+    _write_outside(top, system, units)
     elements = add(top, "ssd:Elements")
     for component in system.components:
         name = component.name
         _write_component(elements, component, sources[name], bindings.get(name), units)
-    if system.connections:
+    if system.connections or system.inputs or system.outputs:
         connections, changes = add(top, "ssd:Connections"), transforms(system)
         names = {c.name: _own_names(c) for c in system.components}
         for c in system.connections:
             _write_connection(connections, c, changes[c.target], names)
+        _write_ways(connections, system, names)
     for_oms = add(top, "ssd:Annotations")
     write_units(root, "ssd", units.values())
     start, stop = (repr(in_seconds(t)) for t in (system.start_ns, system.stop_ns))
@@ -194,12 +199,66 @@ def _write_connection(
     for side, port in (("start", connection.source), ("end", connection.target)):
         ends[f"{side}Element"] = port.component
         ends[f"{side}Connector"] = names[port.component][port.variable]
-    element = add(connections, "ssd:Connection", **ends)
     given = connection.factor is not None or connection.offset is not None
+    _write_change(add(connections, "ssd:Connection", **ends), change, given)
+
+
+def _write_change(element: Any, change: tuple[float, float], given: bool) -> None:
+    """What a connection makes of a value, as a transformation where it does anything."""
     if given or change != (1.0, 0.0):
         element.set("suppressUnitConversion", "true")
         factor, offset = map(repr, change)
         add(element, "ssc:LinearTransformation", factor=factor, offset=offset)
+
+
+def _write_outside(top: Any, system: System, units: Mapping[str, Unit]) -> None:
+    """The connectors of the system itself."""
+    if not (system.inputs or system.outputs):
+        return
+    connectors = add(top, "ssd:Connectors")
+    for name, given in system.inputs.items():
+        behind = [_variable(system, way.port) for way in given.ways]
+        parameters = all(variable.causality == "parameter" for variable in behind)
+        kind = "parameter" if parameters else "input"
+        connector = add(connectors, "ssd:Connector", name=name, kind=kind)
+        if not behind[0].items:
+            _write_type(connector, behind[0].kind, given.unit, units)
+    for name, tap in system.once(taps).items():
+        connector = add(connectors, "ssd:Connector", name=name, kind="output")
+        if not _variable(system, tap.source).items:
+            _write_type(connector, tap.kind, tap.quantity, units)
+
+
+def _write_type(connector: Any, kind: str, unit: Unit | None, units: Mapping[str, Unit]) -> None:
+    """The type of a connector, with its unit where its name means that in the archive."""
+    named = kind == "Real" and unit is not None and same(unit, units[unit.name])
+    add(connector, f"ssc:{kind}", **({"unit": unit.name} if named and unit else {}))
+
+
+def _write_ways(connections: Any, system: System, names: Mapping[str, Mapping[str, str]]) -> None:
+    """The connections between the connectors of the system itself and the components."""
+    for name, given in system.inputs.items():
+        for way in given.ways:
+            element, connector = way.port.component, names[way.port.component][way.port.variable]
+            ends = {"startConnector": name, "endElement": element, "endConnector": connector}
+            connection = add(connections, "ssd:Connection", **ends)
+            _write_change(connection, change_along(system, name, way), way.factor is not None)
+    for name, tap in system.once(taps).items():
+        element, connector = tap.source.component, names[tap.source.component][tap.source.variable]
+        ends = {"startElement": element, "startConnector": connector, "endConnector": name}
+        transformed = system.outputs[name].way.factor is not None
+        _write_change(add(connections, "ssd:Connection", **ends), tap.change, transformed)
+
+
+def _outside_units(system: System) -> Iterable[Unit]:
+    """The units of the connectors of the system itself."""
+    quantities = [given.unit for given in system.inputs.values()]
+    quantities += [tap.quantity for tap in system.once(taps).values()]
+    return [unit for unit in quantities if unit is not None]
+
+
+def _variable(system: System, port: Port) -> Variable:
+    return system.component(port.component, str(port)).interface.by_name[port.variable]
 
 
 def _own_names(component: Component) -> dict[str, str]:

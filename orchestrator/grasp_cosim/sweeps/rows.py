@@ -44,7 +44,7 @@ def varied(text: str) -> tuple[str, list[Value]]:
     """The place and the values of a text in the FORM; InputError where it is none."""
     place, equals, said = text.partition("=")
     where = f"--vary {text!r}"
-    if not (equals and all(place.partition("."))):
+    if not equals or place.startswith(".") or not place:
         raise InputError(f"{where}: must be {FORM}")
     bounds = said.split(":")
     if len(bounds) == 1:
@@ -125,8 +125,7 @@ def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
     """The rows in the units of the system's FMUs; InputError where the first one does not fit."""
     back: dict[str, Any] = {}
     for place in {place for row in rows for place in row}:
-        port = _port(system, place)
-        to_si = parameter_in_si(system, place, port) if port else IDENTITY
+        to_si = _in_si(system, place)
         back[place] = IDENTITY if to_si == IDENTITY else to_si.back
     found = [{p: _converted(v, back[p]) for p, v in row.items()} for row in rows]
     system.with_settings(found[0], "sweep: {}".format)
@@ -135,6 +134,9 @@ def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
 
 def unit_of(system: System, place: str) -> str | None:
     """The SI unit in which the values of a place are; None where they have none."""
+    if place in system.inputs:
+        own = system.inputs[place].unit
+        return own.base if own else None
     port = _port(system, place)
     if port is None:
         return "s" if place in TIMES else None
@@ -144,6 +146,15 @@ def unit_of(system: System, place: str) -> str | None:
     if unit and not unit.si:
         return unit.base
     return variable.unit if variable else None
+
+
+def _in_si(system: System, place: str) -> Conversion:
+    """The conversion of the values of a place to SI base units."""
+    if place in system.inputs:
+        own = system.inputs[place].unit
+        return Conversion(own.factor, own.offset) if own else IDENTITY
+    port = _port(system, place)
+    return parameter_in_si(system, place, port) if port else IDENTITY
 
 
 def _to_si(column: Column) -> Conversion:

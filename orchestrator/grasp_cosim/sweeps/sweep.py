@@ -79,7 +79,7 @@ def sweep(
         check_units(system, Path(rows))
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
-    observed = {str(port) for port in system.observed}
+    observed = system.shown
     own = chosen(metrics, system.metrics, observed, system.roles)
     check_portable(own)
     every = metrics_of(system.metrics, own)

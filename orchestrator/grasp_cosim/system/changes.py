@@ -175,6 +175,9 @@ def stated(system: Structure, name: str) -> frozenset[str]:
         for port in (c.source, c.target)
         if (c.factor, c.offset) != (None, None) or c.target in faulty
     ]
+    ways = [way for given in system.inputs.values() for way in given.ways]
+    ways += [output.way for output in system.outputs.values()]
+    ports += [way.port for way in ways if way.factor is not None]
     for event in system.events:
         for port in event.set:
             ports += system.elements(port)

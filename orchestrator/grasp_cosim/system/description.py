@@ -10,6 +10,7 @@ from ..base.errors import InputError, nearest
 from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
+from .connectors import check_connectors, driven_by_connectors, given_by_connectors
 from .names import in_main_names
 from .native import natives
 from .parts import Component
@@ -42,6 +43,8 @@ class System(Structure):
 
     def __post_init__(self) -> None:
         check_steps(self)
+        if self.input:
+            object.__setattr__(self, "input", driven_by_connectors(self, self.input))
         for name, part in in_main_names(self).items():
             object.__setattr__(self, name, part)
         connections = by_element(self.name, self.components, self.connections)
@@ -58,8 +61,9 @@ class System(Structure):
         check_stimuli(self)
         check_connections(self)
         check_arrays(self)
+        check_connectors(self)
         check_scenario(self)
-        self.record.check(f"{self.name}: record.signals:", self.components)
+        self.record.check(f"{self.name}: record.signals:", self.components, self.outputs)
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
         for group in self.metrics:
@@ -141,6 +145,7 @@ class System(Structure):
         comes from, for messages. InputError where there is no such place, or it is given twice, or
         a value does not fit it.
         """
+        settings, place = given_by_connectors(self, settings, place)
         file = as_file(self, settings, place)
         tables = file.pop("components", {})
         components, notes = {c.name: c for c in self.components}, [*self.notes]
@@ -150,7 +155,7 @@ class System(Structure):
         if not file and all(_of_parameters(self, *named) for named in tables.items()):
             return self._with_parameters(tuple(components.values()))
         made = tuple(components.values())
-        record, lost = self.record.without_missing(self.components, made)
+        record, lost = self.record.without_missing(self.components, made, self.outputs)
         notes += [f"record: {text!r} matches no signal any more: it is left out" for text in lost]
         return replace(
             self,
@@ -185,7 +190,7 @@ class System(Structure):
         recorded. InputError where one matches nothing.
         """
         record = Record(signals)
-        record.check("record:", self.components)
+        record.check("record:", self.components, self.outputs)
         return replace(self, record=record)
 
     def natively(self, native: bool | None = None) -> "System":

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 
 from ..base.checks import choice, number, whole
 from ..base.errors import InputError
+from ..base.si_units import Unit
 from ..interface.expansion import expanded
 from ..interface.interface import Given, Interface, Nested, Value
 from ..interface.obstacles import of_binary
@@ -152,13 +153,13 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """A variable of a component."""
+    """A variable of a component; without one, an input or output of the system itself."""
 
     component: str
     variable: str
 
     def __str__(self) -> str:
-        return f"{self.component}.{self.variable}"
+        return f"{self.component}.{self.variable}" if self.component else self.variable
 
 
 def as_port(place: str, text: Any, must: str = "'component.variable'") -> Port:
@@ -167,6 +168,11 @@ def as_port(place: str, text: Any, must: str = "'component.variable'") -> Port:
     if not component or not variable:
         raise InputError(f"{place} = {text!r}: must be {must}")
     return Port(component, variable)
+
+
+def as_signal(place: str, text: str) -> Port:
+    """The port that a text names, of a component or of the system itself, which has no dot."""
+    return as_port(place, text) if "." in text or not text else Port("", text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +191,42 @@ class Connection:
 
     def __str__(self) -> str:
         return f"{self.source} -> {self.target}"
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Between a connector of the system and a variable: value behind = factor * value + offset.
+
+    factor and offset are None where the units of both ends decide, as on a Connection.
+    """
+
+    port: Port
+    factor: float | None = None
+    offset: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SystemInput:
+    """An input or parameter of the system itself: what is given to it goes all its ways.
+
+    unit is None where values are taken as they are at the end of each way.
+    """
+
+    ways: tuple[Way, ...]
+    unit: Unit | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SystemOutput:
+    """An output of the system itself: that of a component, in its own unit; None for the same.
+
+    kind is Real, Integer, Boolean or String, None for that of the component's output.
+    """
+
+    way: Way
+    unit: Unit | None = None
+    kind: str | None = None
+    description: str = ""
 
 
 @dataclass(frozen=True, slots=True)

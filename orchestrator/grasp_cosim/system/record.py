@@ -9,7 +9,7 @@ has by default: its outputs, or its locals where it has no output.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from ..base.errors import InputError, choices, nearest
@@ -124,17 +124,26 @@ class Record:
         outputs = [str(port) for port in self.watched(components)] if self.takes_in else []
         return Record((*self.signals, *outputs))
 
-    def check(self, place: str, components: Sequence[Component]) -> None:
-        """InputError at the first pattern that matches no signal, or none that can be recorded."""
+    def check(
+        self, place: str, components: Sequence[Component], outputs: Collection[str] = ()
+    ) -> None:
+        """InputError at the first pattern that matches no signal, or none that can be recorded.
+
+        outputs are the names of those of the system itself.
+        """
         for text in self.signals:
-            if reason := missing(text, components):
+            if reason := missing(text, components, outputs):
                 raise InputError(f"{place} {text!r} {reason}")
 
     def without_missing(
-        self, was: Sequence[Component], now: Sequence[Component]
+        self, was: Sequence[Component], now: Sequence[Component], outputs: Collection[str] = ()
     ) -> tuple[Record, list[str]]:
         """The record of a system with other FMUs, and its entries that match nothing any more."""
-        lost = [text for text in self.signals if missing(text, now) and not missing(text, was)]
+        lost = [
+            text
+            for text in self.signals
+            if missing(text, now, outputs) and not missing(text, was, outputs)
+        ]
         return Record(tuple(text for text in self.signals if text not in lost)), lost
 
     def _patterns(self) -> tuple[list[Pattern], list[Pattern]]:
@@ -150,7 +159,9 @@ def by_default(interface: Interface) -> list[Variable]:
     return outputs or [v for v in interface.of("local") if v.supported]
 
 
-def missing(text: str, components: Sequence[Component]) -> str | None:
+def missing(
+    text: str, components: Sequence[Component], outputs: Collection[str] = ()
+) -> str | None:
     """Why a pattern records nothing, or leaves nothing out; None where it does."""
     one = pattern(text)
     matched = [(c, v) for c in components for v in c.interface.variables if one.takes(c, v)]
@@ -162,12 +173,12 @@ def missing(text: str, components: Sequence[Component]) -> str | None:
             f"is of type {v.nature}: {component.name}.{v.name} cannot be recorded; must be "
             f"{choices(SUPPORTED)}"
         )
-    if any(one.matches([name]) for name in _worked_out(components)):
+    if any(one.matches([name]) for name in (*outputs, *_worked_out(components))):
         return None
     names = [f"{c.name}.{v.name}" for c in components for v in c.interface.variables if v.supported]
     wholes = [f"{c.name}.*" for c in components]
     see = components[0].interface.listing if len(components) == 1 else _LISTINGS
-    return f"matches no signal; {nearest(one.text, [*wholes, *names], see)}"
+    return f"matches no signal; {nearest(one.text, [*outputs, *wholes, *names], see)}"
 
 
 _LISTINGS = "`grasp-cosim inspect FMU`"

@@ -23,8 +23,19 @@ from ..base.checks import (
 from ..base.errors import InputError, choices, nearest
 from ..interface.expansion import values_of
 from ..interface.interface import SETTABLE, Given, Interface, Value, Variable
+from .connectors import read_at, taps
 from .faults import FAULTS, RANDOM
-from .parts import RELATIONS, Condition, Connection, Event, Fault, Port, as_lists, as_port
+from .parts import (
+    RELATIONS,
+    Condition,
+    Connection,
+    Event,
+    Fault,
+    Port,
+    as_lists,
+    as_port,
+    as_signal,
+)
 from .structure import Structure
 from .times import Time, first_step, in_nanoseconds, in_seconds, seconds, written
 from .validity import driven
@@ -130,7 +141,7 @@ def _condition(place: str, entry: Mapping[str, Any]) -> Condition | None:
             f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01', "
             "'plant.contact[1] == true' or, for an Enumeration, \"plant.mode == 'fast'\""
         ) from None
-    return Condition(as_port(f"{place}: when", port), relation, value)  # type: ignore[arg-type]
+    return Condition(as_signal(f"{place}: when", port), relation, value)  # type: ignore[arg-type]
 
 
 def _constant(text: str) -> float | bool | str:
@@ -201,12 +212,18 @@ def _why_not(interface: Interface, port: Port) -> str:
 def _check_condition(system: Structure, condition: Condition | None, place: str) -> None:
     if condition is None:
         return
-    place, port, value = f"{place}: when = '{condition}'", condition.port, condition.value
-    interface = system.component(port.component, place).interface
+    port, value = condition.port, condition.value
+    source, _ = read_at(system, port)
+    source = as_port(f"{place}: when", str(source))
+    place = f"{place}: when = '{condition}'"
+    interface = system.component(source.component, place).interface
     valid = [v.name for v in interface.variables if v.is_number]
-    said = f"{place}: {port.component} has no number"
-    known(said, port.variable, valid, see=interface.listing)
-    kind, items = interface.by_name[port.variable].kind, interface.by_name[port.variable].items
+    said = f"{place}: {source.component} has no number"
+    known(said, source.variable, valid, see=interface.listing)
+    kind: str = interface.by_name[source.variable].kind
+    items = interface.by_name[source.variable].items
+    if source != port:
+        kind = system.once(taps)[str(port)].kind
     relations = {"Real": RELATIONS[:4], "Boolean": RELATIONS[4:]}.get(kind, RELATIONS)
     if isinstance(value, str):
         known(f"{place}: {port} is {kind} and has no item", value, items)

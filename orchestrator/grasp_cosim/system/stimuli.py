@@ -21,7 +21,7 @@ from ..base.checks import choice
 from ..base.errors import InputError
 from ..tables.column import Column as TableColumn
 from ..tables.table import read_table
-from .parts import Port, as_port
+from .parts import Port, as_signal
 from .times import LONGEST, NANOSECONDS
 
 Interpolation = Literal["linear", "held"]
@@ -67,7 +67,8 @@ class Stimuli:
     "linear" interpolates continuous Reals and holds all others from row to row; "held" holds all.
     Before the first row and after the last one their values are held. lines are those of the rows
     in the file where they are not simply one after the other. partial says that FMUs may yet be
-    swapped, so that a column may be of a variable which is not there.
+    swapped, so that a column may be of a variable which is not there. behind are the columns of the
+    file that variables have their samples of, where these have other names.
     """
 
     file: str
@@ -76,6 +77,7 @@ class Stimuli:
     interpolation: Interpolation = "linear"
     lines: Sequence[int] = field(default_factory=lambda: array("q"))
     partial: bool = field(default=False, compare=False)
+    behind: Mapping[Port, Port] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         """ValueError where the columns could not be read from a file."""
@@ -89,7 +91,9 @@ class Stimuli:
     def place(self, port: Port, row: int | None = None) -> str:
         """A column, and in it a row, for messages."""
         line = 1 if row is None else self.lines[row] if self.lines else row + 2
-        return f"{self.file}: line {line}, column {[*self.columns].index(port) + 2}, {port}"
+        columns = [*dict.fromkeys(self.behind.get(column, column) for column in self.columns)]
+        column = self.behind.get(port, port)
+        return f"{self.file}: line {line}, column {columns.index(column) + 2}, {column}"
 
 
 def read_stimuli(
@@ -115,7 +119,7 @@ def read_stimuli(
     for column in others:
         if not column.name:  # what a spreadsheet leaves behind the last one
             continue
-        port = as_port(column.heading, column.name)
+        port = as_signal(column.heading, column.name)
         if port in ports:
             raise InputError(f"{column.heading} = {column.head!r}: appears twice; must appear once")
         ports[port] = column

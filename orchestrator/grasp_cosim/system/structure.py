@@ -13,7 +13,17 @@ from ..base.errors import InputError, nearest
 from ..base.si_units import Unit
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion
-from .parts import Component, Connection, Event, Fault, Initialisation, Port, Realtime
+from .parts import (
+    Component,
+    Connection,
+    Event,
+    Fault,
+    Initialisation,
+    Port,
+    Realtime,
+    SystemInput,
+    SystemOutput,
+)
 from .record import Record
 from .stimuli import Stimuli
 from .times import LONGEST, Clock, Time, in_nanoseconds
@@ -35,7 +45,8 @@ class Structure:
     line each. roles name the component that plays a role; where they do not, the component of that
     name plays it. presets are
     values under a name, like {"bench": {"sensor_1.noise.seed": 1}}. input drives inputs without a
-    connection. metrics are names of groups of ours. record says what is recorded. as_read is
+    connection. metrics are names of groups of ours. record says what is recorded. inputs and
+    outputs are those of the system itself, which an archive may have, by name. as_read is
     settings.made_of() when it was read.
     """
 
@@ -57,6 +68,8 @@ class Structure:
     metrics: tuple[str, ...] = ()
     start_ns: Time = 0
     record: Record = Record()
+    inputs: Mapping[str, SystemInput] = field(default_factory=dict)
+    outputs: Mapping[str, SystemOutput] = field(default_factory=dict)
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
@@ -95,6 +108,17 @@ class Structure:
             for v in component.interface.variables
             if (port := Port(component.name, v.name)) in either
         }
+
+    @property
+    def shown(self) -> frozenset[str]:
+        """The names of all that metrics may need: what is observed, and the system's outputs."""
+        return frozenset({*map(str, self.observed), *self.outputs})
+
+    @property
+    def kept(self) -> frozenset[str]:
+        """Those of them that are recorded."""
+        of_system = (name for name in self.outputs if self.record.has(name))
+        return frozenset({*map(str, self.recorded), *of_system})
 
     @cached_property
     def by_name(self) -> dict[str, Component]:

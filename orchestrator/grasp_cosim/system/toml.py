@@ -283,7 +283,7 @@ def as_file(system: Structure, settings: Mapping[str, Any], place: Place) -> dic
                 for v in c.interface.variables
                 if v.settable
             ]
-            near = nearest(key, entries + values)
+            near = nearest(key, [*system.inputs, *entries, *values])
             raise InputError(f"{place(key)}: no place in a system file; {near}")
         *tables, name = place_of(names, key, place(key))
         table = root

@@ -1,0 +1,120 @@
+"""The inputs and outputs of the systems of an archive, as those of the one system that is run.
+
+The top system's are called as they are there; those of a system in it after that and a dot, as the
+variables of a component are. An input is one that nothing in the archive leads to. What leads from
+it to the components, or from one of these to an output, is followed from hop to hop.
+"""
+
+from collections.abc import Callable, Iterator
+
+from ..base.errors import InputError
+from ..base.si_units import Unit
+from ..interface.interface import SETTABLE
+from ..interface.units import IDENTITY, conversion
+from ..system.parts import Port, SystemInput, SystemOutput, Way
+from ..system.structure import unit_of
+from .connectors import Carried, Connectors
+from .elements import Hop, Node
+
+_TIME = "time"
+"""The name of the first column of a recording."""
+
+Called = Callable[[Node], Port]
+"""The name in the system of a variable of a component."""
+
+
+def system_outputs(network: Connectors, called: Called) -> dict[str, SystemOutput]:
+    """The outputs of the systems that come from an output of a component, by name."""
+    outputs: dict[str, SystemOutput] = {}
+    for name, node, place in _named(network, called, ("output",)):
+        notes = network.systems[node.path].origin.notes
+        source = network.output(node)
+        if source is None:
+            notes.add(place, f"{name} has no output of a component behind it; not recorded")
+            continue
+        if not network.variable(source).supported:
+            notes.add(place, f"{name} is of type {network.variable(source).nature}; not recorded")
+            continue
+        hops = network.trace(node)
+        try:
+            kind, carried = network.follow(hops)
+        except InputError as error:
+            notes.add(place, f"{name} is not recorded: {error}")
+            continue
+        own = unit_of(network.parts[source.path].interface, network.variable(source))
+        unit = carried.unit if carried.settled else None
+        outputs[name] = SystemOutput(_way(called(source), hops, own, unit, carried), unit, kind)
+    return outputs
+
+
+def system_inputs(network: Connectors, called: Called) -> dict[str, SystemInput]:
+    """The inputs and parameters of the systems that lead to a component, by name."""
+    behind: dict[Node, list[tuple[Node, list[Hop]]]] = {}
+    for target in network.into:
+        if target.path in network.parts:
+            hops = network.trace(target)
+            behind.setdefault(hops[0].source, []).append((target, hops))
+    inputs: dict[str, SystemInput] = {}
+    for name, node, place in _named(network, called, ("input", "parameter")):
+        notes = network.systems[node.path].origin.notes
+        if node in network.into:
+            continue
+        unit = network.unit(node)
+        ways: list[Way] = []
+        for target, hops in behind.get(node, []):
+            variable = network.variable(target)
+            if variable.causality not in SETTABLE or not variable.supported:
+                notes.add(place, f"{name} leads to {target}, which cannot be set; not passed on")
+                continue
+            carried = Carried(unit)
+            try:
+                for hop in hops:
+                    carried = network.carry(hop, carried)
+            except InputError as error:
+                notes.add(place, f"{name} is not passed on: {error}")
+                continue
+            own = unit_of(network.parts[target.path].interface, variable)
+            ways.append(_way(called(target), hops, unit, own, carried))
+        if ways:
+            inputs[name] = SystemInput(tuple(ways), unit)
+        else:
+            notes.add(place, f"{name} leads to no variable of a component; cannot be given a value")
+    return inputs
+
+
+def _way(
+    port: Port, hops: list[Hop], start: Unit | None, end: Unit | None, carried: Carried
+) -> Way:
+    """The way along the hops; without numbers where the units at its two ends say all about it."""
+    by_units = conversion(start, end) if start and end else IDENTITY
+    transformed = any(hop.suppress or hop.transformation for hop in hops)
+    if not transformed and by_units == (carried.factor, carried.offset):
+        return Way(port)
+    return Way(port, carried.factor, carried.offset)
+
+
+def _named(
+    network: Connectors, called: Called, kinds: tuple[str, ...]
+) -> Iterator[tuple[str, Node, str]]:
+    """Yield the connectors of systems of these kinds, by the names that they have in the run.
+
+    One that has the name of something else is left out, which is said.
+    """
+    taken = {
+        str(called(Node(path, variable.name)))
+        for path, part in network.parts.items()
+        for variable in part.interface.variables
+    }
+    for path, system in network.systems.items():
+        for connector in system.connectors.values():
+            inside = "_".join(path).replace(".", "_")
+            name = f"{inside}.{connector.name}" if path else connector.name
+            if connector.kind not in kinds:
+                continue
+            if name in taken or name.lower() == _TIME:
+                system.origin.notes.add(
+                    connector.place, f"{name!r} is the name of something else; left out"
+                )
+                continue
+            taken.add(name)
+            yield name, Node(path, connector.name), connector.place

@@ -1,0 +1,193 @@
+"""The inputs and outputs of a system itself: what is given to them, and what they show.
+
+An archive has them: Alt is an output of the system, aircraft.Alt that of a component behind it.
+What is given to an input of the system, as a value or as a column of a file, goes to each variable
+behind it, in the unit of that.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from ..base.errors import InputError, nearest
+from ..base.si_units import Unit, known_unit
+from ..interface.interface import SETTABLE, Variable
+from ..interface.units import IDENTITY, Conversion, conversion
+from .parts import Port, Way
+from .stimuli import Column, Stimuli
+from .structure import Structure, unit_of
+
+Place = Callable[[str], str]
+
+
+class Tap(NamedTuple):
+    """What an output of the system shows: the output of a component, converted.
+
+    unit is its name, None without one; quantity is what that means, None where nothing says so.
+    """
+
+    source: Port
+    change: Conversion
+    kind: str
+    unit: str | None
+    quantity: Unit | None
+    description: str
+
+
+def taps(system: Structure) -> dict[str, Tap]:
+    """What the outputs of the system show, by their names."""
+    found: dict[str, Tap] = {}
+    for name, output in system.outputs.items():
+        source = _variable(system, name, output.way.port, ("output",))
+        own = _unit(system, output.way.port, source)
+        change = _change(system, name, own, output.unit, output.way)
+        kind, description = output.kind or source.kind, output.description or source.description
+        unit, quantity = source.unit, own
+        if output.unit is not None:
+            unit, quantity = output.unit.name, output.unit
+        elif change != IDENTITY:
+            unit, quantity = None, None
+        found[name] = Tap(output.way.port, change, kind, unit, quantity, description or "")
+    return found
+
+
+def read_at(system: Structure, port: Port) -> tuple[Port, Conversion]:
+    """The signal of a component that a name stands for, and what is made of its value.
+
+    That is the one behind an output of the system, or the one of that name, as it is.
+    """
+    tap = system.once(taps).get(str(port))
+    return (tap.source, tap.change) if tap else (port, IDENTITY)
+
+
+def change_along(system: Structure, name: str, way: Way) -> Conversion:
+    """What a value of an input of the system becomes along a way; InputError where it cannot go."""
+    variable = _variable(system, name, way.port, SETTABLE)
+    own = _unit(system, way.port, variable)
+    return _change(system, name, system.inputs[name].unit, own, way)
+
+
+def check_connectors(system: Structure) -> None:
+    """InputError at the first input or output of the system that does not fit what is behind it."""
+    system.once(taps)
+    for name, given in system.inputs.items():
+        for way in given.ways:
+            change_along(system, name, way)
+
+
+def given_by_connectors(
+    system: Structure, settings: Mapping[str, Any], place: Place
+) -> tuple[dict[str, Any], Place]:
+    """Settings with those of inputs of the system as values of the variables behind them.
+
+    And what says of each where it comes from.
+    """
+    values: dict[str, Any] = {}
+    origins: dict[str, str] = {}
+    for key, value in settings.items():
+        ways = {key: value}
+        if key in system.inputs:
+            ways = _values(system, key, value, place(key))
+        for port, passed_on in ways.items():
+            if port in values:
+                two = f"{place(origins[port])} and {place(key)}"
+                raise InputError(f"{two}: both give {port} a value; must be given once")
+            values[port], origins[port] = passed_on, key
+    return values, lambda key: place(origins.get(key, key))
+
+
+def driven_by_connectors(system: Structure, stimuli: Stimuli) -> Stimuli:
+    """Stimuli with the columns of inputs of the system as columns of the variables behind them."""
+    if all(str(port) not in system.inputs and port.component for port in stimuli.columns):
+        return stimuli
+    columns: dict[Port, Column] = {}
+    behind: dict[Port, Port] = {}
+    for port, column in stimuli.columns.items():
+        name, place = str(port), stimuli.place(port)
+        passed_on = {port: column}
+        if name in system.inputs:
+            ways = system.inputs[name].ways
+            passed_on = {way.port: _column(system, place, name, column, way) for way in ways}
+        elif not port.component:
+            inputs = [
+                Port(c.name, v.name) for c in system.components for v in c.interface.of("input")
+            ]
+            raise InputError(
+                f"{place}: no input {name!r}; {nearest(name, [*system.inputs, *inputs])}"
+            )
+        for target, samples in passed_on.items():
+            if target in columns:
+                two = f"{stimuli.place(behind[target])} and {place}"
+                raise InputError(f"{two}: both drive {target}; must be driven by one")
+            columns[target], behind[target] = samples, port
+    return replace(stimuli, columns=columns, behind=behind)
+
+
+def _values(system: Structure, name: str, value: Any, place: str) -> dict[str, Any]:
+    """The values of the variables behind an input of the system."""
+    values: dict[str, Any] = {}
+    for way in system.inputs[name].ways:
+        change = change_along(system, name, way)
+        passed_on = value
+        if change != IDENTITY:
+            try:
+                passed_on = change(float(value))
+            except (TypeError, ValueError):
+                raise InputError(f"{place} = {value!r}: must be a number") from None
+        values[str(way.port)] = passed_on
+    return values
+
+
+def _column(system: Structure, place: str, name: str, column: Column, way: Way) -> Column:
+    """The column of a variable behind an input of the system, in the variable's unit."""
+    change, unit = change_along(system, name, way), system.inputs[name].unit
+    if unit is None and change == IDENTITY:
+        return column
+    before: Conversion | None = IDENTITY
+    if column.unit is not None and (unit is None or column.unit != unit.name):
+        named = known_unit(column.unit)
+        before = conversion(named, unit) if named and unit else None
+    if before is None:
+        must = f"a unit of the quantity of {unit.name}" if unit else "left out"
+        raise InputError(f"{place} [{column.unit}]: cannot be converted; must be {must}")
+    if (before, change) == (IDENTITY, IDENTITY):
+        return replace(column, unit=None)
+    if column.texts:
+        raise InputError(f"{place} = {column.texts[0]!r}: must be a number")
+    return Column(array("d", (change(before(sample)) for sample in column.samples)))
+
+
+def _variable(system: Structure, name: str, port: Port, causalities: tuple[str, ...]) -> Variable:
+    """The variable behind an input or output of the system; InputError where there is none."""
+    place = f"{system.name}: {name}"
+    interface = system.component(port.component, place).interface
+    valid = {v.name: v for v in interface.of(*causalities) if v.supported}
+    if port.variable not in valid:
+        near = nearest(port.variable, valid, interface.listing)
+        raise InputError(f"{place}: {port.component} has no {port.variable!r} for it; {near}")
+    return valid[port.variable]
+
+
+def _unit(system: Structure, port: Port, variable: Variable) -> Unit | None:
+    return unit_of(system.component(port.component, str(port)).interface, variable)
+
+
+def _change(
+    system: Structure, name: str, start: Unit | None, end: Unit | None, way: Way
+) -> Conversion:
+    """The conversion along a way; InputError where units do not fit."""
+    if way.factor is not None or way.offset is not None:
+        factor = 1.0 if way.factor is None else way.factor
+        return Conversion(factor, 0.0 if way.offset is None else way.offset)
+    if start is None or end is None:
+        return IDENTITY
+    found = conversion(start, end)
+    if found is None:
+        raise InputError(
+            f"{system.name}: {name}: {start.name} cannot be converted to {end.name}, for "
+            f"{way.port}; must be of the same quantity"
+        )
+    return found
