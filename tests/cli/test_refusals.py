@@ -54,7 +54,7 @@ init a.toml --fmu a=vendor.fmu --fmu a=vendor.fmu :: must be a name of its own
 init a.toml --fmu a=vendor.fmu --as plant=vendor.fmu :: --fmu cannot be used with --as
 init a.toml --fingers 3 --as plant=vendor.fmu :: --fingers and --angles cannot be used with
 init a.toml --angles 0,x :: --angles '0,x': must be numbers in degrees, as 0,90,225
-identify a.csv :: a.csv: no such log; must be a .csv, .mf4, .arrow, .feather, .parquet file
+identify a.csv :: a.csv: no such log; must be a .csv, .tsv, .mf4, .arrow, .feather, .parquet file
 identify --fit mass :: the published experiments: 'mass' cannot be fitted; valid: coulomb
 identify --set plant.nothing=1 :: --set plant.nothing:
 identify --out /proc/nowhere :: /proc/nowhere: cannot write

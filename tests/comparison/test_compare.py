@@ -202,7 +202,7 @@ def test_no_run_and_no_log(tmp_path):
     with pytest.raises(InputError, match="no such run; must be a folder"):
         read_side(tmp_path / "nothing")
     (tmp_path / "page.html").write_text("")
-    with pytest.raises(InputError, match=r"must be a folder .*, or a .csv, .mf4, .*file"):
+    with pytest.raises(InputError, match=r"must be a folder .*, or a .csv, .tsv, .mf4, .*file"):
         read_side(tmp_path / "page.html")
 
 

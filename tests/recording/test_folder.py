@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Realtime, simulate
+from grasp_cosim import InputError, Realtime, SimulationError, simulate
 from grasp_cosim.exchange.listener import Experiment
 from grasp_cosim.recording.folder import FORMS, RunFolder, load_log, load_run
 from recording.rows import EXPERIMENT, SIGNALS, rows
+from support.native_fmus import needs_gcc
+from support.native_systems import integrator
 
 CSV = '"time","a.x","a.on"\n0.0,1.5,1\n0.1,2.5e-300,0\n'
 MADE = {
@@ -96,6 +98,19 @@ def test_it_can_be_read_while_the_run_goes_on(run, tmp_path, torn):
     run.end(complete=False)
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_a_crash_at_once_loses_no_more_than_the_last_batch(grasp, tmp_path, form):
+    """The first row is there as soon as it came: the file that a crash would leave is read."""
+    if form == "arrow":
+        pytest.importorskip("pyarrow")
+    with RunFolder(tmp_path, grasp, form=form) as folder:
+        folder.begin(Experiment.of(MADE), SIGNALS)
+        folder.block(np.arange(1), rows(1))
+        read = load_run(tmp_path)
+        assert (read.complete, read.wall_time, read.time.tolist()) == (False, None, [0.0])
+        folder.end(complete=False)
+
+
 def test_without_a_row_the_older_run_stays(run, tmp_path):
     for name in ("run.json", "signals.csv", *DRAWN):
         (tmp_path / name).write_text("older")
@@ -157,6 +172,50 @@ def test_two_runs_do_not_share_a_folder_nor_is_one_in_a_file(run, grasp, tmp_pat
     below.begin(EXPERIMENT, SIGNALS)
     with pytest.raises(InputError, match="out: cannot be written: Not a directory"):
         below.block(np.arange(2), rows(2))
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("every", [1, 3])
+def test_of_a_run_that_ended_a_file_that_was_cut_is_damaged(grasp, tmp_path, form, every):
+    if form == "arrow":
+        pytest.importorskip("pyarrow")
+    system = grasp.with_experiment(1e-3, 0.02)
+    with RunFolder(tmp_path, system, form=form) as folder:
+        folder.finish(simulate(system, listeners=[folder], every=every))
+    path = tmp_path / f"signals.{form}"
+    whole = load_run(tmp_path)
+    assert whole.complete
+    data = path.read_bytes()
+    if form == "csv":
+        lines = data.splitlines(keepends=True)
+        without_one = b"".join([*lines[:4], *lines[5:]])
+        cuts = [data[:-1], data[:-30], b"".join(lines[:-1]), without_one, data + lines[-1]]
+    else:
+        cuts = [data[:20], data[: len(data) // 2]]
+    for cut in cuts:
+        path.write_bytes(cut)
+        with pytest.raises(InputError, match=r"is damaged[:,] ") as refused:
+            load_run(tmp_path)
+        assert "\n" not in str(refused.value)
+    written = json.loads((tmp_path / "run.json").read_text())
+    path.write_bytes(cuts[1])
+    (tmp_path / "run.json").write_text(json.dumps({**written, "complete": False}))
+    with pytest.raises(InputError, match="is damaged"):  # it was interrupted, and cut later
+        load_run(tmp_path)
+
+
+@needs_gcc
+@pytest.mark.parametrize("values", [{"a.error_at": 0.045}, {"a.terminate_at": 0.045}])
+@pytest.mark.parametrize("every", [1, 7])
+def test_a_run_that_ended_early_is_whole(tmp_path, values, every):
+    system = integrator(tmp_path).with_values(values)
+    with RunFolder(tmp_path / "out", system) as folder:
+        try:
+            result = simulate(system, listeners=[folder], every=every)
+        except SimulationError as error:
+            result = error.result
+        folder.finish(result)
+    assert load_run(tmp_path / "out").time.tolist() == result.time.tolist()
 
 
 # ----------------------------------------------------------------- read back

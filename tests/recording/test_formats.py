@@ -19,7 +19,7 @@ from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.mdf import MdfListener, read_mdf
 from grasp_cosim.recording.signals import read_signals
 from grasp_cosim.system.settings import settings
-from grasp_cosim.tables import text
+from grasp_cosim.tables import table, text
 from hypothesis import given
 from hypothesis import strategies as st
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, play, rows
@@ -177,7 +177,7 @@ def test_a_large_csv_has_the_same_bits_whoever_reads_it(tmp_path, monkeypatch):
     plain = read_signals(path, {"a.s"})[1]
     monkeypatch.setattr(text, "LARGE", 0)
     with monkeypatch.context() as only:
-        only.setattr(text, "Numbers", None)
+        only.setattr(table, "Numbers", None)
         fast = read_signals(path, {"a.s"})[1]
     assert {n: c.tolist() for n, c in fast.items()} == {n: c.tolist() for n, c in plain.items()}
     with path.open("a") as file:

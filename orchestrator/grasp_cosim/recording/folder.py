@@ -212,6 +212,8 @@ def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
 
 # ------------------------------------------------------------------ read back
 
+NOTHING: Mapping[str, str] = {}
+
 TEXT = "str"
 TYPES = ("float64", "int32", "int64", "bool", TEXT)
 """The element types of recorded columns, the last that of Strings."""
@@ -347,19 +349,24 @@ def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
     return typed
 
 
-def load_log(path: Path, note: Callable[[str], None] = lambda _: None) -> Signals:
+def load_log(
+    path: Path, note: Callable[[str], None] = lambda _: None, expects: Mapping[str, str] = NOTHING
+) -> Signals:
     """The numbers in a log of any tool, by the names of its columns.
 
     They come in SI units where the run.json of the run beside it, or the units in the log, tell of
     others; else they are taken to be in SI, which `note` is told. InputError where it is missing,
-    damaged or of another kind, or where what reads it is not installed; at a cell that is no
-    number once its column is asked for.
+    damaged or of another kind, or where what reads it is not installed; where a column is in a unit
+    of something else than it is expected in; at a cell that is no number once its column is asked
+    for.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such log; must be a {choices(LOGS)} file")
     if path.suffix.lower() not in LOGS:
         raise InputError(f"{path}: must be a {choices(LOGS)} file")
     log = read_log(path)
+    for name, unit in expects.items():
+        log.check_unit(name, unit)
     beside = path.with_name(SETTINGS)
     if path.stem == Path(SIGNALS).stem and beside.is_file():
         to_si = {n: Conversion(**c) for n, c in read_run_json(beside).get("to_si", {}).items()}

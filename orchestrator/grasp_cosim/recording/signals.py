@@ -10,11 +10,11 @@ from ..base.errors import InputError, nearest
 from ..base.text import from_cell
 from ..system.times import LONGEST
 from ..tables.column import Column
-from ..tables.table import ARROW, read_table
+from ..tables.table import ARROW, TEXT, read_table
 from .mdf import read_mdf
 from .memory import Columns
 
-LOGS = (".csv", ".mf4", *ARROW)
+LOGS = (*TEXT, ".mf4", *ARROW)
 """The suffixes of logs."""
 
 
@@ -77,6 +77,11 @@ class Log(Mapping[str, npt.NDArray[np.float64] | npt.NDArray[np.bool_]]):
                 return np.array([word == "true" for word in words])
         values = np.asarray(column.numbers())
         return values if values.dtype == np.bool_ else values.astype(np.float64, copy=False)
+
+    def check_unit(self, name: str, unit: str) -> None:
+        """InputError where the column of that name, if there is one, is in no unit like this."""
+        if name in self._columns:
+            self._columns[name].to_unit(unit)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._columns)

@@ -18,8 +18,8 @@ from .column import Column, Table, Values
 from .text import PIECE, Numbers, TextFile
 
 ARROW = (*IPC, *PARQUET)
-SUFFIXES = (".csv", *ARROW)
-"""The suffixes of tables; a file of any other name is read as CSV."""
+TEXT = (".csv", ".tsv")
+"""The suffixes of tables; a file of any other name is read as text."""
 
 _HEAD = re.compile(r"(.*\S)\s+\[([^\[\]]*)\]", re.DOTALL)
 _TIME = re.compile(r"(time)\s*\[([^\[\]]*)\]", re.IGNORECASE)

@@ -6,6 +6,7 @@ the lines show; a name or a cell that holds one stands in double quotes. Numbers
 
 import codecs
 import csv
+import os
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -26,7 +27,7 @@ SHOWN = 5
 PIECE = 1024
 """Rows that are made numbers at once."""
 
-LARGE = 20_000_000
+LARGE = 5_000_000
 """Bytes of a file that is worth another reader."""
 
 MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
@@ -71,9 +72,9 @@ class TextFile:
 
         Those whose first cell is no number are texts. None where the slower way is to be taken.
         """
-        if self._kept is not None or self._torn or self.encoding.startswith("utf-16"):
+        if self._kept is not None or self.encoding.startswith("utf-16"):
             return None
-        if self._path.stat().st_size < LARGE:
+        if self._path.stat().st_size < LARGE or (self._torn and not self._is_whole()):
             return None
         try:
             arrow = extra_module("pyarrow", "it reads large files", "arrow")
@@ -97,6 +98,12 @@ class TextFile:
         except arrow.ArrowInvalid:  # which the slower way says better
             return None
         return [column.to_numpy() for column in table]
+
+    def _is_whole(self) -> bool:
+        """True where the last line has its end."""
+        with self._bytes() as file:
+            file.seek(-1, os.SEEK_END)
+            return bool(file.read() == b"\n")
 
     def _bytes(self) -> Any:
         return self._path.open("rb") if self._kept is None else BytesIO(self._kept)

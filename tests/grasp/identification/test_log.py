@@ -5,7 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from grasp_cosim import InputError, simulate
-from grasp_cosim.grasp.identification.identification import OF_A_LOG, chosen, identify_from_log
+from grasp_cosim.grasp.identification.identification import (
+    OF_A_LOG,
+    chosen,
+    identify,
+    identify_from_log,
+)
 from grasp_cosim.metrics.metric import Signals
 from grasp_cosim.recording.folder import load_log
 from scipy.integrate import solve_ivp
@@ -163,7 +168,7 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("log.txt", b"time\n", "must be a .csv, .mf4, .arrow, .feather, .parquet file"),
+        ("log.txt", b"time\n", "must be a .csv, .tsv, .mf4, .arrow, .feather, .parquet file"),
         ("log.csv", b"time,a\n0.0\n", "line 2 has 1 cell; must have 2, as line 1"),
         ("log.csv", b"t,a\n0,0\n", "no column of the name 'time'; must be one, in s or as in"),
         ("log.csv", b"time,Time [ms],a\n0,0,0\n", "2 columns of the name 'time'; must be one"),
@@ -206,6 +211,13 @@ def test_columns_that_nobody_uses_hold_whatever_they_like(grasp, recorded, tmp_p
         log["temperature"]
     with pytest.raises(InputError, match=r"column 10 = 'note': appears twice; must be"):
         log["note"]
+
+
+def test_a_unit_of_something_else_is_refused(tmp_path):
+    (tmp_path / "log.csv").write_text("time,plant.velocity[1] [N],x [N]\n0,1,2\n", "utf-8")
+    said = r"column 2, plant.velocity\[1\] \[N\]: cannot be converted into m/s; must be a unit of"
+    with pytest.raises(InputError, match=said):
+        identify(tmp_path / "log.csv")
 
 
 def test_what_a_log_is_taken_to_be_in_is_said(tmp_path):

@@ -149,7 +149,8 @@ def identify(
         ]
         data = f"{name}, {len(rows)} contact times"
         return _identified(data, "s", found, rows, scatter(contacts))
-    signals = load_log(log, LOGGER.warning)
+    units = {f"{name}[{j}]": unit for name, unit in USED.items() for j in FINGERS}
+    signals = load_log(log, LOGGER.warning, units)
     parameters = chosen(fit, OF_A_LOG, str(log))
     windows, found = identify_from_log(system, signals, parameters, str(log))
     rows = [{"finger": w.finger, "time": float(t)} for w in windows for t in w.time]
@@ -192,6 +193,10 @@ GAP = 1.5
 """Median steps between two samples; where it is more, one is missing."""
 
 
+USED = {"plant.velocity": "m/s", "controller.force": "N", "plant.contact_force": "N"}
+"""The signals of each finger, and the units of SI in which they are needed."""
+
+
 class Windows(NamedTuple):
     """Of one finger: per window its start in s, its residual without friction in N, and its way,
     1 or -1; and the speeds in m/s, a row per window.
@@ -232,10 +237,7 @@ def _windows(system: System, log: Signals, finger: int, place: str) -> Windows:
         """A row per window."""
         return signal[: len(signal) // size * size].reshape(-1, size)
 
-    v, force, touch = (
-        cut(_signal(log, f"{name}[{finger}]", place))
-        for name in ("plant.velocity", "controller.force", "plant.contact_force")
-    )
+    v, force, touch = (cut(_signal(log, f"{name}[{finger}]", place)) for name in USED)
     time = cut(log.time)
     way = np.sign(v[:, 0])
     moving = (way[:, None] * v > SLOWEST).all(axis=1)
