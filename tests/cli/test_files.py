@@ -81,6 +81,23 @@ def test_a_run_is_not_written_in_the_place_of_a_file(command, here):
     assert err == f"grasp-cosim: file: cannot write to {here}/file: Not a directory\n"
 
 
+@pytest.mark.parametrize("target", ["new", "deep/er/new"])
+def test_a_folder_is_made_where_a_dangling_link_leads(command, here, target):
+    (here / "link").symlink_to(target)
+    code, _, err = command("run", "--stop", "0.01", "--out", "link")
+    assert code == 0, err
+    assert (here / "link").is_symlink()
+    assert (here / target / "run.json").is_file()
+
+
+def test_a_link_to_itself_is_refused(command, here):
+    (here / "link").symlink_to("link")
+    code, out, err = command("run", "--stop", "0.01", "--out", "link")
+    assert (code, out) == (2, "")
+    assert err.startswith("grasp-cosim: link")
+    assert err.count("\n") == 1
+
+
 def test_the_files_of_a_run_go_through_links_and_pipes(command, here):
     folder, found = here / "run", []
     (folder / "signals.csv").unlink()

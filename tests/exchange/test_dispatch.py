@@ -192,6 +192,20 @@ def test_the_scale_is_the_nominal_or_the_first_value_and_a_jump_does_not_trip(
     assert (watch(curve, **options) is not None) == trips
 
 
+@pytest.mark.parametrize(
+    ("curve", "trips"),
+    [
+        (np.full(ROWS, 1.7976931348623157e308), False),
+        (np.where(K % 2, 1.7e308, -1.7e308), False),
+        (1e300 * GROWN, True),  # from its start value on: to be 1e306, and it is 1e308
+        (1e307 * np.minimum(GROWN, 17.0), False),
+        (np.where(K < 100, 0.0, 1.7e308), False),
+    ],
+)
+def test_values_near_the_largest_double_are_watched_without_a_warning(curve, trips):
+    assert (watch(curve) is not None) == trips
+
+
 @given(st.integers(1, 300), st.integers(1, 300))
 def test_blocks_of_any_length_come_to_the_same(one, two):
     columns = [10.0 ** (K[:900] / d) for d in (60.0, 70.0, 61.0)]

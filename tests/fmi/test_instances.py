@@ -281,7 +281,7 @@ def test_a_rejected_step_is_taken_in_parts(tmp_path, version, isolation, engine,
 def test_a_wish_to_end_ends_the_run_in_good_order(tmp_path, version, isolation, engine):
     """The last row is that of the communication point behind it."""
     result = simulate(alone(tmp_path, version, isolation, terminate_at=0.35), engine=engine)
-    assert result.complete
+    assert (result.complete, result.ended_at) == (False, 0.4)
     assert result["part.x"] == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.7], rel=1e-13)
     assert result.log[-1] == (
         "part asked for the end of the simulation at t = 0.35 s; its values there are in the last "
@@ -292,7 +292,7 @@ def test_a_wish_to_end_ends_the_run_in_good_order(tmp_path, version, isolation, 
 
 def test_a_wish_to_end_in_a_part_of_a_step(tmp_path):
     result = simulate(alone(tmp_path, "2.0", "none", early_at=0.32, terminate_at=0.37))
-    assert result.complete
+    assert (result.complete, result.ended_at) == (False, 0.4)
     assert result["part.x"][-1] == pytest.approx(0.74, rel=1e-13)
     assert "at t = 0.37 s" in result.log[-1]
 

@@ -51,7 +51,7 @@ def test_its_time_events_and_its_end_do(tmp_path, kind, isolation):
     found = simulate(system(fmu, table=table))
     assert found["a.counter"].tolist() == [1 + floor(k / 5) for k in range(len(found.time))]
     assert found.time[-1] == 6.8
-    assert found.complete
+    assert (found.complete, found.ended_at) == (False, 6.8)
     assert found.log[-1] == "a asked for the end of the simulation at t = 6.8 s"
 
 
@@ -159,7 +159,7 @@ def test_a_run_ends_with_the_last_sample(tmp_path, kind, engine, step, end, said
     """The other components are then at the same communication point."""
     system = stair(tmp_path, kind, step)
     result = simulate(system, engine=engine)
-    assert result.complete
+    assert (result.complete, result.ended_at) == (False, end)
     assert result.time[-1] == end
     assert result["stair.counter"][[-2, -1]].tolist() == [9, 10]
     assert result.log[-1] == f"stair asked for the end of the simulation at t = 9 s{said}"
@@ -173,7 +173,7 @@ def test_the_end_at_the_very_beginning(tmp_path):
     """In the event at the end of the initialisation."""
     system = stair(tmp_path, "ModelExchange", last=1)
     result = simulate(system, realtime=Realtime(factor=1000.0))
-    assert result.complete
+    assert (result.complete, result.ended_at) == (False, 0.0)
     assert result.time.tolist() == [0.0]
     assert "stair asked for the end of the simulation at t = 0 s" in result.log[-1]
 

@@ -17,6 +17,13 @@ from .errors import InputError
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of a disk, not of the input."""
 
+LIMITED = {
+    errno.EMFILE: "this process has too many files open; `ulimit -n` permits more",
+    errno.ENFILE: "this machine has too many files open",
+    errno.ENOMEM: "there is no memory for it",
+}
+"""Errors that tell nothing of the file, in words."""
+
 FMU_FOLDER = Path("fmus/build")
 """Where the FMUs of this project are built, below the current folder."""
 
@@ -29,7 +36,7 @@ PICTURES = ("png", "svg", "pdf")
 
 def check_folder(folder: Path) -> None:
     """InputError where files could not be written to the folder, which need not exist."""
-    nearest = folder.absolute()
+    nearest = Path(os.path.realpath(folder))
     while not nearest.exists():
         nearest = nearest.parent
     try:
@@ -37,6 +44,11 @@ def check_folder(folder: Path) -> None:
             pass
     except OSError as error:
         raise InputError(f"{folder}: cannot write to {nearest}: {error.strerror}") from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder where there is none, also where a link leads to that is not there yet."""
+    Path(os.path.realpath(folder)).mkdir(parents=True, exist_ok=True)
 
 
 def check_file(path: Path) -> None:
@@ -145,6 +157,11 @@ def remove_parts(folder: Path, *names: str) -> None:
     for name in names:
         for part in folder.glob(f"{escape(name)}.*.part"):
             part.unlink(missing_ok=True)
+
+
+def not_its_fault(error: BaseException | str) -> str | None:
+    """Why a file that may be sound cannot be read; None where it is to blame, or may be."""
+    return LIMITED.get(error.errno or 0) if isinstance(error, OSError) else None
 
 
 def unwritable(path: Path, error: OSError) -> str:

@@ -134,7 +134,7 @@ def run(
             note=say,
             finish=finish,
         )
-    if not result.complete:
+    if not result.came_to_its_end:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
     return 0 if result.signals else NEGATIVE  # as the log says

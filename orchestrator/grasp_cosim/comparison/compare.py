@@ -58,7 +58,7 @@ class Comparison:
     def unfinished(self) -> tuple[str, ...]:
         """The names of the runs that did not come to their end."""
         sides = zip(self.names, (self.a, self.b), strict=True)
-        return tuple(name for name, s in sides if s.result and not s.result.complete)
+        return tuple(name for name, s in sides if s.result and not s.result.came_to_its_end)
 
     @property
     def alike(self) -> bool:

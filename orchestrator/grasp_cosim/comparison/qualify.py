@@ -144,7 +144,7 @@ def qualify(
     result, failure = _tried(swap.swapped, progress)
     if result is None:
         return Qualification(swap, failure=failure)
-    early = any(r.complete and bool(r.time[-1] < r.settings["stop"]) for r in (run, result))
+    early = any(r.ended_at is not None for r in (run, result))
     asked = () if failure else (*asked, END) if early else asked
     own = ours.measured(asked)
     again: list[Side] = []
@@ -181,7 +181,7 @@ def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
 
 def _run(system: System, progress: str | bool) -> Result:
     result = simulate(system, progress=progress)
-    if not result.complete:
+    if not result.came_to_its_end:
         raise KeyboardInterrupt
     return result
 

@@ -25,7 +25,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..base.calls import TRANSFER_2, TRANSFER_3, Call, Native
 from ..base.errors import InputError, SimulationError
-from ..base.files import FULL
+from ..base.files import FULL, not_its_fault
 from ..base.scratch import ScratchFolder, without_scratch
 from ..interface.interface import Element, Interface, Value, Variable
 from ..interface.obstacles import of_binary, of_loading, this_machine
@@ -229,7 +229,9 @@ class LoadedInstance(ABC):
                     f"{self.name}: {self.interface.called} cannot be extracted to {folder}: "
                     f"{error.strerror}; must have room there, or TMPDIR must be another folder"
                 ) from error
-            raise InputError(f"{self.name}: {self.interface.called} is damaged: {error}") from error
+            limit = not_its_fault(error)
+            state = f"cannot be read: {limit}" if limit else f"is damaged: {error}"
+            raise InputError(f"{self.name}: {self.interface.called} {state}") from error
         return folder
 
     def _load(self, folder: Path) -> None:

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from ..base.errors import InputError
-from ..base.files import check_fmu_file
+from ..base.files import check_fmu_file, not_its_fault
 
 NAME = "modelDescription.xml"
 HEAD = 20
@@ -78,6 +78,8 @@ def check_size(archive: zipfile.ZipFile, path: Path) -> None:
 
 def unreadable(path: Path, error: Exception | str) -> InputError:
     """The one line for an FMU that cannot be read."""
+    if limit := not_its_fault(error):
+        return InputError(f"{path}: cannot be read: {limit}")
     reason = " ".join(str(error).split()) or type(error).__name__
     return InputError(f"{path}: not a readable FMU: {reason}")
 

@@ -212,8 +212,18 @@ class Session:
 
     @property
     def complete(self) -> bool:
-        """True if the stop time is reached without a failure, or the end that an FMU asked for."""
-        return self._master.steps_done == self._master.total_steps and not self._failed
+        """True if the stop time is reached without a failure."""
+        return self._master.steps_done == self.system.total_steps and not self._failed
+
+    @property
+    def ended_at(self) -> float | None:
+        """The time in s of the end that an FMU asked for before the stop time, if that is reached.
+
+        None also after a failure.
+        """
+        end = self._master.total_steps
+        early = self._master.steps_done == end < self.system.total_steps
+        return self.time if early and not self._failed else None
 
     def step(self, steps: int = 1) -> bool:
         """Do a number of communication steps, fewer at the end; False if none was done.
@@ -310,6 +320,7 @@ class Session:
             more_metrics=self._metrics,
             to_si={n: c for n, c in self._in_si.conversions.items() if n in columns},
             known=self._known(),
+            ended_at=self.ended_at,
         )
 
     def _of_proxies(self, step: float) -> list[str]:
@@ -347,7 +358,8 @@ class Session:
             f"the first at t = {r.first:.9g} s"
             for name, r in master.rejections.items()
         )
-        pending = master.scenario.pending() if self.complete else ()
+        whole = self.complete or self.ended_at is not None
+        pending = master.scenario.pending() if whole else ()
         step, lost = in_seconds(self.system.step_ns), self._whole and self._whole.lost
         return (
             *self._early(),

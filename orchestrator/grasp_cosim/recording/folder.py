@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from ..base.checks import choice
 from ..base.errors import InputError, choices
-from ..base.files import check_nature, of_any_format, remove, unwritable
+from ..base.files import check_nature, make_folder, of_any_format, remove, unwritable
 from ..base.higher import groups
 from ..base.scratch import SUFFIX, Lock
 from ..base.si_units import known_unit
@@ -147,7 +147,7 @@ class RunFolder:
         """Remove the older run and begin ours; a kill leaves one of them, or no run.json."""
         settings = self._place / SETTINGS
         try:
-            self._place.mkdir(parents=True, exist_ok=True)
+            make_folder(self._place)
             if not self._lock.taken():  # for as long as this process lives
                 raise InputError(
                     f"{self._folder}: another process records a run in it; must end first, or --out"
@@ -263,6 +263,7 @@ def load_run(folder: str | Path) -> Result:
         units=units,
         wall_time=written["wall_time"],
         complete=written["complete"],
+        ended_at=written.get("ended_at"),
         descriptions=written.get("descriptions", {}),
         rejections={name: Rejection(**r) for name, r in written["rejections"].items()},
         log=tuple(written["log"]),

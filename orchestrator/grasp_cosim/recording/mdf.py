@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ..base.checks import extra_module
 from ..base.errors import InputError
+from ..base.files import make_folder, not_its_fault
 from ..base.one_piece import in_one_piece
 from ..exchange.listener import Experiment, Signal
 from .memory import Batch, writing
@@ -50,7 +51,7 @@ class MdfListener:
             raise InputError(f"{self._path}: nothing to record; must be a system with outputs")
         self._experiment, self._signals, self._batch = experiment, signals, Batch()
         with writing(self._path, InputError):
-            self._place.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(self._place.parent)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Keep the rows."""
@@ -108,6 +109,8 @@ def read_mdf(
         with MDF(path) as mdf:
             channels = [c for c in mdf.iter_channels() if len(c.samples)]
     except Exception as error:  # of a damaged file it raises whatever it stumbles over
+        if limit := not_its_fault(error):
+            raise InputError(f"{path}: cannot be read: {limit}") from error
         said = " ".join(f"{type(error).__name__}: {error}".split())
         raise InputError(f"{path}: is damaged, not an MDF file: {said}") from error
     if not channels:

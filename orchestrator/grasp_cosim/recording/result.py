@@ -112,7 +112,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     wall_time: float | None
     """s that it took, files that were written meanwhile not counted; None where it did not end."""
     complete: bool
-    """False where the run was interrupted or an FMU failed."""
+    """True where the stop time was reached: not if it was interrupted, failed, or ended early."""
     descriptions: Mapping[str, str] = field(default_factory=dict)
     rejections: Mapping[str, Rejection] = field(default_factory=dict)
     """By component; only those that rejected steps."""
@@ -130,6 +130,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """What was worked out of every step, where fewer rows were recorded."""
     folder: Path | None = None
     """Where it was read from; None of a run that was just done."""
+    ended_at: float | None = None
+    """The time of the last row in s where an FMU asked for the end before the stop time."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; KeyError, with the names nearest to it, where there is none."""
@@ -220,13 +222,20 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "steps": self.last_step,
             **{key: settings[key] for key in ("scheme", "step", "stop")},
             "complete": self.complete,
+            **({} if self.ended_at is None else {"ended_at": self.ended_at}),
         }
         return Figures(figures | ({"proxies": proxies} if proxies else {}))
 
     @property
+    def came_to_its_end(self) -> bool:
+        """True if it reached the stop time, or the end that an FMU asked for before."""
+        return self.complete or self.ended_at is not None
+
+    @property
     def metric_units(self) -> dict[str, str | None]:
         """The units of the metrics by name; None where a value has none."""
-        return {**self.measured.units, **UNITS}
+        early = {} if self.ended_at is None else {"ended_at": "s"}
+        return {**self.measured.units, **UNITS, **early}
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
@@ -313,6 +322,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         end = f"{self.time[-1]:.6g} s of " if rows and not self.complete else ""
         took = f", took {self.wall_time:.3g} s" if self.wall_time else ""
         broken = "" if self.complete else ", not complete"
+        if self.ended_at is not None:
+            broken = ", ended by an FMU"
         step, stop = 1e3 * settings["step"], settings["stop"]
         how = f"in steps of {step:.6g} ms, {settings['scheme']}"
         yield f"  run      {end}{stop:.6g} s {how}{took}{broken}"

@@ -209,6 +209,7 @@ BESIDE: Mapping[str, Check] = {
     "descriptions": _named(TEXT),
     "to_si": _named(_object({"factor": NUMBER, "offset": NUMBER})),
     "proxies": _named(_named(ANYTHING)),
+    "ended_at": NUMBER,
     "timing": TIMING,
 }
 """What is known of that besides; these may be missing."""

@@ -83,7 +83,9 @@ def summary(run: Mapping[str, Any]) -> str:
         end = number(run["steps"] * run["step"])
         return f'{text} <span class="warn">unfinished: to t = {end} s</span>'
     text += f", {number(run['real_time_factor'], 3)} times as fast as real time"
-    if not run["complete"]:
+    if run.get("ended_at") is not None:
+        text += f" ended at {number(run['ended_at'])} s, as an FMU asked"
+    elif not run["complete"]:
         text += ' <span class="warn">not complete: interrupted, or failed on the way</span>'
     return text
 

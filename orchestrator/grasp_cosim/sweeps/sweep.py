@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, SimulationError
+from ..base.files import make_folder
 from ..base.parallel import Crew, Lost, deliver
 from ..base.progress import Progress, phase
 from ..base.scratch import SUFFIX, Lock, ScratchFolder
@@ -131,15 +132,15 @@ def run_row(task: Task, index: int, row: Row) -> Outcome:
     def finish(result: Result, error: SimulationError | None) -> None:
         if error is not None:
             deliver(Outcome(index, {}, str(error)))
-        elif result.complete:
-            deliver(Outcome(index, result.measured.flat()))
+        elif result.came_to_its_end:
+            deliver(Outcome(index, result.measured.flat(), ended_at=result.ended_at))
 
     try:
         system = task.system.with_settings(row, "sweep: {}".format)
         result = simulate(system, metrics=task.metrics, finish=finish)
-        if not result.complete:
+        if not result.came_to_its_end:
             raise KeyboardInterrupt
-        return Outcome(index, result.measured.flat())
+        return Outcome(index, result.measured.flat(), ended_at=result.ended_at)
     except (InputError, SimulationError) as error:
         return Outcome(index, {}, str(error))
 
@@ -281,7 +282,7 @@ def opened(table: Path, identity: str, done: dict[int, Outcome]) -> Iterator[Fil
     """
     check_format(table)
     path = table.with_name(f"{table.name}.rows")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     lock = Lock(path.with_name(path.name + SUFFIX))
     if not lock.taken():
         said = f"{path}: another process does runs of it"

@@ -35,24 +35,31 @@ SUFFIXES = (".csv", ".parquet")
 
 STEP = "experiment.step"
 
+ENDED_AT = "ended at"
+
 LOWEST, HIGHEST = 0.25, 4.0
 """Orders outside are none: the results do not settle, or what is seen is noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of the run with an index: the metrics by column, or the error, one line."""
+    """What came of the run with an index: the metrics by column, or the error, one line.
+
+    ended_at is the time in s of its end where an FMU asked for that before the stop time.
+    """
 
     index: int
     metrics: Mapping[str, Value | None]
     error: str | None = None
+    ended_at: float | None = None
 
 
 @dataclass(frozen=True)
 class Table:
     """Columns of equal length by name, None where there is no value; a row per run, in order.
 
-    Beside what varied and what came out there are `index` and `error`, one line where a run failed.
+    Beside what varied and what came out there are `index` and `error`, one line where a run failed,
+    and ENDED_AT where an FMU ended one of them before its stop time: the time in s of its end.
     `units` are those of SI in which the columns are, None where they have none.
     """
 
@@ -73,6 +80,12 @@ class Table:
             raise InputError(f"{name!r}: no such column of the sweep; {found}")
         values = self.columns[name]
         return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
+
+    @property
+    def ended_early(self) -> dict[int, float]:
+        """When the runs ended that an FMU ended before their stop time, in s, by index."""
+        times = self.columns.get(ENDED_AT, ())
+        return {i: time for i, time in enumerate(times) if time is not None}
 
     @property
     def errors(self) -> dict[int, str]:
@@ -149,6 +162,9 @@ def made(
     columns: dict[str, Sequence[Any]] = {"index": [o.index for o in outcomes]}
     columns |= {place: [row.get(place) for row in rows] for place in varied}
     columns |= {name: [o.metrics.get(name) for o in outcomes] for name in measured}
+    if any(o.ended_at is not None for o in outcomes):
+        columns[ENDED_AT] = [o.ended_at for o in outcomes]
+        units = {**units, ENDED_AT: "s"}
     columns["error"] = [o.error for o in outcomes]
     of_metrics = {m.name: m.unit for m in metrics}
     found = {name: of_metrics.get(name.partition("[")[0]) for name in measured}
@@ -244,6 +260,7 @@ def as_json(table: Table) -> dict[str, Any]:
         "runs": len(table),
         "failed": len(table.errors),
         "errors": {str(i): text for i, text in table.errors.items()},
+        "ended_early": {str(i): time for i, time in table.ended_early.items()},
         "varied": list(table.varied),
         "metrics": table.summary(),
         "convergence": {name: c._asdict() for name, c in study.items()},
@@ -253,7 +270,8 @@ def as_json(table: Table) -> dict[str, Any]:
 
 def as_text(table: Table) -> str:
     """How many runs there are, what failed, and a line for each metric."""
-    lines = [f"{counted(len(table), 'run')}, {len(table.errors)} failed"]
+    early = f", {len(table.ended_early)} ended early by an FMU" if table.ended_early else ""
+    lines = [f"{counted(len(table), 'run')}, {len(table.errors)} failed{early}"]
     for index, error in list(table.errors.items())[:1]:
         lines.append(f"the first that failed, {index}: {error}")
     if is_study(table):

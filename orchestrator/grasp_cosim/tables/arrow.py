@@ -11,6 +11,7 @@ from typing import Any
 
 from ..base.checks import extra_module
 from ..base.errors import InputError
+from ..base.files import not_its_fault
 
 MAGIC = 8
 """Bytes before the first batch."""
@@ -41,6 +42,8 @@ def arrow_table(path: Path, called: str) -> Any:
             stream = arrow.ipc.open_stream(file)
             return arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
     except (OSError, arrow.ArrowException) as error:
+        if limit := not_its_fault(error):
+            raise InputError(f"{called}: cannot be read: {limit}") from error
         said = " ".join(f"{error}".split())
         raise InputError(f"{called}: is damaged, or no {kind} file: {said}") from error
 
