@@ -69,6 +69,8 @@ class Lock:
 
 def without_scratch(text: str) -> str:
     """The text without the paths of our temporary folders: files are named as in their archive."""
+    if PREFIX not in text:  # as nearly always
+        return text
     folder = r"[\\/]".join(map(re.escape, re.split(r"[\\/]", tempfile.gettempdir())))
     ours = rf"{folder}[\\/]({PREFIX}[^\\/\s]+[\\/])+([0-9a-f]{{64}}[\\/])?"
     return re.sub(rf"(file:///?)?{ours}", "", text)

@@ -70,6 +70,7 @@ addresses of what was in registers and, behind it, of what was on the stack.
 CONVENTION = _CONVENTIONS.get(platform.machine()) if sys.platform == "linux" else None
 
 
+@cache
 def logger_type() -> Any:
     """The type of a logger: a function of the five named arguments, and of all that may follow."""
     if CONVENTION is None:
