@@ -120,6 +120,18 @@ def test_so_does_a_refusal_of_the_initialisation(tmp_path):
         simulate(system(tmp_path))
 
 
+def test_so_does_an_fmu_that_gives_no_instance(tmp_path):
+    talker(tmp_path, "-DNO_INSTANCE")
+    message = (
+        r"^a: .*talker.fmu does not load: Failed to instantiate model; "
+        r"components.a.logging = true may have it say why$"
+    )
+    with pytest.raises(InputError, match=message):
+        simulate(system(tmp_path))
+    with pytest.raises(InputError, match=r"does not load: no key$"):
+        simulate(system(tmp_path, more="logging = true"))
+
+
 @pytest.mark.parametrize("isolation", ["none", "process"])
 def test_an_fmu_that_heeds_no_categories_is_silenced(tmp_path, isolation):
     """It would format each call for the sake of its warnings."""

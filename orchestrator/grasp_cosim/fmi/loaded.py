@@ -50,6 +50,9 @@ _UNUSED = ("documentation/", "sources/", "binaries/")
 LOGGER = logging.getLogger(__name__)
 """Gets what goes wrong where an FMU is terminated."""
 
+NOT_INSTANTIATED = "Failed to instantiate"
+"""So FMPy says that an FMU gave no instance."""
+
 _never_freed: list[Any] = []
 """Slaves that FMI does not let us free: what they call back must stay, too."""
 
@@ -247,6 +250,8 @@ class LoadedInstance(ABC):
             self._slave = self._instantiate(folder)
         except Exception as error:  # FMPy raises plain Exception
             reason = self._reason(error)
+            if reason.startswith(NOT_INSTANTIATED):  # and the FMU logged nothing
+                reason += self._advice(ERROR)
             obstacle = of_loading(self.interface, reason)
             raise InputError(
                 f"{self.name}: {self.interface.called} does not load: {reason}"

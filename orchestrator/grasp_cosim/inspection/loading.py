@@ -43,7 +43,7 @@ from pathlib import Path
 from grasp_cosim.fmi.process import load_here
 from grasp_cosim.interface.read import read_interface
 try:
-    load_here("trial", read_interface(Path(sys.argv[1]))).close()
+    load_here("trial", read_interface(Path(sys.argv[1])), logging=True).close()
 except Exception as error:
     print(error)
     os._exit(1)  # pythonfmu's binary reads freed memory where the process then ends as usual

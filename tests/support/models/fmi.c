@@ -1,7 +1,8 @@
 /* Makes an FMU of a model, for co-simulation and model exchange, that minds the call order.
  *
  * FMI is 2 or 3, NAME in braces is its GUID or token. An FMU with NO_STEPS is for model exchange
- * alone; one with NO_LICENCE finds none; one that is NEEDY has an event in each step, used or not.
+ * alone; one with NO_LICENCE finds none; one with NO_INSTANCE says why only where it is to log; one
+ * that is NEEDY has an event in each step, used or not.
  * AT_INITIALISATION, AT_STEP, AT_TERMINATE and AT_FREE are statements that it does there.
  */
 #ifndef AT_INITIALISATION
@@ -61,6 +62,13 @@ static Model *made(Model *m, const char *name, const char *token, const char *re
     if (strcmp(token, "{" NAME "}")) snprintf(wrong, sizeof wrong, "wrong token %s", token);
 #ifdef NO_LICENCE
     snprintf(wrong, sizeof wrong, "No license for feature X in %s/key", resources);
+#endif
+#ifdef NO_INSTANCE
+    if (m->logging) snprintf(wrong, sizeof wrong, "no key");
+    else {
+        free(m);
+        return NULL;
+    }
 #endif
 #if FMI == 3
     FILE *folder = fopen(resources, "r");
