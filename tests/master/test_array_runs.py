@@ -151,6 +151,31 @@ def test_events_set_elements_of_arrays(tmp_path, engine):
     assert "t = 1.125 s: b.u_Int16[1,2] = 77 (a.y_Enumeration[2,1] == 'fast')" in result.log
 
 
+@engines
+def test_events_set_whole_arrays(tmp_path, engine):
+    more = (
+        '[[events]]\nat = 0.5\nset = { "a.D" = [[0, 0, 0], [0, 2, 0], [0, 0, 1]], "b.u" = 4 }\n'
+        "[[events]]\nat = 1.0\nset = { 'b.u' = [5.0, 6.0, 7.0] }\n"
+    )
+    system = two(tmp_path, "", more).with_values(
+        {"a.C": 0, "a.D": np.eye(3), "b.C": 0, "b.D": np.eye(3)}
+    )
+    result = simulate(system, engine=engine)
+    assert signals(result, "a.y", 3)[[4, 5]].tolist() == [[1.0, 2.0, 3.0], [0.0, 4.0, 3.0]]
+    rows = signals(result, "b.y", 3)[[4, 5, 9]].tolist()
+    assert rows == [[1.0, 2.0, 3.0], [4.0, 4.0, 4.0], [5.0, 6.0, 7.0]]
+    assert "t = 1 s: b.u = [5.0, 6.0, 7.0]" in result.log
+    assert result.settings["events"][1]["set"] == {"b.u": [5.0, 6.0, 7.0]}
+
+
+def test_a_session_sets_a_whole_array(tmp_path):
+    system = alone(tmp_path).with_values({"ss.C": 0, "ss.D": np.eye(3)})
+    with simulate.session(system) as session:
+        session.set("ss.u", np.array([7.0, 8.0, 9.0]))
+        assert session.step()
+        assert [session[f"ss.y[{i}]"] for i in (1, 2, 3)] == [7.0, 8.0, 9.0]
+
+
 def test_a_recorded_run_reads_back(tmp_path):
     two(tmp_path, '"a.y -> b.u"')
     out, file = tmp_path / "out", str(tmp_path / "system.toml")

@@ -84,6 +84,21 @@ def test_a_mistake_is_one_line(load, connections, a, message):
     assert "\n" not in str(caught.value)
 
 
+EVENTS = [
+    ("'a.n' = 2", "a.n: is a structural parameter: it decides on sizes, and is set before the run"),
+    ("'a.u' = [1, 2]", r"set\.a\.u: u = \[1, 2\]: is \[2\]; must be \[3\], or a list"),
+    ("'b.u' = 1", "set.b.u: is a continuous input; must be a tunable parameter, or an input"),
+    ("'a.y' = 1", "set.a.y: is a continuous output; must be"),
+    ("'a.v' = 1", "set.a.v: not there; must be"),
+]
+
+
+@pytest.mark.parametrize(("entry", "message"), EVENTS)
+def test_what_an_event_cannot_set_is_said(load, entry, message):
+    with pytest.raises(InputError, match=message):
+        load('"a.y[2] -> b.u[2]"', more=f"[[events]]\nat = 0.5\nset = {{ {entry} }}\n")
+
+
 def test_a_value_that_a_smaller_array_has_no_place_for_is_named(load):
     system = load(a="values = { A = 1 }")
     with pytest.raises(

@@ -184,6 +184,19 @@ def test_a_value_of_a_variable_that_is_not_there_is_left_out_and_said(vendor, tm
         swapped.with_values({"plant.width": 0.05})
 
 
+def test_a_swap_leaves_out_what_the_new_fmu_calculates(tmp_path):
+    state = 'causality="output" initial="exact" | Real start="1" unit="m"'
+    moved = write_fmu(tmp_path / "moved.fmu", {**PLANT, "opening": state})
+    system = write_system(tmp_path).swap("plant", moved).with_values({"plant.opening": 2.0})
+    other = write_fmu(tmp_path / "other.fmu", {**PLANT, "opening": 'causality="output" | Real'})
+    swapped = system.swap("plant", other)
+    assert "opening" not in swapped.component("plant", "test").values
+    assert swapped.notes[-1] == (
+        "swap plant: in other.fmu opening is an output that the FMU calculates from the start on: "
+        "its value 2.0 is left out"
+    )
+
+
 TODO = """connections = [
   "spring.force -> plant.force",
   "TODO -> spring.position",

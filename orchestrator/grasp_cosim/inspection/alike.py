@@ -148,7 +148,8 @@ def candidates(
     ours: Interface, name: str, theirs: Interface, taken: Collection[str]
 ) -> list[Variable]:
     """The variables of another FMU, other than those taken, that could be one of ours."""
-    variable, left = ours.by_name[name], (v for v in theirs.variables if v.name not in taken)
+    variable, others = ours.by_name[name], {*taken, *theirs.main_names}
+    left = (v for v in theirs.variables if v.name not in others)
     return [v for v in left if v.supported and _may_be(ours, variable, theirs, v)]
 
 

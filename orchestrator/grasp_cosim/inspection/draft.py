@@ -110,7 +110,11 @@ def replacing(system: Structure, name: str, fmu: Path, path: str, presets: Itera
     ends = [port for c in system.connections for port in (c.source, c.target)]
     needed = {port.variable for port in ends if port.component == name} | stated(system, name)
     asked = {*needed, *was.values, *presets, *(v.name for v in ours.of("output"))}
-    variables = [v for v in ours.of(*SETTABLE, "output") if v.supported]
+    variables = [
+        v
+        for v in ours.variables
+        if v.supported and (v.causality in (*SETTABLE, "output") or v.name in was.values)
+    ]
     likely = matches(ours, theirs)
     names = [v.name for v in variables if v.name in likely]
     found = {n: likely[n] for n in names if n in asked or not likely[n].doubt}
@@ -209,12 +213,19 @@ def alone(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]]:
 
 
 def _listed(name: str, interface: Interface, path: str) -> str:
-    """The tables of an FMU alone: its inputs, and in comments what else there is."""
-    variables = [v for v in interface.variables if v.supported]
-    lines = [_line(v.name, _start(v), _told(v)) for v in variables if v.causality == "input"]
-    said = [
-        f"# {_line(v.name, _start(v), _told(v))}" for v in variables if v.causality in PARAMETERS
+    """The tables of an FMU alone: its inputs, and in comments what else there is.
+
+    These are its parameters, the values that others may start from, and its outputs.
+    """
+    variables = [
+        v for v in interface.variables if v.supported and v.name not in interface.main_names
     ]
+    inputs = [v for v in variables if v.causality == "input"]
+    parameters = [v for v in variables if v.causality in PARAMETERS]
+    initial = [v for v in variables if v.settable and v.causality not in SETTABLE]
+    lines = [_line(v.name, _start(v), _told(v)) for v in inputs]
+    said = [f"# {_line(v.name, _start(v), _told(v))}" for v in parameters]
+    said += [f"# {_line(v.name, _start(v), f'at the start, {_told(v)}')}" for v in initial]
     said += [f"# {v.name}, recorded: {_told(v)}" for v in by_default(interface)]
     lines += said[:MOST]
     if len(said) > MOST:

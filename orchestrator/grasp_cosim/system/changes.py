@@ -147,7 +147,7 @@ def _no_place(before: Interface, now: Component, name: str) -> str:
     variable = now.interface.by_name.get(name)
     if variable is None:
         return f"{now.fmu.name} has no {before.by_name[name].causality} {name}"
-    return f"{name} {variable.unsettable}, {now.fmu.name}"
+    return f"in {now.fmu.name} {name} {variable.unsettable}"
 
 
 def _check_ends(system: Structure, was: Component, after: Interface, place: str) -> None:
