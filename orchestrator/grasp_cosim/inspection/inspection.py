@@ -172,7 +172,7 @@ def _table(rows: list[list[str]], width: int | None) -> list[str]:
     if width is not None:
         rows = [[r[0], *(_cut(cell, WIDEST) for cell in r[1:-1]), r[-1]] for r in rows]
     rows = [list(COLUMNS), *rows]
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)][:-1]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)][:-1]
     if width is not None:
         room = max(width - sum(widths) - 2 * len(widths), len(COLUMNS[-1]))
         rows = [[*r[:-1], _cut(r[-1], room)] for r in rows]

@@ -56,6 +56,7 @@ INFINITE = {
     "3": "Annotations/Annotation[@type='grasp-cosim']/Infinite",
 }
 """Where FMUs of ours name the inputs of which inf is a value, by version of FMI."""
+BOUNDS = ("min", "max", "nominal")
 Names = tuple[str, ...] | None
 """The variables that one depends on; None where that is not declared."""
 
@@ -184,6 +185,8 @@ class _Reader:
 
         In FMI 2.0 such are two names of one, and a flaw where an input could be set by both.
         """
+        if len(set(self.references)) == len(self.references):
+            return
         seen: dict[tuple[int, str], tuple[str, str | None]] = {}
         for element, value, reference in zip(
             self.elements, self.typed, self.references, strict=True
@@ -267,7 +270,7 @@ class _Reader:
     def aliases(self, variables: Sequence[Variable]) -> Iterator[Variable]:
         """The other names of variables, which stand within their elements."""
         for v, element in zip(variables, self.elements, strict=True):
-            for alias in element.iterfind("Alias"):
+            for alias in element.iterfind("Alias") if len(element) else ():
                 yield replace(
                     v,
                     name=_printable("variable", _name(alias)),
@@ -302,11 +305,18 @@ class _Reader:
         total = sum(e.get("dependencies", "").count(" ") for e in entries)
         if total > MOST_DEPENDENCIES:
             raise ValueError(f"{way}: {total} dependencies; must have at most {MOST_DEPENDENCIES}")
+        place = f"{group}: {key}"
         for element in entries:
-            name, listed = called(f"{group}: {key}", element.get(key)), element.get("dependencies")
-            place = f"{group} {name!r}: dependencies"
-            parts = None if listed is None else listed.split()
-            found[name] = None if parts is None else tuple(called(place, t) for t in parts)
+            name, listed = called(place, element.get(key)), element.get("dependencies")
+            if listed is None:
+                found[name] = None
+                continue
+            parts = listed.split()
+            try:
+                found[name] = tuple(map(self.names.__getitem__, parts))
+            except KeyError:  # which is written otherwise, or is wrong
+                within = f"{group} {name!r}: dependencies"
+                found[name] = tuple(called(within, part) for part in parts)
         return found
 
     def variable(
@@ -330,7 +340,7 @@ class _Reader:
             stated = {key: text for key, text in attributes.items() if text}
             attributes = {**declared.attrib, **stated}
         low = high = nominal = None
-        if kind in NUMERIC:
+        if kind in NUMERIC and not attributes.keys().isdisjoint(BOUNDS):
             low, high, nominal = self.bounds(place, value.tag, attributes)
         causality, variability = self.nature(element, kind)
         start = value.get("start")
@@ -398,15 +408,14 @@ class _Reader:
 
     def bounds(
         self, place: str, fmi_type: str, attributes: Mapping[str, str]
-    ) -> Iterator[Value | None]:
+    ) -> list[Value | None]:
         """Smallest, largest and nominal value of a variable; what is no number is a flaw."""
-        for key in ("min", "max", "nominal"):
-            text = attributes.get(key)
-            value = typed(fmi_type, text) if text else None
+        values = [typed(fmi_type, attributes.get(key) or None) for key in BOUNDS]
+        for key, value in zip(BOUNDS, values, strict=True):
             if isinstance(value, str):
                 with self.tolerated():
                     _real(f"{place}: {key}", value)
-            yield value
+        return values
 
     def initial(self, element: Element, causality: str, variability: str) -> str | None:
         """How the value at the start comes about, by the tables of the standard where it is not
