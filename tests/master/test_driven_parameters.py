@@ -1,13 +1,15 @@
 """Columns of stimuli that drive tunable parameters, against x' = gain u by hand, and FMPy."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from grasp_cosim import InputError, System, simulate
+from grasp_cosim.system.parts import Component, Event, Port
 from support.marks import engines, skip_where_fmpy_runs_none
-from support.native_fmus import KINDS, build_model, needs_cvode, needs_gcc
+from support.native_fmus import EVENT_MODE, KINDS, build_model, needs_cvode, needs_gcc
 from support.native_systems import REALS, driven
 
 INPUT = '[input]\nfile = "drive.csv"\n'
@@ -91,6 +93,21 @@ def test_either_kind_of_fmu_takes_it(version, kind, tmp_path):
     result = simulate(System.load(tmp_path / "s.toml", input=tmp_path / "k.csv"))
     exact = np.exp(-np.where(POINTS <= 0.4, POINTS, 2.0 * POINTS - 0.4))
     assert result["a.x"] == pytest.approx(exact, rel=1e-8)
+
+
+@needs_gcc
+@engines
+@pytest.mark.parametrize("scheme", ["sequential", "jacobi"])
+def test_an_fmu_with_event_mode_gets_it_there(engine, scheme, tmp_path):
+    """A ball that bounces less from 1 s on; the FMU refuses parameters in step mode."""
+    fmu = build_model("bouncing_ball", tmp_path, "3.0", ["CoSimulation"], capabilities=EVENT_MODE)
+    ball = Component("b", fmu, {})
+    system = System("ball", (ball,), (), 10_000_000, 2_000_000_000, scheme)
+    (tmp_path / "e.csv").write_text("time,b.e\n0,0.7\n1,0.4\n")
+    column = simulate(system.with_input(tmp_path / "e.csv"), engine=engine)
+    event = Event({Port("b", "e"): 0.4}, at_ns=1_000_000_000)
+    assert column["b.h"].tobytes() == simulate(replace(system, events=(event,)))["b.h"].tobytes()
+    assert column["b.h"].tobytes() != simulate(system)["b.h"].tobytes()
 
 
 @needs_gcc
