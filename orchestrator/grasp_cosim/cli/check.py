@@ -176,7 +176,7 @@ def compare(
 
     It compares signals, metrics and settings, over the time that both have. A and B are folders
     that `run --out` wrote; systems (.toml or .ssp), which run as long as the other one; or files of
-    signals from elsewhere: ASAM MDF (.mf4), or CSV with the column time and names like
+    signals from elsewhere: ASAM MDF (.mf4), or tables with the column time and names like
     plant.gap[1], with a unit in brackets where it is not the usual one: "plant.gap[1] [mm]". The
     exit code is 1 where anything is out of its band, or a run did not come to its end.
 

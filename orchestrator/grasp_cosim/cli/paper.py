@@ -70,8 +70,9 @@ def identify(
 ) -> int:
     """Fit the friction of the fingers to a LOG.
 
-    It is a run, as .csv or .mf4, or a table of contact times: CSV with the columns x_m, case,
-    finger, time. By default these are the contact times of the published experiments.
+    It is a run, as a table or .mf4, or a table of contact times, with the columns x_m, case,
+    finger, time. Tables are .csv, .arrow or .parquet files. Without LOG it is the contact times of
+    the published experiments.
 
     \b
     Example: grasp-cosim identify --fit coulomb --fit viscous --out identified

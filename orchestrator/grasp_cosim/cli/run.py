@@ -59,7 +59,9 @@ TABLE = Path("sweep.csv")
 )
 @swap_option
 @click.option(
-    "--input", type=PATH, help="Drive inputs by a CSV file: time, then columns like plant.force."
+    "--input",
+    type=PATH,
+    help="Drive inputs and tunable parameters by a table: time, then columns like plant.force.",
 )
 @record_option
 @metrics_option
@@ -163,9 +165,7 @@ def _write(
     help="Vary a value, in SI units: plant.object_width=0.05:0.07:11, or a list as in "
     "sensor_1.reflectance=0.3,0.57,1.2. Several make every combination.",
 )
-@click.option(
-    "--table", type=PATH, help="Take the rows of a CSV file, with a column for each place."
-)
+@click.option("--table", type=PATH, help="Take the rows of a table, with a column for each place.")
 @system_options
 @swap_option
 @metrics_option

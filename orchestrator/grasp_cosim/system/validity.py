@@ -352,7 +352,7 @@ def _of_connections(system: Structure) -> Iterator[str]:
         for port in driven(system):
             unit = system.input.columns[port].unit
             if unit is not None and _variable(system, port).unit is None:
-                yield f"{system.input.place(port)}: {port} has no unit, taken to be in {unit}"
+                yield f"{system.input.file}: {port} has no unit, taken to be in {unit}"
 
 
 def driven(system: Structure) -> tuple[Port, ...]:
