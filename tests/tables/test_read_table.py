@@ -12,6 +12,7 @@ from grasp_cosim import InputError
 from grasp_cosim.tables.table import names_in, read_table, split_head
 from hypothesis import given
 from hypothesis import strategies as st
+from support.marks import examples
 
 NAMES = st.text('abc.[]1 ,;\t"', min_size=1, max_size=6).map(str.strip).filter(bool)
 CELLS = st.one_of(
@@ -160,3 +161,41 @@ def test_tables_of_arrow_have_units_in_metadata_or_names(tmp_path, kind):
     with pytest.raises(InputError, match=r"is damaged, or no (Arrow|Parquet) file: ") as refused:
         read_table(path)
     assert "\n" not in str(refused.value)
+
+
+@examples(50)
+@given(st.sampled_from(["t.arrow", "t.parquet"]), st.data())
+def test_a_damaged_table_of_arrow_is_one_line(name, data):
+    """Whatever bytes change: texts whose lengths are wrong are not read from anywhere."""
+    arrow = pytest.importorskip("pyarrow")
+    from pyarrow import feather, parquet
+
+    made = arrow.table({"time": [0.0, 1.0] * 9, "n": [*range(18)], "w": ["x", "yy", None] * 6})
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        if name == "t.arrow":
+            feather.write_feather(made, path, compression="uncompressed")
+        else:
+            parquet.write_table(made, path)
+        content = bytearray(path.read_bytes())
+        for _ in range(data.draw(st.integers(1, 3))):
+            content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+        path.write_bytes(content[: data.draw(st.integers(1, len(content)))])
+        try:
+            columns = read_table(path).columns
+        except InputError as error:
+            said = str(error)
+        else:
+            said = "".join(column.head for column in columns if column.texts() is None)
+    assert "\n" not in said
+
+
+def test_decimals_of_arrow_are_numbers(tmp_path):
+    arrow = pytest.importorskip("pyarrow")
+    from decimal import Decimal
+
+    from pyarrow import parquet
+
+    made = arrow.table({"a": arrow.array([Decimal("1.5"), Decimal("-2")])})
+    parquet.write_table(made, tmp_path / "t.parquet")
+    assert list(read_table(tmp_path / "t.parquet").columns[0].numbers()) == [1.5, -2.0]

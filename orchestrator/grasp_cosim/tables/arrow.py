@@ -36,12 +36,15 @@ def arrow_table(path: Path, called: str) -> Any:
     try:
         if kind == "Parquet":
             parquet = extra_module("pyarrow.parquet", "it reads Parquet", "parquet")
-            return parquet.read_table(path)
-        with path.open("rb") as file:
-            file.seek(MAGIC)
-            stream = arrow.ipc.open_stream(file)
-            return arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
-    except (OSError, arrow.ArrowException) as error:
+            table = parquet.read_table(path)
+        else:
+            with path.open("rb") as file:
+                file.seek(MAGIC)
+                stream = arrow.ipc.open_stream(file)
+                table = arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
+        table.validate(full=True)  # lengths of texts, which would be read from anywhere
+        return table
+    except (OSError, ValueError, MemoryError, arrow.ArrowException) as error:
         if limit := not_its_fault(error):
             raise InputError(f"{called}: cannot be read: {limit}") from error
         said = " ".join(f"{error}".split())
