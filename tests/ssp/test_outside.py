@@ -114,6 +114,15 @@ def test_a_column_drives_all_that_an_input_leads_to(load, tmp_path, text):
     assert run["sub_b.y_Real"] == pytest.approx([1e3 * x for x in wanted], rel=1e-12)
 
 
+def test_a_value_for_what_a_column_drives_is_refused(path, tmp_path, command):
+    (tmp_path / "drive.csv").write_text("time,Height\n0,1\n")
+    line = ["run", path, "--step", "0.5", "--input", "drive.csv"]
+    for place in ("Height", "sub_b.u_Real"):
+        code, _, err = command(*line, "--set", f"{place}=1")
+        assert code == 2
+        assert f"--set {place}: does nothing, as drive.csv drives it" in err
+
+
 MISTAKES = {
     "height\n0,1": "line 1, column 2, height: no input 'height'; did you mean Height?",
     "Height [K]\n0,1": "column 2, Height [K]: cannot be converted; must be a unit of the quantity",

@@ -13,6 +13,7 @@ import click
 
 from ..base.errors import InputError
 from ..base.progress import phase
+from ..system.connectors import reached
 from ..system.description import System, read_system
 from ..system.record import Record
 from ..system.stimuli import Stimuli, read_stimuli
@@ -180,11 +181,13 @@ def chosen_system(given: Mapping[str, Any]) -> System:
         way = settings.pop("input.interpolation", "linear")
         stimuli = read_stimuli(settings.pop("input.file"), way, "--set input.interpolation")
         stimuli = replace(stimuli, partial=True)  # FMUs may yet be swapped
-        for port in stimuli.columns:
-            if str(port) in settings:
-                raise InputError(f"--set {port}: does nothing, as {stimuli.file} drives it")
     variant = settings.pop("experiment.variant", None)
     loaded = load_system(given.get("system"), times, stimuli, variant)
+    if loaded.input:
+        columns = {str(port) for port in loaded.input.columns}
+        for place in settings:
+            if columns.issuperset(reached(loaded, place)):
+                raise InputError(f"--set {place}: does nothing, as {loaded.input.file} drives it")
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
     system = loaded
     if law := given.get("controller"):

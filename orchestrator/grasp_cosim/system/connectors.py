@@ -78,6 +78,12 @@ def check_connectors(system: Structure) -> None:
             change_along(system, name, way)
 
 
+def reached(system: Structure, name: str) -> list[str]:
+    """The variables that a value goes to by its name: its own, or those behind an input."""
+    given = system.inputs.get(name)
+    return [str(way.port) for way in given.ways] if given else [name]
+
+
 def given_by_connectors(
     system: Structure, settings: Mapping[str, Any], place: Place
 ) -> tuple[dict[str, Any], Place]:
