@@ -1,5 +1,6 @@
 """FMUs for model exchange are integrated to their exact solutions, event by event."""
 
+import re
 import sys
 from ctypes import c_double
 from pathlib import Path
@@ -185,6 +186,17 @@ def test_what_does_not_go_on_ends_in_one_line(tmp_path, kind):
         run(part("odd", tmp_path, kind=kind), 0.1, 1.0)
     assert "\n" not in str(caught.value)
     assert caught.value.result is not None
+
+
+def test_warnings_of_its_evaluations_are_in_the_log(tmp_path):
+    result = run(part("odd", tmp_path, kind=11), 0.1, 1.0)
+    assert result["odd.x"][-1] == pytest.approx(1.0, rel=1e-9)
+    (line,) = (line for line in result.log if "warning" in line)
+    first, followed = line.split("; ")
+    assert re.fullmatch(
+        r"odd: warning at t = 0\.[56]\d* s: an evaluation returned a warning", first
+    )
+    assert int(followed.removesuffix(" more followed")) > 5
 
 
 def test_a_session_and_its_settings(tmp_path):

@@ -67,6 +67,7 @@ class ModelInstance(LoadedInstance):
         self._started = False
         self._step = 0.0
         self._zero: npt.NDArray[np.bool_] | None = None
+        self._warnings_noted = 0
         super().__init__(name, interface, chosen.relative_tolerance, logging)
 
     @property
@@ -288,6 +289,8 @@ class ModelInstance(LoadedInstance):
                 status = self._set_states(states, self._states)
             if status <= WARNING:
                 status = get(values, size)
+            if status == WARNING:
+                self._note_warning()
             if status > DISCARD:
                 self._failed = status
             return 0 if status <= WARNING else 1 if status == DISCARD else -1
@@ -301,8 +304,16 @@ class ModelInstance(LoadedInstance):
         return values
 
     def _check(self, status: int) -> None:
+        if status == WARNING:
+            self._note_warning()
         if status > WARNING:
             raise self.failure(status, self._now)
+
+    def _note_warning(self) -> None:
+        """Keep a warning that a call returned, unless the FMU has logged one since the last."""
+        if self._messages.count == self._warnings_noted:
+            self._messages.returned("an evaluation")
+        self._warnings_noted = self._messages.count
 
     def _stuck(self, error: CvodeError) -> SimulationError:
         """The error for a step that the solver could not take."""

@@ -5,9 +5,10 @@
  * there that adds 1 to x in each of three iterations, the first of which alone says so. STANDS: each
  * event names the next one for now. PAST, NOWHERE: that at 0.5 s names one before it, or
  * at NaN. FAILS, DISCARDS: no slope from x = 0.5 on. NO_NUMBER: it is none from there.
+ * WARNS: with a warning from there.
  */
 enum { TIME, X, DER_X, RATE, KIND, EVENT_COUNT, U, VARIABLES };
-enum { RELAY = 1, STEPS, ENDLESS, ITERATES, STANDS, FAILS, DISCARDS, NO_NUMBER, PAST, NOWHERE };
+enum { RELAY = 1, STEPS, ENDLESS, ITERATES, STANDS, FAILS, DISCARDS, NO_NUMBER, PAST, NOWHERE, WARNS };
 #define STATES 1
 #define INDICATORS 1
 #define EVENTS
@@ -23,6 +24,7 @@ static void equations(Model *m) {
     bool beyond = *real(m, X) > 0.5;
 
     m->status = beyond && kind(m) == FAILS ? 3 : beyond && kind(m) == DISCARDS ? 2 : 0;
+    if (beyond && kind(m) == WARNS) m->status = 1;
     *real(m, DER_X) = beyond && kind(m) == NO_NUMBER ? NAN : *real(m, RATE);
 }
 
