@@ -66,7 +66,8 @@ typedef struct {
 } Plan;
 
 typedef struct { /* of system/times.py, in ticks: point k is at start + k * step */
-    int64_t start, step, per_second;
+    int64_t start, step;
+    double per_second;
 } Clock;
 
 typedef struct { /* what the loop and others tell each other while it runs */
@@ -222,7 +223,7 @@ static double drive(Drive *d, int64_t time) {
 
 /* The communication point k in s. */
 static double point(const Clock *clock, int64_t k) {
-    return (double)(clock->start + k * clock->step) / (double)clock->per_second;
+    return (double)(clock->start + k * clock->step) / clock->per_second;
 }
 
 /* Count a warning; of the first one the time of the step is kept. */
@@ -287,7 +288,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, cons
 int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t operation,
             int64_t start, int64_t stop, int64_t start_ticks, int64_t step_ticks,
             int64_t per_second, Shared *shared) {
-    const Clock clock = {start_ticks, step_ticks, per_second};
+    const Clock clock = {start_ticks, step_ticks, (double)per_second};
     int64_t k;
 
     shared->operation = shared->status = 0;
