@@ -3,7 +3,9 @@
 import json
 
 import pytest
+from grasp_cosim.inspection import loading
 from grasp_cosim.inspection.inspection import as_text, inspect_fmu
+from grasp_cosim.interface import read
 from ssp.hand_made import described
 from support.native_fmus import needs_gcc, talker
 
@@ -168,3 +170,13 @@ def test_the_categories_of_its_log_are_listed(tmp_path):
     names = ["logEvents", "logSecrets", "logStatusWarning", "logStatusError"]
     assert report["log_categories"] == names
     assert f"log categories      {', '.join(names)}\n" in as_text(report)
+
+
+def test_an_fmu_is_read_once(archive, monkeypatch):
+    """A large one takes seconds."""
+    path, reads = archive(FMI_2), []
+    plain = read.read_document
+    monkeypatch.setattr(read, "read_document", lambda fmu: reads.append(fmu) or plain(fmu))
+    inspect_fmu(path)
+    loading.examine(path)
+    assert reads == [path]
