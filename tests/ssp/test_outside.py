@@ -201,6 +201,22 @@ def test_an_archive_that_is_written_anew_has_them(load, tmp_path):
 
 
 @needs_gcc
+def test_values_of_each_kind_are_passed_on_and_recorded_as_they_are(tmp_path):
+    kinds = ("Boolean", "Enumeration", "Integer", "String")
+    drawn = "".join(connect(k, f"a/u_{k}") + connect(f"a/y_{k}", f"{k}_out") for k in kinds)
+    listed = "; ".join(f"input {k}; output {k}_out" for k in kinds)
+    whole = connect("a/y_Integer", "whole")
+    top = system("top", component("a"), drawn + whole, f"{listed}; output whole Real")
+    entries = {"resources/a.fmu": build(tmp_path, "a", "2.0").read_bytes()}
+    loaded = System.load(archive(tmp_path, structure(top), {}, entries), step=0.5)
+    given = {"Boolean": "true", "Enumeration": "two", "Integer": 7, "String": "x"}
+    run = simulate(loaded.with_values(given))
+    names = [f"{kind}_out" for kind in kinds]
+    assert [run[name][-1] for name in (*names, "whole")] == [True, 2, 7, "x", 7.0]
+    assert [run[name].dtype.kind for name in (*names, "whole")] == [*"biiO", "f"]
+
+
+@needs_gcc
 def test_a_sweep_varies_an_input_in_si_units(load):
     metres = [3.048, 6.096]
     table = sweep(load(), {"Height": metres}, metrics=[deepest], workers=1)

@@ -219,9 +219,10 @@ class Taps:
     def __call__(self, rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """The outputs in the order of the signals; not finite where a value is beyond a float64."""
         values: npt.NDArray[np.float64] = rows[:, self._columns]
-        with np.errstate(over="ignore", invalid="ignore"):
-            for i, change in self._changes:
-                values[:, i] = change(values[:, i])
+        if self._changes:
+            with np.errstate(over="ignore", invalid="ignore"):
+                for i, change in self._changes:
+                    values[:, i] = change(values[:, i])
         return values
 
 
