@@ -41,7 +41,7 @@ def test_files_and_archives_have_the_same_times(tmp_path):
     system = rigid(tmp_path, 'step = "1/30"\nstart = "-1/3"\nstop = "1/3"', more)
     write_ssp(system, tmp_path / "rigid.ssp")
     again = System.load(tmp_path / "rigid.ssp")
-    assert (again.clock, again.stop_ns) == (system.clock, system.stop_ns)
+    assert (again.time_grid, again.stop_ns) == (system.time_grid, system.stop_ns)
     assert again.period("a") == 2
     run = simulate(again)
     run.to_csv(tmp_path / "signals.csv")

@@ -7,7 +7,7 @@ import pytest
 from grasp_cosim import InputError
 from grasp_cosim.system.times import (
     NANOSECONDS,
-    Clock,
+    TimeGrid,
     first_step,
     in_nanoseconds,
     in_seconds,
@@ -91,15 +91,15 @@ def test_a_declared_step_is_never_taken_shorter():
 @pytest.mark.parametrize("start", ["0", "-7/3", "1/7", "0.001"])
 def test_labels_are_the_nearest_floats(per_second, start):
     begin, step = Fraction(start), Fraction(1, per_second)
-    clock = Clock.of(begin * NANOSECONDS, step * NANOSECONDS)
+    grid = TimeGrid.of(begin * NANOSECONDS, step * NANOSECONDS)
     steps = np.array([0, 1, 2, 3, 29, 30, 1001, 123_456_789])
     exact = [float(begin + k * step) for k in steps.tolist()]
-    assert clock.times(steps).tolist() == exact
+    assert grid.times(steps).tolist() == exact
 
 
 def test_whole_nanoseconds_are_counted_as_such():
-    assert Clock.of(5, 1000) == (5, 1000, NANOSECONDS)
-    assert Clock.of(0, ns(1, 1024)) == (0, 1_953_125, 2 * NANOSECONDS)
+    assert TimeGrid.of(5, 1000) == (5, 1000, NANOSECONDS)
+    assert TimeGrid.of(0, ns(1, 1024)) == (0, 1_953_125, 2 * NANOSECONDS)
 
 
 def test_the_first_point_at_or_after_a_time():

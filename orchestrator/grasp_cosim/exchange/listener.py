@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from ..system.times import Clock, Time, nearest_time
+from ..system.times import Time, TimeGrid, nearest_time
 
 
 class Texts:
@@ -76,7 +76,7 @@ class Experiment:
 
     def times(self, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
         """The communication points in s."""
-        return Clock.of(self.start_ns, self.step_ns).times(steps)
+        return TimeGrid.of(self.start_ns, self.step_ns).times(steps)
 
 
 class Listener(Protocol):

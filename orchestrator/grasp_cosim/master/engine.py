@@ -115,8 +115,8 @@ class CompiledLoop:
         operation: int,
         start: int,
         stop: int,
-        start_ticks: int,
-        step_ticks: int,
+        grid_start: int,
+        grid_step: int,
         per_second: int,
         row: int | None = None,
     ) -> tuple[int, int, int]:
@@ -126,13 +126,13 @@ class CompiledLoop:
         if row is None:
             self.shared.taken, row = start, 0
         place, room = rows.ctypes.data, len(rows)
-        clock = start_ticks, step_ticks, per_second
-        step = self._run(tables, place, room, row, operation, start, stop, *clock, shared)
+        grid = grid_start, grid_step, per_second
+        step = self._run(tables, place, room, row, operation, start, stop, *grid, shared)
         return step, self.shared.operation, self.shared.status
 
 
 Loop = Callable[[Any, int, int, int, int, int, int], tuple[int, int, int]] | CompiledLoop
-"""loop.run() over a plan: takes rows, operation, start, stop, and the clock of a run."""
+"""loop.run() over a plan: takes rows, operation, start, stop, and the grid of its times."""
 
 
 def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:

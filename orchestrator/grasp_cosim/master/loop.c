@@ -65,10 +65,10 @@ typedef struct {
     double *warned; /* of each call, how many warnings it returned, and the time of the first */
 } Plan;
 
-typedef struct { /* of system/times.py, in ticks: point k is at start + k * step */
+typedef struct { /* of system/times.py, in counts: point k is at start + k * step */
     int64_t start, step;
     double per_second;
-} Clock;
+} TimeGrid;
 
 typedef struct { /* what the loop and others tell each other while it runs */
     int64_t operation, status; /* why it ended; 0, 0 at the end */
@@ -207,7 +207,7 @@ static void store(const Buffer *buffer, int64_t i, double value) {
     }
 }
 
-/* The value at a time in ticks, which is not before that of the last call. */
+/* The value at a time in counts, which is not before that of the last call. */
 static double drive(Drive *d, int64_t time) {
     const int64_t *times = d->times;
     const double *samples = d->samples;
@@ -222,8 +222,8 @@ static double drive(Drive *d, int64_t time) {
 }
 
 /* The communication point k in s. */
-static double point(const Clock *clock, int64_t k) {
-    return (double)(clock->start + k * clock->step) / clock->per_second;
+static double point(const TimeGrid *grid, int64_t k) {
+    return (double)(grid->start + k * grid->step) / grid->per_second;
 }
 
 /* Count a warning; of the first one the time of the step is kept. */
@@ -233,14 +233,14 @@ static void note_warning(double *warned, double time) {
 }
 
 /* Do one operation in step k; 0, or the status that ends the loop. */
-static int operate(const Plan *plan, const Operation *operation, int64_t k, const Clock *clock,
+static int operate(const Plan *plan, const Operation *operation, int64_t k, const TimeGrid *grid,
                    const Shared *shared) {
     double *values = plan->values;
     int64_t i, begin = operation->first, end = operation->last;
 
     switch (operation->kind) {
     case STEP:
-        plan->clock[0] = point(clock, k + 1 - operation->period);
+        plan->clock[0] = point(grid, k + 1 - operation->period);
         /* fall through */
     case CALL: {
         int status = invoke(&plan->calls[begin], plan->clock, shared);
@@ -269,7 +269,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, cons
     case DRIVE:
         for (i = begin; i < end; i++) {
             Drive *d = &plan->drives[i];
-            values[d->slot] = drive(d, clock->start + (k - operation->phase) * clock->step);
+            values[d->slot] = drive(d, grid->start + (k - operation->phase) * grid->step);
         }
         return 0;
     default: /* LOAD and LOAD_LONG */
@@ -286,15 +286,15 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, cons
 
 /* rows has room for so many, of which the first step takes the given one; then it begins anew. */
 int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t operation,
-            int64_t start, int64_t stop, int64_t start_ticks, int64_t step_ticks,
+            int64_t start, int64_t stop, int64_t grid_start, int64_t grid_step,
             int64_t per_second, Shared *shared) {
-    const Clock clock = {start_ticks, step_ticks, (double)per_second};
+    const TimeGrid grid = {grid_start, grid_step, (double)per_second};
     int64_t k;
 
     shared->operation = shared->status = 0;
     for (k = start; k < stop; k++) {
         plan->clock[1] = (double)k;
-        plan->clock[2] = point(&clock, k + 1);
+        plan->clock[2] = point(&grid, k + 1);
         if (k - __atomic_load_n(&shared->taken, __ATOMIC_ACQUIRE) >= room) {
             shared->operation = operation;
             shared->status = FULL;
@@ -303,7 +303,7 @@ int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t o
         for (; operation < plan->size; operation++) {
             const Operation *o = &plan->operations[operation];
             if (o->period == 1 || k % o->period == o->phase) {
-                int status = operate(plan, o, k, &clock, shared);
+                int status = operate(plan, o, k, &grid, shared);
                 if (status) {
                     shared->operation = operation;
                     shared->status = status;

@@ -46,28 +46,28 @@ def run(
     operation: int,
     start: int,
     stop: int,
-    start_ticks: int,
-    step_ticks: int,
+    grid_start: int,
+    grid_step: int,
     per_second: int,
 ) -> tuple[int, int, int]:
     """Do the steps from start to stop, the first from the given operation on.
 
     The tables are those of a plan; values, clock, buffers, warned and rows are memory views. Step 0
-    begins at start_ticks, and there are per_second of these. After step k the values go into rows,
+    begins at grid_start, and there are per_second of these. After step k the values go into rows,
     one row of len(values) after the other. clock holds the time in s at which the component that
     steps now begins, the step number, and the time at which the step ends. Returns the step
     reached, and where a call's status is a bad one, the operation and the status (else 0 and 0).
     """
-    width, size, ticks = len(values), len(operations), float(per_second)
+    width, size, counts = len(values), len(operations), float(per_second)
     for k in range(start, stop):
         clock[1] = k
-        clock[2] = (start_ticks + (k + 1) * step_ticks) / ticks
+        clock[2] = (grid_start + (k + 1) * grid_step) / counts
         while operation < size:
             what, begin, end, period, phase = operations[operation]
             if k % period == phase:
                 if what >= CALL:
                     if what == STEP:
-                        clock[0] = (start_ticks + (k + 1 - period) * step_ticks) / ticks
+                        clock[0] = (grid_start + (k + 1 - period) * grid_step) / counts
                     status = calls[begin]()
                     if status:
                         if status > WORST:
@@ -83,7 +83,7 @@ def run(
                     for buffer, index, slot in casts[begin:end]:
                         store(buffers[buffer], index, values[slot])
                 elif what == DRIVE:
-                    time = start_ticks + (k - phase) * step_ticks
+                    time = grid_start + (k - phase) * grid_step
                     for drive in drives[begin:end]:
                         values[drive.slot] = drive.at(time)
                 else:

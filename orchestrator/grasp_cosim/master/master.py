@@ -100,7 +100,7 @@ class Master:
         self._rows = np.empty((room, len(self.values)))
         self._rows.fill(0.0)  # its memory is there from now on
         self._cpus = cpus() if self._alone else []
-        self._clock = system.clock
+        self._grid = system.time_grid
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
 
@@ -141,7 +141,7 @@ class Master:
                 self._end(instance, ended, 0)
         for port, slot in self.slots.items():
             drive = self._drives.get(port)
-            value = drive.at(self._clock.start) if drive else values[port]
+            value = drive.at(self._grid.start) if drive else values[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             if port in self._used:
@@ -275,7 +275,7 @@ class Master:
         try:
             while step < (until := min(stop, self.total_steps)):
                 rows = self._rows[step - self._base :]
-                step, operation, status = self._loop(rows, operation, step, until, *self._clock)
+                step, operation, status = self._loop(rows, operation, step, until, *self._grid)
                 if status:
                     self.steps_done = step
                     self._resolve(step, operation, status)
@@ -305,7 +305,7 @@ class Master:
                 while step < (until := min(stop, self.total_steps)):
                     row = (step - self._base) % len(self._rows)
                     step, operation, status = compiled(
-                        self._rows, operation, step, until, *self._clock, row
+                        self._rows, operation, step, until, *self._grid, row
                     )
                     if status == loop.OVERRUN:
                         raise pacer.overrun()

@@ -268,7 +268,7 @@ def _in_turn(chain: Sequence[tuple[Act, Window]], value: float, step: int) -> fl
 
 @dataclass(slots=True)
 class Drive:
-    """The samples of an input at times in ticks, and its slot; row is the last one until now.
+    """The samples of an input at times in counts, and its slot; row is the last one until now.
 
     The compiled loop has the same in a table, with the same bits.
     """
@@ -322,8 +322,8 @@ def tunings_of(system: System) -> list[Tuning]:
     times = np.asarray(ticks_of(system), np.int64)
     tunings = []
     for port in driven_parameters(system):
-        interval = system.period(port.component) * system.clock.step
-        points = np.maximum(-((system.clock.start - times) // interval), 0)
+        interval = system.period(port.component) * system.time_grid.step
+        points = np.maximum(-((system.time_grid.start - times) // interval), 0)
         samples = np.asarray(samples_of(system, port), np.float64)
         last = np.append(points[1:] != points[:-1], True)  # of the rows up to a point, its value
         points, samples = points[last], samples[last]
@@ -343,20 +343,20 @@ def tunings_of(system: System) -> list[Tuning]:
 
 
 def ticks_of(system: System) -> array[int]:
-    """The times of the rows of stimuli in ticks of the run.
+    """The times of the rows of stimuli in counts of the run's grid.
 
     A row is taken to the nanosecond: one that is that near to a communication point is at it.
     """
-    clock, rows = system.clock, system.input.times if system.input else ()
-    if clock.per_nanosecond == 1:
+    grid, rows = system.time_grid, system.input.times if system.input else ()
+    if grid.per_nanosecond == 1:
         return array("q", rows)
-    ticks = array("q")
+    counts = array("q")
     for time in rows:
-        exact_time = clock.per_nanosecond * time
-        nearest_point = round(Fraction(exact_time - clock.start, clock.step))
-        point = clock.start + nearest_point * clock.step
-        ticks.append(point if 2 * abs(point - exact_time) <= clock.per_nanosecond else exact_time)
-    return ticks
+        exact_time = grid.per_nanosecond * time
+        nearest_point = round(Fraction(exact_time - grid.start, grid.step))
+        point = grid.start + nearest_point * grid.step
+        counts.append(point if 2 * abs(point - exact_time) <= grid.per_nanosecond else exact_time)
+    return counts
 
 
 def drives_of(system: System, slots: dict[Port, int]) -> dict[Port, Drive]:
@@ -376,7 +376,7 @@ def at_start(system: System, drives: dict[Port, Drive], name: str) -> dict[str, 
     """The values at the start of the inputs of a component that are driven."""
     by_name = system.component(name, name).interface.by_name
     return {
-        port.variable: of_kind(by_name[port.variable].kind, drive.at(system.clock.start))
+        port.variable: of_kind(by_name[port.variable].kind, drive.at(system.time_grid.start))
         for port, drive in drives.items()
         if port.component == name
     }

@@ -26,7 +26,7 @@ from .parts import (
 )
 from .record import Record
 from .stimuli import Stimuli
-from .times import LONGEST, Clock, Time, in_nanoseconds
+from .times import LONGEST, Time, TimeGrid, in_nanoseconds
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -78,9 +78,9 @@ class Structure:
         return int((self.stop_ns - self.start_ns) // self.step_ns)
 
     @property
-    def clock(self) -> Clock:
+    def time_grid(self) -> TimeGrid:
         """The communication points as a run counts them."""
-        return Clock.of(self.start_ns, self.step_ns)
+        return TimeGrid.of(self.start_ns, self.step_ns)
 
     def time_ns(self, step: int) -> Time:
         """The time of a communication point."""

@@ -2,7 +2,7 @@
 
 A time is a number of nanoseconds: a whole one, or a fraction where a step is 1/30 s or 1/1024 s.
 So every float of seconds that a file, an FMU or a run.json holds means one time, and the nearest
-float of that time is what it was. A run counts in ticks, whole numbers alone: see Clock.
+float of that time is what it was. A run counts in whole numbers alone: see TimeGrid.
 """
 
 from __future__ import annotations
@@ -128,11 +128,11 @@ def multiple(*times: Time) -> Time:
     return _plain(Fraction(math.lcm(*(int(time * per_ns) for time in times)), per_ns))
 
 
-class Clock(NamedTuple):
-    """The communication points of a run in ticks: point k is at start + k * step.
+class TimeGrid(NamedTuple):
+    """The communication points of a run, in counts: point k is at start + k * step.
 
-    A tick is 1 ns, or the longest part of it of which start and step are whole numbers. Below 2**53
-    of them the time of a point is the float nearest to it.
+    A count is 1 ns, or the longest part of it of which start and step are whole numbers. Below
+    2**53 of them the time of a point is the float nearest to it.
     """
 
     start: int
@@ -140,19 +140,19 @@ class Clock(NamedTuple):
     per_second: int
 
     @classmethod
-    def of(cls, start: Time, step: Time) -> Clock:
-        """The clock of points from start on in the given steps."""
+    def of(cls, start: Time, step: Time) -> TimeGrid:
+        """The grid of points from start on in the given steps."""
         per_ns = math.lcm(start.denominator, step.denominator)
         return cls(int(start * per_ns), int(step * per_ns), per_ns * NANOSECONDS)
 
     @property
     def per_nanosecond(self) -> int:
-        """The ticks in a nanosecond."""
+        """The counts in a nanosecond."""
         return self.per_second // NANOSECONDS
 
     @property
     def last(self) -> float:
-        """The time in s until which it is exact; infinite for ticks of 1 ns, as it is not asked."""
+        """The time in s until which it is exact; infinite for counts of 1 ns: nobody asks."""
         return math.inf if self.per_nanosecond == 1 else EXACT / self.per_second
 
     def times(self, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:

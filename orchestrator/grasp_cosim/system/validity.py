@@ -27,7 +27,7 @@ from .stimuli import Column, Stimuli
 from .structure import Structure, unit_of
 from .times import NANOSECONDS, seconds, written
 
-LARGEST_TICKS = 2**62
+LARGEST_COUNT = 2**62
 """Ticks that the times of stimuli may be away from 0, so that their distances fit into 64 bits."""
 
 
@@ -269,13 +269,13 @@ def check_steps(system: Structure) -> None:
 
 def _check_exact(system: Structure) -> None:
     """InputError where times that are no whole numbers of ns are too long to be exact."""
-    clock = system.clock
+    grid = system.time_grid
     last = system.input.times[-1] if system.input else 0
     furthest = max(-system.start_ns, system.stop_ns, last)
-    if furthest > clock.last * NANOSECONDS:
+    if furthest > grid.last * NANOSECONDS:
         raise InputError(
             f"step = {written(system.step_ns)} s from start = {written(system.start_ns)} s: times "
-            f"are exact until {clock.last:.4g} s; all must be before that, or whole numbers of ns"
+            f"are exact until {grid.last:.4g} s; all must be before that, or whole numbers of ns"
         )
 
 
@@ -405,7 +405,7 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
     for event in system.events:
         for port in event.set:
             sources |= dict.fromkeys(system.elements(port), "an event")
-    longest = LARGEST_TICKS // system.clock.per_nanosecond
+    longest = LARGEST_COUNT // system.time_grid.per_nanosecond
     if stimuli.times[0] < -longest or stimuli.times[-1] > longest:
         raise InputError(
             f"{stimuli.file}: from {seconds(stimuli.times[0])} to {seconds(stimuli.times[-1])}; "
