@@ -2,13 +2,16 @@
 
 The wheel and the sdist, the FMUs in Python and as C for every platform, the grasps as SSP archives,
 the playground, SHA256SUMS, and index.html, which says what each is. zig (in the extra native)
-compiles for all platforms, so that none of it depends on the machine.
+compiles for all platforms, so that none of it depends on the machine. It takes a few minutes the
+first time, mostly for zig's own libraries of Windows; what is going on is told on the way.
 """
 
 import hashlib
+import logging
 import re
 import shutil
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from string import Template
@@ -30,6 +33,16 @@ NATIVE: dict[str, tuple[Version, Sequence[str]]] = {
     "fmi3": (3, ("linux64", "win64", "darwin64", "aarch64-linux")),
 }
 """The folders of FMUs as C, the version of FMI, and the platforms that their binaries are for."""
+
+FOLDERS = (*NATIVE, "python")
+"""Those of FMUs."""
+
+MADE_BY = """`make dist` makes the release in `dist/`; its `index.html` says what each file is.
+
+    make dist
+"""
+OF_THE_SOURCES = "Pages in brackets are in the sources, the `.tar.gz`.\n"
+"""In the place of MADE_BY, for who has the release."""
 
 WHAT = {
     "fmi2": "FMUs as C, FMI 2.0, for Linux (x86-64), Windows and macOS: for Simulink, Dymola, "
@@ -64,6 +77,13 @@ $rows
 <table>
 $fmus
 </table>
+<h3>For the cross-check</h3>
+<p>Beside each FMU are the inputs that it can be tried with (<code>NAME_in.csv</code>), the results
+that are right for them (<code>NAME_ref.csv</code>) and the options of such a run
+(<code>NAME_ref.opt</code>), as the rules of the FMI cross-check have them.</p>
+$cross_checks
+<h2 id="ssp">The archives</h2>
+<p>$archives</p>
 $more
 </html>
 """)
@@ -73,11 +93,14 @@ def write_release(out: Path) -> list[Path]:
     """Write all files of a release into the empty folder `out`; returns them in order."""
     out.mkdir(parents=True)
     for name in (build_wheel(str(out)), build_sdist(str(out))):
-        print(out / name)
+        tell(f"{name}: written")
     for folder, (fmi, names) in NATIVE.items():
+        tell(f"{folder}: FMUs as C, FMI {fmi}.0, for {', '.join(names)}")
         build_native(out / folder, planned(targets(names), fmi))
+    tell("python: the FMUs that Python runs")
     build(out / "python")
     for name, system in systems(out / "fmi2"):
+        tell(f"ssp: {name}")
         (out / "ssp").mkdir(exist_ok=True)
         write_ssp(system, out / "ssp" / name)
     shutil.copyfile(ROOT / "docs/playground.html", out / "playground.html")
@@ -85,7 +108,24 @@ def write_release(out: Path) -> list[Path]:
     sums = (f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {_in(out, path)}" for path in files)
     write_text(out / "SHA256SUMS", "".join(f"{line}\n" for line in sums))
     write_text(out / "index.html", page(out))
+    tell(f"{len(files) + 2} files, in {out}")
     return [*files, out / "SHA256SUMS", out / "index.html"]
+
+
+def tell(line: str) -> None:
+    """Print a line, with the time since the start in s."""
+    print(f"{time.perf_counter() - START:4.0f} s  {line}", file=sys.stderr, flush=True)
+
+
+class Told(logging.Handler):
+    """Tells what is logged: each library that was compiled."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Tell the message."""
+        tell(f"  {record.getMessage()}")
+
+
+START = time.perf_counter()
 
 
 def systems(fmus: Path) -> Iterator[tuple[str, System]]:
@@ -101,25 +141,59 @@ def systems(fmus: Path) -> Iterator[tuple[str, System]]:
 
 
 def page(out: Path) -> str:
-    """The page that says what each file is, with its size."""
+    """The page that says what each file is, and links to it."""
     version = next(out.glob("*.whl")).name.split("-")[1]
     rows = (
-        f'<tr><td><a href="{_in(out, path)}">{_in(out, path)}</a><td>{text}'
+        f"<tr><td>{_link(out, path)}<td>{text}"
         for pattern, text in WHAT.items()
         for path in sorted(out.glob(pattern))
     )
-    models = map(read_model_description, sorted((out / "fmi2").glob("*.fmu")))
-    fmus = (f"<tr><td>{model.modelName}<td>{model.description}" for model in models)
     return PAGE.substitute(
-        version=version, rows="\n".join(rows), fmus="\n".join(fmus), more=into_your_tool()
+        version=version,
+        rows="\n".join(rows),
+        fmus="\n".join(_fmus(out)),
+        cross_checks="\n".join(_cross_checks(out)),
+        archives=", ".join(_link(out, path) for path in sorted((out / "ssp").iterdir())),
+        more=into_your_tool(),
     )
 
 
+def _fmus(out: Path) -> Iterator[str]:
+    """The rows of a table of all FMUs, with a column for each folder."""
+    heads = "".join(f'<th id="{folder}">{folder}' for folder in FOLDERS)
+    yield f"<tr><th>{heads}<th>"
+    for path in sorted((out / "fmi2").glob("*.fmu")):
+        model = read_model_description(path)
+        links = (_link(out, out / folder / path.name, "FMU") for folder in FOLDERS)
+        cells = "".join(f"<td>{link}" for link in links)
+        yield f"<tr><td>{model.modelName}{cells}<td>{model.description}"
+
+
+def _cross_checks(out: Path) -> Iterator[str]:
+    """The files beside the FMUs of each folder."""
+    for folder in FOLDERS:
+        files = sorted(path for path in (out / folder).iterdir() if path.suffix != ".fmu")
+        links = ", ".join(_link(out, path, path.name) for path in files)
+        yield f"<details><summary>{folder}, {len(files)} files</summary><p>{links}</p></details>"
+
+
+def _link(out: Path, path: Path, text: str = "") -> str:
+    """A link to a file, or to what the page tells of the files of a folder."""
+    place = _in(out, path)
+    return f'<a href="{"#" if path.is_dir() else ""}{place}">{text or place}</a>'
+
+
 def into_your_tool() -> str:
-    """That page as HTML, without its links to other pages, which a release does not have."""
+    """That page as HTML; of pages that it links to, which are in the sources, it says so."""
     text = (ROOT / "docs/into_your_tool.md").read_text("utf-8")
-    alone = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", text.replace("# Into", "## Into", 1))
+    text = text.replace("# Into", "## Into", 1).replace(MADE_BY, OF_THE_SOURCES)
+    alone = re.sub(r"\[([^]]*)\]\(([^)#]*)[^)]*\)", _in_the_sources, text)
     return str(MarkdownIt().enable("table").render(alone))
+
+
+def _in_the_sources(link: re.Match[str]) -> str:
+    path = (ROOT / "docs" / link[2]).resolve().relative_to(ROOT)
+    return f"{link[1]} (`{path.as_posix()}`)"
 
 
 def _in(out: Path, path: Path) -> str:
@@ -130,5 +204,7 @@ if __name__ == "__main__":
     folder = Path(*sys.argv[1:]) if sys.argv[1:] else ROOT / "dist"
     if folder.exists():
         shutil.rmtree(folder)
+    logging.getLogger("grasp_cosim.base.c_compilers").setLevel(logging.INFO)
+    logging.getLogger("grasp_cosim.base.c_compilers").addHandler(Told())
     for written in write_release(folder):
         print(written)

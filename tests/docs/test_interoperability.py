@@ -67,8 +67,9 @@ def row(name):
 
 
 def tool(name, *needed):
-    """The Python with the tool of a row; else the test is skipped."""
-    return python_with(row(name).tool, row(name).version, *needed)
+    """The Python with the tool of a row, and what it stands on there; else the test is skipped."""
+    version, *others = row(name).version.split(", ")
+    return python_with(row(name).tool, version, *needed, **dict(other.split() for other in others))
 
 
 def kept(name, theirs, ours):
@@ -181,6 +182,16 @@ def test_cofmupy(kinds, kind, tmp_path):
     }
     given = asked_of(system, inputs=inputs, **parts_of(system))
     kept("test_cofmupy", found(python, COFMUPY, tmp_path, given), force(system)[1:])
+
+
+@pytest.mark.interop
+def test_cofmupy_fails_beside_our_fmpy(kinds, tmp_path):
+    """Where it does not, the page has one row to tell less."""
+    python = tool("test_cofmupy_fails_beside_our_fmpy")
+    system = grasp_of(kinds["native"])
+    given = asked_of(system, inputs={c.name: {} for c in system.components}, **parts_of(system))
+    with pytest.raises(AssertionError, match="minimum"):
+        found(python, COFMUPY, tmp_path, given)
 
 
 @by_fmpy

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import cli, simulate
+from grasp_cosim.fmu_export.contract import declared
+from grasp_cosim.fmu_export.shipped import blocks
 from grasp_cosim.recording.folder import load_run
 from support.native_fmus import needs_gcc, vendor_plant
 from support.pictures import assert_same_picture
@@ -146,3 +148,13 @@ def try_commands(block, capsys):
         code = cli.main(shlex.split(command)[1:])
         assert capsys.readouterr().out.startswith(shown), command
         assert code == (1 if shown.startswith("NOT") else 0), command
+
+
+def test_the_parameters_that_are_no_numbers_are_counted():
+    """Those of the FMUs that come with the package, as into_your_tool.md tells."""
+    fields = [f for block in blocks().values() for f in declared(block)]
+    parameters = [f for f in fields if f.causality == "parameter"]
+    booleans = sum(f.kind is bool for f in parameters)
+    enumerations = sum(f.enumeration is not None for f in parameters)
+    said = f"of ours {booleans} are Booleans, .*, and {enumerations} enumerations"
+    assert re.search(said, page("into_your_tool"))

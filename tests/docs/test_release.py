@@ -1,5 +1,6 @@
 """A release: the same bytes twice, whole, and its files work by themselves."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,8 +9,7 @@ import fmpy
 import numpy as np
 import pytest
 from grasp_cosim import System, grasp_system, hand_system, simulate
-
-pytestmark = pytest.mark.platforms
+from release import into_your_tool
 
 SCRIPT = Path(__file__).parents[2] / "docs/release.py"
 
@@ -26,6 +26,7 @@ def releases(tmp_path_factory):
     return folder
 
 
+@pytest.mark.platforms
 def test_it_is_the_same_to_the_byte_and_whole(releases):
     one, two = releases / "one", releases / "two"
     files = [path.relative_to(one) for path in sorted(one.rglob("*")) if path.is_file()]
@@ -33,12 +34,24 @@ def test_it_is_the_same_to_the_byte_and_whole(releases):
     assert [f for f in files if (one / f).read_bytes() != (two / f).read_bytes()] == []
     subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=one, check=True)
     page = (one / "index.html").read_text("utf-8")
-    for path in one.iterdir():
-        assert path.name == "index.html" or f'href="{path.name}"' in page
+    named = {*re.findall(r'href="([^"]*)"', page)}
+    assert named - {f"#{name}" for name in re.findall(r'id="([^"]*)"', page)} == {
+        file.as_posix() for file in files if file.name != "index.html"
+    }
     for path in (one / "fmi2").glob("*.fmu"):
         assert f"<td>{path.stem}<td>" in page
 
 
+def test_what_the_page_tells_of_tools_links_nowhere_and_names_the_sources():
+    text = into_your_tool()
+    assert "href=" not in text
+    assert "make dist" not in text
+    named = set(re.findall(r"\(<code>([^<]*\.(?:md|svg))</code>\)", text))
+    assert {"docs/handoff.md", "docs/loop.svg", "plant/README.md"} <= named
+    assert [name for name in named if not (SCRIPT.parents[1] / name).is_file()] == []
+
+
+@pytest.mark.platforms
 @pytest.mark.parametrize(
     ("name", "like"),
     [
@@ -55,6 +68,7 @@ def test_an_archive_is_the_grasp(releases, name, like):
         assert np.array_equal(found.signals[signal], values), signal
 
 
+@pytest.mark.platforms
 @pytest.mark.parametrize("kind", ["fmi2", "fmi3", "python"])
 def test_fmpy_runs_an_fmu(releases, kind):
     found = fmpy.simulate_fmu(

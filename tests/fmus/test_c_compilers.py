@@ -135,6 +135,32 @@ def test_a_compiler_that_fails_is_heard_in_one_line(said, code, line, tmp_path):
     assert not (tmp_path / "cache/grasp-cosim/compiled").exists()
 
 
+ZIG = """\
+for word; do case $word in *.c) name=${{word%.c}};; esac; done
+echo "begin $name" >> {log}
+sleep {took}
+touch $name.so
+echo "end $name" >> {log}
+"""
+
+
+def test_the_first_library_that_zig_makes_for_a_target_goes_ahead(tmp_path, monkeypatch):
+    """The next would wait for it, with a processor; what is for another target does not wait."""
+    log = tmp_path / "log"
+    zigs = {}
+    for target, took in (("Windows", 0.1), ("Linux", 0.01)):
+        (tmp_path / target).mkdir()
+        zigs[target] = program(tmp_path / target / "zig", ZIG.format(log=log, took=took))
+    monkeypatch.setattr(c_compilers, "_processors", lambda: 2)
+    names = [f"{target}{number}" for number in range(3) for target in zigs]
+    jobs = [Job(n, {f"{n}.c": n.encode()}, zigs[n[:-1]]) for n in names]
+    assert [path.suffix for path in compile_all(jobs, tmp_path)] == [".so"] * len(jobs)
+    lines = log.read_text().splitlines()
+    assert lines.index("end Windows0") < lines.index("begin Windows1")
+    assert lines.index("begin Linux1") < lines.index("begin Windows1")
+    assert {line.split()[1] for line in lines} == {*names}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_no_compiler_outlives_us(number, code, tmp_path):

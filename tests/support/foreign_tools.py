@@ -121,17 +121,23 @@ def _version(python, distribution):
     return None if done.returncode else done.stdout.strip()
 
 
-def python_with(distribution, version, *needed):
-    """The Python that has it in this version and what else is needed; else the test is skipped."""
+def python_with(distribution, version, *needed, **versions):
+    """The Python that has it in this version and what else is needed; else the test is skipped.
+
+    `versions` are those of other distributions that must be there.
+    """
     pythons = [sys.executable, *filter(None, os.environ.get("GRASP_COSIM_TOOLS", "").split(":"))]
     there = [p for p in pythons if _version(p, distribution)]
     if not there:
         pytest.skip(f"{distribution} is not installed; GRASP_COSIM_TOOLS may name a Python with it")
+    exact = {distribution: version, **versions}
     for python in there:
-        if _version(python, distribution) == version and all(_version(python, n) for n in needed):
+        if all(_version(python, n) == v for n, v in exact.items()) and all(
+            _version(python, n) for n in needed
+        ):
             return python
     has = ", ".join(str(_version(p, distribution)) for p in there)
-    needs = "".join(f", with {name}" for name in needed)
+    needs = "".join(f", with {name}" for name in (*map(" ".join, versions.items()), *needed))
     pytest.skip(f"{distribution} is {has}; the page tells of {version}{needs}")
 
 

@@ -5,6 +5,7 @@ compiled is kept under a name made of its sources, the compiler and the flags: s
 """
 
 import importlib.util
+import logging
 import os
 import re
 import shlex
@@ -13,12 +14,18 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from . import cache
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
+
+LOGGER = logging.getLogger(__name__)
+"""Tells of each library that was compiled."""
 
 LIBM = (
     "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "erf",
@@ -47,6 +54,16 @@ class Compiler(NamedTuple):
     """A program that compiles, with its first arguments."""
 
     command: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """As messages call it: zig with its target, else the command."""
+        words = [word for word in self.command[1:] if not word.startswith("-")]
+        return " ".join([Path(self.command[0]).name, *words])
+
+    @property
+    def is_zig(self) -> bool:
+        """True for zig, which makes the libraries of a target itself."""
+        return Path(self.command[0]).stem.lower() == "zig"
 
     @property
     def identity(self) -> str:
@@ -134,31 +151,99 @@ def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
     As many at once as there are processors, while the next job is waited for. What cannot be kept
     stays in scratch. CompilerError where a compiler fails; however this ends, none runs on.
     """
-    most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    from concurrent.futures import ThreadPoolExecutor  # only where something is compiled
+
     libraries: dict[int, Path] = {}
-    running: dict[int, tuple[Job, Path, subprocess.Popen[str]]] = {}
-
-    def finish_first() -> None:
-        first = next(iter(running))
-        job, folder, process = running[first]
-        libraries[first] = cache.keep(_made(job, process, folder), job.kept_as)
-        del running[first]
-
-    try:
-        for i, job in enumerate(jobs):
+    with ThreadPoolExecutor(_processors()) as threads, closing(_Compiling(threads)) as compiling:
+        for number, job in enumerate(jobs):
             if library := cache.kept(job.kept_as):
-                libraries[i] = library
-                continue
-            if len(running) == most:
-                finish_first()
-            folder = Path(mkdtemp(dir=scratch))
-            running[i] = job, folder, _started(job, folder)
-        while running:
-            finish_first()
-        return [libraries[i] for i in sorted(libraries)]
-    finally:
-        for _, _, process in running.values():
-            _end(process)
+                libraries[number] = library
+            else:
+                libraries |= compiling.add(number, job, Path(mkdtemp(dir=scratch)))
+        libraries |= compiling.rest()
+    return [libraries[number] for number in sorted(libraries)]
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class _Running(NamedTuple):
+    """A job that is being done; its number among all."""
+
+    number: int
+    job: Job
+    process: subprocess.Popen[str]
+
+
+class _Compiling:
+    """Jobs that wait and jobs that run; each method returns the libraries made meanwhile.
+
+    Before its first library for a target zig makes its own, for Windows in minutes. Other jobs for
+    that target would wait for these with a processor each: they are started when the first is done.
+    """
+
+    def __init__(self, threads: "ThreadPoolExecutor") -> None:
+        """The threads wait for the compilers."""
+        self._threads = threads
+        self._waiting: list[tuple[int, Job, Path]] = []
+        self._running: "dict[Future[Path], _Running]" = {}
+        self._ready: set[Compiler] = set()
+        """Those that have made a library."""
+
+    def add(self, number: int, job: Job, folder: Path) -> dict[int, Path]:
+        """Take a job, which is done in a folder, once there is a processor for the next."""
+        self._waiting.append((number, job, folder))
+        self._start()
+        made: dict[int, Path] = {}
+        while len(self._running) == _processors():
+            made |= self._wait()
+            self._start()
+        return made
+
+    def rest(self) -> dict[int, Path]:
+        """Do all that is left."""
+        made: dict[int, Path] = {}
+        while self._running:
+            made |= self._wait()
+            self._start()
+        return made
+
+    def close(self) -> None:
+        """End what runs."""
+        for running in self._running.values():
+            _end(running.process)
+
+    def _start(self) -> None:
+        """Start what can be started of the jobs that wait, in their order."""
+        for entry in [*self._waiting]:
+            number, job, folder = entry
+            if len(self._running) < _processors() and not self._held_up(job.compiler):
+                self._waiting.remove(entry)
+                process = _started(job, folder)
+                future = self._threads.submit(_made, job, process, folder)
+                self._running[future] = _Running(number, job, process)
+
+    def _held_up(self, compiler: Compiler) -> bool:
+        """True while zig is at its first library for this target."""
+        first = compiler.is_zig and compiler not in self._ready
+        return first and any(r.job.compiler == compiler for r in self._running.values())
+
+    def _wait(self) -> dict[int, Path]:
+        """Wait for at least one of the jobs that run."""
+        from concurrent.futures import FIRST_COMPLETED, wait
+
+        made: dict[int, Path] = {}
+        done, _ = wait(self._running, return_when=FIRST_COMPLETED)
+        for future in sorted(done, key=lambda f: self._running[f].number):
+            library = future.result()
+            number, job, _ = self._running.pop(future)
+            made[number] = cache.keep(library, job.kept_as)
+            self._ready.add(job.compiler)
+            LOGGER.info("%s%s: compiled by %s", job.name, job.suffix, job.compiler)
+        return made
 
 
 def _started(job: Job, folder: Path) -> subprocess.Popen[str]:
@@ -187,8 +272,8 @@ def _made(job: Job, process: subprocess.Popen[str], folder: Path) -> Path:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a compiler with what it has started."""
-    with process, suppress(ProcessLookupError):
+    """End a compiler with what it has started; the thread that waits for it goes on."""
+    with suppress(ProcessLookupError):
         if process.poll() is None and hasattr(os, "killpg") and hasattr(signal, "SIGKILL"):
             os.killpg(process.pid, signal.SIGKILL)
         process.kill()
