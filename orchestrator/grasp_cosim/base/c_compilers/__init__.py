@@ -189,7 +189,7 @@ class _Compiling:
         """The threads wait for the compilers."""
         self._threads = threads
         self._waiting: list[tuple[int, Job, Path]] = []
-        self._running: "dict[Future[Path], _Running]" = {}
+        self._running: dict[Future[Path], _Running] = {}
         self._ready: set[Compiler] = set()
         """Those that have made a library."""
 
