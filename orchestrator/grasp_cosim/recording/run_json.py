@@ -141,8 +141,8 @@ FAULT = _object(
     {"from": NUMBER, "until": NUMBER, "when": TEXT, "seed": NUMBER},
 )
 
-SPREAD = _object(dict.fromkeys(SPREAD_KEYS, NUMBER))
-OVERRUN = _object({"step": COUNT, "time": NUMBER, "late": NUMBER, "culprit": TEXT, "took": NUMBER})
+SPREAD = _object(dict.fromkeys(SPREAD_KEYS, TIME))
+OVERRUN = _object({"step": COUNT, "time": TIME, "late": TIME, "culprit": TEXT, "took": TIME})
 TIMING = _object(
     {
         "factor": NUMBER,
