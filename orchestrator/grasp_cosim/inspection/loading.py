@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 import warnings
+import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.machinery import all_suffixes
@@ -20,7 +21,6 @@ from typing import Literal
 from ..base.checks import install_command
 from ..base.errors import choices
 from ..base.scratch import ScratchFolder
-from ..fmi import fmpy
 from ..interface.document import unreadable
 from ..interface.interface import Interface
 from ..interface.obstacles import of_binary, of_kind, of_loading, this_machine
@@ -31,6 +31,7 @@ Verdict = tuple[Status, str, str | None]
 """What a check says: status, text, and the fix where one is needed."""
 
 VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
+LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 LIBPYTHON = f"libpython{VERSION}{getattr(sys, 'abiflags', '')}.so.1.0"
 """What a host that is not Python needs of this Python."""
 
@@ -110,10 +111,14 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
     """Unpack an FMU to a folder; InputError where it is none."""
     found = describe(fmu)
     try:
-        fmpy.extract(fmu, folder)
-    except Exception as error:  # FMPy and zipfile raise whatever they like
+        with zipfile.ZipFile(fmu) as archive:
+            for name in archive.namelist():
+                if "\\" in name or ":" in name:  # which FMPy does not load
+                    raise ValueError(f"{name!r} in it has a backslash or a colon; must have none")
+            archive.extractall(folder)
+    except Exception as error:  # zipfile and its decompressors raise whatever they like
         raise unreadable(fmu, str(error).replace(f"{folder}/", "")) from error
-    file = f"{found.identifier}{fmpy.sharedLibraryExtension}"
+    file = f"{found.identifier}{LIBRARY_SUFFIX}"
     return Unpacked(fmu, folder, found, folder / "binaries" / this_machine(found.version) / file)
 
 
