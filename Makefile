@@ -70,6 +70,7 @@ mutants: .venv/mutants
 	$(BIN)/python -m benchmarks.mutants $(ROOM) $(MORE)
 
 dist: .venv/dev
+	@echo "zig, which compiles for all platforms, is installed first: 100 MB"
 	$(PIP) --editable '.[native]'
 	$(BIN)/python docs/release.py
 

@@ -94,6 +94,7 @@ def write_release(out: Path) -> list[Path]:
     out.mkdir(parents=True)
     for name in (build_wheel(str(out)), build_sdist(str(out))):
         tell(f"{name}: written")
+    tell("the first library for Windows takes minutes, as zig makes its own before, once")
     for folder, (fmi, names) in NATIVE.items():
         tell(f"{folder}: FMUs as C, FMI {fmi}.0, for {', '.join(names)}")
         build_native(out / folder, planned(targets(names), fmi))
