@@ -1,5 +1,6 @@
 """How far something is: on a terminal, elsewhere, and while nobody counts."""
 
+import gc
 import io
 import sys
 import threading
@@ -85,3 +86,12 @@ def test_time_is_seen_to_go_by_while_one_run_goes_on(stream, monkeypatch):
     monkeypatch.setattr(sys, "stderr", Watched())
     with Progress("map", 3, delay=0.0):
         assert seen.wait(60.0)
+
+
+def test_one_that_an_interruption_kept_from_beginning_ends_without_a_word(monkeypatch):
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    bar = Progress.__new__(Progress)
+    del bar
+    gc.collect()
+    assert told == []

@@ -39,6 +39,8 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
     unit nothing is counted.
     """
 
+    _begun = False
+
     def __init__(
         self,
         what: str,
@@ -80,6 +82,12 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         )
         if ticking and shown:
             self._ticker.start()
+        self._begun = True
+
+    def __del__(self) -> None:
+        """End it, unless a Ctrl-C came before it had begun."""
+        if self._begun:
+            self.close()
 
     def _tick(self, wait: float, every: float) -> None:
         while not self._over.wait(wait):
