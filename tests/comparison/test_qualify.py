@@ -155,7 +155,7 @@ def test_ctrl_c_is_no_verdict(short, monkeypatch):
     import grasp_cosim.comparison.qualify as module
 
     class Interrupted:
-        complete = False
+        came_to_its_end = False
 
     monkeypatch.setattr(module, "simulate", lambda *_, **__: Interrupted())
     with pytest.raises(KeyboardInterrupt):

@@ -191,7 +191,10 @@ def test_a_thousand_instances_leave_nothing_behind(folder_of, kind, tmp_path, na
 
 
 def test_binaries_let_go_of_python_before_the_process_ends(tmp_path):
-    """pythonfmu 0.7.0 alone does that twice then, the second time in memory that was freed."""
+    """pythonfmu 0.7.0 alone does that twice then, the second time in memory that was freed.
+
+    Hosts have removed the file by then.
+    """
     source, library = tmp_path / "let_go.c", tmp_path / "let_go.so"
     source.write_text(
         "#include <stdio.h>\n"
@@ -200,7 +203,8 @@ def test_binaries_let_go_of_python_before_the_process_ends(tmp_path):
     compile_c(["gcc", "-shared", "-fPIC", source], library)
     program = (
         "import ctypes, sys; from grasp_cosim.fmu_export import slave; ctypes.CDLL(sys.argv[1]);"
-        "slave._binaries |= {sys.argv[1], '/no/such.so'}"
+        "slave._binaries |= {sys.argv[1], '/no/such.so'};"
+        "import os; os.unlink(sys.argv[1])"
     )
     done = subprocess.run([sys.executable, "-c", program, library], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "let go\n", "")

@@ -86,7 +86,7 @@ def test_imports_are_followed_in_whatever_form_they_come(tmp_path, monkeypatch):
 
 
 def test_a_package_that_is_not_installed_is_no_surprise_of_the_host(tmp_path):
-    with pytest.raises(ImportError, match="no_such_package: no such module; must be installed"):
+    with pytest.raises(ImportError, match="no_such_package: no such package; must be installed"):
         with_imports({"Script.py": b"from no_such_package import block\n"})
 
 

@@ -154,7 +154,9 @@ def test_a_rename_table_gives_the_systems_names(tmp_path):
     table = 'rename = { u_force = "u_Float64", "gap[1]" = "x", k = "gain" }\n'
     values = "u_force = 2.0, k = 3.0"
     text = '"a.gap[1] -> b.u_Float64"'
-    with pytest.raises(InputError, match="input or parameter 'u_Float64'; did you mean u_Float32"):
+    with pytest.raises(
+        InputError, match="no input, parameter or initial value 'u_Float64'; did you mean u_Float32"
+    ):
         pair(tmp_path, text, first=table, given=values)
     system = pair(tmp_path, text, first=table, given=values, without="u_Float64")
     result = simulate(system)

@@ -5,6 +5,7 @@ at every call (2.5 us instead of 0.5 us), so the loop calls the FMI functions di
 that are parts of the master's vectors.
 """
 
+import atexit
 import ctypes
 import inspect
 import logging
@@ -259,6 +260,8 @@ class LoadedInstance(ABC):
             ) from error
         finally:
             os.chdir(here)  # where loading fails, FMPy stays in the library's folder
+        if self._python:
+            _binaries_of_pythonfmu.add(self._slave.dll._name)
         self._worst = OK
         self._choose_categories()
 
@@ -510,6 +513,22 @@ class LoadedInstance(ABC):
         if status < ERROR or self._logs_at_once:
             return ""
         return f"; components.{self.name}.logging = true may have it say why"
+
+
+_binaries_of_pythonfmu: set[str] = set()
+"""By their names, those that were loaded, and may be unloaded again."""
+
+
+@atexit.register
+def _let_go_of_python() -> None:
+    """Have the binaries of pythonfmu that are still loaded let go of Python.
+
+    By themselves they do it after the end of Python, in memory that was freed, which may end the
+    process by a signal. FMUs of ours see to it in any host.
+    """
+    for name in _binaries_of_pythonfmu if hasattr(os, "RTLD_NOLOAD") else ():
+        with suppress(OSError, AttributeError):  # it was unloaded, or is of another version
+            ctypes.PyDLL(name, mode=os.RTLD_NOLOAD).finalizePythonInterpreter()
 
 
 @cache

@@ -354,7 +354,7 @@ class Maker:
         with suppress(ValueError):
             sys.path.remove(resources)
         sys.path_importer_cache.pop(resources, None)
-        _binaries.add(f"{resources}/../binaries/linux64/{self.name}.so")
+        _binaries.add(os.path.normpath(f"{resources}/../binaries/linux64/{self.name}.so"))
         slave = Slave(self, instance_name)
         self._made = ref(slave)
         return slave
@@ -378,7 +378,10 @@ def offer(block: Any, module: dict[str, Any]) -> None:
 
 
 _binaries: set[str] = set()
-"""The paths of those that have made an instance."""
+"""The paths of those that have made an instance, as hosts name them when they load them.
+
+The files may be gone at the end; the system then knows a library that is loaded by its name alone.
+"""
 
 
 @atexit.register
