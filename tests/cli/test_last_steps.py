@@ -36,6 +36,7 @@ def check_whole(folder):
     assert result["a.y"][-1] == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["AT_TERMINATE", slow("AT_FREE")])
 @pytest.mark.parametrize("form", ["csv", slow("arrow")])
 def test_a_crash_at_the_end_leaves_a_finished_result(tmp_path, where, form):
@@ -46,6 +47,7 @@ def test_a_crash_at_the_end_leaves_a_finished_result(tmp_path, where, form):
     check_whole(tmp_path / "out")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["AT_TERMINATE", slow("AT_FREE")])
 def test_a_crash_of_an_isolated_fmu_at_its_end_is_one_line(tmp_path, where):
     talker(tmp_path, f"-D{where}={CRASH}")
@@ -68,6 +70,7 @@ def test_a_failure_is_recorded_before_a_crash_that_follows_on_it(tmp_path):
     assert result.wall_time is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["AT_INITIALISATION", slow("AT_STEP")])
 @pytest.mark.parametrize("form", ["csv", slow("arrow")])
 def test_an_fmu_that_goes_to_another_folder_takes_nothing_along(tmp_path, where, form):

@@ -84,6 +84,7 @@ def test_an_option_goes_before_the_file(command, file, tmp_path):
     assert header(tmp_path / "option") == ["time", "a.x"]
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_locals_are_drawn_compared_and_reported_with_what_is_no_number(command, file, tmp_path):
     """a.empty is none from 0.3 s on, in two runs that are alike; in the third it is left out."""

@@ -114,6 +114,7 @@ def test_a_finger_that_hardly_takes_part_is_warned_of():
         hand_system(native=False)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_hand_that_runs(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert command("init", "hand.toml", "--angles", "20,100,200,290")[0] == 0

@@ -46,6 +46,7 @@ def test_one_in_a_process_of_its_own(tmp_path):
     assert result["ball.h"] == pytest.approx(fallen(2.0), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_presets_changes_and_sweeps_set_it_alike(tmp_path):
     loaded = load(tmp_path, "[presets.thrown]\n'ball.v' = 1.0\n")
     thrown = simulate(loaded.with_presets("thrown"))

@@ -216,6 +216,7 @@ def test_values_of_each_kind_are_passed_on_and_recorded_as_they_are(tmp_path):
     assert [run[name].dtype.kind for name in (*names, "whole")] == [*"biiO", "f"]
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_a_sweep_varies_an_input_in_si_units(load):
     metres = [3.048, 6.096]
