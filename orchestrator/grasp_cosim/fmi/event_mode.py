@@ -22,13 +22,8 @@ from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Logging
 from .clocks import Clocks
 from .co_simulation import NEEDED, SHORT, TERMINATE, Fmi3Instance
+from .events import DENSE, ConnectedInputs, Events
 from .instance import AT_POINT, EARLY, EVENT, OK, WARNING, length_until
-
-ITERATIONS = 1000
-"""The most iterations of one event."""
-
-DENSE, MOST_DENSE = 0.01, 1000
-"""So many events, each within this part of a communication step after the one before, end a run."""
 
 
 class EventInstance(Fmi3Instance):
@@ -48,6 +43,7 @@ class EventInstance(Fmi3Instance):
     ) -> None:
         """As LoadedInstance."""
         self._clocks = Clocks(interface, self._bound, self._refusal)
+        self._events = Events(self._clocks, self._error)
         self._point = 0.0
         """The time that the FMU has come to, in s, at its events."""
         self._next = math.inf
@@ -56,8 +52,9 @@ class EventInstance(Fmi3Instance):
         self._started = False
         self._pending: dict[Variable, Value] = {}
         """What was set one by one, and has not arrived."""
-        self._inputs_at_events: list[_Inputs] = []
-        self._dense, self._last_event = 0, -math.inf
+        self._inputs_at_events: list[_PartOfInputs] = []
+        self._step = 0.0
+        """The communication step in s."""
         super().__init__(name, interface, tolerance, logging)
 
     def enter_initialization(
@@ -89,17 +86,15 @@ class EventInstance(Fmi3Instance):
         if not self._inputs.running:
             super().set(variables, values)
             return
-        given = dict(zip(variables, values, strict=True))
-        at_once = {
-            v: x
-            for v, x in given.items()
-            if _is_continuous(v) or not (self._in_step_mode or v.clocks)
-        }
-        waiting = {v: x for v, x in given.items() if v not in at_once}
-        self._pending |= waiting
+        at_once: dict[Variable, Value] = {}
+        by_event: dict[Variable, Value] = {}
+        for variable, value in zip(variables, values, strict=True):
+            waits = not _is_continuous(variable) and (self._in_step_mode or variable.clocks)
+            (by_event if waits else at_once)[variable] = value
+        self._pending |= by_event
         with self._failures():
             self._assign(at_once.items())
-            if self._in_step_mode and not all(v.clocks for v in waiting):
+            if self._in_step_mode and not all(v.clocks for v in by_event):
                 if self._started:
                     self._limit[0] = -math.inf
                 else:
@@ -115,10 +110,10 @@ class EventInstance(Fmi3Instance):
             places = continuous if _is_continuous(v) else by_clocks.setdefault(v.clocks, [])
             places.append(place)
 
-        def bind(places: list[int], clocks: tuple[int, ...]) -> _Inputs:
+        def bind(places: list[int], clocks: tuple[int, ...]) -> _PartOfInputs:
             part, bound = np.zeros(len(places), data.dtype), [variables[p] for p in places]
             call = super(EventInstance, self).transfer("set", bound, part)
-            return _Inputs(data, np.array(places), part, call, clocks)
+            return _PartOfInputs(data, np.array(places), part, call, clocks)
 
         at_events = [bind(places, clocks) for clocks, places in by_clocks.items()]
         at_once = [bind(continuous, ())] if continuous else []
@@ -139,6 +134,7 @@ class EventInstance(Fmi3Instance):
         if not self.interface.can_vary_step:
             for v in self.interface.input_clocks:
                 self._check_ticks(v, step)
+        self._step = self._step or step  # the first is that of the run; others are parts of it
         return super().stepper(clock, step)
 
     def _check_ticks(self, v: Variable, step: float) -> None:
@@ -192,44 +188,20 @@ class EventInstance(Fmi3Instance):
 
     def _event(self, near: float = AT_POINT) -> None:
         """Event mode, now; it counts as close upon another that was less than `near` s before."""
-        close = self._point - self._last_event <= near
-        self._dense = self._dense + 1 if close else 0
-        self._last_event = self._point
-        if self._dense >= MOST_DENSE:
-            raise self._error(
-                f"chatters, or does not come to rest ({MOST_DENSE} events in a row, each within "
-                f"{DENSE:.0%} of the step after the one before)",
-                self._point,
-            )
+        self._events.count(self._point, near, self._step)
         self._slave.fmi3EnterEventMode(self._slave.component)
         self._settle()
 
     def _settle(self) -> None:
         """Have clocks tick and inputs arrive, update the discrete states until they settle."""
-        self._clocks.begin(self._point)
-        ticked = self._clocks.tick()
-        self._take_inputs(ticked)
-        for _ in range(ITERATIONS):
-            again, ended, _, _, defined, next_event = self._slave.updateDiscreteStates()
-            if ended:
-                self._flags[TERMINATE], self._last[0] = True, self._point
-                return
-            self._clocks.schedule(ticked)
-            ticked = self._clocks.tick()
-            self._take_inputs(ticked)
-            if not again and not ticked:
-                break
-        else:
-            text = f"does not settle an event in {ITERATIONS} iterations"
-            raise self._error(text, self._point)
-        if defined and math.isnan(next_event):
-            raise self._error("names nan as the time of its next event", self._point)
-        next_event = next_event if defined else math.inf
-        if next_event == self._next and next_event <= self._point + AT_POINT:
-            next_event = (
-                math.inf
-            )  # its inner steps are behind: it will return for that event itself
-        self._next = next_event
+        update = self._slave.updateDiscreteStates
+        settled = self._events.settle(self._point, update, self._take_inputs)
+        if settled.ended:
+            self._flags[TERMINATE], self._last[0] = True, self._point
+            return
+        handles_it_itself = settled.next == self._next <= self._point + AT_POINT
+        # its inner steps are behind then: it will return for that event by itself
+        self._next = math.inf if handles_it_itself else settled.next
         self._slave.enterStepMode()
         self._in_step_mode = True
         self._limit[0] = min(self._next, self._clocks.next) - AT_POINT
@@ -250,7 +222,7 @@ class EventInstance(Fmi3Instance):
         return max(self._point, super()._time())
 
 
-class _Inputs:
+class _PartOfInputs(ConnectedInputs):
     """Connected inputs that arrive together: a part of the values that come over connections."""
 
     def __init__(
@@ -264,24 +236,24 @@ class _Inputs:
         """Places are those of the values in data that the call passes on, which takes them from
         part; clocks are the references of those with whose ticks they arrive, if any.
         """
+        super().__init__(data, call)
         self.clocks = clocks
-        self._data, self._places, self._part, self._call = data, places, part, call
-        self._passed = b""
+        self._places, self._part = places, part
 
     def expect(self, values: Sequence[Value | None]) -> None:
         """The FMU has these values now, as far as they are known."""
         if None not in values:
             self._passed = np.array(values, self._part.dtype).tobytes()
 
-    def changed(self) -> bool:
-        """True if the FMU has other values."""
-        return self._data[self._places].tobytes() != self._passed
+    def coming(self) -> npt.NDArray[Any]:
+        """As ConnectedInputs.coming()."""
+        values: npt.NDArray[Any] = self._data[self._places]
+        return values
 
     def pass_on(self) -> int:
-        """Set them; the FMI status."""
-        self._part[:] = self._data[self._places]
-        self._passed = self._part.tobytes()
-        return self._call.python()
+        """As ConnectedInputs.pass_on()."""
+        self._part[:] = self.coming()
+        return super().pass_on()
 
 
 def _is_continuous(variable: Variable) -> bool:

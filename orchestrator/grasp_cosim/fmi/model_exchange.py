@@ -25,7 +25,7 @@ from ..system.parts import Logging, Solver
 from .clocks import Clocks
 from .co_simulation import Fmi3Instance, FmuInstance, Texts3
 from .cvode import Cvode, CvodeError, Function
-from .event_mode import DENSE, ITERATIONS, MOST_DENSE
+from .events import DENSE, ConnectedInputs, Events
 from .instance import AT_POINT, DISCARD, EARLY, OK, WARNING
 from .loaded import Lenient, LoadedInstance
 
@@ -43,10 +43,7 @@ class ModelInstance(LoadedInstance):
     """The function that evaluates the derivatives."""
 
     UPDATE: ClassVar[str]
-    """The method of FMPy's class for one iteration of an event.
-
-    Again, the end of the simulation, new nominals, new states, a next event, and its time in s.
-    """
+    """The method of FMPy's class that updates the discrete states once: Update of events.py."""
 
     def __init__(
         self, name: str, interface: Interface, chosen: Solver, logging: Logging = False
@@ -54,6 +51,7 @@ class ModelInstance(LoadedInstance):
         """Extract and instantiate; InputError where the FMU does not load."""
         self._chosen = chosen
         self._clocks = Clocks(interface, self._bound, self._refusal)
+        self._events = Events(self._clocks, self._error)
         self._solver: Cvode | None = None
         self._now = 0.0
         self._next = math.inf
@@ -62,8 +60,7 @@ class ModelInstance(LoadedInstance):
         self._failed = OK
         self._given: dict[Variable, Value] = {}
         self._waiting: dict[Variable, Value] = {}
-        self._buffers: list[_Buffer] = []
-        self._dense, self._last_event = 0, -math.inf
+        self._connected: list[ConnectedInputs] = []
         self._started = False
         self._step = 0.0
         self._zero: npt.NDArray[np.bool_] | None = None
@@ -128,7 +125,7 @@ class ModelInstance(LoadedInstance):
         call = super().transfer(action, variables, data)
         if action == "get":
             return call
-        self._buffers.append(_Buffer(data, call))
+        self._connected.append(ConnectedInputs(data, call))
         return Call(lambda: OK)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
@@ -145,7 +142,7 @@ class ModelInstance(LoadedInstance):
     def _advance(self, end: float) -> None:
         with self._failures():
             self._waiting = {v: x for v, x in self._waiting.items() if self._given.get(v) != x}
-            if self._waiting or any(buffer.changed() for buffer in self._buffers):
+            if self._waiting or any(inputs.changed() for inputs in self._connected):
                 self._event()
             while self._now < end and self._ended is None:
                 stop = self._next if self._next <= end + AT_POINT else end
@@ -191,39 +188,27 @@ class ModelInstance(LoadedInstance):
 
         It counts as close upon another event that was less than `near` s before.
         """
-        self._count(near)
+        self._events.count(self._now, near, self._step, self._next)
         self._slave.enterEventMode()
         waiting, self._waiting = self._waiting, {}
         self._given |= waiting
         self._assign(waiting.items())
-        for buffer in self._buffers if self._started else ():
-            if buffer.changed():
-                self._check(buffer.pass_on())
+        for inputs in self._connected if self._started else ():
+            if inputs.changed():
+                self._check(inputs.pass_on())
         self._settle()
 
     def _settle(self, first: bool = False) -> None:
         """Iterate an event until nothing changes, and begin the continuous time after it."""
-        nominals = first
-        self._clocks.begin(self._now)
-        ticked = self._clocks.tick()
-        for _ in range(ITERATIONS):
-            again, ended, renominated, _, defined, time = getattr(self._slave, self.UPDATE)()
-            nominals = nominals or renominated
-            if ended:
-                self._ended = self._now
-                return
-            self._clocks.schedule(ticked)
-            ticked = self._clocks.tick()
-            if not again and not ticked:
-                break
-        else:
-            raise self._error(f"does not settle an event in {ITERATIONS} iterations", self._now)
-        if defined and math.isnan(time):
-            raise self._error("names nan as the time of its next event", self._now)
-        self._next = min(time if defined else math.inf, self._clocks.next)
+        update = getattr(self._slave, self.UPDATE)
+        settled = self._events.settle(self._now, update, arrive=lambda _: None)
+        if settled.ended:
+            self._ended = self._now
+            return
+        self._next = min(settled.next, self._clocks.next)
         self._slave.enterContinuousTimeMode()
         if self._solver:
-            self._begin(self._solver, nominals)
+            self._begin(self._solver, first or settled.new_nominals)
 
     def _begin(self, solver: Cvode, nominals: bool) -> None:
         """Have the solver begin anew with the states that the FMU has now."""
@@ -237,20 +222,6 @@ class ModelInstance(LoadedInstance):
         solver.restart(self._now, new)
         zero = self._indicators_now() == 0.0
         self._zero = zero if zero.any() else None
-
-    def _count(self, near: float) -> None:
-        """Count events that come close upon each other; SimulationError where they do not end."""
-        self._dense = self._dense + 1 if self._now - self._last_event <= near else 0
-        self._last_event = self._now
-        if self._dense >= MOST_DENSE:
-            next_one = f", the next at t = {self._next:.9g} s" if self._next < math.inf else ""
-            raise self._error(
-                f"chatters, or does not come to rest ({MOST_DENSE} events in a row, each within "
-                f"{DENSE:.0%} of the step after the one before{next_one})",
-                self._now,
-                "; must have a hysteresis, name later times for its events, or have a shorter step "
-                f"than {self._step:g} s",
-            )
 
     def _bind(self) -> None:
         """Bind the functions that are called in the steps of the solver, and make that."""
@@ -325,21 +296,6 @@ class ModelInstance(LoadedInstance):
 def _no_slope(slopes: int, _: int) -> int:
     ctypes.c_double.from_address(slopes).value = 0.0
     return OK
-
-
-class _Buffer:
-    """Values of connected inputs: those that the FMU has, and those that are to come."""
-
-    def __init__(self, data: npt.NDArray[Any], call: Call) -> None:
-        self._data, self._call = data, call
-        self._passed = b""
-
-    def changed(self) -> bool:
-        return self._data.tobytes() != self._passed
-
-    def pass_on(self) -> int:
-        self._passed = self._data.tobytes()
-        return self._call.python()
 
 
 class FMU2Equations(Lenient, FMU2Model):  # type: ignore[misc]  # FMPy has no types

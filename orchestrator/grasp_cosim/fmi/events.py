@@ -1,0 +1,119 @@
+"""The events of an FMU that its master handles, in co-simulation and in model exchange.
+
+In an event clocks tick and inputs arrive, then the discrete states are updated until they settle.
+Events that do not settle, or do not come to rest, end the run.
+"""
+
+import math
+from collections.abc import Callable, Collection
+from typing import Any, NamedTuple, Protocol
+
+import numpy.typing as npt
+
+from ..base.calls import Call
+from ..base.errors import SimulationError
+from .clocks import Clocks
+
+ITERATIONS = 1000
+"""The most updates of the discrete states in one event."""
+
+DENSE, MOST_DENSE = 0.01, 1000
+"""So many events, each within this part of a communication step after the one before, end a run."""
+
+Update = Callable[[], tuple[bool, bool, bool, bool, bool, float]]
+"""Updates the discrete states once. Whether it wants another update, asks for the end of the
+simulation, has changed nominal values or states, or has named a next event, and the time of that
+in s.
+"""
+
+Arrive = Callable[[Collection[int]], None]
+"""Has the inputs arrive that may be set while the clocks of these references tick."""
+
+
+class Refuse(Protocol):
+    """Gives the error for what the FMU did at a time in s, and how that must be."""
+
+    def __call__(self, what: str, time: float, must: str = "") -> SimulationError:
+        """`must` is the end of the line."""
+
+
+class Settled(NamedTuple):
+    """What came of an event: the end of the simulation, or the time of the next event in s."""
+
+    ended: bool
+    new_nominals: bool
+    next: float
+    """inf where the FMU names none."""
+
+
+class Events:
+    """The events of one instance."""
+
+    def __init__(self, clocks: Clocks, refuse: Refuse) -> None:
+        self._clocks, self._refuse = clocks, refuse
+        self._in_a_row, self._last = 0, -math.inf
+
+    def count(self, time: float, near: float, step: float, following: float = math.inf) -> None:
+        """Count an event at a time, which is close upon another that was at most `near` before.
+
+        SimulationError where too many come in a row. All in s: `step` is the communication step,
+        `following` the time of the next event that the FMU has named.
+        """
+        self._in_a_row = self._in_a_row + 1 if time - self._last <= near else 0
+        self._last = time
+        if self._in_a_row < MOST_DENSE:
+            return
+        next_one = f", the next at t = {following:.9g} s" if following < math.inf else ""
+        raise self._refuse(
+            f"chatters, or does not come to rest ({MOST_DENSE} events in a row, each within "
+            f"{DENSE:.0%} of the step after the one before{next_one})",
+            time,
+            "; must have a hysteresis, name later times for its events, or have a shorter step "
+            f"than {step:g} s",
+        )
+
+    def settle(self, time: float, update: Update, arrive: Arrive) -> Settled:
+        """Tick the clocks that are due at a time in s, and update the discrete states until they
+        settle; SimulationError where they do not.
+        """
+        self._clocks.begin(time)
+        ticked = self._clocks.tick()
+        arrive(ticked)
+        new_nominals = False
+        for _ in range(ITERATIONS):
+            again, ended, renominated, _, defined, named = update()
+            new_nominals = new_nominals or renominated
+            if ended:
+                return Settled(True, new_nominals, math.inf)
+            self._clocks.schedule(ticked)
+            ticked = self._clocks.tick()
+            arrive(ticked)
+            if not again and not ticked:
+                break
+        else:
+            raise self._refuse(f"does not settle an event in {ITERATIONS} iterations", time)
+        if defined and math.isnan(named):
+            raise self._refuse("names nan as the time of its next event", time)
+        return Settled(False, new_nominals, named if defined else math.inf)
+
+
+class ConnectedInputs:
+    """Connected inputs that arrive by an event: the values to come, and those that the FMU has."""
+
+    def __init__(self, data: npt.NDArray[Any], call: Call) -> None:
+        """The call passes data on."""
+        self._data, self._call = data, call
+        self._passed = b""
+
+    def coming(self) -> npt.NDArray[Any]:
+        """The values to come."""
+        return self._data
+
+    def changed(self) -> bool:
+        """True if the FMU has other values."""
+        return self.coming().tobytes() != self._passed
+
+    def pass_on(self) -> int:
+        """Set them; the FMI status."""
+        self._passed = self.coming().tobytes()
+        return self._call.python()
