@@ -125,7 +125,7 @@ def test_a_value_for_what_a_column_drives_is_refused(path, tmp_path, command):
 
 MISTAKES = {
     "height\n0,1": "line 1, column 2, height: no input 'height'; did you mean Height?",
-    "Height [K]\n0,1": "column 2, Height [K]: cannot be converted; must be a unit of the quantity",
+    "Height [K]\n0,1": "column 2, Height [K]: cannot be converted into ft; must be a unit of that",
     "Height\n0,high": "column 2, Height = 'high': must be a number",
     "Height,sub_a.u_Real\n0,1,1": "both drive sub_a.u_Real; must be driven by one",
     "b.x,Height\n0,1,1": "no component 'b'",

@@ -11,8 +11,8 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from ..base.one_piece import in_one_piece, is_stream
 from .errors import InputError
+from .one_piece import in_one_piece, is_stream
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of a disk, not of the input."""

@@ -96,7 +96,7 @@ def use_of(system: System, name: str) -> Use:
         component.values,
         stated(system, name),
         own(p for event in system.events for port in event.set for p in system.elements(port)),
-        in_seconds(component.step_ns or system.step_ns),
+        in_seconds(system.step_of(component)),
     )
 
 

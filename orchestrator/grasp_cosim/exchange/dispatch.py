@@ -207,13 +207,13 @@ class Taps:
         self, system: System, slots: Mapping[Port, int], texts: Mapping[Port, Texts]
     ) -> None:
         """Slots are the columns of the rows, texts those of Strings."""
-        found = system.once(taps)
+        by_name = system.once(taps)
         self.signals = tuple(
             Signal(name, tap.unit, tap.kind, tap.description, texts.get(tap.source, Texts()))
-            for name, tap in found.items()
+            for name, tap in by_name.items()
         )
-        self._columns = np.array([slots[tap.source] for tap in found.values()], np.intp)
-        changes = [tap.change for tap in found.values()]
+        self._columns = np.array([slots[tap.source] for tap in by_name.values()], np.intp)
+        changes = [tap.change for tap in by_name.values()]
         self._changes = [(i, change) for i, change in enumerate(changes) if change != IDENTITY]
 
     def __call__(self, rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -259,8 +259,8 @@ class Unwatched:
             ],
             np.intp,
         )
-        whole = [self._signals[place].kind == "Integer" for place in self._places]
-        self._limits = np.where(whole, float(EXACT), np.inf)
+        is_integer = [self._signals[place].kind == "Integer" for place in self._places]
+        self._limits = np.where(is_integer, float(EXACT), np.inf)
         self._log: dict[int, str] = {}
 
     @property

@@ -3,6 +3,7 @@
 import math
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
+from ..base.errors import InputError
 from ..base.si_units import Unit
 
 if TYPE_CHECKING:  # reading a description needs no numpy, which takes time to load
@@ -40,3 +41,10 @@ def conversion(source: Unit, target: Unit) -> Conversion | None:
     factor, offset = source.factor / target.factor, (source.offset - target.offset) / target.factor
     possible = factor != 0.0 and math.isfinite(factor) and math.isfinite(offset)
     return Conversion(factor, offset) if possible else None
+
+
+def no_conversion(place: str, unit: str | None, target: str) -> InputError:
+    """The error for a column in a unit that is not known, or not of the quantity of the target."""
+    return InputError(
+        f"{place} [{unit}]: cannot be converted into {target}; must be a unit of that quantity"
+    )

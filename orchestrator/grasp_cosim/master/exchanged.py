@@ -39,21 +39,22 @@ def exchanged(system: System) -> Exchanged:
     passed_on = system.once(sourced)
     sources = {connection.source for connection in system.connections}
     sources |= {tap.source for tap in system.once(taps).values()}
-    known = _with_whole_arrays(system, {*system.observed, *sources, *in_conditions(system)})
+    needed = _with_whole_arrays(system, {*system.observed, *sources, *in_conditions(system)})
     fetched: dict[str, list[list[Variable]]] = {}
     passed: dict[str, list[list[Variable]]] = {}
     texts: list[Port] = []
     for component in system.components:
-        get, set_ = list[Variable](), list[Variable]()
+        to_fetch: list[Variable] = []
+        to_pass: list[Variable] = []
         for v in component.loaded.variables:
             port = Port(component.name, v.name)
-            if v.kind == "String" and port in known:
+            if v.kind == "String" and port in needed:
                 texts.append(port)
             elif v.is_number and port in passed_on:
-                set_.append(v)
-            elif v.is_number and port in known:
-                get.append(v)
-        fetched[component.name], passed[component.name] = _by_type(get), _by_type(set_)
+                to_pass.append(v)
+            elif v.is_number and port in needed:
+                to_fetch.append(v)
+        fetched[component.name], passed[component.name] = _by_type(to_fetch), _by_type(to_pass)
     return Exchanged(fetched, passed, tuple(texts))
 
 
@@ -79,13 +80,13 @@ def in_conditions(system: System) -> frozenset[Port]:
 
 def _with_whole_arrays(system: System, ports: set[Port]) -> frozenset[Port]:
     """The ports and, of those that are elements of arrays, the other elements."""
-    whole = set(ports)
+    with_others = set(ports)
     for component in system.components:
         for array in component.loaded.arrays.values():
             elements = {Port(component.name, name) for name in array.names}
             if not ports.isdisjoint(elements):
-                whole |= elements
-    return frozenset(whole)
+                with_others |= elements
+    return frozenset(with_others)
 
 
 def _by_type(variables: Iterable[Variable]) -> list[list[Variable]]:

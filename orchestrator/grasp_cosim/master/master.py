@@ -360,7 +360,7 @@ def told_stop(system: System, component: Component) -> float:
     round to more than the stop time: 0.2 + 0.1 > 0.3. Then it is told that sum, a few units in the
     last place later, so that its last step has the length of all others.
     """
-    length = component.step_ns or system.step_ns
+    length = system.step_of(component)
     last = in_seconds(system.stop_ns - length) + in_seconds(length)
     return max(in_seconds(system.stop_ns), last)
 

@@ -286,34 +286,34 @@ def _check_rows(path: Path, read: Result, written: Mapping[str, Any]) -> None:
         raise InputError(
             f"{path.with_name(SETTINGS)}: wall_time = None; must be a number, as it is complete"
         )
-    there, last = len(read.time), read.last_step
-    if (there, last) != (written["rows"], written["steps"]):
+    count, last = len(read.time), read.last_step
+    if (count, last) != (written["rows"], written["steps"]):
         raise InputError(
-            f"{path}: is damaged: has {counted(there, 'row')}, the last of step {last}; must have "
+            f"{path}: is damaged: has {counted(count, 'row')}, the last of step {last}; must have "
             f"{written['rows']}, the last of step {written['steps']}, as {SETTINGS} says"
         )
 
 
 def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
     """A result of some rows or signals with the metrics that run.json has, which are of all."""
-    asked, measured = metrics_of(read.groups, read.more_metrics), written["measured"]
-    there = tuple(m for m in asked if m.name in measured)
-    if not there and asked and read.every > 1:  # it did not come to its end
+    metrics, measured = metrics_of(read.groups, read.more_metrics), written["measured"]
+    worked_out = tuple(m for m in metrics if m.name in measured)
+    if not worked_out and metrics and read.every > 1:  # it did not come to its end
         line = f"one row in {read.every} was recorded: the metrics are of these"
         return replace(read, log=(*read.log, line))
-    if not there and "proxies" not in written:
+    if not worked_out and "proxies" not in written:
         return read
     place = read.folder / SETTINGS if read.folder else SETTINGS
-    values = {m.name: measured[m.name] for m in there}
-    sized = tuple(_sized(m, values[m.name], read.roles) for m in there)
+    values = {m.name: measured[m.name] for m in worked_out}
+    sized = tuple(_sized(m, values[m.name], read.roles) for m in worked_out)
     for m in (m for m in sized if m not in read.more_metrics):
         value = values[m.name]
         several = isinstance(value, list)
         if several != bool(m.entries) or (several and len(value) != len(m.entries)):
             count = counted(len(m.entries) or 1, "value")
             raise InputError(f"{place}: measured: {m.name} = {value!r}; must be {count}")
-    known = Measured(values, sized, tuple(written.get("missing_metrics", ())))
-    return replace(read, known=Known(known, written.get("proxies", {})))
+    of_all_rows = Measured(values, sized, tuple(written.get("missing_metrics", ())))
+    return replace(read, known=Known(of_all_rows, written.get("proxies", {})))
 
 
 def _sized(m: Metric, value: Any, roles: Mapping[str, str]) -> Metric:
@@ -378,15 +378,15 @@ def load_log(
 
 def _units_to_si(log: Log, note: Callable[[str], None]) -> dict[str, Conversion]:
     """The conversions of the columns that are in a unit that is not of SI."""
-    known = {name: known_unit(unit) for name, unit in log.units.items() if unit}
-    silent = [name for name in log.numeric if name not in known]
+    units = {name: known_unit(unit) for name, unit in log.units.items() if unit}
+    silent = [name for name in log.numeric if name not in units]
     if log.path.suffix.lower() == ".mf4":
         silent = []  # in which Booleans have no unit either
-    elif not known:
+    elif not units:
         missing = f"there is no {SETTINGS} beside it"
         note(f"{log.path}: {missing}; its values are taken to be in SI units")
     elif silent:
         note(f"{log.path}: {choices(silent, 6)}: no unit; taken to be in SI units")
-    for name in (name for name, unit in known.items() if unit is None):
+    for name in (name for name, unit in units.items() if unit is None):
         note(f"{log.path}: {name} [{log.units[name]}]: not a known unit; taken to be in SI units")
-    return {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
+    return {n: Conversion(u.factor, u.offset) for n, u in units.items() if u and not u.si}

@@ -81,11 +81,11 @@ def read_ssp(
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     names = component_names(file, parts)
     annotated = _annotated(file, root, names.values())
-    given = {} if annotated else experiment(str, times)
-    given_ns = given.get("step_ns")
+    chosen_times = {} if annotated else experiment(str, times)
+    chosen_step_ns = chosen_times.get("step_ns")
     extras, by = annotated, ""
     if extras is None:
-        extras, by = read_foreign(file, root, names.values(), given_ns)
+        extras, by = read_foreign(file, root, names.values(), chosen_step_ns)
     called = {
         at: _called(file, names[at], part, extras.components[names[at]])
         for at, part in _sized(systems, parts, notes).items()
@@ -110,10 +110,10 @@ def read_ssp(
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
     if by:
         decided.append(f"scheme = {extras.scheme}, as meant by {by}")
-    start_ns, stop_ns = _times(file, root, parts.values(), given, decided)
-    if by and not given_ns:
+    start_ns, stop_ns = _times(file, root, parts.values(), chosen_times, decided)
+    if by and not chosen_step_ns:
         decided.append(f"step = {written(extras.step_ns)} s, by {by}")
-    step_ns = given_ns or extras.step_ns
+    step_ns = chosen_step_ns or extras.step_ns
     step_ns = step_ns or _shortest_step(file, parts.values(), stop_ns - start_ns, decided)
     used = {TYPE, *FOREIGN} if annotated or by else {TYPE}
     other_names = {".".join(path): name for path, name in names.items()}
@@ -248,8 +248,8 @@ def _components(
         starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):
             port, start = Port(name, variable.name), variable.start
-            given = port in sourced or variable.name in values
-            if variable.supported and not variable.element and not given and start is not None:
+            has_value = port in sourced or variable.name in values
+            if variable.supported and not variable.element and not has_value and start is not None:
                 place = f"{file}: start value of {port}"
                 starts[variable.name] = component.interface.parse(
                     place, variable.name, start, text=True
@@ -259,21 +259,21 @@ def _components(
 
 
 def _times(
-    file: str, root: Any, parts: Iterable[Part], given: Mapping[str, Time], notes: list[str]
+    file: str, root: Any, parts: Iterable[Part], chosen: Mapping[str, Time], notes: list[str]
 ) -> tuple[Time, Time]:
     """The start and the stop time in ns.
 
-    They are those given, or of the archive, or else 0 and the longest that its FMUs name.
+    They are those chosen, or of the archive, or else 0 and the longest that its FMUs name.
     """
     default = child(root, "ssd:DefaultExperiment")
     attributes = {} if default is None else default.attrib
     start = float(attributes.get("startTime", "0"))
     place = file if default is None else at(file, default)
-    start_ns = given.get("start_ns")
+    start_ns = chosen.get("start_ns")
     if start_ns is None:
         start_ns = in_nanoseconds(f"{place}: startTime", start, zero=True, low=-LONGEST)
-    if "stop_ns" in given:
-        return start_ns, given["stop_ns"]
+    if "stop_ns" in chosen:
+        return start_ns, chosen["stop_ns"]
     if "stopTime" in attributes:
         return start_ns, in_nanoseconds(f"{place}: stopTime", float(attributes["stopTime"]))
     declared = [part.interface.experiment.get("stop_time") for part in parts]

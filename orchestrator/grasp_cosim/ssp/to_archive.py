@@ -199,13 +199,13 @@ def _write_connection(
     for side, port in (("start", connection.source), ("end", connection.target)):
         ends[f"{side}Element"] = port.component
         ends[f"{side}Connector"] = names[port.component][port.variable]
-    given = connection.factor is not None or connection.offset is not None
-    _write_change(add(connections, "ssd:Connection", **ends), change, given)
+    transformed = connection.factor is not None or connection.offset is not None
+    _write_change(add(connections, "ssd:Connection", **ends), change, transformed)
 
 
-def _write_change(element: Any, change: tuple[float, float], given: bool) -> None:
+def _write_change(element: Any, change: tuple[float, float], transformed: bool) -> None:
     """What a connection makes of a value, as a transformation where it does anything."""
-    if given or change != (1.0, 0.0):
+    if transformed or change != (1.0, 0.0):
         element.set("suppressUnitConversion", "true")
         factor, offset = map(repr, change)
         add(element, "ssc:LinearTransformation", factor=factor, offset=offset)
@@ -216,13 +216,13 @@ def _write_outside(top: Any, system: System, units: Mapping[str, Unit]) -> None:
     if not (system.inputs or system.outputs):
         return
     connectors = add(top, "ssd:Connectors")
-    for name, given in system.inputs.items():
-        behind = [_variable(system, way.port) for way in given.ways]
+    for name, system_input in system.inputs.items():
+        behind = [_variable(system, way.port) for way in system_input.ways]
         parameters = all(variable.causality == "parameter" for variable in behind)
         kind = "parameter" if parameters else "input"
         connector = add(connectors, "ssd:Connector", name=name, kind=kind)
         if not behind[0].items:
-            _write_type(connector, behind[0].kind, given.unit, units)
+            _write_type(connector, behind[0].kind, system_input.unit, units)
     for name, tap in system.once(taps).items():
         connector = add(connectors, "ssd:Connector", name=name, kind="output")
         if not _variable(system, tap.source).items:
@@ -237,8 +237,8 @@ def _write_type(connector: Any, kind: str, unit: Unit | None, units: Mapping[str
 
 def _write_ways(connections: Any, system: System, names: Mapping[str, Mapping[str, str]]) -> None:
     """The connections between the connectors of the system itself and the components."""
-    for name, given in system.inputs.items():
-        for way in given.ways:
+    for name, system_input in system.inputs.items():
+        for way in system_input.ways:
             element, connector = way.port.component, names[way.port.component][way.port.variable]
             ends = {"startConnector": name, "endElement": element, "endConnector": connector}
             connection = add(connections, "ssd:Connection", **ends)
@@ -252,7 +252,7 @@ def _write_ways(connections: Any, system: System, names: Mapping[str, Mapping[st
 
 def _outside_units(system: System) -> Iterable[Unit]:
     """The units of the connectors of the system itself."""
-    quantities = [given.unit for given in system.inputs.values()]
+    quantities = [system_input.unit for system_input in system.inputs.values()]
     quantities += [tap.quantity for tap in system.once(taps).values()]
     return [unit for unit in quantities if unit is not None]
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ..base.errors import InputError, nearest
 from ..base.si_units import Unit, known_unit
 from ..interface.interface import SETTABLE, Variable
-from ..interface.units import IDENTITY, Conversion, conversion
+from ..interface.units import IDENTITY, Conversion, conversion, no_conversion
 from .parts import Port, Way
 from .stimuli import Column, Stimuli
 from .structure import Structure, unit_of
@@ -39,19 +39,19 @@ class Tap(NamedTuple):
 
 def taps(system: Structure) -> dict[str, Tap]:
     """What the outputs of the system show, by their names."""
-    found: dict[str, Tap] = {}
+    by_name: dict[str, Tap] = {}
     for name, output in system.outputs.items():
         source = _variable(system, name, output.way.port, ("output",))
-        own = _unit(system, output.way.port, source)
-        change = _change(system, name, own, output.unit, output.way)
-        kind, description = output.kind or source.kind, output.description or source.description
-        unit, quantity = source.unit, own
+        unit, quantity = source.unit, _unit(system, output.way.port, source)
+        change = _change(system, name, quantity, output.unit, output.way)
         if output.unit is not None:
             unit, quantity = output.unit.name, output.unit
         elif change != IDENTITY:
             unit, quantity = None, None
-        found[name] = Tap(output.way.port, change, kind, unit, quantity, description or "")
-    return found
+        kind = output.kind or source.kind
+        description = output.description or source.description or ""
+        by_name[name] = Tap(output.way.port, change, kind, unit, quantity, description)
+    return by_name
 
 
 def read_at(system: Structure, port: Port) -> tuple[Port, Conversion]:
@@ -66,22 +66,23 @@ def read_at(system: Structure, port: Port) -> tuple[Port, Conversion]:
 def change_along(system: Structure, name: str, way: Way) -> Conversion:
     """What a value of an input of the system becomes along a way; InputError where it cannot go."""
     variable = _variable(system, name, way.port, SETTABLE)
-    own = _unit(system, way.port, variable)
-    return _change(system, name, system.inputs[name].unit, own, way)
+    unit = _unit(system, way.port, variable)
+    return _change(system, name, system.inputs[name].unit, unit, way)
 
 
 def check_connectors(system: Structure) -> None:
     """InputError at the first input or output of the system that does not fit what is behind it."""
     system.once(taps)
-    for name, given in system.inputs.items():
-        for way in given.ways:
+    for name, system_input in system.inputs.items():
+        for way in system_input.ways:
             change_along(system, name, way)
 
 
 def reached(system: Structure, name: str) -> list[str]:
     """The variables that a value goes to by its name: its own, or those behind an input."""
-    given = system.inputs.get(name)
-    return [str(way.port) for way in given.ways] if given else [name]
+    if name not in system.inputs:
+        return [name]
+    return [str(way.port) for way in system.inputs[name].ways]
 
 
 def given_by_connectors(
@@ -152,18 +153,20 @@ def _column(system: Structure, place: str, name: str, column: Column, way: Way) 
     change, unit = change_along(system, name, way), system.inputs[name].unit
     if unit is None and change == IDENTITY:
         return column
-    before: Conversion | None = IDENTITY
-    if column.unit is not None and (unit is None or column.unit != unit.name):
-        named = known_unit(column.unit)
-        before = conversion(named, unit) if named and unit else None
-    if before is None:
-        must = f"a unit of the quantity of {unit.name}" if unit else "left out"
-        raise InputError(f"{place} [{column.unit}]: cannot be converted; must be {must}")
-    if (before, change) == (IDENTITY, IDENTITY):
+    into_unit = IDENTITY
+    if column.unit is not None and unit is None:
+        raise InputError(f"{place} [{column.unit}]: cannot be converted; must be left out")
+    if column.unit is not None and unit is not None and column.unit != unit.name:
+        source = known_unit(column.unit)
+        conversion_or_none = conversion(source, unit) if source else None
+        if conversion_or_none is None:
+            raise no_conversion(place, column.unit, unit.name)
+        into_unit = conversion_or_none
+    if (into_unit, change) == (IDENTITY, IDENTITY):
         return replace(column, unit=None)
     if column.texts:
         raise InputError(f"{place} = {column.texts[0]!r}: must be a number")
-    return Column(array("d", (change(before(sample)) for sample in column.samples)))
+    return Column(array("d", (change(into_unit(sample)) for sample in column.samples)))
 
 
 def _variable(system: Structure, name: str, port: Port, causalities: tuple[str, ...]) -> Variable:
@@ -190,10 +193,10 @@ def _change(
         return Conversion(factor, 0.0 if way.offset is None else way.offset)
     if start is None or end is None:
         return IDENTITY
-    found = conversion(start, end)
-    if found is None:
+    change = conversion(start, end)
+    if change is None:
         raise InputError(
             f"{system.name}: {name}: {start.name} cannot be converted to {end.name}, for "
             f"{way.port}; must be of the same quantity"
         )
-    return found
+    return change

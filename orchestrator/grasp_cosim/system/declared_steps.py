@@ -18,22 +18,20 @@ from .times import LONGEST, Time, common, multiple, step_of, written
 def check_declared_steps(system: Structure) -> None:
     """InputError at the first FMU that declares that it cannot take the step asked of it."""
     for component in system.components:
-        own = _own_step(component)
-        if (
-            own is not None
-            and not component.loaded.can_vary_step
-            and asked(system, component) % own
-        ):
-            raise InputError(f"{system.name}: {_no_whole_number(system, component, own)}")
+        inner = _inner_step(component)
+        if inner is None or component.loaded.can_vary_step:
+            continue
+        if system.step_of(component) % inner:
+            raise InputError(f"{system.name}: {_no_whole_number(system, component, inner)}")
 
 
 def of_declared_steps(system: Structure) -> Iterator[str]:
     """Remarks on FMUs that may not take the step asked of them."""
     for component in system.components:
-        own, step = _own_step(component), asked(system, component)
-        if own is not None:
-            if step % own:
-                yield _no_whole_number(system, component, own)
+        inner, step = _inner_step(component), system.step_of(component)
+        if inner is not None:
+            if step % inner:
+                yield _no_whole_number(system, component, inner)
             continue
         recommended = _time(component.loaded.step)
         if component.integrated or component.loaded.can_vary_step or recommended is None:
@@ -48,12 +46,7 @@ def of_declared_steps(system: Structure) -> Iterator[str]:
             )
 
 
-def asked(system: Structure, component: Component) -> Time:
-    """The communication step of a component."""
-    return component.step_ns or system.step_ns
-
-
-def _own_step(component: Component) -> Time | None:
+def _inner_step(component: Component) -> Time | None:
     """The length of the steps that the FMU of a component takes inside, where it tells that."""
     if component.integrated:
         return None
@@ -65,28 +58,28 @@ def _time(declared: object) -> Time | None:
     return step_of(declared) if isinstance(declared, float) and 0.0 < declared <= LONGEST else None
 
 
-def _no_whole_number(system: Structure, component: Component, own: Time) -> str:
-    """That the step of a component is no whole number of its own steps, and what would be."""
-    step = asked(system, component)
-    whole = max(1, round(step / own)) * own
+def _no_whole_number(system: Structure, component: Component, inner: Time) -> str:
+    """That the step of a component is no whole number of its inner steps, and what would be."""
+    step = system.step_of(component)
+    fitting = max(1, round(step / inner)) * inner
     return (
-        f"{component.name}: {component.fmu.name} takes steps of {written(own)} s inside "
+        f"{component.name}: {component.fmu.name} takes steps of {written(inner)} s inside "
         f"(fixedInternalStepSize), and {written(step)} s is no whole number of them; "
-        f"one would be: {_settings(system, component, whole)}"
+        f"one would be: {_settings(system, component, fitting)}"
     )
 
 
 def _settings(system: Structure, component: Component, step: Time) -> str:
     """The settings with which a component has a step, and the system still fits together."""
     others = [c.step_ns for c in system.components if c.step_ns is not None and c is not component]
-    settings = {}
+    settings: dict[str, Time] = {}
     base = system.step_ns
     if step % base:
         base = common(step, *others)
         settings["experiment.step"] = base
     if step != base or component.step_ns is not None:
         settings[f"components.{component.name}.step"] = step
-    span, whole = system.stop_ns - system.start_ns, multiple(step, *others)
-    if span % whole:
-        settings["experiment.stop"] = system.start_ns + max(1, round(span / whole)) * whole
+    span, unit = system.stop_ns - system.start_ns, multiple(step, *others)
+    if span % unit:
+        settings["experiment.stop"] = system.start_ns + max(1, round(span / unit)) * unit
     return " ".join(f"--set {place}={written(time)}" for place, time in settings.items())

@@ -58,13 +58,14 @@ def _by_port(
     place: str, interfaces: Mapping[str, Interface], parts: Mapping[Port, Part]
 ) -> dict[Port, Part]:
     """The same by main ports; InputError where two of them are one."""
-    named: dict[Port, Port] = {}
-    found: dict[Port, Part] = {}
+    spelling: dict[Port, Port] = {}
+    by_main_port: dict[Port, Part] = {}
     for port, part in parts.items():
         main = main_port(interfaces, port)
-        if main in named:
+        if main in spelling:
             raise InputError(
-                f"{place}: {named[main]} and {port} are names of one variable; must be one of them"
+                f"{place}: {spelling[main]} and {port} are names of one variable; must be one of "
+                "them"
             )
-        named[main], found[main] = port, part
-    return found
+        spelling[main], by_main_port[main] = port, part
+    return by_main_port

@@ -140,10 +140,13 @@ class Structure:
         """What it was made of alone: other processes work out the rest themselves."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
+    def step_of(self, component: Component) -> Time:
+        """The communication step of a component: its own, or else that of the system."""
+        return self.step_ns if component.step_ns is None else component.step_ns
+
     def period(self, name: str) -> int:
-        """The own step of the component of that name, in communication steps of the system."""
-        own = self.component(name, name).step_ns
-        return 1 if own is None else int(own // self.step_ns)
+        """The step of the component of that name, in communication steps of the system."""
+        return int(self.step_of(self.component(name, name)) // self.step_ns)
 
     def elements(self, port: Port) -> tuple[Port, ...]:
         """The ports of the elements of a whole array; that of any other variable alone."""

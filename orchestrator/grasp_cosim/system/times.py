@@ -75,12 +75,13 @@ def in_nanoseconds(place: str, given: Any, zero: bool = False, low: float = 0.0)
     span = f"from {low:g} to" if zero else "greater than 0, at most"
     must = f"a number {span} {LONGEST:g}"
     fraction = _fraction(given)
-    asked = given if fraction is None else float(fraction)
+    as_number = given if fraction is None else float(fraction)
     if isinstance(given, str):
         must += ', or a fraction like "1/30"'
-        with suppress(ValueError):
-            asked = real(given) if fraction is None else asked
-    value = number(place, asked, low, LONGEST, above=not zero, must=must, unit="s")
+        if fraction is None:
+            with suppress(ValueError):
+                as_number = real(given)
+    value = number(place, as_number, low, LONGEST, above=not zero, must=must, unit="s")
     time = _meant(value)
     if fraction is not None and (time is None or time != fraction * NANOSECONDS):
         raise InputError(

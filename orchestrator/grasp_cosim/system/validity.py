@@ -20,7 +20,7 @@ from ..base.text import counted
 from ..interface.expansion import shape_text
 from ..interface.interface import SUPPORTED, Clock, Interface, Value, Variable, limits
 from ..interface.obstacles import KINDS
-from ..interface.units import IDENTITY, Conversion, conversion
+from ..interface.units import IDENTITY, Conversion, conversion, no_conversion
 from .declared_steps import of_declared_steps
 from .parts import Component, Connection, Port, Solver
 from .stimuli import Column, Stimuli
@@ -426,7 +426,8 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
         elif not is_drivable(v):
             raise InputError(
                 f"{place}: is a {v.variability} {v.causality}, which cannot be set in the run; "
-                f"must be an input or a tunable parameter; {nearest(str(port), drivable)}"
+                "must be an input or a tunable parameter; "
+                f"{nearest(str(port), drivable, interface.listing)}"
             )
         v = interface.by_name[port.variable]
         if not v.is_number or (column.unit is not None and v.kind != "Real"):
@@ -475,14 +476,11 @@ def _conversion(place: str, interface: Interface, port: Port, column: Column) ->
     variable = interface.by_name[port.variable]
     if column.unit is None or variable.unit in (None, column.unit):
         return IDENTITY
-    given = interface.units.get(column.unit) or known_unit(column.unit)
-    if given and variable.relative:
-        given = given.without_offset
-    own = unit_of(interface, variable)
-    found = conversion(given, own) if given and own else None
-    if found is None:
-        raise InputError(
-            f"{place} [{column.unit}]: cannot be converted into {variable.unit}; must be a unit "
-            "of that quantity"
-        )
-    return found
+    source = interface.units.get(column.unit) or known_unit(column.unit)
+    if source and variable.relative:
+        source = source.without_offset
+    target = unit_of(interface, variable)
+    change = conversion(source, target) if source and target else None
+    if change is None:
+        raise no_conversion(place, column.unit, str(variable.unit))
+    return change

@@ -47,8 +47,8 @@ def arrow_table(path: Path, called: str) -> Any:
     except (OSError, ValueError, MemoryError, arrow.ArrowException) as error:
         if limit := not_its_fault(error):
             raise InputError(f"{called}: cannot be read: {limit}") from error
-        said = " ".join(f"{error}".split())
-        raise InputError(f"{called}: is damaged, or no {kind} file: {said}") from error
+        reason = " ".join(f"{error}".split())
+        raise InputError(f"{called}: is damaged, or no {kind} file: {reason}") from error
 
 
 def _whole_batches(arrow: Any, stream: Any) -> Iterator[Any]:

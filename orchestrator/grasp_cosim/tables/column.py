@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Union
 from ..base.checks import real
 from ..base.errors import InputError, nearest
 from ..base.si_units import known_unit
-from ..interface.units import Conversion, conversion
+from ..interface.units import Conversion, conversion, no_conversion
 
 if TYPE_CHECKING:  # stimuli need no numpy, which takes time to load
     import numpy.typing as npt
@@ -80,13 +80,10 @@ class Column:
 
         InputError where the column is in a unit of something else, or in one that is not known.
         """
-        own, wanted = known_unit(self.unit or name), known_unit(name)
-        change = conversion(own, wanted) if own and wanted else None
+        source, target = known_unit(self.unit or name), known_unit(name)
+        change = conversion(source, target) if source and target else None
         if change is None:
-            raise InputError(
-                f"{self.place()} [{self.unit}]: cannot be converted into {name}; must be a unit of "
-                "that quantity"
-            )
+            raise no_conversion(self.place(), self.unit, name)
         return change
 
     def is_time(self) -> bool:
@@ -95,10 +92,10 @@ class Column:
 
     def time_unit(self) -> Fraction:
         """The unit of a column of times in s, exactly; InputError where it is none of time."""
-        own, second = known_unit(self.unit or "s"), known_unit("s")
-        if own is None or second is None or conversion(own, second) is None:
+        unit, second = known_unit(self.unit or "s"), known_unit("s")
+        if unit is None or second is None or conversion(unit, second) is None:
             raise InputError(f"{self.heading} = {self.head!r}: must be in a unit of time, like ms")
-        return Fraction(repr(own.factor))
+        return Fraction(repr(unit.factor))
 
 
 MISSING = ": missing; must be a number"
