@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -98,6 +99,18 @@ def test_a_crash_takes_its_own_run_only(system, mine):
         table = sweep(system, rows, metrics=mine, workers=workers)
         assert set(table.errors) == {1, 3}
         assert "the process of the run ended with signal" in table.errors[1]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_rows_come_through_a_pipe_too(system, mine, tmp_path):
+    pipe = tmp_path / "rows"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_text, args=("a.gain\n1.0\n2.0\n",))
+    writer.start()
+    table = sweep(system, pipe, metrics=mine, workers=1)
+    writer.join()
+    assert table["end"].tolist() == pytest.approx([0.2, 0.4], rel=1e-12)
 
 
 def test_what_is_refused_before_any_run(system, mine, tmp_path):

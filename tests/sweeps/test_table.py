@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.sweeps.rows import as_rows, grid, read_rows, settings_of, unit_of, varied
+from grasp_cosim.sweeps.rows import as_rows, grid, settings_of, unit_of, varied
 from grasp_cosim.sweeps.table import (
     Outcome,
     Table,
@@ -219,7 +219,7 @@ def test_times_may_be_fractions():
 def test_a_unit_in_the_head_is_converted(tmp_path):
     path = tmp_path / "rows.csv"
     path.write_text("plant.width [mm],sensor.angle [deg],t [degC],n\n60,180,20,3\n")
-    (row,) = read_rows(path)
+    (row,) = as_rows(path)
     assert row == pytest.approx({"plant.width": 0.06, "sensor.angle": np.pi, "t": 293.15, "n": 3})
 
 

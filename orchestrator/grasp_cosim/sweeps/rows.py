@@ -19,7 +19,7 @@ from ..system.parts import Port
 from ..system.structure import parameter_in_si
 from ..system.times import LONGEST, in_nanoseconds, in_seconds
 from ..system.toml import place_of, plain
-from ..tables.column import Column
+from ..tables.column import Column, Table
 from ..tables.table import read_table
 from ..tables.text import is_number
 
@@ -64,13 +64,15 @@ def varied(text: str) -> tuple[str, list[Value]]:
 
 
 def as_rows(given: Any) -> list[dict[str, Value]]:
-    """The rows of a table in a file, of columns by place, of a pandas DataFrame, or of rows.
+    """The rows of a table, read or in a file, of columns by place, of a DataFrame, or of rows.
 
     A cell that is None, NaN or empty leaves that place as the system has it. InputError where
     nothing varies, or there are more than MOST rows.
     """
     if isinstance(given, str | Path):
-        rows = read_rows(Path(given))
+        given = read_rows(Path(given))
+    if isinstance(given, Table):
+        rows = _rows_in(given)
     elif hasattr(given, "to_dict"):
         rows = given.to_dict("records")
     elif isinstance(given, Mapping):
@@ -86,12 +88,16 @@ def as_rows(given: Any) -> list[dict[str, Value]]:
     return [{k: value for k, value in row.items() if value is not None} for row in plain_rows]
 
 
-def read_rows(path: Path) -> list[dict[str, Value]]:
+def read_rows(path: Path) -> Table:
+    """The table of rows in a file, which may be a stream; InputError where it is damaged."""
+    return read_table(path, f"--table {path}")
+
+
+def _rows_in(table: Table) -> list[dict[str, Value]]:
     """The rows of a table whose head has places, with a unit in brackets if it is not of SI.
 
     A cell that is empty has no value. InputError at the first one that is not as it must be.
     """
-    table = read_table(path, f"--table {path}")
     rows: list[dict[str, Value]] = [{} for _ in range(table.count)]
     columns = [column for column in table.columns if column.name]
     for column in columns:
@@ -110,12 +116,12 @@ def read_rows(path: Path) -> list[dict[str, Value]]:
     return [row for row in rows if row]
 
 
-def check_units(system: System, path: Path) -> None:
+def check_units(system: System, table: Table) -> None:
     """InputError at the first column of a table that is in a unit of something else than its place.
 
     What has no unit in the system takes the values as they are in SI units.
     """
-    for column in read_table(path, f"--table {path}").columns:
+    for column in table.columns:
         unit = unit_of(system, column.name) if column.unit else None
         if unit and known_unit(unit):
             column.to_unit(unit)

@@ -34,7 +34,7 @@ from ..metrics.metric import Function, Metric, available, check_portable, chosen
 from ..recording.result import Result
 from ..system.description import System
 from ..system.settings import settings
-from .rows import Row, as_rows, check_units, settings_of, unit_of
+from .rows import Row, as_rows, check_units, read_rows, settings_of, unit_of
 from .table import Outcome, Table, check_format, made
 
 AHEAD = 100
@@ -75,38 +75,39 @@ def sweep(
     something else; SimulationError where processes do not start or a run cannot be kept;
     KeyboardInterrupt at Ctrl-C.
     """
-    found = as_rows(rows)
     if isinstance(rows, str | Path):
-        check_units(system, Path(rows))
+        rows = read_rows(Path(rows))
+        check_units(system, rows)
+    rows_in_si = as_rows(rows)
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
     observed = system.shown
-    own = chosen(metrics, system.metrics, observed, system.roles)
-    check_portable(own)
-    every = metrics_of(system.metrics, own)
-    in_si(system, every)
-    asked, missing = available(every, observed, system.roles)
-    if not asked:
+    own_metrics = chosen(metrics, system.metrics, observed, system.roles)
+    check_portable(own_metrics)
+    all_metrics = metrics_of(system.metrics, own_metrics)
+    in_si(system, all_metrics)
+    measured, missing = available(all_metrics, observed, system.roles)
+    if not measured:
         because = f" ({'; '.join(missing)})" if missing else ""
         raise InputError(
             f"{system.name}: has no metric{because}; name a file of yours by --metrics"
         )
-    units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in found for p in row)}
-    task = Task(system.natively(native), own)
-    given = settings_of(task.system, found)
+    units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in rows_in_si for p in row)}
+    task = Task(system.natively(native), own_metrics)
+    settings_of_runs = settings_of(task.system, rows_in_si)
     file = Path(out) if out is not None else None
     done: dict[int, Outcome] = {}
-    with opened(file, _identity(task, given), done) if file else nullcontext() as store:
-        left = [(i, row) for i, row in enumerate(given) if i not in done]
-        results = _elsewhere(executor, task, left) if executor else _here(task, left, workers)
-        bar = Progress("sweep", len(found), shown=progress, initial=len(done))
-        with phase(f"sweep, {counted(len(left), 'run')}"), bar, closing(results):
+    with opened(file, _identity(task, settings_of_runs), done) if file else nullcontext() as store:
+        to_do = [(i, row) for i, row in enumerate(settings_of_runs) if i not in done]
+        results = _elsewhere(executor, task, to_do) if executor else _here(task, to_do, workers)
+        bar = Progress("sweep", len(rows_in_si), shown=progress, initial=len(done))
+        with phase(f"sweep, {counted(len(to_do), 'run')}"), bar, closing(results):
             for outcome in results:
                 if store:
                     keep(store, outcome)
                 done[outcome.index] = outcome
                 bar.update()
-        table = made(found, [done[i] for i in range(len(found))], units, asked)
+        table = made(rows_in_si, [done[i] for i in range(len(rows_in_si))], units, measured)
         if file:
             table.write(file)
     return table
