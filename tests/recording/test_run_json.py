@@ -153,3 +153,17 @@ def test_the_clock_of_a_system_is_read_though_its_run_did_not_keep_to_it(grasp, 
     with RunFolder(tmp_path, system) as folder:
         folder.finish(simulate(system, listeners=[folder]))
     assert load_run(tmp_path).timing is None
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [("tolerance", "1e-6"), ("logging", "logEvents"), ("logging", []), ("logging", [1])],
+)
+def test_a_wrong_entry_of_a_component_is_named(runs, tmp_path, entry, value):
+    folder, written = runs[0]
+    (tmp_path / "signals.csv").write_bytes((folder / "signals.csv").read_bytes())
+    changed = copy.deepcopy(written)
+    changed["components"]["plant"][entry] = value
+    (tmp_path / "run.json").write_text(json.dumps(changed))
+    with pytest.raises(InputError, match=rf"run.json: components: plant: {entry} = .*; must be "):
+        load_run(tmp_path)

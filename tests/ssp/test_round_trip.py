@@ -34,7 +34,7 @@ from ssp.hand_made import (
     structure,
     system,
 )
-from support.native_fmus import needs_gcc
+from support.native_fmus import needs_gcc, talker
 from support.native_systems import driven
 
 FORK = "child = os.fork(); child or sys.exit(); os.waitpid(child, 0)"
@@ -83,7 +83,7 @@ def test_what_ssp_has_no_form_for_comes_back(grasp, tmp_path):
     gap, contact = Port("plant", "gap[1]"), Port("plant", "contact[1]")
     full = replace(
         grasp,
-        components=(replace(plant, step_ns=300_000, isolation="process"), *others),
+        components=(replace(plant, step_ns=300_000, isolation="process", logging=True), *others),
         scheme="jacobi",
         initialisation=Initialisation("refuse", 1e-8, 7),
         realtime=Realtime(0.5, "stop", priority=80),
@@ -102,6 +102,14 @@ def test_what_ssp_has_no_form_for_comes_back(grasp, tmp_path):
         presets={"wide": {"plant.object_width": 0.08}, "loud": {"sensor_1.noise.seed": 3}},
     )
     assert round_trip(full, tmp_path) == full
+
+
+@needs_gcc
+def test_what_an_fmu_is_asked_to_log_comes_back(tmp_path):
+    asked = ("logEvents", "logStatusError")
+    parts = (Component("a", talker(tmp_path), {}, logging=asked),)
+    original = System("talk.toml", parts, (), 1_000_000, 1_000_000_000, "sequential")
+    assert round_trip(original, tmp_path) == original
 
 
 def hand(folder, *connections, rename=False):

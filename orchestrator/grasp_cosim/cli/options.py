@@ -72,8 +72,9 @@ record_option = click.option(
     "--record",
     multiple=True,
     metavar="NAME,NAME,...",
-    help="Record these signals, whatever they are: plant.*,controller.force[1]; '!plant.clock' "
-    "leaves one out. Default: the outputs, or what SYSTEM says.",
+    help="Record these signals, be they outputs, inputs, parameters or locals: "
+    "plant.*,controller.force[1]; '!plant.clock' leaves one out. Default: what SYSTEM says, or "
+    "else the outputs.",
 )
 
 step_option = click.option(

@@ -76,7 +76,7 @@ TABLE = Path("sweep.csv")
     "form",
     type=click.Choice(FORMS),
     default="csv",
-    help="Of the signals in --out: arrow is for long runs.",
+    help="Write the signals in --out in this format: arrow is for long runs.",
 )
 @click.option(
     "--plot",

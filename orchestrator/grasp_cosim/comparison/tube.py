@@ -11,8 +11,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 ROUNDING = 0.5e-9
-"""s; times are whole nanoseconds, so a sample this close to the end of a window is at its end."""
-
+"""s, half a nanosecond; a sample this close to the end of a window is at its end."""
 
 FAR = 1e300
 """As far from zero as a value counts: inf and the largest double, a distance to nothing."""

@@ -1,4 +1,4 @@
-"""The result of a run: every output at every communication point, as plain data."""
+"""The result of a run: what was recorded at every communication point, as plain data."""
 
 from __future__ import annotations
 

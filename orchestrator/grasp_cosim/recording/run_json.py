@@ -68,6 +68,11 @@ def _is_step(value: Any) -> bool:
     return _is_time(value) and value * NANOSECONDS >= 1.0
 
 
+def _is_logging(value: Any) -> bool:
+    categories = value if isinstance(value, list) else []
+    return isinstance(value, bool) or (bool(categories) and all(map(_is_text, categories)))
+
+
 def _is_metric(value: Any) -> bool:
     values = value if isinstance(value, list) else [value]
     return all(v is None or isinstance(v, bool) or _is_finite(v) for v in values)
@@ -132,7 +137,12 @@ COMPONENT = _object(
         "isolation": TEXT,
         "rename": _named(TEXT),
     },
-    {"units": _named(TEXT), "solver": _object({"relative_tolerance": NUMBER})},
+    {
+        "units": _named(TEXT),
+        "solver": _object({"relative_tolerance": NUMBER}),
+        "tolerance": NUMBER,
+        "logging": _a("true or a list of strings", _is_logging),
+    },
 )
 CONNECTION = _object({"from": TEXT, "to": TEXT, "factor": NUMBER_OR_NULL, "offset": NUMBER_OR_NULL})
 EVENT = _object({"set": _named(VALUE)}, {"at": NUMBER, "when": TEXT})

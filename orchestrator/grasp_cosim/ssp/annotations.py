@@ -27,7 +27,16 @@ from lxml import etree  # type: ignore[import-untyped]
 from ..base.checks import check_values
 from ..base.errors import InputError, choices, nearest
 from ..system.description import System
-from ..system.parts import Event, Fault, Initialisation, Isolation, Port, Realtime, Solver
+from ..system.parts import (
+    Event,
+    Fault,
+    Initialisation,
+    Isolation,
+    Logging,
+    Port,
+    Realtime,
+    Solver,
+)
 from ..system.record import Record
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
@@ -52,18 +61,23 @@ _TOP: tuple[tuple[str, ...], ...] = (("ssd:DefaultExperiment",), ("ssd:System",)
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """The attributes of a component that SSP has no form for; earlier ones lack the last two."""
+    """The attributes of a component that SSP has no form for; earlier archives lack the last ones,
+    which have a default.
+    """
 
     rename: Mapping[str, str]
     step_ns: Time | None
     isolation: Isolation
     units: Mapping[str, str] = field(default_factory=dict)
     solver: Solver | None = None
+    logging: Logging = False
 
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """The attributes of a system that SSP has no form for; earlier archives lack the last six."""
+    """The attributes of a system that SSP has no form for; earlier archives lack the last ones,
+    which have a default.
+    """
 
     step_ns: Time
     scheme: Scheme
@@ -84,7 +98,7 @@ def extras_of(system: System) -> Extras:
     """The extras of a system."""
     shared = {f.name: getattr(system, f.name) for f in fields(Extras)}
     beside = {
-        c.name: Beside(dict(c.rename), c.step_ns, c.isolation, dict(c.units), c.solver)
+        c.name: Beside(dict(c.rename), c.step_ns, c.isolation, dict(c.units), c.solver, c.logging)
         for c in system.components
     }
     return Extras(**{**shared, "components": beside})
@@ -153,7 +167,8 @@ def _typed(kind: Any, value: Any) -> Any:
     if origin in (Union, UnionType):
         if Fraction in arguments and isinstance(value, str) and "/" in value:
             return _typed(Fraction, value)
-        fitting = [alternative for alternative in arguments if alternative is type(value)]
+        of_value = tuple if isinstance(value, list) else type(value)
+        fitting = [a for a in arguments if of_value in (a, get_origin(a))]
         return _typed((fitting or arguments)[0], value)
     if origin is Literal:
         if value not in arguments:

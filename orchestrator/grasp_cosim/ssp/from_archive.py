@@ -244,6 +244,7 @@ def _components(
             beside.isolation,
             units,
             solver=solver,
+            logging=beside.logging,
         )
         starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):

@@ -64,7 +64,7 @@ def sweep(
     """Run the system once for each row, and return a table of rows and metrics.
 
     rows are mappings of places, as with_settings() has them, to values in SI units; or columns by
-    place, a pandas DataFrame, or the path of a CSV file. metrics are worked out beside those of the
+    place, a pandas DataFrame, or the path of a table. metrics are worked out beside those of the
     system. The table is written to `out`, a .csv or .parquet file; until all are done, finished
     runs are kept beside it, and the same call goes on. workers are processes here, by default one
     for each processor; an executor of concurrent.futures takes their place, and gets the FMUs. The

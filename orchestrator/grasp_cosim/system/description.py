@@ -85,7 +85,7 @@ class System(Structure):
     ) -> "System":
         """The system of a TOML file or SSP archive; an archive has its own FMUs.
 
-        start, step and stop in s, and a CSV file of inputs, go before what it says. fmus is where
+        start, step and stop in s, and a table of stimuli, go before what it says. fmus is where
         the FMUs of a TOML file are, by default beside it. variant names the structure of an archive
         that has several, by default SystemStructure.ssd.
         """
@@ -180,7 +180,7 @@ class System(Structure):
         return system
 
     def with_input(self, input: str | Path | Stimuli | None) -> "System":  # noqa: A002
-        """A copy whose inputs without another source are driven by a CSV file, or by none."""
+        """A copy whose tunable parameters and inputs without a source a table drives, or none."""
         return replace(self, input=_stimuli(input))
 
     def with_record(self, *signals: str) -> "System":

@@ -43,11 +43,10 @@ class Structure:
     Times are in nanoseconds, and exact: see times.py. From start to stop it is a whole multiple of
     step_ns, and of the step of each component. notes are what its reader decided or did not use, a
     line each. roles name the component that plays a role; where they do not, the component of that
-    name plays it. presets are
-    values under a name, like {"bench": {"sensor_1.noise.seed": 1}}. input drives inputs without a
-    connection. metrics are names of groups of ours. record says what is recorded. inputs and
-    outputs are those of the system itself, which an archive may have, by name. as_read is
-    settings.made_of() when it was read.
+    name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
+    input drives inputs without a connection, and tunable parameters. metrics are names of groups of
+    ours. record says what is recorded. inputs and outputs are those of the system itself, which an
+    archive may have, by name. as_read is settings.made_of() when it was read.
     """
 
     name: str
