@@ -135,15 +135,15 @@ def judge(
         reference, other = reference.without_gaps(), other.without_gaps()
         if not len(reference.time) and not len(other.time):
             continue
-        unit, given = a.units[name], bands.of_signal(name)
+        unit, stated = a.units[name], bands.of_signal(name)
         if not np.array_equal(gaps, other_gaps):
             exact = Band(0.0, shift, "derived")
-            band = given.band(0.0, exact) if given else exact
+            band = stated.band(0.0, exact) if stated else exact
             time = float(np.setxor1d(gaps, other_gaps)[0])
             signals.append(Compared(name, unit, band, inf, None, None, time))
             continue
         numerics = [c for run in runs if len((c := run[name].without_gaps()).time)]
-        band = signal_band(reference, numerics, nominal, shift, given)
+        band = signal_band(reference, numerics, nominal, shift, stated)
         apart = deviation(reference.until(float(other.time[-1])), other, band.time)
         worst = apart.values.argmax()
         time, distance, was, now = (float(column[worst]) for column in apart)

@@ -172,22 +172,22 @@ class LoadedInstance(ABC):
         Some log no warning without that. InputError where it has to be, and the FMU refuses.
         """
         severe = set(SEVERE.values()).intersection(self.interface.log_categories)
-        asked = () if isinstance(self._logging, bool) else self._logging
-        if self._logs_at_once or not (severe or asked):
+        categories = () if isinstance(self._logging, bool) else self._logging
+        if self._logs_at_once or not (severe or categories):
             return
         try:
             with self._messages.ignored():
-                self._slave.setDebugLogging(True, sorted({*severe, *asked}))
+                self._slave.setDebugLogging(True, sorted({*severe, *categories}))
         except (FMICallException, MissingFunctionError) as error:
             fatal = isinstance(error, FMICallException) and error.status >= FATAL
-            if asked or fatal:
+            if categories or fatal:
                 self._worst = FATAL if fatal else self._worst
                 raise InputError(
                     f"{self.name}: {self.interface.called} does not take log categories: "
                     f"{self._reason(error)}"
                 ) from error
         else:
-            self._restrained = not asked
+            self._restrained = not categories
 
     def quieten(self) -> None:
         """Switch logging off again in an FMU that takes no notice of the categories it was told.
@@ -275,9 +275,9 @@ class LoadedInstance(ABC):
                 reason = as_reason(self._messages.reasons())
                 LOGGER.warning("%s: %s%s", self.name, error, reason)
         # fmi2Fatal is what pythonfmu makes of any call refused: our Python FMUs outlive it
-        ours = self._python and self.interface.ours
+        outlives_fatal = self._python and self.interface.ours
         if self._slave is not None:
-            if self._worst < FATAL or ours:
+            if self._worst < FATAL or outlives_fatal:
                 self._free()
             else:
                 _never_freed.append(self._slave)

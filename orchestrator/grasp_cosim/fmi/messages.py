@@ -74,11 +74,11 @@ class Messages:
         if status > OK:
             return not self._ignoring
         if isinstance(self._logging, bool):
-            asked = self._logging
+            is_asked_for = self._logging
         else:
-            asked = (category or b"").decode(errors="replace") in self._logging
-        self.unasked += not asked
-        return asked
+            is_asked_for = (category or b"").decode(errors="replace") in self._logging
+        self.unasked += not is_asked_for
+        return is_asked_for
 
     def take(self, status: int, text: bytes | None) -> None:
         """Take a message as the FMU logs it."""
@@ -144,8 +144,8 @@ class Messages:
 
     def _bare(self, text: str) -> str:
         """The text without what pythonfmu, and our own FMUs, put before it."""
-        ours = re.compile(rf"\A{re.escape(self._component)}, t = \S+ s: ")
-        return ours.sub("", _PYTHONFMU_PREFIX.sub("", text), count=1)
+        prefix = re.compile(rf"\A{re.escape(self._component)}, t = \S+ s: ")
+        return prefix.sub("", _PYTHONFMU_PREFIX.sub("", text), count=1)
 
 
 def _followed(count: int) -> str:

@@ -149,8 +149,8 @@ def candidates(
 ) -> list[Variable]:
     """The variables of another FMU, other than those taken, that could be one of ours."""
     variable, others = ours.by_name[name], {*taken, *theirs.main_names}
-    left = (v for v in theirs.variables if v.name not in others)
-    return [v for v in left if v.supported and _may_be(ours, variable, theirs, v)]
+    free = (v for v in theirs.variables if v.name not in others)
+    return [v for v in free if v.supported and _may_be(ours, variable, theirs, v)]
 
 
 def _meaning(name: str) -> frozenset[str]:

@@ -224,12 +224,12 @@ def _listed(name: str, interface: Interface, path: str) -> str:
     parameters = [v for v in variables if v.causality in PARAMETERS]
     initial = [v for v in variables if v.settable and v.causality not in SETTABLE]
     lines = [_line(v.name, _start(v), _told(v)) for v in inputs]
-    said = [f"# {_line(v.name, _start(v), _told(v))}" for v in parameters]
-    said += [f"# {_line(v.name, _start(v), f'at the start, {_told(v)}')}" for v in initial]
-    said += [f"# {v.name}, recorded: {_told(v)}" for v in by_default(interface)]
-    lines += said[:MOST]
-    if len(said) > MOST:
-        lines.append(f"# and {len(said) - MOST} more: grasp-cosim inspect {path}")
+    comments = [f"# {_line(v.name, _start(v), _told(v))}" for v in parameters]
+    comments += [f"# {_line(v.name, _start(v), f'at the start, {_told(v)}')}" for v in initial]
+    comments += [f"# {v.name}, recorded: {_told(v)}" for v in by_default(interface)]
+    lines += comments[:MOST]
+    if len(comments) > MOST:
+        lines.append(f"# and {len(comments) - MOST} more: grasp-cosim inspect {path}")
     tables = _component(name, path), _table(f"[components.{name}.values]", lines)
     return "".join(f"{text}\n\n" for text in tables if text)[:-1]
 

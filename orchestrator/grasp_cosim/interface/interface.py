@@ -432,15 +432,15 @@ class Interface:
 
         place says of a name where its value comes from.
         """
-        named: dict[str, str] = {}
+        name_of: dict[str, str] = {}
         for name, value in values.items():
-            other = named.setdefault(self.main_name(name), name)
+            other = name_of.setdefault(self.main_name(name), name)
             if values[other] != value:
                 raise InputError(
                     f"{place(name)} = {value!r}: is another name of {other}, which is "
                     f"{values[other]!r}; must have one value"
                 )
-        return {main: values[name] for main, name in named.items()}
+        return {main: values[name] for main, name in name_of.items()}
 
     def conversion(self, name: str, other: "Interface") -> Conversion | None:
         """The conversion of a variable into the unit that `other` has it in; None for no way.

@@ -115,8 +115,8 @@ def capabilities_of(kinds: Mapping[str, Element], major: str) -> dict[str, Value
     capabilities: dict[str, Value | None] = {}
     first = next(iter(kinds), "")
     for kind, element in kinds.items():
-        named = dict.fromkeys(CAPABILITIES.get((major, kind), ()))
-        for flag in named | element.attrib:
+        flags = dict.fromkeys(CAPABILITIES.get((major, kind), ()))
+        for flag in flags | element.attrib:
             if flag == "modelIdentifier":
                 continue
             text = element.get(flag)

@@ -384,27 +384,29 @@ class _Reader:
             clocks=_references(place, attributes["clocks"]) if "clocks" in attributes else (),
         )
 
-    def clock(self, place: str, said: Mapping[str, str]) -> Clock:
+    def clock(self, place: str, attributes: Mapping[str, str]) -> Clock:
         """When a clock ticks, by its attributes and those of its type."""
         interval, shift, resolution = None, Fraction(0), 0
         with self.tolerated():
-            if "resolution" in said:
-                resolution = _whole(f"{place}: resolution", said["resolution"])
-            if resolution and "intervalCounter" in said:
-                counter = _whole(f"{place}: intervalCounter", said["intervalCounter"])
+            if "resolution" in attributes:
+                resolution = _whole(f"{place}: resolution", attributes["resolution"])
+            if resolution and "intervalCounter" in attributes:
+                counter = _whole(f"{place}: intervalCounter", attributes["intervalCounter"])
                 interval = Fraction(counter, resolution)
-            elif "intervalDecimal" in said:
-                interval = _decimal(f"{place}: intervalDecimal", said["intervalDecimal"])
-            if resolution and "shiftCounter" in said:
-                shift = Fraction(_whole(f"{place}: shiftCounter", said["shiftCounter"]), resolution)
-            elif "shiftDecimal" in said:
-                shift = _decimal(f"{place}: shiftDecimal", said["shiftDecimal"])
+            elif "intervalDecimal" in attributes:
+                interval = _decimal(f"{place}: intervalDecimal", attributes["intervalDecimal"])
+            if resolution and "shiftCounter" in attributes:
+                shift = Fraction(
+                    _whole(f"{place}: shiftCounter", attributes["shiftCounter"]), resolution
+                )
+            elif "shiftDecimal" in attributes:
+                shift = _decimal(f"{place}: shiftDecimal", attributes["shiftDecimal"])
             if interval is not None and interval <= 0:
                 raise ValueError(f"{place}: interval = {float(interval):g} s: must be above 0")
             if shift < 0:
                 raise ValueError(f"{place}: shift = {float(shift):g} s: must be at least 0")
-        fractions = said.get("supportsFraction") in ("true", "1")
-        return Clock(said.get("intervalVariability", ""), interval, shift, fractions)
+        fractions = attributes.get("supportsFraction") in ("true", "1")
+        return Clock(attributes.get("intervalVariability", ""), interval, shift, fractions)
 
     def bounds(
         self, place: str, fmi_type: str, attributes: Mapping[str, str]

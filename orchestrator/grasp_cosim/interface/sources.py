@@ -40,10 +40,10 @@ def why_not_compiled(fmu: Interface) -> str:
         except (ValueError, ExpatError) as error:
             return f"{place} cannot be read: {error}"
     element = "SourceFile" if place == BUILD else "SourceFiles/File"
-    listed = [file.get("name", "") for file in root.iterfind(f".//{element}")]
-    if not listed:
+    files = [file.get("name", "") for file in root.iterfind(f".//{element}")]
+    if not files:
         return f"{place} lists no source files"
-    lost = next((name for name in listed if FOLDER + name not in names), None)
+    lost = next((name for name in files if FOLDER + name not in names), None)
     if lost is not None:
         return f"{place} lists {lost}, which is not there"
     return _lacking_header(texts) or _prefix(texts, fmu.identifier)
@@ -51,11 +51,11 @@ def why_not_compiled(fmu: Interface) -> str:
 
 def _lacking_header(texts: Mapping[str, str]) -> str:
     """A file of its own that a source includes and that is not there; empty where there is none."""
-    own = {PurePosixPath(name).name for name in texts}
+    packed = {PurePosixPath(name).name for name in texts}
     for name, text in texts.items():
         for header in _INCLUDE.findall(text):
             file = PurePosixPath(header).name
-            if file not in own and not file.endswith(HEADERS):
+            if file not in packed and not file.endswith(HEADERS):
                 return f"{name} includes {header}, which is not there"
     return ""
 

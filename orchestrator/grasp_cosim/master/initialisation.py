@@ -62,15 +62,15 @@ def cut_loops(graph: dict[Port, list[Port]], inputs: Container[Port]) -> list[tu
             users[source].append(port)
     loops: list[tuple[Port, ...]] = []
     cut: set[Port] = set()
-    left: set[Port] = set()
+    finished: set[Port] = set()
 
     def search(start: Port) -> None:
-        path: dict[Port, int] = {} if start in left else {start: 0}
+        path: dict[Port, int] = {} if start in finished else {start: 0}
         following = [iter(users[port]) for port in path]
         while path:
-            user = next((u for u in following[-1] if u not in left and u not in cut), None)
+            user = next((u for u in following[-1] if u not in finished and u not in cut), None)
             if user is None:
-                left.add(path.popitem()[0])
+                finished.add(path.popitem()[0])
                 following.pop()
             elif user not in path:
                 path[user] = len(path)

@@ -31,14 +31,14 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     InputError where a signal that one of those interprets which the system permits is of another
     quantity than it expects, or its unit is not defined. Signals without any unit are in SI.
     """
-    asked, of_system = tuple(metrics), system.once(taps)
+    chosen, of_system = tuple(metrics), system.once(taps)
     observed: dict[str, Variable | Tap] = {str(port): v for port, v in system.observed.items()}
     observed |= of_system
     units = {str(port): unit for port, unit in system.once(signal_units).items()}
     numbers = (name for name, tap in of_system.items() if tap.kind in ("Real", "Integer"))
     units |= {name: of_system[name].quantity for name in numbers}
     expected = set()
-    for metric in available(asked, observed, system.roles)[0]:
+    for metric in available(chosen, observed, system.roles)[0]:
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
         for need, wanted in metric.expects.items():
             if wanted is None:
@@ -63,7 +63,7 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
                     f"{undefined}; {purpose} must know its unit, one like {wanted}: "
                     f"{remedy}"
                 )
-    free = any(not m.expects for m in asked)
+    free = any(not m.expects for m in chosen)
     silent = [n for n, v in observed.items() if v.kind == "Real" and v.unit is None]
     read = [name for name in silent if free or name in expected]
     others = {name: unit for name, unit in units.items() if unit and not unit.si}

@@ -39,14 +39,14 @@ def flow_order(
             waits[other] += 1
     ready = [node for node, loop in enumerate(loop_of) if not waits[loop]]
     heapify(ready)
-    left = [len(nodes) for nodes in members]
+    unplaced = [len(nodes) for nodes in members]
     order: list[Component] = []
     while ready:
         node = heappop(ready)  # the first in the file
         order.append(components[node])
         loop = loop_of[node]
-        left[loop] -= 1
-        if left[loop]:
+        unplaced[loop] -= 1
+        if unplaced[loop]:
             continue
         for other in behind[loop]:
             waits[other] -= 1
@@ -60,8 +60,7 @@ def loops(forward: Graph, backward: Graph) -> list[int]:
     """The loop that each node is in, by the number of one of its nodes.
 
     Nodes that reach one another are in one loop, others alone. backward has the edges of forward
-    the other way round.
-    Kosaraju's algorithm, linear in nodes and edges.
+    the other way round. By Kosaraju's algorithm, linear in nodes and edges.
     """
     loop_of = [0] * len(forward)
     placed: set[int] = set()

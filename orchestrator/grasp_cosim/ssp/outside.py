@@ -41,9 +41,11 @@ def system_outputs(network: Connectors, called: Called) -> dict[str, SystemOutpu
         except InputError as error:
             notes.add(place, f"{name} is not recorded: {error}")
             continue
-        own = unit_of(network.parts[source.path].interface, network.variable(source))
+        start_unit = unit_of(network.parts[source.path].interface, network.variable(source))
         unit = carried.unit if carried.settled else None
-        outputs[name] = SystemOutput(_way(called(source), hops, own, unit, carried), unit, kind)
+        outputs[name] = SystemOutput(
+            _way(called(source), hops, start_unit, unit, carried), unit, kind
+        )
     return outputs
 
 
@@ -73,8 +75,8 @@ def system_inputs(network: Connectors, called: Called) -> dict[str, SystemInput]
             except InputError as error:
                 notes.add(place, f"{name} is not passed on: {error}")
                 continue
-            own = unit_of(network.parts[target.path].interface, variable)
-            ways.append(_way(called(target), hops, unit, own, carried))
+            end_unit = unit_of(network.parts[target.path].interface, variable)
+            ways.append(_way(called(target), hops, unit, end_unit, carried))
         if ways:
             inputs[name] = SystemInput(tuple(ways), unit)
         else:

@@ -141,8 +141,8 @@ def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
 def unit_of(system: System, place: str) -> str | None:
     """The SI unit in which the values of a place are; None where they have none."""
     if place in system.inputs:
-        own = system.inputs[place].unit
-        return own.base if own else None
+        connector_unit = system.inputs[place].unit
+        return connector_unit.base if connector_unit else None
     port = _port(system, place)
     if port is None:
         return "s" if place in TIMES else None
@@ -157,8 +157,8 @@ def unit_of(system: System, place: str) -> str | None:
 def _in_si(system: System, place: str) -> Conversion:
     """The conversion of the values of a place to SI base units."""
     if place in system.inputs:
-        own = system.inputs[place].unit
-        return Conversion(own.factor, own.offset) if own else IDENTITY
+        unit = system.inputs[place].unit
+        return Conversion(unit.factor, unit.offset) if unit else IDENTITY
     port = _port(system, place)
     return parameter_in_si(system, place, port) if port else IDENTITY
 

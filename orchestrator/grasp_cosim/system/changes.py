@@ -106,19 +106,19 @@ def with_old_values(
     arrays = before.arrays
     anew = {v for name in anew for v in (arrays[name].names if name in arrays else (name,))}
     _check_ends(system, was, after, place)
-    given = {
+    values = {
         name: value
         for name, value in was.values.items()
         if name in after.by_name and after.by_name[name].settable
     }
-    kept = {name: value for name, value in given.items() if name not in anew}
+    kept = {name: value for name, value in values.items() if name not in anew}
     for name in [*kept, *sorted(stated(system, was.name))]:
         if reason := _lost(before, after, name, name in kept):
             raise InputError(f"{place}: {name} {reason}")
     notes = [
         f"{place}: {_no_place(before, now, name)}: its value {literal(value)} is left out"
         for name, value in was.values.items()
-        if name not in given
+        if name not in values
     ]
     had = {v.name for v in before.variables if v.unit not in (None, "1")}
     bare = [v.name for v in after.variables if v.kind == "Real" and not v.unit and v.name in had]
@@ -127,19 +127,19 @@ def with_old_values(
             "%s: %s tells no unit of %s, as %s does: taken to be in SI; `units` names others",
             place, now.fmu.name, choices(bare, 6), was.fmu.name,
         )  # fmt: skip
-    given |= converted(kept, before, after)
+    values |= converted(kept, before, after)
     for name in kept:
         old, new = before.by_name[name].items, after.by_name[name].items
         label, meant = (
-            next((k for k, n in items.items() if n == given[name]), None) for items in (old, new)
+            next((k for k, n in items.items() if n == values[name]), None) for items in (old, new)
         )
         if old and new and label != meant:
             raise InputError(
-                f"{place}: {name} = {given[name]!r} is {label} in {was.fmu.name} and "
+                f"{place}: {name} = {values[name]!r} is {label} in {was.fmu.name} and "
                 f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
                 f"{choices(new)}"
             )
-    return replace(now, values=given), notes
+    return replace(now, values=values), notes
 
 
 def _no_place(before: Interface, now: Component, name: str) -> str:

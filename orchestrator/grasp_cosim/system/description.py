@@ -154,12 +154,12 @@ class System(Structure):
             notes += more
         if not file and all(_of_parameters(self, *named) for named in tables.items()):
             return self._with_parameters(tuple(components.values()))
-        made = tuple(components.values())
-        record, lost = self.record.without_missing(self.components, made, self.outputs)
+        changed = tuple(components.values())
+        record, lost = self.record.without_missing(self.components, changed, self.outputs)
         notes += [f"record: {text!r} matches no signal any more: it is left out" for text in lost]
         return replace(
             self,
-            components=made,
+            components=changed,
             connections=as_written(self),
             notes=tuple(notes),
             record=record,

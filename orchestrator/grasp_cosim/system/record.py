@@ -116,8 +116,8 @@ class Record:
     def has(self, name: str) -> bool:
         """True if a signal is recorded that is worked out of others."""
         taken_in, left_out = self._patterns()
-        wanted = not taken_in or any(p.matches([name]) for p in taken_in)
-        return wanted and not any(p.matches([name]) for p in left_out)
+        is_taken_in = not taken_in or any(p.matches([name]) for p in taken_in)
+        return is_taken_in and not any(p.matches([name]) for p in left_out)
 
     def with_outputs(self, components: Sequence[Component]) -> Record:
         """The record that has all outputs besides, but for those that are left out."""
@@ -136,13 +136,13 @@ class Record:
                 raise InputError(f"{place} {text!r} {reason}")
 
     def without_missing(
-        self, was: Sequence[Component], now: Sequence[Component], outputs: Collection[str] = ()
+        self, before: Sequence[Component], after: Sequence[Component], outputs: Collection[str] = ()
     ) -> tuple[Record, list[str]]:
         """The record of a system with other FMUs, and its entries that match nothing any more."""
         lost = [
             text
             for text in self.signals
-            if missing(text, now, outputs) and not missing(text, was, outputs)
+            if missing(text, after, outputs) and not missing(text, before, outputs)
         ]
         return Record(tuple(text for text in self.signals if text not in lost)), lost
 

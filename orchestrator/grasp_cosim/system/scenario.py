@@ -218,8 +218,8 @@ def _check_condition(system: Structure, condition: Condition | None, place: str)
     place = f"{place}: when = '{condition}'"
     interface = system.component(source.component, place).interface
     valid = [v.name for v in interface.variables if v.is_number]
-    said = f"{place}: {source.component} has no number"
-    known(said, source.variable, valid, see=interface.listing)
+    lacking = f"{place}: {source.component} has no number"
+    known(lacking, source.variable, valid, see=interface.listing)
     kind: str = interface.by_name[source.variable].kind
     items = interface.by_name[source.variable].items
     if source != port:

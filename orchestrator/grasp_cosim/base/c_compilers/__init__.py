@@ -197,19 +197,19 @@ class _Compiling:
         """Take a job, which is done in a folder, once there is a processor for the next."""
         self._waiting.append((number, job, folder))
         self._start()
-        made: dict[int, Path] = {}
+        libraries: dict[int, Path] = {}
         while len(self._running) == _processors():
-            made |= self._wait()
+            libraries |= self._wait()
             self._start()
-        return made
+        return libraries
 
     def rest(self) -> dict[int, Path]:
         """Do all that is left."""
-        made: dict[int, Path] = {}
+        libraries: dict[int, Path] = {}
         while self._running:
-            made |= self._wait()
+            libraries |= self._wait()
             self._start()
-        return made
+        return libraries
 
     def close(self) -> None:
         """End what runs."""
@@ -235,15 +235,15 @@ class _Compiling:
         """Wait for at least one of the jobs that run."""
         from concurrent.futures import FIRST_COMPLETED, wait
 
-        made: dict[int, Path] = {}
+        libraries: dict[int, Path] = {}
         done, _ = wait(self._running, return_when=FIRST_COMPLETED)
         for future in sorted(done, key=lambda f: self._running[f].number):
             library = future.result()
             number, job, _ = self._running.pop(future)
-            made[number] = cache.keep(library, job.kept_as)
+            libraries[number] = cache.keep(library, job.kept_as)
             self._ready.add(job.compiler)
             LOGGER.info("%s%s: compiled by %s", job.name, job.suffix, job.compiler)
-        return made
+        return libraries
 
 
 def _started(job: Job, folder: Path) -> subprocess.Popen[str]:
