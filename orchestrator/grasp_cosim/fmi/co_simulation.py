@@ -312,8 +312,8 @@ class Fmi3Instance(LoadedInstance):
         call, _ = self._function("DoStep", *size, *self._places())
         logged = self._messages.count
         status = call()
-        if status == WARNING and self._messages.count == logged:
-            self._messages.returned("fmi3DoStep")
+        if status == WARNING:
+            self._messages.returned("fmi3DoStep", logged)
         return status
 
     def _outcome(self, status: int) -> int:

@@ -79,8 +79,8 @@ class Lenient:
         before = self.messages.count
         answer = super()._call(function, *arguments)  # type: ignore[misc]
         has_status = self._functions[function].restype is ctypes.c_int  # type: ignore[attr-defined]
-        if has_status and answer == WARNING and self.messages.count == before:
-            self.messages.returned(function)
+        if has_status and answer == WARNING:
+            self.messages.returned(function, before)
         return answer
 
 
@@ -416,9 +416,8 @@ class LoadedInstance(ABC):
         self._worst = OK if status == EARLY else status
         if status == EARLY:
             return self._error("ended a step early", time)
-        known = status < len(STATUS)
-        what = f"returned {STATUS[status] if known else status}"
-        return self._error(what, time, advice=self._advice(status))
+        name = STATUS[status] if status < len(STATUS) else status
+        return self._error(f"returned {name}", time, advice=self._advice(status))
 
     def _refusal(self, what: str, status: int) -> SimulationError:
         """The error for what the FMU did, now, when it returned a status. It is not used again."""
@@ -441,25 +440,21 @@ class LoadedInstance(ABC):
 
     def _function(self, name: str, *arguments: Any) -> tuple[Callable[[], int], int]:
         """The bound function for Python, and its address."""
-        prototype = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
-        full = f"fmi{self._major}{name}"
-        if not hasattr(self._slave.dll, full):
-            raise self._incomplete(MissingFunctionError(full))
-        function = prototype((full, self._slave.dll))
+        function = self._symbol(name, _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION)
         bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
         return bound, ctypes.cast(function, ctypes.c_void_p).value or 0
 
     def _bound(self, name: str, *kinds: Any) -> Callable[..., int]:
-        """A function of the FMU, for its instance, by the types of its arguments.
-
-        InputError where it has none such.
-        """
+        """A function of the FMU, for its instance, by the types of its arguments."""
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *kinds)
+        return partial(self._symbol(name, prototype), self._slave.component)
+
+    def _symbol(self, name: str, prototype: Any) -> Any:
+        """A function of the binary, with a prototype of ctypes; InputError where it lacks it."""
         full = f"fmi{self._major}{name}"
         if not hasattr(self._slave.dll, full):
             raise self._incomplete(MissingFunctionError(full))
-        function = prototype((full, self._slave.dll))
-        return partial(function, self._slave.component)
+        return prototype((full, self._slave.dll))
 
     def _stepping(
         self, clock: npt.NDArray[np.float64], step: float, *arguments: Any

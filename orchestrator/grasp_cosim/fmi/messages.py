@@ -85,9 +85,12 @@ class Messages:
         plain = without_scratch((text or b"").decode(errors="replace"))
         self.keep(Message(status, plain, self._now()))
 
-    def returned(self, function: str) -> None:
-        """Take the warning that a call of a function returned, without having logged why."""
-        self.keep(Message(WARNING, f"{function} returned a warning", self._now()))
+    def returned(self, function: str, since: int) -> None:
+        """Take the warning that a call of a function returned, if none was logged `since` a count
+        of them.
+        """
+        if self.count == since:
+            self.keep(Message(WARNING, f"{function} returned a warning", self._now()))
 
     def keep(self, message: Message) -> None:
         """Keep a message, and show it to who wants to see it."""

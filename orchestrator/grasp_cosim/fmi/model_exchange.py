@@ -282,8 +282,7 @@ class ModelInstance(LoadedInstance):
 
     def _note_warning(self) -> None:
         """Keep a warning that a call returned, unless the FMU has logged one since the last."""
-        if self._messages.count == self._warnings_noted:
-            self._messages.returned("an evaluation")
+        self._messages.returned("an evaluation", self._warnings_noted)
         self._warnings_noted = self._messages.count
 
     def _stuck(self, error: CvodeError) -> SimulationError:

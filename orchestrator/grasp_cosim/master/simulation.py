@@ -402,15 +402,16 @@ class Simulate:
         error how far it is, by the name of the system or the one given. every keeps only each n-th
         communication point, and the last. listeners get what is kept while it is recorded. engine
         is "python", "compiled" (needs a C compiler) or "auto", compiled where that pays; the
-        results have the same bits.
-        realtime paces the run by the clock, as the system says, or as it says itself: the result
-        has a timing, and the same bits. metrics are
-        worked out beside those of the system: from @metric, or functions of their
-        own name; a name among them says that the result must have that metric. diverging, "stop" or
+        results have the same bits. realtime paces the run by the clock, as the system says, or as
+        it says itself: the result has a timing, and the same bits.
+
+        metrics are worked out beside those of the system: from @metric, or functions of their own
+        name; a name among them says that the result must have that metric. diverging, "stop" or
         "continue", replaces that of the system. note gets the lines of the log but for
         system.notes: what is known of the system and of t = 0 before the first step, the others at
         the end, also after a failure. finish gets the result, and the error that ended the run if
         there is one, before the FMUs are terminated and freed, in which they may crash.
+
         Ctrl-C ends the run early: the result is what was recorded, with complete = False.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way, or a signal runs away.
