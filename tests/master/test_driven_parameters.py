@@ -46,7 +46,7 @@ def test_it_has_the_value_of_the_last_row_at_the_beginning_of_each_step(
     result = simulate(System.load(path), engine=engine, scheme=scheme)
     assert result["a.x"][0] == 0.0
     assert result["a.x"][1:] == pytest.approx(integral(), rel=1e-12)
-    line = f"drive.csv drives a.u_{REALS[version]}, a.gain (linear), each step by the values at its"
+    line = f"drive.csv drives a.u_{REALS[version]} (linear), a.gain (held), each step by the values"
     assert [said.startswith(line) for said in result.log if "gain" in said] == [True]
 
 

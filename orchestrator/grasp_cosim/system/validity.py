@@ -347,7 +347,7 @@ def _of_connections(system: Structure) -> Iterator[str]:
                 unit = source.unit or target.unit
                 yield f"{named}: {missing[0]} has no unit, taken to be in {unit}"
     if system.input:
-        listed = f"{choices(driven(system), 6)} ({system.input.interpolation})"
+        listed = ", ".join(_driven_in_words(system, system.input))
         yield f"{system.input.file} drives {listed}, each step by the values at its beginning"
         for port in driven(system):
             unit = system.input.columns[port].unit
@@ -455,8 +455,19 @@ def samples_of(system: Structure, port: Port) -> array[float]:
     return array("d", column.samples if same else (change(x) for x in column.samples))
 
 
+def _driven_in_words(system: Structure, stimuli: Stimuli) -> Iterator[str]:
+    """What stimuli drive, and whether it is interpolated between two rows."""
+    ports = driven(system)
+    linear = [port for port in ports if is_linear(stimuli, _variable(system, port))]
+    if linear:
+        yield f"{choices(linear, 6)} (linear)"
+    held = [port for port in ports if not is_linear(stimuli, _variable(system, port))]
+    if held:
+        yield f"{choices(held, 6)} (held)"
+
+
 def is_linear(stimuli: Stimuli, variable: Variable) -> bool:
-    """True if the values of an input change between two rows."""
+    """True if the values of a variable change between two rows, as no parameter's do."""
     continuous = variable.kind == "Real" and variable.variability == "continuous"
     return stimuli.interpolation == "linear" and continuous
 
