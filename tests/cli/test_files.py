@@ -204,6 +204,7 @@ TABLE = "[experiment]\nstep = 0.1\nstop = 1.0\n"
     [
         ("x", "a.toml: not readable as TOML"),
         (TABLE + "stop = 2.0\n", "(at line 4, column 11): stop = 2.0"),
+        ("[a]\nstep = 1/30  # s\n", '1/30  # s; a fraction must be in quotes, like "1/30"'),
         (f"{TABLE}\n[a]\n{TABLE}", "(at line 6, column 12): [experiment]"),
         ("\ufeff" + TABLE, "[components]: missing"),  # a byte order mark, as some editors write it
     ],

@@ -194,7 +194,15 @@ def toml_table(path: Path, what: str) -> dict[str, Any]:
         raise InputError(f"{path}: no such {what}") from None
     except (OSError, ValueError, RecursionError) as error:
         where = re.search(r"at line (\d+)", str(error))
-        line = f": {text.splitlines()[int(where[1]) - 1].strip()}" if where else ""
-        said = reason(error).replace("Cannot overwrite a value", "a key is given a second time")
-        raise InputError(f"{path}: not readable as TOML: {said}{line}") from error
+        line = text.splitlines()[int(where[1]) - 1].strip() if where else ""
+        why = reason(error).replace("Cannot overwrite a value", "a key is given a second time")
+        if line:
+            why += f": {line}"
+        if _BARE_FRACTION.search(line):
+            why += '; a fraction must be in quotes, like "1/30"'
+        raise InputError(f"{path}: not readable as TOML: {why}") from error
     return table
+
+
+_BARE_FRACTION = re.compile(r"=\s*\d+\s*/\s*\d+\s*(#.*)?$")
+"""A line of TOML with a fraction that is no text."""
