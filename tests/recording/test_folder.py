@@ -9,7 +9,7 @@ import pytest
 from grasp_cosim import InputError, Realtime, SimulationError, simulate
 from grasp_cosim.exchange.listener import Experiment
 from grasp_cosim.recording.folder import FORMS, RunFolder, load_log, load_run
-from recording.rows import EXPERIMENT, SIGNALS, rows
+from recording.rows import EXPERIMENT, SIGNALS, full_disk, rows
 from support.native_fmus import needs_gcc
 from support.native_systems import integrator
 
@@ -216,6 +216,52 @@ def test_a_run_that_ended_early_is_whole(tmp_path, values, every):
             result = error.result
         folder.finish(result)
     assert load_run(tmp_path / "out").time.tolist() == result.time.tolist()
+
+
+@needs_gcc
+def test_rows_that_find_no_room_at_the_end_leave_what_was_whole(tmp_path):
+    """The run.json of the end would have rows that are not there, and the folder be damaged."""
+    pytest.importorskip("pyarrow")
+    system = integrator(tmp_path)
+    with RunFolder(tmp_path / "out", system, form="arrow") as folder:
+
+        class Full:
+            """A listener behind the folder, from whose beginning on nothing more is written."""
+
+            def begin(self, *_):
+                pass
+
+            def block(self, *_):
+                pass
+
+            def end(self, complete):
+                size = (tmp_path / "out/signals.arrow").stat().st_size
+                with full_disk(size), pytest.raises(SimulationError, match="arrow: cannot be wri"):
+                    folder.end(complete)
+
+        class Begun:
+            begin, block = folder.begin, folder.block
+
+            def end(self, complete):
+                pass
+
+        result = simulate(system, step=1e-3, listeners=[Begun(), Full()])
+        folder.finish(result)
+    back = load_run(tmp_path / "out")
+    assert (back.complete, back.time[0]) == (False, 0.0)
+    assert len(back.time) < len(result.time)
+
+
+@needs_gcc
+def test_a_run_json_that_finds_no_room_is_said_by_the_name_that_was_given(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    system = integrator(tmp_path)
+    refused = pytest.raises(SimulationError, match=r"^out/run\.json: cannot be written: File too")
+    with RunFolder(Path("out"), system) as folder:
+        result = simulate(system, listeners=[folder])
+        with full_disk(10), refused:
+            folder.finish(result)
+    assert not load_run("out").complete
 
 
 # ----------------------------------------------------------------- read back

@@ -6,15 +6,17 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ProcessPoolExecutor
+from io import FileIO
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from grasp_cosim import InputError, System, sweep
+from grasp_cosim import InputError, System, metric, sweep
 from grasp_cosim.metrics.metric import load_metrics
 from grasp_cosim.sweeps.rows import grid
-from grasp_cosim.sweeps.sweep import Task, cluster, packed, run_packed, run_row
+from grasp_cosim.sweeps.sweep import Task, cluster, opened, packed, run_packed, run_row, write_line
+from recording.rows import full_disk
 from support.native_fmus import needs_gcc, talker
 from support.native_systems import integrator, write_integrator
 from support.processes import ends
@@ -260,3 +262,39 @@ def test_a_scheduler_that_is_none(monkeypatch):
         monkeypatch.setitem(sys.modules, "distributed", module)
         with pytest.raises(InputError, match=said), cluster("tcp://x"):
             pass
+
+
+@metric("one", unit="1")
+def one(run):
+    """A number."""
+    return 1.0
+
+
+def test_a_file_of_runs_that_finds_no_room_is_said(tmp_path):
+    system = integrator(tmp_path)
+    with (
+        full_disk(10),
+        pytest.raises(InputError, match=r"t\.csv\.rows: cannot be written: (File too|No space)"),
+    ):
+        sweep(system, [{"a.gain": 1.0}], metrics=[one], out=tmp_path / "t.csv", workers=1)
+
+
+@pytest.mark.parametrize("line", [b"\0\0\0", b"null", b"{}", b'{"index": "0", "metrics": {}}'])
+def test_a_damaged_line_of_what_is_kept_is_said(tmp_path, line):
+    path = tmp_path / "t.csv.rows"
+    path.write_bytes(b'{"runs of": "these"}\n' + line + b'\n{"index": 1, "metrics": {}}\n')
+    with (
+        pytest.raises(InputError, match=r"t\.csv\.rows: line 2 is damaged; remove the file, or"),
+        opened(tmp_path / "t.csv", "these", {}),
+    ):
+        pass
+
+
+def test_there_is_never_half_a_line_of_what_is_kept(tmp_path):
+    path = tmp_path / "rows"
+    with FileIO(path, "a") as file:
+        write_line(file, b"whole\n")
+        with full_disk(10), pytest.raises(OSError, match="No space"):
+            write_line(file, b"half of it\n")
+        write_line(file, b"next\n")
+    assert path.read_bytes() == b"whole\nnext\n"

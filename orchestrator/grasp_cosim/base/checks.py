@@ -15,6 +15,8 @@ from typing import Any
 
 from .errors import InputError, choices, nearest, reason
 
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
+
 EXACT = 2**53
 """Whole numbers of a smaller magnitude are exact as a float64."""
 
@@ -83,6 +85,13 @@ def real(text: str) -> float:
     if "_" in text or not text.isascii():
         raise ValueError(f"{text!r}: must be a number")
     return float(text)
+
+
+def point_advice(value: object) -> str:
+    """What a message adds for a number that is written with a decimal comma; else nothing."""
+    if isinstance(value, str) and _DECIMAL_COMMA.fullmatch(value.strip()):
+        return ", with a point before its decimals"
+    return ""
 
 
 def integer(text: str) -> int:

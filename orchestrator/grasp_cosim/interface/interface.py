@@ -11,7 +11,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
-from ..base.checks import EXACT, integer, known, real
+from ..base.checks import EXACT, integer, known, point_advice, real
 from ..base.errors import InputError, choices
 from ..base.scratch import without_scratch
 from ..base.si_units import Unit, known_unit, spelt_like
@@ -595,7 +595,8 @@ class Interface:
         if text or variable.kind == "String" or not isinstance(value, str):
             converted = _convert(variable, value, self.version)
         if converted is None:
-            raise InputError(f"{place}: {name} = {given!r}: must be {_expected(variable)}")
+            advice = point_advice(given) if variable.kind == "Real" else ""
+            raise InputError(f"{place}: {name} = {given!r}: must be {_expected(variable)}{advice}")
         return converted
 
 

@@ -4,7 +4,8 @@ import os
 import platform
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -29,7 +30,7 @@ from ..realtime.timing import Timing
 from ..system.description import System
 from .arrow import ArrowListener
 from .csv import CsvListener
-from .memory import Rows, typed
+from .memory import Rows, typed, writing
 from .result import OF_ANY, Known, Rejection, Result
 from .run_json import MADE, MADE_BESIDE, ORIGIN, read_run_json, unreadable
 from .signals import LOGS, Log, read_log, read_signals
@@ -129,19 +130,33 @@ class RunFolder:
                     self._write(*self._waiting.popleft())
             finally:
                 if self._signals:
-                    self._file.end(complete)
+                    with self._whole_only_if_written():
+                        self._file.end(complete)
 
     def finish(self, result: Result) -> None:
-        """Write the run.json of a result that ended, in whatever way; not if rows are missing."""
+        """Write the run.json of a result that ended, in whatever way; not if rows are missing.
+
+        SimulationError where that fails.
+        """
         if self._begun and not self._broken:
-            replace(result, origin=self._origin).to_json(self._place / SETTINGS)
+            with writing(self._folder / SETTINGS):
+                self._write_settings(result)
+
+    def _write_settings(self, result: Result) -> None:
+        replace(result, origin=self._origin).to_json(self._place / SETTINGS)
 
     def _write(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         if not self._signals:
             return
-        self._broken = True
-        self._file.block(steps, rows)
-        self._broken = False
+        with self._whole_only_if_written():
+            self._file.block(steps, rows)
+
+    @contextmanager
+    def _whole_only_if_written(self) -> Iterator[None]:
+        """The rows are broken from here on if their writing fails: the older run.json stays."""
+        was_broken, self._broken = self._broken, True
+        yield
+        self._broken = was_broken
 
     def _take_the_folder(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Remove the older run and begin ours; a kill leaves one of them, or no run.json."""
@@ -169,7 +184,7 @@ class RunFolder:
                 {s.name: s.unit for s in of}, None, False, {s.name: s.description for s in of},
                 to_si=self._to_si, known=Known(Measured({}, (), ()), {}),
             )  # fmt: skip
-            self.finish(begun)
+            self._write_settings(begun)
         except OSError as error:
             path = Path(error.filename or self._place)
             if path.is_relative_to(self._place):

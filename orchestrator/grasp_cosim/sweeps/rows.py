@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.checks import point_advice
 from ..base.errors import InputError
 from ..base.si_units import known_unit
 from ..interface.interface import Value
@@ -112,7 +113,8 @@ def _rows_in(table: Table) -> list[dict[str, Value]]:
             elif is_number(text):
                 rows[row][column.name] = to_si(float(text))
             else:
-                raise InputError(f"{column.place(row)} = {text!r}: must be a number")
+                advice = point_advice(text)
+                raise InputError(f"{column.place(row)} = {text!r}: must be a number{advice}")
     return [row for row in rows if row]
 
 

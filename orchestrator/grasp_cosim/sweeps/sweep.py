@@ -6,6 +6,7 @@ are done are kept beside the table until all are: a line of JSON each.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -31,6 +32,7 @@ from ..base.text import counted
 from ..master.simulation import simulate
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, check_portable, chosen, metrics_of
+from ..recording.memory import writing
 from ..recording.result import Result
 from ..system.description import System
 from ..system.settings import settings
@@ -268,10 +270,23 @@ def _said(error: BaseException) -> str:
 def keep(file: FileIO, outcome: Outcome) -> None:
     """Keep the outcome of a run from now on; SimulationError where that fails."""
     try:
-        file.write(json.dumps(asdict(outcome)).encode() + b"\n")
+        write_line(file, as_line(asdict(outcome)))
     except OSError as error:
         said = f"{file.name!r}: {error.strerror}"
         raise SimulationError(f"{said}; with room for it the same command goes on") from error
+
+
+def as_line(content: Any) -> bytes:
+    """A line of JSON."""
+    return json.dumps(content).encode() + b"\n"
+
+
+def write_line(file: FileIO, line: bytes) -> None:
+    """Write a line at the end of a file; OSError where there is no room for all of it."""
+    end = file.seek(0, os.SEEK_END)
+    if file.write(line) < len(line):  # which is no error to it
+        file.truncate(end)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 @contextmanager
@@ -291,10 +306,11 @@ def opened(table: Path, identity: str, done: dict[int, Outcome]) -> Iterator[Fil
     try:
         with closing(FileIO(path, "a")) as file:
             first, *lines = path.read_bytes().splitlines(keepends=True) or [b""]
-            head = json.dumps({"runs of": identity}).encode() + b"\n"
+            head = as_line({"runs of": identity})
             if not first.endswith(b"\n"):
-                file.truncate(0)
-                file.write(head)
+                with writing(path, InputError):
+                    file.truncate(0)
+                    write_line(file, head)
             elif first != head:
                 raise InputError(
                     f"{path}: has runs of another system, other FMUs or other rows; remove it, or "
@@ -302,12 +318,26 @@ def opened(table: Path, identity: str, done: dict[int, Outcome]) -> Iterator[Fil
                 )
             if lines and not lines[-1].endswith(b"\n"):  # torn by a kill
                 file.truncate(path.stat().st_size - len(lines.pop()))
-            outcomes = [Outcome(**json.loads(line)) for line in lines]
+            outcomes = [_outcome(path, number, line) for number, line in enumerate(lines, 2)]
             done |= {outcome.index: outcome for outcome in outcomes}
             yield file
         path.unlink()  # closed, as Windows wants it
     finally:
         lock.release()
+
+
+def _outcome(path: Path, number: int, line: bytes) -> Outcome:
+    """The outcome that a line of the file of runs holds; InputError where it holds none."""
+    try:
+        outcome = Outcome(**json.loads(line))
+        whole = isinstance(outcome.index, int) and isinstance(outcome.metrics, dict)
+    except (ValueError, TypeError):
+        whole = False
+    if not whole:
+        raise InputError(
+            f"{path}: line {number} is damaged; remove the file, or name another --out"
+        )
+    return outcome
 
 
 def _identity(task: Task, rows: Sequence[Row]) -> str:

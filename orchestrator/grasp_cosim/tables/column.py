@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Union
 
-from ..base.checks import real
+from ..base.checks import point_advice, real
 from ..base.errors import InputError, nearest
 from ..base.si_units import known_unit
 from ..interface.units import Conversion, conversion, no_conversion
@@ -71,8 +71,8 @@ class Column:
             try:
                 numbers.append(real(cell))
             except ValueError:
-                problem = f" = {cell.strip()!r}: must be a number" if cell.strip() else MISSING
-                raise InputError(f"{self.place(row)}{problem}") from None
+                problem = NOT_A_NUMBER.format(cell.strip()) if cell.strip() else MISSING
+                raise InputError(f"{self.place(row)}{problem}{point_advice(cell)}") from None
         return numbers  # decimal ones of Arrow, say
 
     def to_unit(self, name: str) -> Conversion:
@@ -99,6 +99,7 @@ class Column:
 
 
 MISSING = ": missing; must be a number"
+NOT_A_NUMBER = " = {!r}: must be a number"
 
 
 @dataclass(frozen=True, eq=False)
