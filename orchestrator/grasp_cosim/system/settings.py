@@ -20,39 +20,50 @@ def run_settings(system: Structure) -> dict[str, Any]:
 
 def settings(system: Structure) -> dict[str, Any]:
     """The settings of a system, of types that JSON has; times in s."""
-    return {
+    entries: dict[str, Any] = {
         "system": system.name,
         "scheme": system.scheme,
         "step": in_seconds(system.step_ns),
         "stop": in_seconds(system.stop_ns),
-        **({"start": in_seconds(system.start_ns)} if system.start_ns else {}),
-        **({"diverging": system.diverging} if system.diverging != "stop" else {}),
-        "initialisation": asdict(system.initialisation),
-        "components": {
-            c.name: {
-                "fmu": c.fmu.name,
-                "values": dict(c.values),
-                "step": None if c.step_ns is None else in_seconds(c.step_ns),
-                "isolation": c.isolation,
-                "rename": dict(c.rename),
-                "units": dict(c.units),
-                **_solver(c),
-                **({"logging": c.logging} if c.logging else {}),
-            }
-            for c in system.components
-        },
-        "metrics": list(system.metrics),
-        **({"record": list(system.record.signals)} if system.record.signals else {}),
-        "roles": dict(system.roles),
-        "connections": [
-            {"from": str(c.source), "to": str(c.target), "factor": c.factor, "offset": c.offset}
-            for c in system.connections
-        ],
-        "events": [event_entry(e) for e in system.events],
-        "faults": [fault_entry(f) for f in system.faults],
-        **({"realtime": asdict(system.realtime)} if system.realtime != Realtime() else {}),
-        **({"input": input_entry(system.input)} if system.input else {}),
     }
+    if system.start_ns:
+        entries["start"] = in_seconds(system.start_ns)
+    if system.diverging != "stop":
+        entries["diverging"] = system.diverging
+    entries["initialisation"] = asdict(system.initialisation)
+    entries["components"] = {c.name: _component(c) for c in system.components}
+    entries["metrics"] = list(system.metrics)
+    if system.record.signals:
+        entries["record"] = list(system.record.signals)
+    entries["roles"] = dict(system.roles)
+    entries["connections"] = [
+        {"from": str(c.source), "to": str(c.target), "factor": c.factor, "offset": c.offset}
+        for c in system.connections
+    ]
+    entries["events"] = [event_entry(e) for e in system.events]
+    entries["faults"] = [fault_entry(f) for f in system.faults]
+    if system.realtime != Realtime():
+        entries["realtime"] = asdict(system.realtime)
+    if system.input:
+        entries["input"] = input_entry(system.input)
+    return entries
+
+
+def _component(component: Component) -> dict[str, Any]:
+    """The settings of a component."""
+    step = component.step_ns
+    entries: dict[str, Any] = {
+        "fmu": component.fmu.name,
+        "values": dict(component.values),
+        "step": None if step is None else in_seconds(step),
+        "isolation": component.isolation,
+        "rename": dict(component.rename),
+        "units": dict(component.units),
+        **_solver(component),
+    }
+    if component.logging:
+        entries["logging"] = component.logging
+    return entries
 
 
 def _solver(component: Component) -> dict[str, Any]:
