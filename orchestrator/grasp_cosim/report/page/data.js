@@ -33,14 +33,14 @@ async function inflate(base64) {
 // What is further from zero is not drawn: inf and the largest double, a distance to nothing.
 const FAR = 1e300;
 
-function drawn(values) {
+function drawable(values) {
   const near = (value) => Math.abs(value) < FAR;
   return values.every(near) ? values : values.map((value) => (near(value) ? value : NaN));
 }
 
 // Levels of minima and maxima over blocks of FOLD, FOLD^2, ... rows. A NaN is passed over.
 function pyramid(values) {
-  const rows = drawn(values), levels = [{ low: rows, high: rows }];
+  const rows = drawable(values), levels = [{ low: rows, high: rows }];
   while (levels[levels.length - 1].low.length > 2 * FOLD) {
     const below = levels[levels.length - 1], blocks = Math.ceil(below.low.length / FOLD);
     const low = new Float64Array(blocks).fill(Infinity);
