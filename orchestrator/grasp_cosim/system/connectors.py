@@ -17,7 +17,7 @@ from ..base.si_units import Unit, known_unit
 from ..interface.interface import SETTABLE, Variable
 from ..interface.units import IDENTITY, Conversion, conversion, no_conversion
 from .parts import Port, Way
-from .stimuli import Column, Stimuli
+from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of
 
 Place = Callable[[str], str]
@@ -110,7 +110,7 @@ def driven_by_connectors(system: Structure, stimuli: Stimuli) -> Stimuli:
     """Stimuli with the columns of inputs of the system as columns of the variables behind them."""
     if all(str(port) not in system.inputs and port.component for port in stimuli.columns):
         return stimuli
-    columns: dict[Port, Column] = {}
+    columns: dict[Port, Stimulus] = {}
     behind: dict[Port, Port] = {}
     for port, column in stimuli.columns.items():
         name, place = str(port), stimuli.place(port)
@@ -148,7 +148,7 @@ def _values(system: Structure, name: str, value: Any, place: str) -> dict[str, A
     return values
 
 
-def _column(system: Structure, place: str, name: str, column: Column, way: Way) -> Column:
+def _column(system: Structure, place: str, name: str, column: Stimulus, way: Way) -> Stimulus:
     """The column of a variable behind an input of the system, in the variable's unit."""
     change, unit = change_along(system, name, way), system.inputs[name].unit
     if unit is None and change == IDENTITY:
@@ -166,7 +166,7 @@ def _column(system: Structure, place: str, name: str, column: Column, way: Way) 
         return replace(column, unit=None)
     if column.texts:
         raise InputError(f"{place} = {column.texts[0]!r}: must be a number")
-    return Column(array("d", (change(into_unit(sample)) for sample in column.samples)))
+    return Stimulus(array("d", (change(into_unit(sample)) for sample in column.samples)))
 
 
 def _variable(system: Structure, name: str, port: Port, causalities: tuple[str, ...]) -> Variable:

@@ -19,7 +19,7 @@ from typing import Literal, get_args
 
 from ..base.checks import choice
 from ..base.errors import InputError
-from ..tables.column import Column as TableColumn
+from ..tables.column import Column
 from ..tables.table import read_table
 from .parts import Port, as_signal
 from .times import LONGEST, NANOSECONDS
@@ -29,7 +29,7 @@ INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 
 @dataclass(frozen=True)
-class Column:
+class Stimulus:
     """The samples of one input or parameter, in its unit or in the one named.
 
     With texts, such as the names of an enumeration, they are their places among these. Sequences
@@ -73,7 +73,7 @@ class Stimuli:
 
     file: str
     times: Sequence[int]
-    columns: Mapping[Port, Column]
+    columns: Mapping[Port, Stimulus]
     interpolation: Interpolation = "linear"
     lines: Sequence[int] = field(default_factory=lambda: array("q"))
     partial: bool = field(default=False, compare=False)
@@ -115,7 +115,7 @@ def read_stimuli(
         )
     if not table.count:
         raise InputError(f"{path.name}: has no row below its names; must have one")
-    ports: dict[Port, TableColumn] = {}
+    ports: dict[Port, Column] = {}
     for column in others:
         if not column.name:  # what a spreadsheet leaves behind the last one
             continue
@@ -132,7 +132,7 @@ def read_stimuli(
     )
 
 
-def _samples(column: TableColumn) -> Column:
+def _samples(column: Column) -> Stimulus:
     """The numbers of a column, or its texts; InputError at the first cell without a value."""
     texts: dict[str, int] = {}
     if column.values is not None:
@@ -143,10 +143,10 @@ def _samples(column: TableColumn) -> Column:
             raise InputError(f"{column.place(cells.index(''))}: missing; must be a value")
         samples = array("d", (texts.setdefault(cell, len(texts)) for cell in cells))
     _check_finite(column, samples)
-    return Column(samples, column.unit, tuple(texts))
+    return Stimulus(samples, column.unit, tuple(texts))
 
 
-def _check_finite(column: TableColumn, samples: Sequence[float]) -> None:
+def _check_finite(column: Column, samples: Sequence[float]) -> None:
     if all(map(math.isfinite, samples)):
         return
     for row, sample in enumerate(samples):
@@ -154,7 +154,7 @@ def _check_finite(column: TableColumn, samples: Sequence[float]) -> None:
             raise InputError(f"{column.place(row)} = {sample}: must be a finite number")
 
 
-def _times(column: TableColumn) -> array[int]:
+def _times(column: Column) -> array[int]:
     """The times in ns."""
     unit, samples = column.time_unit(), array("d", column.numbers())
     _check_finite(column, samples)

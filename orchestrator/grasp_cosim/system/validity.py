@@ -23,7 +23,7 @@ from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion, conversion, no_conversion
 from .declared_steps import of_declared_steps
 from .parts import Component, Connection, Port, Solver
-from .stimuli import Column, Stimuli
+from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of
 from .times import NANOSECONDS, seconds, written
 
@@ -482,7 +482,7 @@ def _value(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Valu
     return interface.parse(stimuli.place(port, row), port.variable, value, text=True)
 
 
-def _conversion(place: str, interface: Interface, port: Port, column: Column) -> Conversion:
+def _conversion(place: str, interface: Interface, port: Port, column: Stimulus) -> Conversion:
     """The conversion of a column into the unit of its input; InputError where there is none."""
     variable = interface.by_name[port.variable]
     if column.unit is None or variable.unit in (None, column.unit):
