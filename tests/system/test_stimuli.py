@@ -31,6 +31,18 @@ def test_names_are_quoted_or_not_and_rows_may_be_apart(tmp_path):
     assert found.place(Port("b", "v"), 1) == "drive.csv: line 4, column 3, b.v"
 
 
+def test_a_place_is_that_in_the_file_whatever_it_is(tmp_path):
+    found = read(tmp_path, "time,,a.u\n0,,1\n")
+    assert found.place(Port("a", "u")) == "drive.csv: line 1, column 3, a.u"
+    arrow = pytest.importorskip("pyarrow")
+    table = arrow.table({"time": [0.0, 1.0], "a.u": [1.0, 2.0]})
+    with arrow.ipc.new_file(tmp_path / "drive.arrow", table.schema) as file:
+        file.write_table(table)
+    found = read_stimuli(tmp_path / "drive.arrow")
+    assert found.place(Port("a", "u")) == "drive.arrow: column 2, a.u"
+    assert found.place(Port("a", "u"), 1) == "drive.arrow: row 2, column 2, a.u"
+
+
 def test_a_time_may_be_in_another_unit(tmp_path):
     assert read(tmp_path, "time [ms],a.u\n-1,0\n2.5,0\n").times == array(
         "q", [-1_000_000, 2_500_000]

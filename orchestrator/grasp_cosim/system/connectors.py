@@ -166,7 +166,8 @@ def _column(system: Structure, place: str, name: str, column: Stimulus, way: Way
         return replace(column, unit=None)
     if column.texts:
         raise InputError(f"{place} = {column.texts[0]!r}: must be a number")
-    return Stimulus(array("d", (change(into_unit(sample)) for sample in column.samples)))
+    samples = array("d", (change(into_unit(sample)) for sample in column.samples))
+    return replace(column, samples=samples, unit=None)
 
 
 def _variable(system: Structure, name: str, port: Port, causalities: tuple[str, ...]) -> Variable:

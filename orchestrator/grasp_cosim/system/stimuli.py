@@ -39,6 +39,8 @@ class Stimulus:
     samples: Sequence[float]
     unit: str | None = None
     texts: tuple[str, ...] = ()
+    number: int = 0
+    """That of its column in the file, from 1; 0 where it is not known, as in earlier archives."""
 
     def text(self, row: int) -> str:
         """The sample of a row as a text."""
@@ -68,7 +70,8 @@ class Stimuli:
     Before the first row and after the last one their values are held. lines are those of the rows
     in the file where they are not simply one after the other. partial says that FMUs may yet be
     swapped, so that a column may be of a variable which is not there. behind are the columns of the
-    file that variables have their samples of, where these have other names.
+    file that variables have their samples of, where these have other names. is_text_file is False
+    for a file of Arrow or Parquet, which has no lines.
     """
 
     file: str
@@ -78,6 +81,7 @@ class Stimuli:
     lines: Sequence[int] = field(default_factory=lambda: array("q"))
     partial: bool = field(default=False, compare=False)
     behind: Mapping[Port, Port] = field(default_factory=dict, compare=False)
+    is_text_file: bool = True
 
     def __post_init__(self) -> None:
         """ValueError where the columns could not be read from a file."""
@@ -90,10 +94,16 @@ class Stimuli:
 
     def place(self, port: Port, row: int | None = None) -> str:
         """A column, and in it a row, for messages."""
-        line = 1 if row is None else self.lines[row] if self.lines else row + 2
-        columns = [*dict.fromkeys(self.behind.get(column, column) for column in self.columns)]
-        column = self.behind.get(port, port)
-        return f"{self.file}: line {line}, column {columns.index(column) + 2}, {column}"
+        parts = []
+        if not self.is_text_file:
+            parts += [] if row is None else [f"row {row + 1}"]
+        elif row is None:
+            parts.append("line 1")
+        else:
+            parts.append(f"line {self.lines[row] if self.lines else row + 2}")
+        if number := self.columns[port].number:
+            parts.append(f"column {number}")
+        return f"{self.file}: {', '.join([*parts, str(self.behind.get(port, port))])}"
 
 
 def read_stimuli(
@@ -129,6 +139,7 @@ def read_stimuli(
         {port: _samples(column) for port, column in ports.items()},
         chosen,
         array("q", time.lines),
+        is_text_file=time.is_text_file,
     )
 
 
@@ -143,7 +154,7 @@ def _samples(column: Column) -> Stimulus:
             raise InputError(f"{column.place(cells.index(''))}: missing; must be a value")
         samples = array("d", (texts.setdefault(cell, len(texts)) for cell in cells))
     _check_finite(column, samples)
-    return Stimulus(samples, column.unit, tuple(texts))
+    return Stimulus(samples, column.unit, tuple(texts), column.number)
 
 
 def _check_finite(column: Column, samples: Sequence[float]) -> None:
