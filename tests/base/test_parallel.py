@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from multiprocessing.context import SpawnProcess
 
@@ -12,6 +13,7 @@ import pytest
 from grasp_cosim.base.errors import InputError, SimulationError
 from grasp_cosim.base.parallel import Crew
 from grasp_cosim.base.progress import Progress
+from grasp_cosim.base.system_calls import held_back
 from support.processes import ends
 
 
@@ -77,6 +79,29 @@ def _endless(folder):
     """As an FMU that hangs in C code, and keeps the lock of the interpreter."""
     (folder / "pid").write_text(str(os.getpid()))
     ctypes.PyDLL(None).sleep(1000)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_a_signal_that_another_thread_takes_comes_at_the_end_as_well():
+    """The mask is that of one thread; what was started there would lack what it waits for."""
+    over, done = threading.Event(), []
+
+    def interrupted():
+        with held_back([signal.SIGINT, signal.SIGTERM]):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.02)
+            done.append("all of it")
+
+    thread = threading.Thread(target=over.wait)
+    thread.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    finally:
+        over.set()
+        thread.join()
+    assert done == ["all of it"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path):

@@ -10,6 +10,7 @@ import os
 import select
 import signal
 import sys
+import threading
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -88,8 +89,30 @@ def memory(size: int) -> mmap.mmap:
 def held_back(signals: Iterable[int]) -> Iterator[None]:
     """Signals that come meanwhile come at the end, and not at all to processes started here.
 
-    Where there is no such mask, a process that is about to start gets them, too.
+    The mask of this thread is for those processes; another thread may take a signal all the same,
+    so what Python does then waits, too. Where there is no such mask, a process that is about to
+    start gets them.
     """
+    came: list[int] = []
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        handlers = {number: signal.getsignal(number) for number in signals}
+    python_handlers = {n: handler for n, handler in handlers.items() if callable(handler)}
+    for number in python_handlers:
+        signal.signal(number, lambda number, _: came.append(number))
+    try:
+        with _masked(signals):
+            yield
+    finally:
+        for number, handler in python_handlers.items():
+            signal.signal(number, handler)
+        for number in came:
+            python_handlers[number](number, None)
+
+
+@contextmanager
+def _masked(signals: Iterable[int]) -> Iterator[None]:
+    """Nothing here, nor a process that is started here, is told of signals, if the system can."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -33,8 +33,8 @@ def entry() -> NoReturn:
     if COMPLETE in os.environ:
         cli.main(prog_name="grasp-cosim", complete_var=COMPLETE)
     keep_output_for_us()
-    interruption.command()
     try:
+        interruption.command()
         when_c_exits(_EXITED)
         if "--debug" in sys.argv:
             faulthandler.enable()
