@@ -49,6 +49,16 @@ def test_no_number_ends_the_run_in_any_case(tmp_path):
         run.to_the_end()
 
 
+@pytest.mark.parametrize("value", [inf, nan])
+def test_an_output_that_goes_nowhere_can_be_left_out_as_its_failure_says(tmp_path, value):
+    mock = Mock(tmp_path, "plant", lambda u, t: value)
+    system = make_system([mock], [], STEPS)
+    with pytest.raises(SimulationError, match=r'no input: --record "(!plant\.y)" leaves it out$'):
+        Run(system, [mock]).to_the_end()
+    without = Run(system.with_record("!plant.y"), [mock])
+    assert list(without.to_the_end()) == []
+
+
 @pytest.mark.parametrize("gaps", [[inf] * 5, [0.1, 0.1, inf, inf, 0.1], [1e307] * 2 + [inf] * 3])
 def test_a_run_that_is_to_go_on_does_so_with_inf_and_tells(tmp_path, gaps):
     run = looking(tmp_path, gaps, infinite=(False,), diverging="continue")

@@ -95,6 +95,8 @@ class Dispatcher:
         watched = {port: observed[port] for port in system.watched}
         self._watched = _places(observed.values(), watched.values())
         self._watched_signals = tuple(watched.values())
+        sources = {connection.source for connection in system.connections}
+        self._unconnected = [port not in sources for port in watched]
         open_ended = to_open_ends(system)
         self._divergence = Divergence(system, watched, open_ended)
         self._unwatched = Unwatched(system, observed)
@@ -177,7 +179,11 @@ class Dispatcher:
         i = int(valid[good].argmin())
         name, value = self._watched_signals[i].name, outputs[good, i]
         line = f"{name} = {value} at step {steps[good]}: must be finite"
-        return good + 1, line if np.isnan(value) else f"{line}, {ON}"
+        if not np.isnan(value):
+            line += f", {ON}"
+        if self._unconnected[i]:
+            line += f'; it goes to no input: --record "!{name}" leaves it out'
+        return good + 1, line
 
     def spare(self, ns: float) -> bool:
         """Give a listener that puts work off so many ns for it; False if none had any to do."""
