@@ -2,7 +2,7 @@
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.system.record import Record
+from grasp_cosim.system.record import Pattern, Record
 from support.native_fmus import state_space
 
 VARIABLES = """
@@ -126,6 +126,19 @@ def test_what_records_nothing_is_refused_with_the_nearest_names(load, record, me
 def test_with_record_refuses_by_name(load):
     with pytest.raises(InputError, match=r"^record: 'b.gab\[1\]' matches no signal; did you mean"):
         load().with_record("b.gab[1]")
+
+
+def test_a_pattern_is_checked_up_to_the_first_signal_that_it_matches(load, monkeypatch):
+    """FMUs have 100,000 variables, and each change of a system checks again."""
+    system, takes, compared = load(), Pattern.takes, []
+
+    def counted(one, component, variable):
+        compared.append(variable.name)
+        return takes(one, component, variable)
+
+    monkeypatch.setattr(Pattern, "takes", counted)
+    Record(("b.gap*", "!b.y")).check("record:", system.components)
+    assert compared == ["y", "gap[1]", "y"]
 
 
 def test_an_array_stands_for_its_elements(tmp_path):

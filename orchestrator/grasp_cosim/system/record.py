@@ -164,11 +164,15 @@ def missing(
 ) -> str | None:
     """Why a pattern records nothing, or leaves nothing out; None where it does."""
     one = pattern(text)
-    matched = [(c, v) for c in components for v in c.interface.variables if one.takes(c, v)]
-    if any(v.supported for _, v in matched):
-        return None
-    if matched:
-        component, v = matched[0]
+    unrecordable: tuple[Component, Variable] | None = None
+    for component in components:
+        for v in component.interface.variables:
+            if one.takes(component, v):
+                if v.supported:
+                    return None
+                unrecordable = unrecordable or (component, v)
+    if unrecordable:
+        component, v = unrecordable
         return (
             f"is of type {v.nature}: {component.name}.{v.name} cannot be recorded; must be "
             f"{choices(SUPPORTED)}"
