@@ -104,6 +104,26 @@ def test_a_signal_that_another_thread_takes_comes_at_the_end_as_well():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+MASKS = """
+import signal
+from functools import partial
+from grasp_cosim.base.parallel import Crew
+from grasp_cosim.base.progress import Progress
+
+if __name__ == "__main__":
+    with Crew(1) as crew, Progress("runs", shown=False) as bar:
+        blocked = crew.map(partial(signal.pthread_sigmask, signal.SIG_BLOCK), [()], bar)
+    print(*(sorted(s.name for s in mask) for mask in blocked))
+"""
+
+
+def test_also_the_first_process_starts_with_signals_held_back(tmp_path):
+    """Ctrl-C would end its start with a traceback; that multiprocessing is new takes a new one."""
+    (tmp_path / "masks.py").write_text(MASKS)
+    done = subprocess.run([sys.executable, tmp_path / "masks.py"], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("['SIGINT', 'SIGTERM']\n", "")
+
+
 def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path):
     code = (
         "from pathlib import Path; from test_parallel import _endless, run_all; "

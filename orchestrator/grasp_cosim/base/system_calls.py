@@ -116,6 +116,9 @@ def _masked(signals: Iterable[int]) -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    from multiprocessing.resource_tracker import ensure_running
+
+    ensure_running()  # else the first process that is started has it run, which lifts the mask
     before = _signal.pthread_sigmask(_signal.SIG_BLOCK, signals)
     try:
         yield
