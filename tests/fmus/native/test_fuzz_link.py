@@ -59,6 +59,7 @@ def fuzzed(program, seeds):
         (corpus / f"{i}").write_bytes(seed)
     options = [f"-runs={RUNS}", f"-seed={marks.first_seed + 1}", "-rss_limit_mb=600"]
     options += ["-max_len=6000", f"-artifact_prefix={found}/", "-print_final_stats=1"]
+    options += ["-report_slow_units=1000"]  # s: how slow one is depends on the machine
     # By a shell: a process inherits the peak of memory of the one that starts it, here of tests.
     command = ["/bin/sh", "-c", '"$@"; exit $?', "sh", str(program), *options, str(corpus)]
     # What was freed is kept to find its use, and counts as memory: how much depends on speed.
