@@ -169,6 +169,16 @@ def test_another_step_than_a_rigid_fmu_recommends_is_said_once(
     assert remarks_on(system.with_settings(dict(pairs))) == ()
 
 
+def test_a_step_that_is_no_whole_number_of_those_recommended_is_said(tmp_path):
+    """Though the FMU may vary its step."""
+    system = rigid(tmp_path, "step = 0.007\nstop = 0.07", step=0.005)
+    assert remarks_on(system) == (
+        "a: rigid.fmu recommends steps of 0.005 s, and is asked for 0.007 s, which is no whole "
+        "number of them; one would be: --set experiment.step=0.005",
+    )
+    assert remarks_on(system.with_experiment(step=0.005)) == ()
+
+
 @pytest.mark.parametrize("built", [{"step": 0.005}, {"capabilities": RIGID}])
 def test_nothing_is_said_where_it_may_vary_or_is_asked_for_its_own(tmp_path, built):
     assert remarks_on(rigid(tmp_path, "step = 0.01\nstop = 1.0", **built)) == ()

@@ -171,3 +171,8 @@ def test_a_component_may_be_called_record(folder):
     text = SYSTEM.replace("components.a", "components.record")
     (folder / "r.toml").write_text(text + '[record]\nsignals = ["record.x"]', "utf-8")
     assert names(System.load(folder / "r.toml")) == ["record.x"]
+
+
+def test_a_list_in_the_place_of_names_is_refused(grasp):
+    with pytest.raises(InputError, match=r"^record: \['plant.\*'\]: must be a name; several are"):
+        grasp.with_record(["plant.*"])

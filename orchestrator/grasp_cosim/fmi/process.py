@@ -40,7 +40,6 @@ from ..base.system_calls import end_fork, end_group, listener
 from ..interface.interface import Interface, Value, Variable
 from ..system.parts import Component, Logging, Solver
 from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
-from .event_mode import EventInstance
 from .instance import CLOCK, EARLY, OK, WARNING, Inputs, Instance, dtype
 from .messages import Message, Messages
 
@@ -102,6 +101,8 @@ def load_here(
     if not exchanged:
         tolerance = solver.relative_tolerance if solver else interface.tolerance
         if interface.event_mode:
+            from .event_mode import EventInstance  # only here: few FMUs have it
+
             return EventInstance(name, interface, tolerance, logging)
         return (Fmi3Instance if three else FmuInstance)(name, interface, tolerance, logging)
     try:

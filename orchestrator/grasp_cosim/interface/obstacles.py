@@ -16,7 +16,6 @@ from xml.etree.ElementTree import Element
 from ..base.errors import choices
 from .document import HEAD
 from .interface import Interface, Value, typed
-from .sources import why_not_compiled
 
 KINDS = {
     "CoSimulation": "co-simulation",
@@ -215,6 +214,8 @@ def of_binary(fmu: Interface) -> Obstacle | None:
     if fmu.python and fmu.ours:
         remedy += ", or make a native one of its block: grasp-cosim build --native"
     if fmu.sources:
+        from .sources import why_not_compiled  # only here: most FMUs have a binary
+
         lacking = why_not_compiled(fmu)
         way = f"; its sources do not compile as they are: {lacking}"
         if not lacking:

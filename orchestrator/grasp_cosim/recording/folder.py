@@ -10,7 +10,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,9 @@ from .csv import CsvListener
 from .memory import Rows, typed, writing
 from .result import OF_ANY, Known, Rejection, Result
 from .run_json import MADE, MADE_BESIDE, ORIGIN, read_run_json, unreadable
-from .signals import LOGS, Log, read_log, read_signals
+
+if TYPE_CHECKING:
+    from .signals import Log
 
 SIGNALS, ARROW, SETTINGS = "signals.csv", "signals.arrow", "run.json"
 """The files of a run's folder, of which it has one of the former two."""
@@ -262,6 +264,8 @@ def load_run(folder: str | Path) -> Result:
         rows.stat()
     except OSError as error:
         raise unreadable(rows, error) from error
+    from .signals import read_signals  # only here, as below: a run that writes does not read
+
     time, columns = read_signals(rows, [name for name, kind in types.items() if kind == TEXT])
     if list(units) != list(columns):
         raise InputError(
@@ -376,6 +380,8 @@ def load_log(
     of something else than it is expected in; at a cell that is no number once its column is asked
     for.
     """
+    from .signals import LOGS, read_log
+
     if not path.is_file():
         raise InputError(f"{path}: no such log; must be a {choices(LOGS)} file")
     if path.suffix.lower() not in LOGS:
@@ -391,7 +397,7 @@ def load_log(
     return Signals(log.time, log, to_si=to_si)
 
 
-def _units_to_si(log: Log, note: Callable[[str], None]) -> dict[str, Conversion]:
+def _units_to_si(log: "Log", note: Callable[[str], None]) -> dict[str, Conversion]:
     """The conversions of the columns that are in a unit that is not of SI."""
     units = {name: known_unit(unit) for name, unit in log.units.items() if unit}
     silent = [name for name in log.numeric if name not in units]

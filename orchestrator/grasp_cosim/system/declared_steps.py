@@ -4,7 +4,9 @@ FMI has three declarations. fixedInternalStepSize (FMI 3.0) is the length of the
 gets to a communication point only where the step that is asked is a whole number of these.
 canHandleVariableCommunicationStepSize = false says that all steps have to be equally long, but not
 how long. stepSize of the default experiment recommends a length; of an FMU that cannot vary its
-step it may be the only one: some take it whatever they are asked, and nothing shows it.
+step it may be the only one: some take it whatever they are asked, and nothing shows it. Where it
+can vary them, a step is worth a word that is no whole number of those. Only the FMUs of ours divide
+any step by themselves.
 """
 
 from collections.abc import Iterator
@@ -34,9 +36,17 @@ def of_declared_steps(system: Structure) -> Iterator[str]:
                 yield _no_whole_number(system, component, inner)
             continue
         recommended = _time(component.loaded.step)
-        if component.integrated or component.loaded.can_vary_step or recommended is None:
+        if component.integrated or recommended is None:
             continue
-        if step != recommended:
+        if component.loaded.can_vary_step:
+            if step % recommended and not component.loaded.ours:
+                yield (
+                    f"{component.name}: {component.fmu.name} recommends steps of "
+                    f"{written(recommended)} s, and is asked for {written(step)} s, which is no "
+                    "whole number of them; one would be: "
+                    f"{_settings(system, component, _nearest_multiple(step, recommended))}"
+                )
+        elif step != recommended:
             yield (
                 f"{component.name}: {component.fmu.name} recommends steps of "
                 f"{written(recommended)} s, and declares that it cannot vary them "
@@ -58,10 +68,15 @@ def _time(declared: object) -> Time | None:
     return step_of(declared) if isinstance(declared, float) and 0.0 < declared <= LONGEST else None
 
 
+def _nearest_multiple(step: Time, inner: Time) -> Time:
+    """The whole number of inner steps that is nearest to a step, at least one."""
+    return max(1, round(step / inner)) * inner
+
+
 def _no_whole_number(system: Structure, component: Component, inner: Time) -> str:
     """That the step of a component is no whole number of its inner steps, and what would be."""
     step = system.step_of(component)
-    fitting = max(1, round(step / inner)) * inner
+    fitting = _nearest_multiple(step, inner)
     return (
         f"{component.name}: {component.fmu.name} takes steps of {written(inner)} s inside "
         f"(fixedInternalStepSize), and {written(step)} s is no whole number of them; "

@@ -189,6 +189,11 @@ class System(Structure):
         One behind a ! is left out: with_record("!plant.clock"). Without any, the outputs are
         recorded. InputError where one matches nothing.
         """
+        for signal in signals:
+            if not isinstance(signal, str):
+                raise InputError(
+                    f"record: {signal!r}: must be a name; several are several arguments"
+                )
         record = Record(signals)
         record.check("record:", self.components, self.outputs)
         return replace(self, record=record)

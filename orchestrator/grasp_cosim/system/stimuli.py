@@ -15,14 +15,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from ..base.checks import choice
 from ..base.errors import InputError
-from ..tables.column import Column
-from ..tables.table import read_table
 from .parts import Port, as_signal
 from .times import LONGEST, NANOSECONDS
+
+if TYPE_CHECKING:
+    from ..tables.column import Column
 
 Interpolation = Literal["linear", "held"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
@@ -114,6 +115,8 @@ def read_stimuli(
     InputError where there is none, or at the first cell that is not as it must be, but for what
     depends on the variables: see validity.py.
     """
+    from ..tables.table import read_table  # only here: most runs have no stimuli
+
     path = Path(path)
     chosen: Interpolation = choice(place, interpolation, INTERPOLATIONS)
     table = read_table(path, path.name)
