@@ -13,7 +13,7 @@ from ..base.scratch import sweep
 from .frame import EVERYWHERE, told
 
 SECTIONS = {
-    "Simulate": {"run": "run", "sweep": "run", "evaluate": "paper", "identify": "paper"},
+    "Simulate": {"run": "run", "sweep": "sweep", "evaluate": "paper", "identify": "paper"},
     "Look at recorded runs": {"report": "check", "compare": "check"},
     "Make and check FMUs and systems": {
         "init": "systems", "build": "make", "inspect": "fmu", "qualify": "check",
