@@ -521,9 +521,10 @@ def _let_go_of_python() -> None:
     By themselves they do it after the end of Python, in memory that was freed, which may end the
     process by a signal. FMUs of ours see to it in any host.
     """
-    for name in _binaries_of_pythonfmu if hasattr(os, "RTLD_NOLOAD") else ():
-        with suppress(OSError, AttributeError):  # it was unloaded, or is of another version
-            ctypes.PyDLL(name, mode=os.RTLD_NOLOAD).finalizePythonInterpreter()
+    if hasattr(os, "RTLD_NOLOAD"):  # on Windows there is no need
+        for name in _binaries_of_pythonfmu:
+            with suppress(OSError, AttributeError):  # it was unloaded, or is of another version
+                ctypes.PyDLL(name, mode=os.RTLD_NOLOAD).finalizePythonInterpreter()
 
 
 @cache
