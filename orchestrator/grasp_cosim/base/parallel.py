@@ -133,7 +133,7 @@ class _Worker:
         self._started = False
         self.process: BaseProcess = context.Process(target=_work, args=(theirs,))
         try:
-            with closing(theirs), held_back(interruption.SIGNALS), _safe_path():  # they are for us
+            with closing(theirs), _safe_path(), held_back(interruption.SIGNALS):  # they are for us
                 self.process.start()
         except BaseException:  # of a signal that came meanwhile
             _end([self])
