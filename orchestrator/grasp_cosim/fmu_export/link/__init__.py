@@ -14,7 +14,6 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
-from io import BytesIO
 from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
@@ -64,13 +63,45 @@ class Signature:
         """Return the variables of a causality, in order."""
         return tuple(v for v in self.variables if v.causality == causality)
 
-    def difference(self, proxy: bytes) -> str:
-        """Return the first variable that is another one in a proxy's text, whatever that is."""
-        theirs, ours = BytesIO(proxy.partition(b"\0")[0]), BytesIO(self.text.encode())
-        pairs = zip_longest(theirs, ours, fillvalue=b"no more")
+    def parts(self) -> list["Part"]:
+        """Return the text in the parts that a HELLO can carry, each of whole lines."""
+        whole = self.text.encode()
+        parts = [Part(0, len(whole), b"")]
+        for line in whole.splitlines(keepends=True):
+            last = parts[-1]
+            if len(last.text) + len(line) <= LARGEST_PART:
+                parts[-1] = last._replace(text=last.text + line)
+            else:
+                parts.append(Part(last.offset + len(last.text), len(whole), line))
+        return parts
+
+    def difference(self, part: "Part") -> str:
+        """Return the first variable that is another one in a part of a proxy's text, in words.
+
+        Empty where all is equal so far and the proxy has more. The part may be any bytes.
+        """
+        own = self.text.encode()[part.offset :].splitlines(keepends=True)
+        if part.offset and self.text.encode()[part.offset - 1 : part.offset] != b"\n":
+            own = []
+        theirs = part.text.splitlines(keepends=True)
+        is_last = part.offset + len(part.text) >= part.whole
+        if not is_last:
+            own = own[: len(theirs)]
+        pairs = zip_longest(theirs, own, fillvalue=b"no more")
         differ = (pair for pair in pairs if pair[0] != pair[1])
-        first, own = (_ascii(line.strip(b"\n")) for line in next(differ, [b"no more"] * 2))
-        return f"the proxy has {first.decode()}, the peer {own.decode()}"
+        found = next(differ, (b"no more", b"no more") if is_last else None)
+        if found is None:
+            return ""
+        first, ours = (_ascii(line.strip(b"\n")).decode() for line in found)
+        return f"the proxy has {first}, the peer {ours}"
+
+
+class Part(NamedTuple):
+    """A part of a proxy's signature: where it begins in the text, the whole's size, both in bytes."""
+
+    offset: int
+    whole: int
+    text: bytes
 
 
 def _ascii(words: bytes) -> bytes:
@@ -81,11 +112,11 @@ def _ascii(words: bytes) -> bytes:
 Value = float | int | bool | str
 """The value of a variable of FMI; texts are not exchanged."""
 
-MAGIC, VERSION = b"GRSP", 2
+MAGIC, VERSION = b"GRSP", 3
 HELLO, WELCOME, REFUSE, INITIALISE, STEP, OUTPUTS, END = range(1, 8)
 """Kinds of datagrams."""
 
-OTHER_INTERFACE, BUSY, UNKNOWN, FAILED, OTHER_VERSION = range(1, 6)
+OTHER_INTERFACE, BUSY, UNKNOWN, FAILED, OTHER_VERSION, OTHER_NAME = range(1, 7)
 """The reasons why a peer refuses: codes of REFUSE."""
 
 HEAD = struct.Struct("<4sHBB16sQQQddqII")
@@ -95,8 +126,17 @@ LARGEST = 65_507
 PORT = 5501
 """The default UDP port of a peer."""
 
-SHORTEST_HELLO = 1024
-"""Bytes of the body of a HELLO, at least, so that there is room for the reason in its answer."""
+LARGEST_HANDSHAKE = 1200
+"""Bytes of a HELLO and of its answer, at most: no network takes these apart."""
+HELLO_SIZE = LARGEST_HANDSHAKE - HEAD.size - TAG_SIZE
+"""Bytes of the body of a HELLO, always, so that there is room for the reason in its answer."""
+NAME_SIZE, BUILD_SIZE = 64, 128
+"""Bytes that a name and a build have in a body, of which one NUL or more is the end."""
+HELLO_HEAD = struct.Struct(f"<{NAME_SIZE}sIIII")
+"""What a HELLO begins with: name, offset, size of the part, size of the whole text, 0."""
+LARGEST_PART = HELLO_SIZE - HELLO_HEAD.size
+"""Bytes of a signature that a HELLO carries, at most."""
+LARGEST_COUNT = 2**32 - 1
 LONGEST_STEP = 3600.0
 """s that a STEP may ask for, so that no datagram keeps a bench busy for good."""
 
@@ -119,7 +159,11 @@ _KINDS: dict[str, tuple[str, type[Value], Callable[[Any], bool]]] = {
 
 
 class Message(NamedTuple):
-    """A datagram taken apart, as in HEAD; times in s, but `sent` in ns of the proxy's clock."""
+    """A datagram taken apart, as in HEAD; times in s, but `sent` in ns of the proxy's clock.
+
+    `count` is of INITIALISE and STEP the number of requests before it, back to the newest one whose
+    answer the proxy has; of OUTPUTS the number of trips of the peer; else 0.
+    """
 
     kind: int
     code: int
@@ -132,6 +176,7 @@ class Message(NamedTuple):
     sent: int
     body: bytes
     version: int = VERSION
+    count: int = 0
 
 
 class Sealer:
@@ -148,8 +193,8 @@ class Sealer:
 
     def pack(self, m: Message) -> bytes:
         """Return the datagram of a message; ValueError where it would be too large."""
-        *fields, body, version = m
-        datagram = HEAD.pack(MAGIC, version, *fields, len(body), 0) + body
+        *fields, body, version, count = m
+        datagram = HEAD.pack(MAGIC, version, *fields, len(body), count) + body
         size = len(datagram) + self._tag_size
         if size > LARGEST:
             raise ValueError(f"datagram of {size} bytes: must be {LARGEST} at most")
@@ -164,10 +209,45 @@ class Sealer:
             tag = hmac.digest(self._key, datagram[:end], "sha256")
             if not hmac.compare_digest(tag, datagram[end:]):
                 return FORGED
-        _, version, *fields, size, zero = HEAD.unpack_from(datagram)
-        m = Message._make((*fields, datagram[HEAD.size : end], version))
+        _, version, *fields, size, count = HEAD.unpack_from(datagram)
+        m = Message._make((*fields, datagram[HEAD.size : end], version, count))
         known = HELLO <= m.kind <= END and isfinite(m.time + m.step)
-        return m if known and size == len(m.body) and not zero else MALFORMED
+        counted = not count or m.kind in (INITIALISE, STEP, OUTPUTS)
+        return m if known and counted and size == len(m.body) else MALFORMED
+
+
+def check_name(name: str) -> str:
+    """Return the name of a peer; ValueError where a HELLO cannot carry it."""
+    if len(name) >= NAME_SIZE or not all(" " <= c <= "~" for c in name):
+        must = f"must be printable ASCII of {NAME_SIZE - 1} characters at most"
+        raise ValueError(f"name {name!r}: {must}")
+    return name
+
+
+def pack_hello(name: str, part: Part) -> bytes:
+    """Return the body of a HELLO: the name of the peer that is wanted, a part of the signature."""
+    size = len(part.text)
+    head = HELLO_HEAD.pack(name.encode("ascii"), part.offset, size, part.whole, 0)
+    return (head + part.text).ljust(HELLO_SIZE, b"\0")
+
+
+def unpack_hello(body: bytes) -> tuple[str, Part] | None:
+    """Return name and part in the body of a HELLO; None where it is none."""
+    if len(body) != HELLO_SIZE:
+        return None
+    name, offset, size, whole, zero = HELLO_HEAD.unpack_from(body)
+    text = unpack_text(name)
+    if text is None or size > LARGEST_PART or zero:
+        return None
+    return text, Part(offset, whole, body[HELLO_HEAD.size :][:size])
+
+
+def unpack_text(padded: bytes) -> str | None:
+    """Return a text with its NULs taken off; None where it is not printable ASCII with one NUL."""
+    text = padded.rstrip(b"\0")
+    if len(text) == len(padded) or re.search(rb"[^ -~]", text):
+        return None
+    return text.decode("ascii")
 
 
 class Codec:
@@ -216,15 +296,16 @@ def exposed(path: Path) -> str:
 
 
 def check_size(signature: Signature) -> None:
-    """ValueError where the variables do not fit into a datagram."""
-    for name, variables, size in (
-        ("a request", signature.request, 8 * len(signature.request)),
-        ("an answer", signature.answer, 8 * len(signature.answer)),
-        ("a HELLO", signature.variables, len(signature.text.encode())),
-    ):
-        if (whole := HEAD.size + size + TAG_SIZE) > LARGEST:
+    """ValueError where the variables do not fit into a datagram, or one not into a HELLO."""
+    for name, variables in (("a request", signature.request), ("an answer", signature.answer)):
+        whole = HEAD.size + 8 * len(variables) + TAG_SIZE
+        if whole > LARGEST:
             said = f"{name} with {len(variables)} variables has {whole} bytes"
             raise ValueError(f"{said}: must be {LARGEST} at most")
+    for line in signature.text.encode().splitlines(keepends=True):
+        if len(line) > LARGEST_PART:
+            said = f"variable {line[:40].decode(errors='replace')!r}...: its line has {len(line)}"
+            raise ValueError(f"{said} bytes in a HELLO: must be {LARGEST_PART} at most")
 
 
 ALIVE = 1_000_000_000
@@ -244,7 +325,8 @@ class PeerCounters:
     `steps` and `initialisations`: done. `repeated`: answered again. `duplicated`: steps that had
     come already; `stale`: older than the last. `foreign`: of another interface or session;
     `other_version`: of the protocol. `malformed`: none of it, or with invalid values. `forged`:
-    without the tag of the key. `busy`: while another session was under way.
+    without the tag of the key. `busy`: while another session was under way. `other_name`: of a
+    proxy that wants another peer.
     """
 
     steps: int = 0
@@ -257,6 +339,7 @@ class PeerCounters:
     malformed: int = 0
     forged: int = 0
     busy: int = 0
+    other_name: int = 0
 
 
 class Request(NamedTuple):
@@ -279,15 +362,28 @@ Action = Request | bytes | None
 class Peer:
     """One bench. It serves one session at a time.
 
+    A named peer takes a proxy only that wants this name, or any; `build` says what runs there.
     `random` are bytes that nobody can guess, which cookies are made of; by default drawn.
-    ValueError where the key is too short.
+    ValueError where the key is too short, or where name or build are none.
     """
 
     def __init__(
-        self, signature: Signature, key: bytes | None = None, random: bytes | None = None
+        self,
+        signature: Signature,
+        key: bytes | None = None,
+        random: bytes | None = None,
+        name: str = "",
+        build: str = "",
     ) -> None:
         self.signature = signature
+        self.name = check_name(name)
+        self._welcome = struct.pack(f"{NAME_SIZE}s{BUILD_SIZE}s", name.encode(), _build(build))
         self.counters = PeerCounters()
+        self.trips = 0
+        """How often the safe state was entered in this session: latched, the inputs stay so."""
+        self.acknowledged_at = 0
+        """When a request last told that a newer answer had arrived, in ns of the caller's clock."""
+        self._acknowledged = 0
         self.unknown = 0
         """Of the foreign datagrams, those of a session that is not known."""
         self._sealer = Sealer(key)
@@ -300,6 +396,17 @@ class Peer:
         self._last_answer: bytes | None = None
         self._refused: tuple[int, int, int] | None = None  # the request that failed, for its repeat
         self._reason = ""  # why it failed
+
+    def trip(self) -> None:
+        """Latch the safe state until the next session begins: every answer tells of it."""
+        self.trips += 1
+
+    def expire(self, now: int, silence: int) -> bool:
+        """End the session where nothing new came for so many ns; True where that is so."""
+        over = self.in_session and now - self._heard >= silence
+        if over:
+            self._live = self._last = None
+        return over
 
     @property
     def in_session(self) -> bool:
@@ -326,7 +433,7 @@ class Peer:
         """Return the answer to the last request: outputs, and the time in s they belong to."""
         assert self._last is not None  # noqa: S101 - there is a request to answer
         body = self._answer.pack(*values)
-        self._last_answer = self._pack(self._last, OUTPUTS, 0, body, time)
+        self._last_answer = self._pack(self._last, OUTPUTS, 0, body, time, self.trips)
         return self._last_answer
 
     def failed(self, reason: str) -> bytes:
@@ -346,16 +453,21 @@ class Peer:
         return other and now - self._heard < ALIVE
 
     def _hello(self, m: Message, now: int) -> Action:
-        if m.sequence or m.cookie:
+        hello = unpack_hello(m.body)
+        if m.sequence or m.cookie or hello is None:
             return self._count(MALFORMED)
+        name, part = hello
         if m.interface != self.signature.hash:
-            reason = self.signature.difference(m.body)
-            return self._count("foreign", self._refuse(m, OTHER_INTERFACE, reason, len(m.body)))
+            reason = self.signature.difference(part)
+            return self._count("foreign", self._refuse(m, OTHER_INTERFACE, reason))
+        if name and self.name and name != self.name:
+            reason = f"the peer is {self.name}, the proxy wants {name}"
+            return self._count("other_name", self._refuse(m, OTHER_NAME, reason))
         if self._busy(m.session, now):
             return self._count("busy", self._refuse(m, BUSY))
         session, cookie = self._live or (None, 0)
         cookie = cookie if session == m.session else self._cookie(m.session)
-        return self._pack(m._replace(cookie=cookie), WELCOME)
+        return self._pack(m._replace(cookie=cookie), WELCOME, body=self._welcome)
 
     def _cookie(self, session: int) -> int:
         """That of a session that may begin now: another one once any session has begun."""
@@ -399,8 +511,14 @@ class Peer:
         values = self._request.unpack(m.body)
         stepping = not fresh and self._last is not None and self._last.kind == STEP
         too_late = m.kind == INITIALISE and stepping
-        if values is None or too_late or (m.kind == STEP) != (m.step > 0.0):
+        lost = m.count >= m.sequence  # more than there were
+        if values is None or too_late or lost or (m.kind == STEP) != (m.step > 0.0):
             return self._count(MALFORMED)
+        if fresh:
+            self.trips = self._acknowledged = 0
+        acknowledged = m.sequence - 1 - m.count
+        if fresh or acknowledged > self._acknowledged:
+            self._acknowledged, self.acknowledged_at = acknowledged, now
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
         self._heard = now
         self._last, self._last_answer, self._refused = m, None, None
@@ -414,8 +532,22 @@ class Peer:
         return self._pack(m, REFUSE, code, words)
 
     def _pack(
-        self, m: Message, kind: int, code: int = 0, body: bytes = b"", time: float = 0.0
+        self,
+        m: Message,
+        kind: int,
+        code: int = 0,
+        body: bytes = b"",
+        time: float = 0.0,
+        count: int = 0,
     ) -> bytes:
         """Return an answer to the request `m`."""
         fields = (kind, code, self.signature.hash, m.session, m.cookie, m.sequence)
-        return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body))
+        return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body, count=count))
+
+
+def _build(build: str) -> bytes:
+    """What a WELCOME has as the build; ValueError where it does not fit."""
+    if len(build) >= BUILD_SIZE or not all(" " <= c <= "~" for c in build):
+        must = f"must be printable ASCII of {BUILD_SIZE - 1} characters at most"
+        raise ValueError(f"build {build!r}: {must}")
+    return build.encode()

@@ -82,7 +82,10 @@ def wire(prefix: str, signature: Signature) -> str:
         second_half_of_the_hash=", ".join(octets[8:]),
         signature_lines="".join(f"        {line},\n" for line in lines),
         version=link.VERSION,
-        shortest_hello=link.SHORTEST_HELLO,
+        hello_size=link.HELLO_SIZE,
+        name_size=link.NAME_SIZE,
+        build_size=link.BUILD_SIZE,
+        largest_part=link.LARGEST_PART,
         longest_step=link.LONGEST_STEP,
         largest_key=link.LARGEST_KEY,
     )
