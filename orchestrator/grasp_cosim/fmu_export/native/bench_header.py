@@ -5,8 +5,10 @@ variables. It does what the peer in link does. wire.h.in is what it has in commo
 proxy: datagrams, values and keys. Protocol: link/README.md
 """
 
+import math
 import re
 import struct
+import sys
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from itertools import chain, count
@@ -15,8 +17,18 @@ from string import Template
 from typing import NamedTuple
 
 from .. import link
-from ..link import ORDER, TOO_LONG, Causality, Codec, LinkVariable, Signature, Value, check_size
-from .text import WORDS, string
+from ..link import (
+    ORDER,
+    TOO_LONG,
+    Causality,
+    Codec,
+    LinkVariable,
+    Signature,
+    Value,
+    check_name,
+    check_size,
+)
+from .text import WORDS, number, string
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
 WIRE = Path(__file__).with_name("wire.h.in")
@@ -33,6 +45,14 @@ _MEANINGS: dict[Causality, str] = {
 }
 
 
+class Limit(NamedTuple):
+    """The range of a value, and how fast it may change, per s: infinite where there is no limit."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    rate: float = math.inf
+
+
 class Group(NamedTuple):
     """The variables of a causality, with their identifiers in C."""
 
@@ -47,11 +67,14 @@ def bench_header(
     signature: Signature,
     starts: Mapping[str, Value] | None = None,
     descriptions: Mapping[str, str] | None = None,
+    limits: Mapping[str, Limit] | None = None,
+    peer: str = "",
 ) -> str:
     """Return the header for the bench side of the proxy of the model `name`, as text in ASCII.
 
     `starts` are the start values of inputs and parameters by name, 0, false or empty where there is
-    none; those of others are of no account. `descriptions`, by name, are for the comments. Names in
+    none; those of others are of no account. `descriptions`, by name, are for the comments; `limits`
+    are of Real inputs, by name; `peer` is the name of this bench, empty for none. Names in
     the header begin with the model's in lower snake case; members are named after the variables,
     with _ for what C cannot have; a name that was given already gets _2, _3, ...
 
@@ -67,6 +90,8 @@ def bench_header(
         structs=structs(groups, _MEANINGS, starts or {}, descriptions or {}),
         wire=wire(prefix, signature),
         packing="\n".join(_function(group, *texts) for group, texts in pairs),
+        limiting=_limiting(groups[0], limits or {}),
+        name_text=string(check_name(peer)),
         too_long=TOO_LONG,
         answer_size=link.HEAD.size + link.TAG_SIZE + max(sizes["outputs_size"], LARGEST_REASON),
         **sizes,
@@ -197,6 +222,34 @@ def lines_of(group: Group, line: str, unused: str, first: int = 0) -> list[str]:
         known = {"prefix": group.prefix, "kind": kind, "name": name, "text": text, "at": 8 * i}
         found.append(line.format(**known, i=first + i, number=number, truth=truth))
     return found or [f"    {unused}"]
+
+
+def _limiting(inputs: Group, limits: Mapping[str, Limit]) -> str:
+    """Return the function that keeps the inputs within their limits."""
+    prefix, lines = inputs.prefix, []
+    for v, name in inputs.members:
+        limit = limits.get(v.name)
+        if limit is None or v.kind != "Real":
+            continue
+        low, high = (number(_bounded(x)) for x in (limit.low, limit.high))
+        lines.append(f"    limited += {prefix}_limit(&inputs->{name}, {low}, {high});")
+        if math.isfinite(limit.rate):
+            rate = f"{number(limit.rate)} * over_s"
+            lines.append(f"    limited += over_s > 0.0 && {prefix}_limit(&inputs->{name},")
+            lines.append(f"            before->{name} - {rate}, before->{name} + {rate});")
+    unused = [] if lines else ["    (void)inputs, (void)before, (void)over_s;"]
+    if lines and not any("before->" in line for line in lines):
+        unused = ["    (void)before, (void)over_s;"]
+    head = (
+        f"static inline int {prefix}_limit_inputs({inputs.struct} *inputs,\n"
+        f"        const {inputs.struct} *before, double over_s)\n{{\n    int limited = 0;"
+    )
+    return "\n".join([head, *unused, *lines, "    return limited;", "}"])
+
+
+def _bounded(limit: float) -> float:
+    """The limit as a number of C."""
+    return math.copysign(min(abs(limit), sys.float_info.max), limit)
 
 
 def comment(text: str) -> str:
