@@ -39,7 +39,14 @@ from .frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
     help="Safe value of an input. Default: its start value.",
 )
 @click.option("--key-file", type=PATH, help="A file with a key that the proxy has, too.")
+@click.option("--name", default="", help="Take only a proxy that wants this name: proxy.name.")
 @click.option("--sessions", type=click.IntRange(1), help="End after so many sessions.")
+@click.option(
+    "--silence",
+    type=float,
+    default=30.0,
+    help="s without anything new after which a session is over.",
+)
 @json_option
 def serve(
     fmu: Path,
@@ -49,7 +56,9 @@ def serve(
     watchdog: float,
     failsafe: tuple[str, ...],
     key_file: Path | None,
+    name: str,
     sessions: int | None,
+    silence: float,
     as_json: bool,
 ) -> int:
     """Serve FMU to a proxy, as a bench would, until interrupted.
@@ -66,6 +75,8 @@ def serve(
         watchdog_ns=round(in_nanoseconds("--watchdog", watchdog)),
         failsafe=dict(pair("--failsafe", text, "INPUT=VALUE") for text in failsafe),
         key=None if key_file is None else shared_key(key_file, say),
+        name=name,
+        silence_ns=round(in_nanoseconds("--silence", silence)),
     )
     served = ServedFmu(exchanged(fmu), service, say)
     with Server(served, (host, port), say) as server:

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from hashlib import sha256
 from math import ceil, isclose, isfinite
 
 import numpy as np
@@ -48,15 +49,19 @@ class Service:
     """The way in which an FMU is served.
 
     `lockstep`: step on request; else by an own clock, in steps of the length that the proxy asks
-    for. `watchdog_ns`: without a request for so long the inputs go to what `failsafe` says, else to
-    their start values; an FMU that steps on request then stands still. `key` is the one shared with
-    the proxy, if any.
+    for. `watchdog_ns`: where no request told for so long that a newer answer had arrived, an FMU with
+    an own clock trips: its inputs go to what `failsafe` says, else to their start values, and stay
+    there until the next session. One that steps on request stands still anyhow. `key` is the one
+    shared with the proxy, if any; `name` tells it from others of its interface. A session in which
+    nothing new comes for `silence_ns` is over.
     """
 
     lockstep: bool = False
     watchdog_ns: int = 100_000_000
     failsafe: Mapping[str, Value] = field(default_factory=dict)
     key: bytes | None = None
+    name: str = ""
+    silence_ns: int = 30_000_000_000
 
 
 COUNTS = ("sessions", "own_steps", "skipped", "watchdog", "failures")
@@ -71,6 +76,7 @@ DROPPED = {
     "foreign": "of another interface was refused: its proxy must be made of the FMU served here",
     "unknown": "of an unknown session was refused: it began before this server did",
     "busy": "of another proxy was refused while a session is under way",
+    "other_name": "of a proxy that wants another name was refused: the two ports may be swapped",
 }
 """The line for the first datagram of a kind, by its counter."""
 
@@ -89,7 +95,8 @@ class ServedFmu:
         self._counts = dict.fromkeys(COUNTS, 0)
         self._service, self._say = service, say
         try:
-            self.peer = Peer(signature, service.key)
+            build = sha256(interface.path.read_bytes()).hexdigest()
+            self.peer = Peer(signature, service.key, name=service.name, build=build)
         except ValueError as error:
             raise InputError(str(error)) from error
         self._failsafe = _failsafe(interface, self.peer, service.failsafe)
@@ -98,7 +105,7 @@ class ServedFmu:
         self._in_session = False
         self._deadline: Time | None = None  # of the next own step, exact
         self._step_ns: Time = 0
-        self._heard: int | None = None  # the last request, while the watchdog watches
+        self._watching = False  # the watchdog, from the first step until it has tripped
         self._own_failure = ""
         self._unsaid = dict(DROPPED)
 
@@ -112,9 +119,14 @@ class ServedFmu:
 
     def due(self) -> int | None:
         """Return when `look` has something to do next; None: not before the next datagram."""
-        watchdog = None if self._heard is None else self._heard + self._service.watchdog_ns
-        deadline = None if self._deadline is None else ceil(self._deadline)
-        return min((m for m in (deadline, watchdog) if m is not None), default=None)
+        moments: list[int] = []
+        if self._deadline is not None:
+            moments.append(ceil(self._deadline))
+        if self._watching:
+            moments.append(self.peer.acknowledged_at + self._service.watchdog_ns)
+        if self.peer.in_session:
+            moments.append(self.peer.heard_at + self._service.silence_ns)
+        return min(moments, default=None)
 
     def answer(self, datagram: bytes, source: str, now: int) -> bytes | None:
         """Do what a datagram says, whatever it holds; return what to send back to its source."""
@@ -150,8 +162,8 @@ class ServedFmu:
     def _do(self, request: Request, now: int) -> None:
         if self._own_failure:
             raise SimulationError(self._own_failure)
-        self._values = request.values
         if request.kind == INITIALISE:
+            self._values = request.values
             self._fmu.initialise(request.time, request.values, request.fresh)
         elif self._service.lockstep:
             self._fmu.step(request.time, request.step, request.values)
@@ -160,8 +172,10 @@ class ServedFmu:
                 raise SimulationError(
                     f"step of {request.step!r} s: must be 1 ns or more, to be the own step"
                 )
-            self._heard = now
-            self._fmu.set(request.values)
+            if not self.peer.trips:
+                self._values = request.values
+                self._watching = True
+                self._fmu.set(request.values)
             if self._deadline is None:
                 self._step_ns = nearest_time(request.step)
                 self._deadline = now + self._step_ns
@@ -169,14 +183,9 @@ class ServedFmu:
     def look(self, now: int) -> None:
         """Do what is due by the own clock."""
         try:
-            if self._heard is not None and now - self._heard >= self._service.watchdog_ns:
-                self._heard = None
-                self._counts["watchdog"] += 1
+            if self._watching and now - self.peer.acknowledged_at >= self._service.watchdog_ns:
                 silence = self._service.watchdog_ns / NANOSECONDS
-                self._say(f"no request for {silence:g} s: the inputs went to their failsafe values")
-                for i, value in self._failsafe.items():
-                    self._values[i] = value
-                self._fmu.set(self._values)
+                self.trip(f"no request for {silence:g} s that told of an answer")
             if self._deadline is not None and now >= self._deadline:
                 self._fmu.advance(self._fmu.time, in_seconds(self._step_ns))
                 self._counts["own_steps"] += 1
@@ -188,11 +197,23 @@ class ServedFmu:
         except (InputError, SimulationError) as error:
             self._own_failure = str(error)
             self._say(self._own_failure)
-            self._deadline = self._heard = None
+            self._deadline, self._watching = None, False
+        if self.peer.expire(now, self._service.silence_ns):
+            self._end(f"nothing came for {self._service.silence_ns / NANOSECONDS:g} s")
+
+    def trip(self, reason: str) -> None:
+        """Put the inputs to their failsafe values, where they stay until the next session."""
+        self._watching = False
+        self._counts["watchdog"] += 1
+        self.peer.trip()
+        self._say(f"{reason}: the inputs are at their failsafe values until the next session")
+        for i, value in self._failsafe.items():
+            self._values[i] = value
+        self._fmu.set(self._values)
 
     def _end(self, reason: str) -> None:
         was_one, self._in_session = self._in_session, False
-        self._deadline = self._heard = None
+        self._deadline, self._watching = None, False
         self._own_failure = ""
         self._fmu.close()
         if was_one:

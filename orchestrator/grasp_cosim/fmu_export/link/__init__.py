@@ -391,7 +391,8 @@ class Peer:
         self._random = random or os.urandom(16)
         self._begun = 0  # sessions
         self._live: tuple[int, int] | None = None  # session and cookie
-        self._heard = 0
+        self.heard_at = 0
+        """When something new came last, in ns of the caller's clock."""
         self._last: Message | None = None
         self._last_answer: bytes | None = None
         self._refused: tuple[int, int, int] | None = None  # the request that failed, for its repeat
@@ -403,7 +404,7 @@ class Peer:
 
     def expire(self, now: int, silence: int) -> bool:
         """End the session where nothing new came for so many ns; True where that is so."""
-        over = self.in_session and now - self._heard >= silence
+        over = self.in_session and now - self.heard_at >= silence
         if over:
             self._live = self._last = None
         return over
@@ -450,7 +451,7 @@ class Peer:
 
     def _busy(self, session: int, now: int) -> bool:
         other = self._live is not None and self._live[0] != session
-        return other and now - self._heard < ALIVE
+        return other and now - self.heard_at < ALIVE
 
     def _hello(self, m: Message, now: int) -> Action:
         hello = unpack_hello(m.body)
@@ -520,7 +521,7 @@ class Peer:
         if fresh or acknowledged > self._acknowledged:
             self._acknowledged, self.acknowledged_at = acknowledged, now
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
-        self._heard = now
+        self.heard_at = now
         self._last, self._last_answer, self._refused = m, None, None
         if m.step > LONGEST_STEP:
             return self.failed(TOO_LONG)
