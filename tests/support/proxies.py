@@ -13,14 +13,16 @@ from grasp_cosim.fmu_export.link import (
     HELLO,
     INITIALISE,
     LARGEST,
+    NAME_SIZE,
     OUTPUTS,
     REFUSE,
-    SHORTEST_HELLO,
     STEP,
     WELCOME,
     Codec,
     Message,
     Sealer,
+    pack_hello,
+    unpack_text,
 )
 from grasp_cosim.hil.proxy import exchanged
 from grasp_cosim.hil.relay import Relay
@@ -45,15 +47,17 @@ class HandProxy:
         self.round = 0
         """What the header has as the time of sending."""
         self.outputs_time = 0.0
+        self.trips = 0
+        self.build = self.name = None
         self._ask = ask
         self._sealer = Sealer(key)
         self._codecs = Codec(signature.request), Codec(signature.answer)
         self._session = self._cookie = self._sequence = 0
 
-    def hello(self, session, **changed):
+    def hello(self, session, name="", part=0, **changed):
         """The HELLO that begins a session."""
         self._session, self._cookie, self._sequence = session, 0, 0
-        body = self.signature.text.encode().ljust(SHORTEST_HELLO, b"\0")
+        body = pack_hello(name, self.signature.parts()[part])
         return self.pack(HELLO, **{"body": body, **changed})
 
     def request(self, kind, time, values, step=0.0, /, **changed):
@@ -94,9 +98,10 @@ class HandProxy:
         assert m.interface == self.signature.hash
         if m.kind == WELCOME:
             self._cookie = m.cookie
+            self.name, self.build = map(unpack_text, (m.body[:NAME_SIZE], m.body[NAME_SIZE:]))
             return []
         assert (m.kind, m.cookie) == (OUTPUTS, self._cookie)
-        self.outputs_time = m.time
+        self.outputs_time, self.trips = m.time, m.count
         values = self._codecs[1].unpack(m.body)
         assert values is not None
         return values

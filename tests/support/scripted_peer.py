@@ -12,12 +12,14 @@ from threading import Thread
 
 from grasp_cosim.fmu_export.contract import Variable
 from grasp_cosim.fmu_export.link import (
+    BUILD_SIZE,
     BUSY,
     END,
     FAILED,
     HELLO,
     INITIALISE,
     LARGEST,
+    NAME_SIZE,
     OUTPUTS,
     REFUSE,
     STEP,
@@ -106,7 +108,7 @@ class ScriptedPeer:
 
     def pack(self, m, kind, body=b"", code=0, **changed):
         """The datagram of an answer to m."""
-        answer = m._replace(kind=kind, code=code, interface=SIGNATURE.hash, body=body)
+        answer = m._replace(kind=kind, code=code, interface=SIGNATURE.hash, body=body, count=0)
         return self._sealer.pack(answer._replace(step=0.0, **changed))
 
     def outputs(self, m):
@@ -140,8 +142,12 @@ class ScriptedPeer:
 # What a peer may do
 
 
+NOBODY = bytes(NAME_SIZE + BUILD_SIZE)
+"""What a peer without a name and a build says of itself."""
+
+
 def welcome(peer, m):
-    peer.send(peer.pack(m, WELCOME, cookie=next(peer.cookies)))
+    peer.send(peer.pack(m, WELCOME, NOBODY, cookie=next(peer.cookies)))
 
 
 def answer(peer, m):
@@ -151,7 +157,7 @@ def answer(peer, m):
 def miss(peer, m):
     """Let the deadline pass."""
     peer.clock.now += 10**12
-    peer.send(peer.pack(m, WELCOME))  # again, which means nothing
+    peer.send(peer.pack(m, WELCOME, NOBODY))  # again, which means nothing
 
 
 def keep(peer, m):

@@ -119,6 +119,14 @@ def build(
     "--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, help="UDP port of the peer."
 )
 @click.option("--timeout", type=float, default=DEFAULTS.timeout, help="Longest wait per step in s.")
+@click.option("--name", default="", help="Name of the peer. Default: that of the component.")
+@click.option(
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="NAME=LOW:HIGH[:RATE]",
+    help="Of an input, what is sent at most; of an output, what is plausible; the rate is per s.",
+)
 @target_option
 @click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of the proxy. Default: 2")
 @click.option("--c-header", type=PATH, help="Write the peer's side as a C99 header.")
@@ -129,6 +137,8 @@ def proxy(
     host: str,
     port: int,
     timeout: float,
+    name: str,
+    limits: tuple[str, ...],
     target: str | None,
     fmi: str | None,
     c_header: Path | None,
@@ -146,7 +156,7 @@ def proxy(
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
     For others: grasp-cosim proxy vendor.fmu -o Bench.fmu --target linux64,win64
     """
-    from ..hil.proxy import write_peer_header, write_proxy  # only here: it takes time to load
+    from ..hil.proxy import read_limits, write_peer_header, write_proxy  # it takes time to load
 
     if out is None and c_header is None:
         raise InputError("proxy: needs -o FILE.fmu or --c-header FILE, or both")
@@ -157,12 +167,13 @@ def proxy(
             raise InputError(f"{option} needs -o FILE.fmu")
     report: dict[str, object] = {}
     lines, notes = [], []
+    bounds = read_limits(fmu, limits)
     if c_header:
-        notes = write_peer_header(fmu, c_header)
+        notes = write_peer_header(fmu, c_header, bounds, name)
         lines.append(f"{c_header}: written")
         report["c_header"] = str(c_header)
     if out:
-        settings = Settings(host, port, timeout)
+        settings = Settings(host, port, timeout, name=name)
         targets = target.split(",") if target is not None else ()
         built, notes = write_proxy(
             fmu,
@@ -170,6 +181,7 @@ def proxy(
             settings,
             targets,
             3 if fmi == "3" else 2,
+            bounds,
             lambda line: waiting(f"{line}{FIRST if target else ''}"),
         )
         lines.insert(0, f"{out}: {built.status}")

@@ -1,14 +1,16 @@
 """Builds the proxy of an FMU: the same variables, in C, which a peer gives values to over UDP."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args, get_type_hints
 
 from ..base.si_units import BASE, Unit
 from .contract import TYPES, Scalar, Variable
 from .description import ERROR, WARNING, Description, Version
-from .link import PORT, LinkVariable, Signature
+from .link import BUILD_SIZE, NAME_SIZE, PORT, Limit, LinkVariable, Signature
 
 if TYPE_CHECKING:
     from .build import Plan
@@ -37,14 +39,33 @@ class Settings(NamedTuple):
     misses_tolerated: Annotated[
         int, "", (0, 2**31 - 1), "misses in a row before the peer is lost with one more"
     ] = 3
+    greatest_lead: Annotated[
+        float, "s", (0.0, 3600.0),
+        "how far the outputs may be ahead of the step they answer, or behind; beyond: lost",
+    ] = 0.1  # fmt: skip
     on_loss: Annotated[
         str, "", _TEXT, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"
     ] = "stop"
-    resume: Annotated[bool, "", None, "go on asking a lost peer, and come back when it answers"] = (
-        False
-    )
+    resume: Annotated[
+        bool, "", None, "ask whether a lost peer is back: the loop may then be initialised anew"
+    ] = False
+    on_limit: Annotated[
+        str, "", _TEXT, "clamp: a command beyond its limits is limited; trip: the peer is given up"
+    ] = "clamp"
     key_file: Annotated[
         str, "", _TEXT, "file with a key shared with the peer, 16 bytes or more; empty: none"
+    ] = ""
+    name: Annotated[
+        str,
+        "",
+        (0, NAME_SIZE - 1),
+        "name of the peer; empty: that of this instance, later the peer's",
+    ] = ""
+    build: Annotated[
+        str,
+        "",
+        (0, BUILD_SIZE - 1),
+        "what the peer must have been built from; empty: any, later it",
     ] = ""
 
 
@@ -52,7 +73,9 @@ DEFAULTS = Settings()
 
 _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
     "state": (
-        int, "", "0 not connected, 1 connected, 2 missing: outputs held, 3 lost: on_loss holds",
+        int, "",
+        "0 not connected, 1 connected, 2 missing: outputs held, 3 lost: on_loss holds, "
+        "4 back: to be initialised anew",
     ),
     "missed": (int, "", "steps without an answer in time"),
     "consecutive_missed": (int, "", "steps missed since the last answer in time"),
@@ -61,19 +84,38 @@ _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
     "duplicated": (int, "", "answers that had come already"),
     "rejected": (int, "", "datagrams that were malformed, foreign or not authentic"),
     "sessions": (int, "", "sessions begun; more than 1: the peer's model was set up anew"),
+    "trips": (int, "", "how often the peer put itself into its safe state in this session"),
+    "limited": (int, "", "commands that were beyond their limits"),
+    "implausible": (int, "", "answers with values that cannot have been measured: dropped"),
     "round_trip_time": (float, "s", "round trip of the newest answer"),
     "age": (
         float, "s",
         "simulation time since that which the outputs belong to; below 0: the peer is ahead",
     ),
+    "lead": (float, "s", "by how far the newest answer in time was ahead of the step it answered"),
 }  # fmt: skip
 """Type, unit and description of the outputs proxy.* by their names."""
 
 
+Limits = Mapping[str, Limit]
+"""By the name of a Real input what may be sent, by that of a Real output what is plausible."""
+
+NO_LIMITS: Limits = {}
+
+LARGEST_REAL = sys.float_info.max
+"""In the place of an infinite limit, which no start value may be."""
+
+
 def build_proxy(
-    target: Path, original: Description, plan: "Plan", settings: Settings = DEFAULTS
+    target: Path,
+    original: Description,
+    plan: "Plan",
+    settings: Settings = DEFAULTS,
+    limits: Limits = NO_LIMITS,
 ) -> "Built":
-    """Build the proxy of an FMU for the platforms of a plan; its parameters start at `settings`.
+    """Build the proxy of an FMU for the platforms of a plan.
+
+    Its parameters start at `settings` and `limits`.
 
     `original` has the name of the FMU's file, and of its variables the inputs, parameters and
     outputs that are exchanged, in this order. A proxy that is there with the same content is left
@@ -83,13 +125,17 @@ def build_proxy(
     from .build import with_binaries  # only here, as below: they take time to load
     from .package import write_members
 
-    members = proxy_members(target, original, plan.fmi, settings)
+    members = proxy_members(target, original, plan.fmi, settings, limits)
     fmus = with_binaries([(target.stem, members)], plan, networked=True)
     return write_members(target, fmus[target.stem])
 
 
 def proxy_members(
-    target: Path, original: Description, fmi: Version = 2, settings: Settings = DEFAULTS
+    target: Path,
+    original: Description,
+    fmi: Version = 2,
+    settings: Settings = DEFAULTS,
+    limits: Limits = NO_LIMITS,
 ) -> dict[str, bytes]:
     """Return the files of a proxy but for the binaries, by name; ValueError as build_proxy()."""
     from .native.bench_header import wire
@@ -97,7 +143,7 @@ def proxy_members(
     from .package import HASH, Model
     from .page import icon
 
-    description = _description(target, original, settings)
+    description = _description(target, original, settings, limits)
     signature = shared_signature(original.variables)
     own = {
         "wire.h": f"{_LICENCE}#ifndef WIRE_H\n#define WIRE_H\n\n{_INCLUDED}\n"
@@ -110,29 +156,55 @@ def proxy_members(
     return with_description(model, sources, fmi)
 
 
-def own_variables(outputs: Sequence[Variable], settings: Settings = DEFAULTS) -> list[Variable]:
-    """Return what a proxy has besides the original: settings, hold, failsafe, diagnostics.
+def own_variables(
+    variables: Sequence[Variable], settings: Settings = DEFAULTS, limits: Limits = NO_LIMITS
+) -> list[Variable]:
+    """Return what a proxy has besides the original: settings, hold, failsafe, limits, diagnostics.
 
-    `outputs` are those of the original; `settings` are start values.
+    `variables` are those of the original; `settings` and `limits` are start values. ValueError
+    where a limit is of none of its Real inputs and outputs.
     """
+    outputs = [v for v in variables if v.causality == "output"]
+    sent, measured = reals(variables, "input"), reals(variables, "output")
+    for name in limits:
+        if name not in {v.name for v in (*sent, *measured)}:
+            raise ValueError(f"limit of {name}: must be of a Real input or output of the FMU")
 
     def add(name: str, kind: type[Scalar], unit: str, start: Scalar, *about: Any) -> None:
         own.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", *about))
 
     own: list[Variable] = []
     for name, hint in get_type_hints(Settings, include_extras=True).items():
-        kind, unit, limits, text = get_args(hint)
-        add(name, kind, unit, getattr(settings, name), limits, text)
+        kind, unit, valid, text = get_args(hint)
+        add(name, kind, unit, getattr(settings, name), valid, text)
     for v in outputs:
         text = f"{v.name} stays as it is while the peer is lost"
         add(f"hold.{v.name}", bool, "", False, None, text)
     for v in outputs:
         text = f"value of {v.name} while the peer is lost"
         add(f"failsafe.{v.name}", v.kind, v.unit, v.kind(), None, text, None, v.relative)
+    for group, names, what in (
+        (sent, ("min", "max", "rate"), "that is sent"),
+        (measured, ("lowest", "highest", "fastest"), "that is plausible"),
+    ):
+        for v in group:
+            limit = limits.get(v.name, Limit())
+            low, high = max(limit.low, -LARGEST_REAL), min(limit.high, LARGEST_REAL)
+            rate = limit.rate if isfinite(limit.rate) else 0.0
+            lowest, highest, fastest = (f"{name}.{v.name}" for name in names)
+            add(lowest, float, v.unit, low, None, f"lowest {v.name} {what}", None, v.relative)
+            add(highest, float, v.unit, high, None, f"highest {v.name} {what}", None, v.relative)
+            text = f"fastest change of {v.name} {what}, {v.unit or '1'}/s; 0: any"
+            add(fastest, float, "", rate, (0.0, LARGEST_REAL), text)
     for name, (kind, unit, text) in _DIAGNOSTICS.items():
         variability = "continuous" if kind is float else "discrete"
         own.append(Variable(f"proxy.{name}", kind, "output", unit, None, variability, None, text))
     return own
+
+
+def reals(variables: Sequence[Variable], causality: str) -> list[Variable]:
+    """Return the Real variables of a causality."""
+    return [v for v in variables if v.causality == causality and v.kind is float]
 
 
 def shared_signature(variables: Sequence[Variable]) -> Signature:
@@ -141,14 +213,16 @@ def shared_signature(variables: Sequence[Variable]) -> Signature:
     return Signature(tuple(LinkVariable(*v) for v in shared))  # type: ignore[arg-type]  # no String
 
 
-def _description(target: Path, original: Description, settings: Settings) -> Description:
+def _description(
+    target: Path, original: Description, settings: Settings, limits: Limits
+) -> Description:
     name, file = target.stem, original.name
     if not (name.isascii() and name.isidentifier()) or target.suffix != ".fmu":
         must = "must be NAME.fmu, NAME of letters, digits and _, no digit first"
         raise ValueError(f"{target}: {must}")
     if taken := [v.name for v in original.variables if v.name.startswith("proxy.")]:
         raise ValueError(f"{file}: {taken[0]}: proxy. begins the names of a proxy's own")
-    own = own_variables([v for v in original.variables if v.causality == "output"], settings)
+    own = own_variables(original.variables, settings, limits)
     for v in own:
         if v.start is not None:
             v.check(v.start)
@@ -207,11 +281,15 @@ def _table(signature: Signature, variables: Sequence[Variable]) -> str:
         flags = v.variability == "fixed", limits is not None or v.kind is int
         numbers = ", ".join(number(float(x)) for x in (low, high, start))
         rows += f"    {{{', '.join(cells)}, {flags[0]:d},\n     {flags[1]:d}, {numbers}}},\n"
+    shared = variables[: len(signature.variables)]
+    sent, measured = reals(shared, "input"), reals(shared, "output")
     defined = {
         "N_REQUEST": len(signature.request),
         "N_ANSWER": len(signature.answer),
         "REQUEST_SIZE": 8 * len(signature.request),
         "ANSWER_SIZE": 8 * len(signature.answer),
+        "N_SENT": len(sent),
+        "N_MEASURED": len(measured),
         "N_VARIABLES": len(variables),
         "N_TEXTS": len(texts),
     }
@@ -223,4 +301,12 @@ def _table(signature: Signature, variables: Sequence[Variable]) -> str:
         + "static const char *const texts[N_TEXTS + 1] = {\n"
         + "".join(f"    {text},\n" for text in texts)
         + '    ""};\n'
+        + _places("sent_reals", "N_SENT", sent, variables)
+        + _places("measured_reals", "N_MEASURED", measured, variables)
     )
+
+
+def _places(name: str, size: str, group: Sequence[Variable], among: Sequence[Variable]) -> str:
+    """Return the table of where the variables of a group are, which C has never empty."""
+    places = [among.index(v) for v in group]
+    return f"\nstatic const int {name}[{size} + 1] = {{{', '.join(map(str, [*places, 0]))}}};\n"

@@ -8,9 +8,21 @@ from math import isfinite, isinf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError, nearest
 from ..base.files import check_file, write_text
-from ..fmu_export.link import ALIVE, ORDER, LinkVariable, Signature, check_size, exposed, read_key
+from ..fmu_export.link import (
+    ALIVE,
+    HEAD,
+    LARGEST_HANDSHAKE,
+    ORDER,
+    TAG_SIZE,
+    Limit,
+    LinkVariable,
+    Signature,
+    check_size,
+    exposed,
+    read_key,
+)
 from ..interface.expansion import expanded
 from ..interface.interface import Interface, Value, Variable
 from ..interface.read import read_interface
@@ -66,6 +78,25 @@ def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
     return signature, notes
 
 
+def read_limits(fmu: Path, texts: Sequence[str]) -> dict[str, Limit]:
+    """Return limits from texts, NAME=LOW:HIGH:RATE, by name.
+
+    InputError where one is none, or of no Real input or output of the FMU.
+    """
+    reals = [v.name for v in exchanged(fmu).of("input", "output") if v.kind == "Real"]
+    limits: dict[str, Limit] = {}
+    for text in texts:
+        name, sign, limit = text.partition("=")
+        if not sign or name not in reals:
+            valid = nearest(name, reals)
+            raise InputError(f"--limit {text}: {name}: no Real input or output of {fmu}; {valid}")
+        try:
+            limits[name] = Limit.read(limit)
+        except ValueError as error:
+            raise InputError(f"--limit {name}={error}") from error
+    return limits
+
+
 def shared_key(path: Path, say: Callable[[str], None]) -> bytes:
     """Return the key in a file, and say where others can read it.
 
@@ -103,12 +134,14 @@ def write_proxy(
     settings: Settings,
     targets: Sequence[str] = (),
     fmi: Version = 2,
+    limits: Mapping[str, Limit] | None = None,
     during: Callable[[str], AbstractContextManager[object]] = nullcontext,
 ) -> tuple[Built, list[str]]:
     """Write the proxy of an FMU; return what was built, and notes on it.
 
-    settings are start values of its parameters; targets name the platforms that get a binary,
-    beside this machine. `during` makes of a line that says what is done the context to do it in.
+    settings and limits are start values of its parameters; targets name the platforms that get a
+    binary, beside this machine. `during` makes of a line that says what is done the context to do
+    it in.
     InputError where the FMU or a setting does not permit it, SimulationError where the compiler
     fails.
     """
@@ -134,16 +167,31 @@ def write_proxy(
     try:
         plan = planned(found(targets), fmi)
         with during(f"building for {', '.join(t.tuple for t in plan.places)}"):
-            built = build_proxy(out, original, plan, settings)
+            built = build_proxy(out, original, plan, settings, limits or {})
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
     except CompilerError as error:
         raise SimulationError(str(error)) from error
-    return built, [*notes, *([plan.note] if plan.note else [])]
+    return built, [*notes, *_large(signature), *([plan.note] if plan.note else [])]
 
 
-def write_peer_header(fmu: Path, out: Path) -> list[str]:
+def _large(signature: Signature) -> list[str]:
+    """A note where a datagram of the session is taken apart on its way."""
+    sizes = {"STEP": len(signature.request), "answer": len(signature.answer)}
+    return [
+        f"each {name} has {size} bytes, over {LARGEST_HANDSHAKE}: networks take it apart, and some "
+        "drop the parts"
+        for name, count in sizes.items()
+        if (size := HEAD.size + 8 * count + TAG_SIZE) > LARGEST_HANDSHAKE
+    ]
+
+
+def write_peer_header(
+    fmu: Path, out: Path, limits: Mapping[str, Limit] | None = None, name: str = ""
+) -> list[str]:
     """Write the side of a proxy's peer as a C99 header; return notes on what is left out.
+
+    limits are of inputs, by name; those of outputs are the proxy's alone. name is that of the peer.
 
     InputError where the FMU does not permit it.
     """
@@ -156,7 +204,7 @@ def write_peer_header(fmu: Path, out: Path) -> list[str]:
     known = {name: start for name, start in starts.items() if start is not None}
     said = {v.name: v.description or "" for v in interface.variables}
     try:
-        write_text(out, bench_header(interface.identifier, signature, known, said))
+        write_text(out, bench_header(interface.identifier, signature, known, said, limits, name))
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
     return notes

@@ -49,11 +49,11 @@ class Service:
     """The way in which an FMU is served.
 
     `lockstep`: step on request; else by an own clock, in steps of the length that the proxy asks
-    for. `watchdog_ns`: where no request told for so long that a newer answer had arrived, an FMU with
-    an own clock trips: its inputs go to what `failsafe` says, else to their start values, and stay
-    there until the next session. One that steps on request stands still anyhow. `key` is the one
-    shared with the proxy, if any; `name` tells it from others of its interface. A session in which
-    nothing new comes for `silence_ns` is over.
+    for. `watchdog_ns`: where no request told for so long that a newer answer had arrived, an FMU
+    with an own clock trips: its inputs go to what `failsafe` says, else to their start values, and
+    stay there until the next session. One that steps on request stands still anyhow. `key` is the
+    one shared with the proxy, if any; `name` tells it from others of its interface. A session in
+    which nothing new comes for `silence_ns` is over.
     """
 
     lockstep: bool = False

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import zip_longest
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -33,6 +33,33 @@ class LinkVariable(NamedTuple):
     kind: Kind
     causality: Causality
     unit: str | None = None
+
+
+class Limit(NamedTuple):
+    """The range of a Real, and how fast it may change, per s: infinite where there is no limit."""
+
+    low: float = -inf
+    high: float = inf
+    rate: float = inf
+
+    @classmethod
+    def read(cls, text: str) -> "Limit":
+        """Read LOW:HIGH or LOW:HIGH:RATE, each part empty for none; ValueError if it is none."""
+        parts = text.split(":")
+        must = (
+            f"{text!r}: must be LOW:HIGH or LOW:HIGH:RATE, as in -5:5:200, each part empty for none"
+        )
+        if len(parts) not in (2, 3):
+            raise ValueError(must)
+        try:
+            given = [float(part) if part.strip() else None for part in parts]
+        except ValueError:
+            raise ValueError(must) from None
+        pairs = zip(given, cls(), strict=False)
+        limit = cls(*(default if value is None else value for value, default in pairs))
+        if not (limit.low <= limit.high and limit.rate > 0.0):
+            raise ValueError(f"{text!r}: the lower limit must be below the upper, the rate over 0")
+        return limit
 
 
 class Signature:
@@ -97,7 +124,7 @@ class Signature:
 
 
 class Part(NamedTuple):
-    """A part of a proxy's signature: where it begins in the text, the whole's size, both in bytes."""
+    """A part of a proxy's signature: where it begins in the text and the size of all, in bytes."""
 
     offset: int
     whole: int

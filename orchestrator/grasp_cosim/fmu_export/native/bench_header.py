@@ -22,6 +22,7 @@ from ..link import (
     TOO_LONG,
     Causality,
     Codec,
+    Limit,
     LinkVariable,
     Signature,
     Value,
@@ -43,14 +44,6 @@ _MEANINGS: dict[Causality, str] = {
     "parameter": "What the proxy sends with every request as well; only tunable ones change",
     "output": "What it gets",
 }
-
-
-class Limit(NamedTuple):
-    """The range of a value, and how fast it may change, per s: infinite where there is no limit."""
-
-    low: float = -math.inf
-    high: float = math.inf
-    rate: float = math.inf
 
 
 class Group(NamedTuple):

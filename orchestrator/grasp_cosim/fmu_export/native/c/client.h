@@ -23,11 +23,16 @@ typedef struct {
     char reason[CLIENT_REASON + 1];
     uint8_t outputs[ANSWER_SIZE + 1];  /* of the newest answer */
     double outputs_time;               /* s: what they belong to */
+    uint64_t trips;                    /* of the peer in this session, as the newest answer says */
     int64_t round_trip;                /* ns: from its request to the newest answer */
+    char wanted[WIRE_NAME_SIZE];       /* the name of the peer; empty: any */
+    char name[WIRE_NAME_SIZE], build[WIRE_BUILD_SIZE];  /* of the peer, as it welcomed */
 
     wire_sealer sealer;
     uint64_t session, cookie, sequence, first_step, newest, awaited;
     int greeting;
+    const char *const *part;           /* the first line of the signature in the HELLO of now */
+    int64_t greeted;                   /* ns: when that was made, which its answer returns */
     uint8_t seen[CLIENT_WINDOW];  /* 1: the request with this sequence, modulo, was answered */
 } Client;
 
@@ -40,9 +45,17 @@ static int client_begin(Client *client, const uint8_t *key, size_t size)
 
 /* Requests. The body is at datagram + WIRE_HEAD_SIZE already; the size of the whole is returned. */
 
+/* The requests before this one, back to the newest one that is answered */
+static uint64_t client_unanswered(const Client *client)
+{
+    uint64_t unanswered = client->sequence - 1 - client->newest;
+    return unanswered < UINT32_MAX ? unanswered : UINT32_MAX;
+}
+
 static size_t client_pack(const Client *client, uint8_t kind, double time, double step, int64_t now,
                           size_t body, uint8_t *datagram)
 {
+    int counted = kind == WIRE_INITIALISE || kind == WIRE_STEP;
     memset(datagram, 0, WIRE_HEAD_SIZE);
     memcpy(datagram, "GRSP", 4);
     wire_put(datagram + WIRE_AT_VERSION, 2, WIRE_VERSION);
@@ -55,25 +68,62 @@ static size_t client_pack(const Client *client, uint8_t kind, double time, doubl
     wire_put_real(datagram + WIRE_AT_STEP, step);
     wire_put(datagram + WIRE_AT_SENT, 8, (uint64_t)now);
     wire_put(datagram + WIRE_AT_SIZE, 4, body);
+    wire_put(datagram + WIRE_AT_COUNT, 4, counted ? client_unanswered(client) : 0);
     return wire_seal(&client->sealer, datagram, WIRE_HEAD_SIZE + body);
 }
 
-/* HELLO, to begin a session of that number */
-static size_t client_greet(Client *client, uint64_t session, int64_t now, uint8_t *datagram)
+static size_t client_bytes_before(const char *const *end)
 {
     const char *const *line;
     size_t size = 0;
-    client->session = session;
-    client->cookie = client->sequence = client->first_step = client->newest = client->awaited = 0;
-    client->greeting = 1;
-    client->refused = 0;
-    memset(datagram + WIRE_HEAD_SIZE, 0, WIRE_SHORTEST_HELLO);
-    for (line = wire_lines(); *line; line++) {
-        memcpy(datagram + WIRE_HEAD_SIZE + size, *line, strlen(*line));
+    for (line = wire_lines(); line != end; line++) {
         size += strlen(*line);
     }
-    size = size > WIRE_SHORTEST_HELLO ? size : WIRE_SHORTEST_HELLO;
-    return client_pack(client, WIRE_HELLO, 0.0, 0.0, now, size, datagram);
+    return size;
+}
+
+/* HELLO with the lines of the signature from client->part on, as many as there is room for */
+static size_t client_hello(Client *client, int64_t now, uint8_t *datagram)
+{
+    uint8_t *body = datagram + WIRE_HEAD_SIZE;
+    const char *const *line;
+    size_t size = 0, offset = client_bytes_before(client->part);
+    memset(body, 0, WIRE_HELLO_SIZE);
+    memcpy(body + WIRE_HELLO_AT_NAME, client->wanted, sizeof client->wanted);
+    for (line = client->part; *line && size + strlen(*line) <= WIRE_LARGEST_PART; line++) {
+        memcpy(body + WIRE_HELLO_AT_PART + size, *line, strlen(*line));
+        size += strlen(*line);
+    }
+    wire_put(body + WIRE_HELLO_AT_OFFSET, 4, offset);
+    wire_put(body + WIRE_HELLO_AT_PART_SIZE, 4, size);
+    while (*line) {
+        line++;
+    }
+    wire_put(body + WIRE_HELLO_AT_WHOLE_SIZE, 4, client_bytes_before(line));
+    client->greeted = now;
+    return client_pack(client, WIRE_HELLO, 0.0, 0.0, now, WIRE_HELLO_SIZE, datagram);
+}
+
+/* The first HELLO, to begin a session of that number */
+static size_t client_greet(Client *client, uint64_t session, int64_t now, uint8_t *datagram)
+{
+    client->session = session;
+    client->cookie = client->sequence = client->first_step = client->newest = client->awaited = 0;
+    client->trips = 0;
+    client->greeting = 1;
+    client->refused = 0;
+    client->part = wire_lines();
+    return client_hello(client, now, datagram);
+}
+
+/* The HELLO after one with which the peer's signature agreed; 0 where there are no more lines */
+static size_t client_greet_on(Client *client, int64_t now, uint8_t *datagram)
+{
+    size_t size = 0;
+    while (*client->part && size + strlen(*client->part) <= WIRE_LARGEST_PART) {
+        size += strlen(*client->part++);
+    }
+    return *client->part ? client_hello(client, now, datagram) : 0;
 }
 
 /* INITIALISE, or a STEP over `step`, both from `time` in s */
@@ -103,10 +153,22 @@ static int client_reject(Client *client)
     return CLIENT_NOTHING;
 }
 
+/* A text of so many bytes, in one line of ASCII whatever it is */
+static void client_take_text(char *text, const uint8_t *bytes, size_t size)
+{
+    size_t i;
+    for (i = 0; i < size - 1 && bytes[i]; i++) {
+        text[i] = (char)(bytes[i] < 0x20 ? ' ' : bytes[i] < 0x7f ? bytes[i] : '?');
+    }
+    text[i] = '\0';
+}
+
 static int client_receive_welcome(Client *client, const uint8_t *datagram, size_t body, int64_t now)
 {
     uint64_t cookie = wire_get(datagram + WIRE_AT_COOKIE, 8);
-    if (memcmp(datagram + WIRE_AT_INTERFACE, wire_hash(), 16) != 0 || !cookie || body > 0) {
+    const uint8_t *name = datagram + WIRE_HEAD_SIZE;
+    if (memcmp(datagram + WIRE_AT_INTERFACE, wire_hash(), 16) != 0 || !cookie
+        || body != WIRE_NAME_SIZE + WIRE_BUILD_SIZE) {
         return client_reject(client);
     }
     if (!client->greeting) {  /* the peer answers a repeated HELLO again */
@@ -114,6 +176,8 @@ static int client_receive_welcome(Client *client, const uint8_t *datagram, size_
     }
     client->greeting = 0;
     client->cookie = cookie;
+    client_take_text(client->name, name, WIRE_NAME_SIZE);
+    client_take_text(client->build, name + WIRE_NAME_SIZE, WIRE_BUILD_SIZE);
     client->round_trip = (int64_t)((uint64_t)now - wire_get(datagram + WIRE_AT_SENT, 8));
     return CLIENT_ANSWERED;
 }
@@ -125,7 +189,9 @@ static int client_receive_refusal(Client *client, const uint8_t *datagram, size_
     if (sequence != (client->greeting ? 0 : client->awaited)
         || wire_get(datagram + WIRE_AT_COOKIE, 8) != client->cookie
         || !(client->greeting || client->awaited) || code < WIRE_OTHER_INTERFACE
-        || code > WIRE_OTHER_VERSION) {
+        || code > WIRE_OTHER_NAME
+        || (client->greeting
+            && wire_get(datagram + WIRE_AT_SENT, 8) != (uint64_t)client->greeted)) {
         return client_reject(client);
     }
     client->refused = code;
@@ -172,6 +238,7 @@ static int client_receive_outputs(Client *client, const uint8_t *datagram, size_
         client->newest = sequence;
         memcpy(client->outputs, datagram + WIRE_HEAD_SIZE, body);
         client->outputs_time = wire_get_real(datagram + WIRE_AT_TIME);
+        client->trips = wire_get(datagram + WIRE_AT_COUNT, 4);
         client->round_trip = (int64_t)((uint64_t)now - wire_get(datagram + WIRE_AT_SENT, 8));
     }
     if (awaited) {

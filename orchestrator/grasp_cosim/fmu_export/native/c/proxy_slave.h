@@ -2,10 +2,12 @@
 
    Before it is included: wire.h, and what slave.h needs but for what is defined here; of the FMU, whose
    variables are in the order inputs, parameters, outputs of the original, settings, holds, failsafes,
-   diagnostics
+   limits of its Real inputs (lowest, highest, rate), those of its Real outputs, diagnostics
        PROXY_ORIGINAL               the file name of the original
        N_REQUEST, N_ANSWER          its inputs and parameters, its outputs
-       REQUEST_SIZE, ANSWER_SIZE    the bytes of their values */
+       REQUEST_SIZE, ANSWER_SIZE    the bytes of their values
+       N_SENT, sent_reals           its Real inputs: their number and places
+       N_MEASURED, measured_reals   its Real outputs */
 #ifndef PROXY_SLAVE_H
 #define PROXY_SLAVE_H
 
@@ -15,8 +17,9 @@
 #include "channel.h"
 #include "variable.h"
 
-enum { NOT_CONNECTED, CONNECTED, MISSING, LOST };  /* proxy.state */
-enum { HOLD, FAILSAFE, STOP };                     /* proxy.on_loss */
+enum { NOT_CONNECTED, CONNECTED, MISSING, LOST, BACK };  /* proxy.state */
+enum { HOLD, FAILSAFE, STOP };                           /* proxy.on_loss */
+enum { CLAMP, TRIP };                                    /* proxy.on_limit */
 
 /* The places of the proxy's own variables */
 enum {
@@ -26,12 +29,18 @@ enum {
     PROXY_TIMEOUT,
     PROXY_CONNECT_TIMEOUT,
     PROXY_MISSES_TOLERATED,
+    PROXY_GREATEST_LEAD,
     PROXY_ON_LOSS,
     PROXY_RESUME,
+    PROXY_ON_LIMIT,
     PROXY_KEY_FILE,
+    PROXY_NAME,
+    PROXY_BUILD,
     PROXY_HOLDS,
     PROXY_FAILSAFES = PROXY_HOLDS + N_ANSWER,
-    PROXY_STATE = PROXY_FAILSAFES + N_ANSWER,
+    PROXY_SENT_LIMITS = PROXY_FAILSAFES + N_ANSWER,
+    PROXY_MEASURED_LIMITS = PROXY_SENT_LIMITS + 3 * N_SENT,
+    PROXY_STATE = PROXY_MEASURED_LIMITS + 3 * N_MEASURED,
     PROXY_MISSED,
     PROXY_CONSECUTIVE_MISSED,
     PROXY_LATE,
@@ -39,14 +48,25 @@ enum {
     PROXY_DUPLICATED,
     PROXY_REJECTED,
     PROXY_SESSIONS,
+    PROXY_TRIPS,
+    PROXY_LIMITED,
+    PROXY_IMPLAUSIBLE,
     PROXY_ROUND_TRIP_TIME,
-    PROXY_AGE
+    PROXY_AGE,
+    PROXY_LEAD
 };
 
 typedef struct {
-    int state, on_loss;
-    uint64_t missed, sessions;  /* in a row; begun, when it last answered */
-    uint8_t request[REQUEST_SIZE + 1];  /* the values that go to the peer */
+    int state, on_loss, on_limit;
+    uint64_t missed;             /* in a row */
+    uint64_t limited, implausible;
+    uint64_t taken;              /* the sequence of the answer that the outputs are of */
+    uint64_t refused_answer;     /* of the last one that was implausible */
+    double taken_time, lead;     /* s: what they belong to; of the newest answer in time */
+    double sent[N_SENT + 1], sent_time;  /* the inputs that went out last; when, in s */
+    uint8_t request[REQUEST_SIZE + 1];   /* the values that go to the peer */
+    uint8_t answered[REQUEST_SIZE + 1];  /* those that it was initialised with */
+    int is_initialised;
     Text loss;                          /* why the peer is lost */
     int is_connected;
     char host[NET_HOST_SIZE], key_file[NET_HOST_SIZE];  /* to what */
@@ -57,6 +77,7 @@ typedef struct {
 #include "slave.h"
 
 static const char *const proxy_on_loss[] = {"hold", "failsafe", "stop"};
+static const char *const proxy_on_limit[] = {"clamp", "trip"};
 
 /* Messages */
 
@@ -80,7 +101,11 @@ static void proxy_put_refusal(const Channel *c, Text *said)
         text_put(said, "the peer is busy with another proxy");
         break;
     case WIRE_UNKNOWN:
-        text_put(said, "the peer does not know this session");
+        text_put(said, "the peer does not know this session: it was started anew, or another proxy "
+                       "has taken over");
+        break;
+    case WIRE_OTHER_NAME:
+        text_say(said, "another name: %s; are two ports swapped?", c->client.reason);
         break;
     default:
         text_say(said, "the peer failed: %s", c->client.reason);
@@ -104,19 +129,28 @@ static int64_t proxy_deadline(const Slave *s, int timeout)
     return net_now() + (int64_t)rint(s->values[timeout] * 1e9);
 }
 
+/* The place of a word among so many; less than 0: it is none of them */
+static int proxy_choice(const char *word, const char *const *words, int n)
+{
+    int i;
+    for (i = n - 1; i >= 0 && strcmp(word, words[i]) != 0; i--) {
+    }
+    return i;
+}
+
 static Status proxy_read_settings(Slave *s)
 {
-    const char *chosen = slave_string(s, PROXY_ON_LOSS);
-    int i;
-    for (i = HOLD; i <= STOP && !s->params_are_read; i++) {
-        if (strcmp(chosen, proxy_on_loss[i]) == 0) {
-            s->model.on_loss = i;
-            s->params_are_read = 1;
-        }
+    const char *on_loss = slave_string(s, PROXY_ON_LOSS), *on_limit = slave_string(s, PROXY_ON_LIMIT);
+    s->model.on_loss = proxy_choice(on_loss, proxy_on_loss, STOP + 1);
+    s->model.on_limit = proxy_choice(on_limit, proxy_on_limit, TRIP + 1);
+    if (s->model.on_loss < 0) {
+        return slave_refuse(s, "proxy.on_loss = %s: must be hold, failsafe, stop", on_loss);
     }
-    return s->params_are_read
-               ? SLAVE_OK
-               : slave_refuse(s, "proxy.on_loss = %s: must be hold, failsafe, stop", chosen);
+    if (s->model.on_limit < 0) {
+        return slave_refuse(s, "proxy.on_limit = %s: must be clamp, trip", on_limit);
+    }
+    s->params_are_read = 1;
+    return SLAVE_OK;
 }
 
 static Status proxy_refuse_key(Slave *s, const char *reason)
@@ -181,7 +215,8 @@ static Status proxy_give_up(Slave *s)
     Text *said;
     slave_end(s);
     said = slave_say(s);
-    if (c->refused) {
+    if (c->refused || c->busy) {
+        c->refused = c->refused ? c->refused : WIRE_BUSY;
         text_put(proxy_put_peer(s, said), ": ");
         proxy_put_refusal(c, said);
         return slave_refused(s);
@@ -212,10 +247,50 @@ static Status proxy_open(Slave *s)
     }
     m->channel.stage = CHANNEL_NEW;
     m->channel.sessions = 0;
-    m->channel.refused = 0;
+    m->channel.refused = m->channel.busy = 0;
     m->channel.trouble[0] = '\0';
+    m->channel.again = 0;
     m->is_connected = 1;
+    m->is_initialised = 0;
     return SLAVE_OK;
+}
+
+/* The peer must be the one that is wanted; what it says of itself takes the place of "any". */
+static Status proxy_check_peer(Slave *s)
+{
+    const Client *c = &s->model.channel.client;
+    char *build = slave_string(s, PROXY_BUILD);
+    const char *wrong = NULL;
+    if (*c->name && *c->wanted && strcmp(c->name, c->wanted) != 0) {
+        wrong = "name";
+    } else if (*build && strcmp(c->build, build) != 0) {
+        wrong = "build";
+    }
+    if (wrong) {
+        int is_name = *wrong == 'n';
+        slave_end(s);
+        text_say(proxy_put_peer(s, slave_say(s)), ": the peer's %s is %s: must be %s", wrong,
+                 is_name ? c->name : *c->build ? c->build : "empty", is_name ? c->wanted : build);
+        return slave_refused(s);
+    }
+    strcpy(build, c->build);
+    strcpy(slave_string(s, PROXY_NAME), c->name);
+    return SLAVE_OK;
+}
+
+/* The name of the peer that is wanted: that of the settings, or of this instance where it fits */
+static void proxy_want(Slave *s)
+{
+    const char *name = slave_string(s, PROXY_NAME);
+    char *wanted = s->model.channel.client.wanted;
+    size_t i, size;
+    name = *name ? name : s->name;
+    size = strlen(name);
+    size = size < WIRE_NAME_SIZE ? size : WIRE_NAME_SIZE - 1;
+    for (i = 0; i < size; i++) {
+        wanted[i] = (char)(name[i] >= ' ' && name[i] <= '~' ? name[i] : '?');
+    }
+    memset(wanted + size, 0, WIRE_NAME_SIZE - size);
 }
 
 /* A channel with a session to the peer of the settings */
@@ -234,8 +309,12 @@ static Status proxy_connect(Slave *s)
     if (proxy_open(s) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
+    proxy_want(s);
     if (!channel_greet(&m->channel, proxy_deadline(s, PROXY_CONNECT_TIMEOUT))) {
         return proxy_give_up(s);
+    }
+    if (proxy_check_peer(s) != SLAVE_OK) {
+        return SLAVE_ERROR;
     }
     proxy_set_state(s, CONNECTED);
     return SLAVE_OK;
@@ -256,14 +335,84 @@ static void proxy_pack(Slave *s)
     }
 }
 
-/* The outputs of the newest answer */
-static void proxy_take(Slave *s)
+/* The limits of a Real that is sent, or measured: its lowest and highest value, and rate per s */
+static const double *proxy_limits(const Slave *s, int first, int i)
 {
-    const uint8_t *at = s->model.channel.client.outputs;
+    return &s->values[first + 3 * i];
+}
+
+/* Keep what is to be sent `over` s after the last within its limits: 1 if nothing was beyond. */
+static int proxy_limit(Slave *s, double over)
+{
+    Model *m = &s->model;
+    int i, within = 1;
+    for (i = 0; i < N_SENT; i++) {
+        const double *limits = proxy_limits(s, PROXY_SENT_LIMITS, i);
+        double value = s->values[sent_reals[i]], limited = value;
+        if (limits[2] > 0.0 && over > 0.0) {
+            double change = limits[2] * over;
+            limited = fmin(fmax(limited, m->sent[i] - change), m->sent[i] + change);
+        }
+        limited = fmin(fmax(limited, limits[0]), limits[1]);
+        if (limited != value) {
+            within = 0;
+            m->limited++;
+        }
+        wire_put_real(m->request + 8 * sent_reals[i], limited);
+    }
+    return within;
+}
+
+/* What goes out now: later rates are relative to it. */
+static void proxy_note_sent(Slave *s, double time)
+{
     int i;
+    for (i = 0; i < N_SENT; i++) {
+        s->model.sent[i] = wire_get_real(s->model.request + 8 * sent_reals[i]);
+    }
+    s->model.sent_time = time;
+}
+
+/* Whether the newest answer has what can have been measured, after the one that was taken last */
+static int proxy_is_plausible(const Slave *s)
+{
+    const Client *c = &s->model.channel.client;
+    double over = c->outputs_time - s->model.taken_time;
+    int i;
+    for (i = 0; i < N_MEASURED; i++) {
+        const double *limits = proxy_limits(s, PROXY_MEASURED_LIMITS, i);
+        int place = measured_reals[i];
+        double value = wire_get_real(c->outputs + 8 * (place - PROXY_OUTPUTS));
+        double change = fabs(value - s->values[place]);
+        if (value < limits[0] || value > limits[1]
+            || (limits[2] > 0.0 && over > 0.0 && s->model.taken > 0 && change > limits[2] * over)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* The outputs of the newest answer, if that is another one than before; 0 where it is implausible,
+   and the outputs stay. */
+static int proxy_take(Slave *s)
+{
+    const Client *c = &s->model.channel.client;
+    const uint8_t *at = c->outputs;
+    int i;
+    if (c->newest == s->model.taken) {
+        return 1;
+    }
+    if (!proxy_is_plausible(s)) {
+        s->model.implausible += c->newest != s->model.refused_answer;
+        s->model.refused_answer = c->newest;
+        return 0;
+    }
     for (i = PROXY_OUTPUTS; i < PROXY_OUTPUTS + N_ANSWER; i++, at += 8) {
         s->values[i] = variables[i].kind == KIND_REAL ? wire_get_real(at) : wire_get_integer(at);
     }
+    s->model.taken = c->newest;
+    s->model.taken_time = c->outputs_time;
+    return 1;
 }
 
 /* The outputs of a lost peer that are not held */
@@ -295,28 +444,50 @@ static void proxy_report(Slave *s)
     v[PROXY_DUPLICATED] = proxy_count(client->counters.duplicated);
     v[PROXY_REJECTED] = proxy_count(client->counters.rejected);
     v[PROXY_SESSIONS] = proxy_count(s->model.channel.sessions);
+    v[PROXY_TRIPS] = proxy_count(client->trips);
+    v[PROXY_LIMITED] = proxy_count(s->model.limited);
+    v[PROXY_IMPLAUSIBLE] = proxy_count(s->model.implausible);
     v[PROXY_ROUND_TRIP_TIME] = (double)client->round_trip / 1e9;
-    v[PROXY_AGE] = v[SLAVE_TIME] - client->outputs_time;
+    v[PROXY_AGE] = v[SLAVE_TIME] - s->model.taken_time;
+    v[PROXY_LEAD] = s->model.lead;
+}
+
+/* In initialisation mode exchange values, if they are others than before: what is measured is
+   measured once. */
+static Status proxy_initialise(Slave *s)
+{
+    Model *m = &s->model;
+    if (proxy_connect(s) != SLAVE_OK) {
+        return SLAVE_ERROR;
+    }
+    proxy_pack(s);
+    if (!proxy_limit(s, 0.0) && m->on_limit == TRIP) {
+        return slave_refuse(s, "an input is beyond its limits, and proxy.on_limit = trip");
+    }
+    if (m->is_initialised && memcmp(m->request, m->answered, REQUEST_SIZE) == 0) {
+        return SLAVE_OK;
+    }
+    m->taken = 0;
+    if (!channel_initialise(&m->channel, s->values[SLAVE_TIME], m->request,
+                            proxy_deadline(s, PROXY_CONNECT_TIMEOUT))) {
+        return proxy_give_up(s);
+    }
+    memcpy(m->answered, m->request, REQUEST_SIZE);
+    m->is_initialised = 1;
+    if (!proxy_take(s)) {
+        return slave_refuse(s, "the peer answers what is beyond proxy.lowest.* and proxy.highest.*");
+    }
+    proxy_note_sent(s, s->values[SLAVE_TIME]);
+    return SLAVE_OK;
 }
 
 /* In initialisation mode exchange values; after that outputs do not follow a set */
 static Status slave_refresh(Slave *s)
 {
-    if (s->phase != INITIALISING && s->phase != STEPPING) {
-        return SLAVE_OK;
-    }
-    if (s->phase == INITIALISING && proxy_connect(s) != SLAVE_OK) {
+    if (s->phase == INITIALISING && proxy_initialise(s) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
-    proxy_pack(s);
-    if (s->phase == INITIALISING) {
-        if (!channel_initialise(&s->model.channel, s->values[SLAVE_TIME], s->model.request,
-                                proxy_deadline(s, PROXY_CONNECT_TIMEOUT))) {
-            return proxy_give_up(s);
-        }
-        proxy_take(s);
-    }
-    s->outputs_follow = 1;
+    s->outputs_follow |= s->phase == INITIALISING || s->phase == STEPPING;
     return SLAVE_OK;
 }
 
@@ -324,11 +495,12 @@ static Status slave_refresh(Slave *s)
 
 static Status slave_start(Slave *s)
 {
+    Model *m = &s->model;
     slave_start_values(s);
-    s->model.state = NOT_CONNECTED;
-    s->model.missed = 0;
-    s->model.sessions = 1;
-    s->model.is_connected = 0;
+    m->state = NOT_CONNECTED;
+    m->missed = m->limited = m->implausible = m->taken = m->refused_answer = 0;
+    m->lead = m->taken_time = 0.0;
+    m->is_connected = m->is_initialised = 0;
     return SLAVE_OK;
 }
 
@@ -342,58 +514,99 @@ static Status slave_enter_initialisation(Slave *s)
 
 /* Steps */
 
-static void proxy_note_answer(Slave *s)
-{
-    Model *m = &s->model;
-    if (m->state == LOST) {
-        text_say(proxy_put_peer(s, slave_say(s)), ": the peer answers again%s",
-                 m->channel.sessions > m->sessions ? " in a new session, its model set up anew" : "");
-        slave_log(s, SLAVE_WARNING);
-    }
-    m->sessions = m->channel.sessions;
-    m->state = CONNECTED;
-    m->missed = 0;
-}
-
+/* The peer is given up, as m->loss says: its session is over, and no command goes out any more. */
 static void proxy_lose(Slave *s)
 {
     Model *m = &s->model;
     m->state = LOST;
-    text_clear(&m->loss);
-    text_say(proxy_put_peer(s, &m->loss), " is lost, %d missed in a row: ",
-             (int)proxy_count(m->missed));
-    if (m->channel.refused) {
-        proxy_put_refusal(&m->channel, &m->loss);
-    } else {
-        text_put(&m->loss, "no answer");
-        proxy_put_silence(s, PROXY_TIMEOUT, &m->loss);
-    }
+    channel_end(&m->channel);
     if (m->on_loss == STOP) {
         return;
     }
     text_say(slave_say(s), "%s; proxy.on_loss = %s", m->loss.at, proxy_on_loss[m->on_loss]);
     slave_log(s, SLAVE_WARNING);
-    proxy_take(s);
     if (m->on_loss == FAILSAFE) {
         proxy_take_failsafe(s);
     }
+}
+
+/* HOST:PORT is lost: - the beginning of why */
+static Text *proxy_say_loss(Slave *s)
+{
+    text_clear(&s->model.loss);
+    text_put(proxy_put_peer(s, &s->model.loss), " is lost: ");
+    return &s->model.loss;
 }
 
 static void proxy_note_miss(Slave *s)
 {
     Model *m = &s->model;
     m->missed++;
-    if (m->state == LOST) {
-        return;
-    }
     m->state = MISSING;
-    if (m->channel.refused == WIRE_FAILED
-        || (double)m->missed > s->values[PROXY_MISSES_TOLERATED]) {
+    if (m->channel.refused) {
+        proxy_put_refusal(&m->channel, proxy_say_loss(s));
+        proxy_lose(s);
+    } else if ((double)m->missed > s->values[PROXY_MISSES_TOLERATED]) {
+        text_say(proxy_say_loss(s), "%d missed in a row: no answer", (int)proxy_count(m->missed));
+        proxy_put_silence(s, PROXY_TIMEOUT, &m->loss);
+        proxy_lose(s);
+    }
+}
+
+/* An answer came in time: the peer is lost where it tells that it tripped, or what time it is in */
+static void proxy_note_answer(Slave *s, double end)
+{
+    Model *m = &s->model;
+    const Client *c = &m->channel.client;
+    double greatest = s->values[PROXY_GREATEST_LEAD];
+    m->state = CONNECTED;
+    m->missed = 0;
+    m->lead = c->outputs_time - end;
+    if (c->trips > 0) {
+        text_put(proxy_say_loss(s), "its watchdog or a limit of its own tripped, it is in its safe state");
+        proxy_lose(s);
+    } else if (!(fabs(m->lead) <= greatest)) {
+        text_say(proxy_say_loss(s), "its clock is %g s %s: must be within %g s (proxy.greatest_lead)",
+                 fabs(m->lead), m->lead > 0.0 ? "ahead" : "behind; does the run keep to the clock", greatest);
         proxy_lose(s);
     }
 }
 
 /* Send inputs and parameters, wait for the outputs; without them, hold or lose */
+static void proxy_exchange(Slave *s, double time, double h)
+{
+    Model *m = &s->model;
+    int answered;
+    proxy_pack(s);
+    if (!proxy_limit(s, time + h - m->sent_time) && m->on_limit == TRIP) {
+        text_put(proxy_say_loss(s), "a command was beyond its limits, and proxy.on_limit = trip");
+        proxy_lose(s);
+        return;
+    }
+    answered = channel_step(&m->channel, time, h, m->request, proxy_deadline(s, PROXY_TIMEOUT));
+    proxy_note_sent(s, time + h);
+    if (!proxy_take(s) && answered) {
+        m->channel.client.counters.missed++;
+        answered = 0;
+    }
+    if (answered) {
+        proxy_note_answer(s, time + h);
+    } else {
+        proxy_note_miss(s);
+    }
+}
+
+/* A lost peer that answers is back: its host must initialise all, before it gets a command again. */
+static void proxy_look_for(Slave *s)
+{
+    if (channel_probe(&s->model.channel)) {
+        s->model.state = BACK;
+        text_put(proxy_put_peer(s, slave_say(s)),
+                 ": the peer answers again; it gets no commands before the loop is initialised anew");
+        slave_log(s, SLAVE_WARNING);
+    }
+}
+
 static Status slave_do_step(Slave *s, double time, double h)
 {
     Model *m = &s->model;
@@ -404,22 +617,16 @@ static Status slave_do_step(Slave *s, double time, double h)
     if (!s->outputs_follow && slave_refresh(s) != SLAVE_OK) {
         return SLAVE_ERROR;
     }
-    if (m->state != LOST || s->values[PROXY_RESUME] != 0.0) {
-        if (channel_step(&m->channel, time, h, m->request, proxy_deadline(s, PROXY_TIMEOUT),
-                         m->state == LOST)) {
-            proxy_note_answer(s);
-        } else {
-            proxy_note_miss(s);
-        }
+    if (m->state == CONNECTED || m->state == MISSING) {
+        proxy_exchange(s, time, h);
+    } else if (m->state == LOST && s->values[PROXY_RESUME] != 0.0) {
+        proxy_look_for(s);
     }
     if (m->state == LOST && m->on_loss == STOP) {
         proxy_report(s);
         return slave_refuse(s, "%s", m->loss.at);
     }
     s->values[SLAVE_TIME] = time + h;
-    if (m->state != LOST) {
-        proxy_take(s);
-    }
     proxy_report(s);
     return SLAVE_OK;
 }
