@@ -61,9 +61,9 @@ const char *grasp_controller_step(double time, double step, const grasp_controll
     return control(step, inputs, parameters, outputs);
 }
 
-void grasp_controller_make_safe(grasp_controller_inputs *inputs)
+void grasp_controller_write_safe(grasp_controller_inputs *inputs)
 {
-    /* What a silent loop leaves behind: fingers at rest, nothing near */
+    /* Here: zero forces to your drives. What goes on meanwhile: fingers at rest, nothing near */
     static const grasp_controller_inputs nothing;
     *inputs = nothing;
 }

@@ -51,6 +51,9 @@ SANITISED = ["-g", "-O2", "-fsanitize=address,undefined", "-fno-sanitize-recover
 RANDOM = b"not at random..."
 """What the driver makes its cookies from."""
 KEY = b"sixteen bytes of key, and some more"
+NAME, BUILD = "bench 1", "0123abcd"
+TIMEOUT = 400_000_000
+"""ns of the driver's watchdog."""
 FAIL, SILENT = 13, 14
 """Values of p.integer with which the driver's model fails, and does not answer."""
 NOTHING, SEND, DO_INITIALISE, DO_STEP, ENDED = range(5)
@@ -96,8 +99,11 @@ def driver(made_once):
     """The header for every kind behind a pipe, with all the compiler can check at run time."""
 
     def fill(folder):
-        header = bench_header("EveryKind", EVERY_KIND)
-        compile_c(folder, header, "EveryKind", NATIVE / "link_driver.c", *SANITISED)
+        header = bench_header("EveryKind", EVERY_KIND, peer=NAME)
+        compile_c(
+            folder, header, "EveryKind", NATIVE / "link_driver.c", *SANITISED,
+            f'-DEVERY_KIND_BUILD="{BUILD}"',
+        )  # fmt: skip
 
     return made_once("driver", fill) / "program"
 
@@ -221,7 +227,7 @@ def test_sha256_and_hmac(driver, key, size):
     assert driven(driver, "hmac", pipe=sized(secret) + sized(data)) == expected
 
 
-Record = namedtuple("Record", "time step behind event alive fresh answer")
+Record = namedtuple("Record", "time step behind event safe fresh answer")
 """What the driver did with a datagram."""
 
 
@@ -234,17 +240,23 @@ def linked(driver, received, key=None):
         *found, size = RECORD.unpack_from(out)
         records.append(Record(*found, out[RECORD.size : RECORD.size + size]))
         out = out[RECORD.size + size :]
-    return records, PeerCounters(*struct.unpack(f"={len(fields(PeerCounters))}Q", out))
+    return records, struct.unpack(f"={len(fields(PeerCounters)) + 1}Q", out)
 
 
-def expected(peer, datagram, now):
-    """What the driver must do, by the peer in Python: event, answer, whether a session begins."""
+def expected(peer, datagram, now, held):
+    """What the driver must do, by the peer in Python: event, answer, whether a session begins.
+
+    held are the inputs that it has, which it keeps once it has tripped.
+    """
     action = peer.receive(datagram, now)
     if not isinstance(action, Request):
         return (SEND, action, False) if action else (NOTHING, b"", False)
     if action.kind == link.END:
         return ENDED, b"", False
-    u, ui, ub, pb, pi, p = action.values
+    if not peer.trips or action.fresh:
+        held[:] = action.values[:3]
+    u, ui, ub = held
+    pb, pi, p = action.values[3:]
     outputs = [not ub, ui ^ 0x55, -u, pi ^ 0x55, -p, not pb]
     answer = b"" if pi == SILENT else peer.failed("thirteen") if pi == FAIL else None
     answer = peer.outputs(outputs, action.time + action.step) if answer is None else answer
@@ -331,25 +343,38 @@ class Proxies:
             return s.pack(link.END)
         values = drawn_values(rng)
         values[4] = rng.choice((FAIL, SILENT)) if rng.random() < 0.02 else values[4]
+        count = rng.choice((0, 0, 0, 1, 5, s._sequence, 2**32 - 1))
         if chosen < 0.2 or not s._sequence:
-            return s.request(INITIALISE, rng.choice((0.0, 2.5)), values)
+            return s.request(INITIALISE, rng.choice((0.0, 2.5)), values, count=count)
         time, step = rng.uniform(-1.0, 1e6), rng.choice(STEPS)
         time = rng.choice((time, self.reached, self.reached + 1e-12))
         self.reached = time + step
-        return s.request(STEP, time, values, step)
+        return s.request(STEP, time, values, step, count=count)
 
     def _hello(self, s):
-        """One of the same interface, longer or not, of another, of any bytes, or version."""
+        """One of the same interface, for this bench or another, of another, or version."""
         rng = self.rng
-        text = EVERY_KIND.text.encode() + bytes(rng.choice((0, 0, 50)))
-        other = bytearray(text[: 1 + rng.randrange(len(text))])
-        other[rng.randrange(len(other))] ^= rng.choice((0, 2, 96, 128))
-        odd = {"body": bytes(other), "interface": bytes(16)}
-        odd = odd if rng.random() < 0.2 else {"body": text}
+        name = rng.choice(("", NAME, NAME, "bench 2"))
+        odd = {"body": self._other(name), "interface": bytes(16)}
+        odd = odd if rng.random() < 0.2 else {}
         cookie = s._cookie
-        datagram = s.hello(s._session, version=rng.choice((*[link.VERSION] * 9, 1, 3)), **odd)
+        version = rng.choice((*[link.VERSION] * 9, 1, 2))
+        datagram = s.hello(s._session, name, version=version, **odd)
         s._cookie = cookie
         return datagram
+
+    def _other(self, name):
+        """A HELLO's body with a part of another signature, or of any bytes."""
+        rng, text = self.rng, EVERY_KIND.text.encode()
+        lines = text.splitlines(keepends=True)
+        first = rng.randrange(len(lines))
+        offset = len(b"".join(lines[:first])) + rng.choice((0, 0, 0, 1, 500))
+        size = 1 + rng.randrange(len(text) - len(b"".join(lines[:first])))
+        part = bytearray(text[offset : offset + size])
+        if part:
+            part[rng.randrange(len(part))] ^= rng.choice((0, 0, 2, 96, 128))
+        whole = offset + len(part) + rng.choice((0, 0, 9))
+        return link.pack_hello(name, link.Part(offset, whole, bytes(part)))
 
     def _damaged(self, datagram):
         rng = self.rng
@@ -379,32 +404,59 @@ class Proxies:
 def test_the_same_as_the_peer_in_python(driver, key):
     """Whatever comes: the same events, the same answers to the bit, the same counts.
 
-    Lost requests are told; new ones alone feed the watchdog, for a recorded one, sent again and
-    again, must not keep the inputs from being made safe.
+    Lost requests are told. The watchdog looks at requests that tell of newer answers: neither one
+    that was recorded, sent again and again, nor one whose sender gets no answers keeps it quiet.
     """
     rng = random.Random(20)
-    proxies, peer = Proxies(rng, key), Peer(EVERY_KIND, key, RANDOM)
+    proxies = Proxies(rng, key)
+    watched = Watched(Peer(EVERY_KIND, key, RANDOM, NAME, BUILD))
     now = 0
-    received, must, alive = [], [], []
-    for _ in range(6000):
+    received, must = [], []
+    for _ in range(9000):
         now += rng.choice((1_000_000, 1_000_000, 300_000_000, ALIVE)) if rng.random() < 0.3 else 0
         received.append((now, proxies.request()))
-        must.append(expected(peer, received[-1][1], now))
-        alive.append(peer.in_session and peer._heard == now)
+        must.append(watched.receive(received[-1][1], now))
         proxies.hear(must[-1][1])
     records, counters = linked(driver, received, key)
     reached = 0.0
-    for i, (record, (event, answer, fresh)) in enumerate(zip(records, must, strict=True)):
-        assert (record.event, record.answer, record.alive) == (event, answer, alive[i]), i
+    for i, (record, (event, answer, fresh, safe)) in enumerate(zip(records, must, strict=True)):
+        assert (record.event, record.answer, record.safe) == (event, answer, safe), i
         if event in (DO_INITIALISE, DO_STEP):
             behind = record.time - reached if event == DO_STEP else 0.0
             behind = behind if abs(behind) > 1e-9 + 1e-12 * abs(record.time) else 0.0
             assert (record.fresh, record.behind) == (fresh, behind), i
             reached = record.time + record.step
-    assert counters == peer.counters
-    seen = asdict(counters)
+    assert counters == (*asdict(watched.peer.counters).values(), 0)
+    seen = asdict(watched.peer.counters)
     assert min(seen[name] for name in seen if key or name != "forged") > 5, seen
     assert {event for event, *_ in must} == {NOTHING, SEND, DO_INITIALISE, DO_STEP, ENDED}
+    assert watched.trips > 5
+
+
+class Watched:
+    """The peer in Python with the watchdog of a bench that has its own clock."""
+
+    def __init__(self, peer):
+        self.peer = peer
+        self.safe = True
+        self.trips = 0
+        self.held = []
+
+    def receive(self, datagram, now):
+        """What expected() says, and whether the safe state is to be written after it."""
+        peer = self.peer
+        was_live, was_tripped = peer.in_session, peer.trips > 0
+        event, answer, fresh = expected(peer, datagram, now, self.held)
+        too_long = event == SEND and was_live and not peer.in_session
+        if (event == DO_STEP or too_long) and not was_tripped:
+            self.safe = False
+        silent = now - peer.acknowledged_at > TIMEOUT
+        due = not self.safe and (not peer.in_session or peer.trips > 0 or silent)
+        if due and peer.in_session:
+            peer.trip()
+            self.trips += 1
+        self.safe = self.safe or due
+        return event, answer, fresh, due
 
 
 # The example, as the target with the gripper plant
@@ -510,11 +562,18 @@ def test_a_key_in_a_file(target, tmp_path):
         bench.begin(session=3)
 
 
-def test_inputs_are_made_safe_once_the_proxy_is_silent(target):
+def test_the_safe_state_is_written_first_and_last_and_whenever_the_proxy_is_silent(target):
+    """In lockstep, where the next step goes on: what it writes is over then."""
     with Target(target) as bench:
-        for act in (lambda: None, bench.begin, lambda: bench.proxy.step(0.0, 0.1, bench.values())):
-            act()
+        assert bench.said(bench.process.stderr) == b"safe\n"
+        bench.begin()
+        for k in range(2):
+            bench.proxy.step(0.1 * k, 0.1, bench.values())
             assert bench.said(bench.process.stderr) == b"safe\n"
+        assert bench.proxy.trips == 0
+        bench.process.terminate()
+        assert bench.said(bench.process.stderr) == b"safe\n"
+        assert bench.process.wait(30.0) == 0
 
 
 def test_a_target_with_a_clock_of_its_own(target):

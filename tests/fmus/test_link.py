@@ -1,6 +1,7 @@
 """The link without sockets: variables, datagrams and keys to the byte, and the bench's side."""
 
 import hmac
+import math
 import struct
 from hashlib import sha256
 
@@ -13,6 +14,7 @@ from grasp_cosim.fmu_export.link import (
     STEP,
     VERSION,
     Codec,
+    Limit,
     LinkVariable,
     Message,
     Peer,
@@ -26,7 +28,7 @@ from support.proxies import HandProxy, RefusedError
 
 KEY, OTHER_KEY = b"sixteen bytes...", b"another 16 bytes"
 HASH = b"0123456789abcdef"
-EXAMPLE = Message(STEP, 0, HASH, 2**63 + 1, 7, 3, 0.25, 1e-3, -5, b"12345678")
+EXAMPLE = Message(STEP, 0, HASH, 2**63 + 1, 7, 3, 0.25, 1e-3, -5, b"12345678", count=2)
 
 U = LinkVariable("u", "Real", "input", "m")
 P = LinkVariable("p", "Boolean", "parameter")
@@ -42,6 +44,7 @@ messages = st.builds(
     Message, st.integers(1, 7), st.integers(0, 255), st.binary(min_size=16, max_size=16),
     whole, whole, whole, st.floats(-1e300, 1e300), st.floats(-1e300, 1e300),
     st.integers(-(2**63), 2**63 - 1), st.binary(max_size=300), st.integers(0, 2**16 - 1),
+    st.just(0),
 )  # fmt: skip
 
 
@@ -50,11 +53,11 @@ messages = st.builds(
 
 def test_the_bytes_are_those_of_the_card():
     datagram = Sealer().pack(EXAMPLE)
-    assert datagram[:8] == b"GRSP\x02\x00\x05\x00"
+    assert datagram[:8] == b"GRSP\x03\x00\x05\x00"
     assert datagram[8:24] == HASH
     assert struct.unpack_from("<QQQ", datagram, 24) == (2**63 + 1, 7, 3)
     assert struct.unpack_from("<dd", datagram, 48) == (0.25, 1e-3)
-    assert struct.unpack_from("<qII", datagram, 64) == (-5, 8, 0)
+    assert struct.unpack_from("<qII", datagram, 64) == (-5, 8, 2)
     assert datagram[80:] == b"12345678"
     assert Sealer(KEY).pack(EXAMPLE) == datagram + hmac.digest(KEY, datagram, "sha256")
 
@@ -146,7 +149,8 @@ def test_text_and_hash_are_those_of_the_card():
     ],
 )
 def test_the_first_difference_is_named(proxy, difference):
-    assert SIGNATURE.difference(Signature(proxy).text.encode() + bytes(9)) == difference
+    (part,) = Signature(proxy).parts()
+    assert SIGNATURE.difference(part) == difference
 
 
 @pytest.mark.parametrize(
@@ -160,6 +164,57 @@ def test_the_first_difference_is_named(proxy, difference):
 def test_what_the_text_cannot_hold(variables, reason):
     with pytest.raises(ValueError, match=reason):
         Signature(variables)
+
+
+def many(count, last="N"):
+    """A signature too long for one HELLO."""
+    names = (f"contact_force_of_finger[{i}]" for i in range(count))
+    inputs = [LinkVariable(name, "Real", "input", "N") for name in names]
+    return Signature((*inputs[:-1], inputs[-1]._replace(unit=last)))
+
+
+@keyed
+@pytest.mark.parametrize("last", ["N", "mN"])
+def test_a_long_signature_is_compared_in_parts_of_1200_bytes(key, last):
+    """Equal parts get an empty reason; the last one names the difference, or that there is more."""
+    peer, theirs = Peer(many(101), key), many(100 if last == "N" else 101, last)
+    proxy = HandProxy(theirs, lambda datagram: peer.receive(datagram, 0), key)
+    parts = range(len(theirs.parts()))
+    hellos = [proxy.hello(1, part=i) for i in parts]
+    assert [len(hello) for hello in hellos] == [1168 + (32 if key else 0)] * len(parts)
+    reasons = [refused(proxy.take, peer.receive(hello, 0)) for hello in hellos]
+    differ = {
+        "N": "the proxy has no more, the peer input Real N contact_force_of_finger[100]",
+        "mN": "the proxy has input Real mN contact_force_of_finger[100], "
+        "the peer input Real N contact_force_of_finger[100]",
+    }
+    expected = [*[""] * (len(parts) - 1), differ[last]]
+    assert len(parts) > 3
+    assert reasons == [(link.OTHER_INTERFACE, reason) for reason in expected]
+
+
+def test_a_line_that_no_hello_holds():
+    long = Signature((U._replace(name="x" * 1200),))
+    with pytest.raises(ValueError, match=r"bytes in a HELLO: must be 1008 at most"):
+        link.check_size(long)
+
+
+@pytest.mark.parametrize(
+    ("text", "limit"),
+    [
+        ("-5:5:200", (-5.0, 5.0, 200.0)),
+        (":1", (-math.inf, 1.0, math.inf)),
+        ("0::", (0.0, math.inf, math.inf)),
+    ],
+)
+def test_limits_as_texts(text, limit):
+    assert Limit.read(text) == limit
+
+
+@pytest.mark.parametrize("text", ["5", "1:2:3:4", "a:1", "2:1", "0:1:0", "nan:1"])
+def test_texts_that_are_no_limits(text):
+    with pytest.raises(ValueError, match="must be"):
+        Limit.read(text)
 
 
 # Sessions; whatever is sent in them, again or damaged: test_bench_header.py
@@ -257,6 +312,60 @@ def test_a_recorded_session_cannot_be_played_again():
     assert bench.done[:-1] == done
 
 
+def test_a_peer_takes_a_proxy_that_wants_its_name_or_any_and_says_who_it_is():
+    peer = Peer(SIGNATURE, name="sensor_1", build="0123abcd")
+    proxy = HandProxy(SIGNATURE, lambda datagram: peer.receive(datagram, 0))
+    for name in ("", "sensor_1"):
+        assert proxy.take(peer.receive(proxy.hello(1, name), 0)) == []
+        assert (proxy.name, proxy.build) == ("sensor_1", "0123abcd")
+    other = refused(proxy.take, peer.receive(proxy.hello(1, "sensor_2"), 0))
+    assert other == (link.OTHER_NAME, "the peer is sensor_1, the proxy wants sensor_2")
+    assert peer.counters.other_name == 1
+    unnamed = Peer(SIGNATURE)
+    assert proxy.take(unnamed.receive(proxy.hello(1, "sensor_2"), 0)) == []
+
+
+@pytest.mark.parametrize("name", ["µ", "x" * 64, "a\nb"])
+def test_names_that_are_none(name):
+    with pytest.raises(ValueError, match=r"must be printable ASCII of 63 characters at most"):
+        Peer(SIGNATURE, name=name)
+
+
+def test_what_tells_of_newer_answers_is_what_acknowledges():
+    """Requests that come while no answers arrive do not; nor do those sent again."""
+    bench = Bench()
+    proxy = bench.begun()
+    seen = []
+    for count in (0, 0, 1, 2, 3, 1, 0):
+        bench.now += 1
+        bench(proxy.request(STEP, 0.0, VALUES, 0.1, count=count))
+        seen.append(bench.peer.acknowledged_at == bench.now)
+    assert seen == [True, True, False, False, False, True, True]
+    assert bench(proxy.request(STEP, 0.0, VALUES, 0.1, count=9)) is None  # more than there were
+    assert bench.counts()["malformed"] == 1
+
+
+def test_trips_are_told_until_another_session_begins():
+    bench = Bench()
+    proxy = bench.begun()
+    bench.peer.trip()
+    for _ in range(2):
+        proxy.step(0.0, 0.1, VALUES)
+        assert proxy.trips == 1
+    proxy.end()
+    proxy.begin(7, VALUES)
+    assert proxy.trips == 0
+
+
+def test_a_silent_session_is_over():
+    bench = Bench()
+    proxy = bench.begun()
+    assert not bench.peer.expire(bench.now + 9, 10)
+    assert bench.peer.expire(bench.now + 10, 10)
+    assert not bench.peer.in_session
+    assert refused(proxy.step, 0.0, 0.1, VALUES) == (link.UNKNOWN, "")
+
+
 @keyed
 def test_another_version_or_interface_is_refused_with_its_reason(key):
     bench = Bench(key)
@@ -293,7 +402,7 @@ NUMBERS = (st.integers(0, 8), st.integers(0, 255), HASHES, SMALL, SMALL, SMALL)
 ZEROS = (st.just(0.0), st.just(0.0), st.just(0))
 
 
-@given(st.builds(Message, *NUMBERS, *ZEROS, st.binary(max_size=200), SMALL))
+@given(st.builds(Message, *NUMBERS, *ZEROS, st.binary(max_size=200), SMALL, st.just(0)))
 @keyed
 def test_without_a_session_no_answer_is_longer_than_its_request(key, m):
     bench = Bench(key)

@@ -14,6 +14,7 @@ from grasp_cosim.fmu_export.link import (
     OUTPUTS,
     STEP,
     VERSION,
+    Codec,
     Message,
     Sealer,
 )
@@ -41,6 +42,27 @@ FOR_EVER = Clock(tick=40_000_000)
 """A clock by which 0.1 s are soon over."""
 
 
+def tripped(peer, m):
+    peer.send(peer.pack(m, OUTPUTS, Codec(SIGNATURE.answer).pack(1.0, 1, True), count=1))
+
+
+def shifted(lead):
+    """Outputs that belong to another time."""
+
+    def act(peer, m):
+        before, peer.offset = peer.offset, -lead
+        answer(peer, m)
+        peer.offset = before
+
+    return act
+
+
+def introduced(name="", build=""):
+    """A welcome by a peer that says who it is."""
+    body = name.encode().ljust(link.NAME_SIZE, b"\0") + build.encode().ljust(link.BUILD_SIZE, b"\0")
+    return lambda peer, m: peer.send(peer.pack(m, link.WELCOME, body, cookie=next(peer.cookies)))
+
+
 # Initialisation
 
 
@@ -51,7 +73,7 @@ def test_a_get_after_a_set_exchanges_in_initialisation_mode_and_nothing_else_doe
         assert (host.state(), peer.kinds()) == (0, [])
         host.enter()
         assert host.outputs() == START
-        assert peer.got[0].body == SIGNATURE.text.encode().ljust(link.SHORTEST_HELLO, b"\0")
+        assert peer.got[0].body == link.pack_hello("proxy", *SIGNATURE.parts())
         assert peer.values(peer.got[1]) == [1.5, 3, True, 2.0, 0.5]
         diagnostics = host.own()
         host.set(force=-2.0)
@@ -250,20 +272,20 @@ def lost(host, peer):
     ],
 )
 def test_a_lost_peer(settings, outputs):
-    """Nothing is sent but the end any more, and nothing is taken."""
+    """The end is said, at once. Nothing is sent any more, and nothing is taken."""
     with connected(**settings) as (host, peer):
         lost(host, peer)
         assert host.outputs() == outputs
         assert host.counts() == {"missed": 4, "consecutive_missed": 4}
-        before = peer.kinds()
-        peer.send(peer.outputs(peer.got[-1]))
+        last = next(m for m in reversed(peer.got) if m.kind == STEP)
+        peer.send(peer.outputs(last))
         host.step()
-        assert (host.state(), host.outputs(), peer.kinds()) == (3, outputs, before)
+        assert (host.state(), host.outputs()) == (3, outputs)
         assert host.log() == [
-            f"proxy, t = 0.75 s: 127.0.0.1:{peer.port} is lost, 4 missed in a row: "
+            f"proxy, t = 0.75 s: 127.0.0.1:{peer.port} is lost: 4 missed in a row: "
             f"no answer within 100 s; proxy.on_loss = {settings['on_loss']}"
         ]
-    assert peer.kinds() == [*before, END]
+    assert peer.kinds() == [HELLO, INITIALISE, *[STEP] * 4, END]
 
 
 def test_the_host_may_be_stopped():
@@ -273,7 +295,7 @@ def test_the_host_may_be_stopped():
         host.step()
         for _ in range(2):  # and it stays so
             assert host.refused(host.do_step, 0.5, 0.25) == (
-                f"proxy, t = 0.5 s: 127.0.0.1:{peer.port} is lost, 2 missed in a row: "
+                f"proxy, t = 0.5 s: 127.0.0.1:{peer.port} is lost: 2 missed in a row: "
                 "no answer within 100 s"
             )
         assert (host.state(), peer.kinds().count(STEP)) == (3, 3)
@@ -284,19 +306,112 @@ def test_the_host_may_be_stopped():
     ("act", "tolerated", "reason"),
     [
         (miss, 0, "1 missed in a row: no answer within 100 s;"),
-        (fail, 3, "1 missed in a row: the peer failed: the motor is hot;"),
-        (forget, 1, "2 missed in a row: the peer does not know this session;"),
+        (fail, 3, "the peer failed: the motor is hot;"),
+        (forget, 3, "the peer does not know this session: it was started anew, or another proxy"),
+        (tripped, 3, "its watchdog or a limit of its own tripped, it is in its safe state;"),
+        (shifted(0.25), 3, "its clock is 0.25 s ahead: must be within 0.1 s (proxy.greatest_lead)"),
+        (shifted(-0.25), 3, "its clock is 0.25 s behind; does the run keep to the clock: must be"),
     ],
 )
 def test_when_a_peer_is_lost(act, tolerated, reason):
     with connected(misses_tolerated=tolerated) as (host, peer):
-        peer.told(STEP, act, act)
+        peer.told(STEP, act)
         host.step()
-        if act is forget:
-            assert (host.state(), host.outputs()) == (2, START)
-            host.step()
         assert (host.state(), host.outputs()) == (3, ZEROS)
-        assert f"is lost, {reason}" in host.log()[0]
+        assert f"is lost: {reason}" in host.log()[0]
+        host.step()
+        assert host.state() == 3
+    assert peer.kinds() == [HELLO, INITIALISE, STEP, END]
+
+
+def test_a_peer_may_be_ahead_and_behind_as_far_as_is_said():
+    with connected(greatest_lead=0.5) as (host, peer):
+        for lead in (0.5, -0.5):
+            peer.told(STEP, shifted(lead))
+            host.step()
+            assert (host.state(), host.get("proxy.lead")) == (1, lead)
+
+
+def test_requests_tell_which_answers_have_arrived():
+    """That of INITIALISE, in time, late; what is lost is counted back to it."""
+    with connected() as (host, peer):
+        peer.told(STEP, answer, miss, keep, send_kept_and_miss, answer)
+        for _ in range(6):
+            host.step()
+        assert [m.count for m in peer.got] == [0, 0, 0, 0, 1, 2, 1, 0]
+
+
+# Limits
+
+
+def sent(peer):
+    """The force of the last request."""
+    return peer.values(peer.got[-1])[0]
+
+
+def test_commands_are_kept_within_their_limits_and_counted():
+    """By value, and by rate from what was sent last; the start is 1.5 N, a step 0.25 s."""
+    limits = {"min.force": -10.0, "max.force": 4.0, "rate.force": 8.0}
+    with connected(**limits) as (host, peer):
+        forces = {2.0: 2.0, 5.0: 4.0, -3.0: 2.0, -1e300: 0.0, 1.0: 1.0}
+        for force, limited in forces.items():
+            host.set(force=force)
+            host.step()
+            assert sent(peer) == limited
+        assert (host.get("proxy.limited"), host.state()) == (3, 1)
+
+
+def test_a_command_beyond_its_limits_may_end_the_session():
+    with connected(**{"max.force": 4.0, "on_limit": "trip"}) as (host, peer):
+        host.set(force=5.0)
+        host.step()
+        assert host.state() == 3
+        assert "is lost: a command was beyond its limits" in host.log()[0]
+    assert peer.kinds() == [HELLO, INITIALISE, END]
+
+
+def test_what_cannot_have_been_measured_is_a_miss():
+    """By value and by rate; outputs stay, and a peer that goes on so is lost."""
+    limits = {"lowest.doubled": -50.0, "highest.doubled": 50.0, "fastest.doubled": 40.0}
+    with connected(**limits) as (host, _):
+        for force, doubled, implausible in (
+            (5.0, 10.0, 0), (26.0, 10.0, 1), (-1.0, -2.0, 1), (5.0, -2.0, 2), (4.0, 8.0, 2),
+        ):  # fmt: skip
+            host.set(force=force)
+            host.step()
+            found = host.get("doubled"), host.get("proxy.implausible")
+            assert found == (doubled, implausible), force
+        host.set(force=100.0)
+        for _ in range(4):
+            host.step()
+        assert (host.state(), host.get("proxy.missed")) == (3, 6)
+
+
+# Names
+
+
+@pytest.mark.parametrize(
+    ("settings", "act", "line"),
+    [
+        ({}, introduced("bench 2"), "the peer's name is bench 2: must be proxy"),
+        ({"name": "b"}, introduced("bench 2"), "the peer's name is bench 2: must be b"),
+        ({"build": "abc"}, introduced(build="abd"), "the peer's build is abd: must be abc"),
+        ({}, refuse(link.OTHER_NAME, b"the peer is b, the proxy wants a"),
+         "another name: the peer is b, the proxy wants a; are two ports swapped?"),
+    ],
+)  # fmt: skip
+def test_the_peer_must_be_the_one_that_is_wanted(settings, act, line):
+    with ScriptedPeer() as peer, hosted(peer.port, peer.clock, **settings) as host:
+        peer.told(HELLO, act)
+        assert host.refused(host.enter) == f"proxy, t = 0 s: 127.0.0.1:{peer.port}: {line}"
+
+
+def test_who_the_peer_is_can_be_read():
+    with ScriptedPeer() as peer, hosted(peer.port, peer.clock, name="b1") as host:
+        peer.told(HELLO, introduced("b1", "0123abcd"))
+        host.initialise()
+        assert peer.got[0].body == link.pack_hello("b1", *SIGNATURE.parts())
+        assert (host.get("proxy.name"), host.get("proxy.build")) == ("b1", "0123abcd")
 
 
 # What comes late, twice, or from elsewhere
@@ -375,12 +490,14 @@ def test_state_counts_and_outputs_are_what_the_answers_make_them(seed):
     tolerated, resume = random.randrange(4), random.random() < 0.5
     failsafe = {"failsafe.doubled": -1.0}
     acts = [answer, answer, miss, miss, keep, send_kept_and_answer, fail]
+    busy_for_ever = [refuse(link.BUSY)] * 40
     with connected(misses_tolerated=tolerated, resume=resume, **failsafe) as (host, peer):
+        peer.told(HELLO, *busy_for_ever)
         is_lost, in_a_row, missed, shown = False, 0, 0, 3.0
         for _ in range(40):
             force = random.uniform(-9.0, 9.0)
             host.set(force=force)
-            if resume or not is_lost:
+            if not is_lost:
                 act = random.choice(acts)
                 peer.told(STEP, act)
                 if act in (answer, send_kept_and_answer):
@@ -402,51 +519,41 @@ def test_state_counts_and_outputs_are_what_the_answers_make_them(seed):
 # Coming back
 
 
-def test_a_lost_peer_may_come_back_but_not_by_a_late_answer():
+def wait_for(host, peer, state):
+    """Step until the proxy is in a state: it does not wait for its peer."""
+    for _ in range(10_000):
+        if host.state() == state:
+            return
+        peer.clock.now += 60_000_000  # HELLO is repeated
+        host.step()
+    raise AssertionError(f"never in state {state}")
+
+
+def test_a_lost_peer_gets_no_command_before_its_host_initialises_it_anew():
+    """Probes are HELLOs, which do not wait. A peer that welcomes is back, and that is all."""
     with connected(resume=True) as (host, peer):
         lost(host, peer)
-        peer.told(STEP, keep, send_kept_and_miss, answer)
-        for _ in range(2):
+        peer.told(HELLO, lambda p, m: None, busy, refuse(link.OTHER_NAME, b"other"))
+        wait_for(host, peer, 4)
+        for _ in range(3):
             host.step()
-            assert (host.state(), host.outputs()) == (3, ZEROS)
+        assert (host.state(), host.outputs()) == (4, ZEROS)
+        assert host.log()[-1].endswith(
+            "the peer answers again; it gets no commands before the loop is initialised anew"
+        )
+        kinds = peer.kinds()
+        assert kinds.count(STEP) == 4
+        assert kinds.index(END) == len(kinds) - 1 - kinds[::-1].count(HELLO) + 1
+        assert {m.body for m in peer.got if m.kind == HELLO} == {peer.got[0].body}
+        host.must("Reset")
+        host.set(**{"proxy.port": peer.port, "proxy.on_loss": "hold"})
+        host.set(**{"proxy.timeout": 100.0, "proxy.connect_timeout": 100.0, "force": 2.0})
+        host.setup(host.time)
+        host.enter()
+        host.must("ExitInitializationMode")
         host.step()
-        assert (host.state(), host.get("doubled")) == (1, 100.0)
-        assert host.counts() == {"missed": 6, "late": 1}
-        assert host.log()[1:] == [
-            f"proxy, t = 1.5 s: 127.0.0.1:{peer.port}: the peer answers again"
-        ]
-
-
-@pytest.mark.parametrize(
-    ("steps", "hellos", "initialisations", "kinds"),
-    [
-        ([forget, forget], [], [], [[STEP], [STEP, HELLO, INITIALISE, STEP]]),
-        ([forget, forget], [miss], [miss, miss],  # longer than a step may take
-         [[STEP], [STEP, HELLO], [HELLO, INITIALISE], [INITIALISE], [INITIALISE, STEP]]),
-        ([forget, forget], [], [refuse(link.UNKNOWN), miss],
-         [[STEP], [STEP, *[HELLO, INITIALISE] * 2], [INITIALISE, STEP]]),
-        ([fail, forget], [], [fail],
-         [[STEP], [STEP, HELLO, INITIALISE], [HELLO, INITIALISE, STEP]]),
-    ],
-    ids=["at once", "slowly", "with another between", "after one more failure"],
-)  # fmt: skip
-def test_a_peer_that_was_started_anew_is_greeted_anew(steps, hellos, initialisations, kinds):
-    with connected(resume=True, misses_tolerated=0) as (host, peer):
-        peer.told(STEP, *steps)
-        peer.told(HELLO, *hellos)
-        peer.told(INITIALISE, *initialisations)
-        host.set(force=20.0)
-        for expected in kinds:
-            before = len(peer.got)
-            host.step()
-            assert peer.kinds()[before:] == expected
-            assert host.state() == (1 if expected is kinds[-1] else 3)
-        assert host.get("doubled") == 40.0
-        assert host.get("proxy.missed") == len(kinds) - 1
-        assert host.get("proxy.sessions") >= 2
-        assert "in a new session, its model set up anew" in host.log()[-1]
-        assert peer.values(peer.got[-2]) == peer.values(peer.got[-1])
-        assert peer.got[-1].session != peer.got[0].session
+        assert (host.state(), host.get("doubled")) == (1, 4.0)
+    assert peer.kinds()[len(kinds) :] == [HELLO, INITIALISE, STEP, END]
 
 
 # The end

@@ -108,8 +108,8 @@ class ScriptedPeer:
 
     def pack(self, m, kind, body=b"", code=0, **changed):
         """The datagram of an answer to m."""
-        answer = m._replace(kind=kind, code=code, interface=SIGNATURE.hash, body=body, count=0)
-        return self._sealer.pack(answer._replace(step=0.0, **changed))
+        answer = m._replace(kind=kind, code=code, interface=SIGNATURE.hash, body=body)
+        return self._sealer.pack(answer._replace(**{"step": 0.0, "count": 0, **changed}))
 
     def outputs(self, m):
         """The OUTPUTS to m."""

@@ -12,10 +12,11 @@
 #include <stdlib.h>
 
 enum { LARGEST = 70000, FAIL = 13, SILENT = 14 };
+#define TIMEOUT_NS 400000000
 
 typedef struct {
     double time, step, behind;
-    uint32_t event, alive, fresh, size;
+    uint32_t event, safe, fresh, size;
 } Record;
 
 static const uint8_t RANDOM[] = "not at random...";
@@ -81,7 +82,7 @@ static int run(const char *key)
         memset(&record, 0, sizeof record);
         record.time = link.time, record.step = link.step, record.behind = link.behind;
         record.event = event, record.fresh = link.fresh, record.size = (uint32_t)size;
-        record.alive = every_kind_link_alive(&link, now, 0);
+        record.safe = every_kind_link_watch(&link, now, TIMEOUT_NS);
         write_bytes(&record, sizeof record);
         write_bytes(answer, size);
     }

@@ -48,7 +48,7 @@ const char *gripper_plant_step(double time, double step, const gripper_plant_inp
     return go_on(step, u, p, y);
 }
 
-void gripper_plant_make_safe(gripper_plant_inputs *u)
+void gripper_plant_write_safe(gripper_plant_inputs *u)
 {
     u->force_1 = u->force_2 = 0.0;
     fprintf(stderr, "safe\n");
