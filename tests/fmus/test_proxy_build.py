@@ -34,14 +34,18 @@ OWN_PARAMETERS = {
     "proxy.timeout": ("Real", 0.01),
     "proxy.connect_timeout": ("Real", 5.0),
     "proxy.misses_tolerated": ("Integer", 3),
+    "proxy.greatest_lead": ("Real", 0.1),
     "proxy.on_loss": ("String", "stop"),
     "proxy.resume": ("Boolean", False),
+    "proxy.on_limit": ("String", "clamp"),
     "proxy.key_file": ("String", ""),
+    "proxy.name": ("String", ""),
+    "proxy.build": ("String", ""),
 }
 OWN_OUTPUTS = dict.fromkeys(
     ["state", "missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected",
-     "sessions"], "Integer",
-) | {"round_trip_time": "Real", "age": "Real"}  # fmt: skip
+     "sessions", "trips", "limited", "implausible"], "Integer",
+) | {"round_trip_time": "Real", "age": "Real", "lead": "Real"}  # fmt: skip
 
 
 @pytest.fixture
@@ -108,6 +112,10 @@ def exchanged(fmu):
     return {v.name: v for v in found if v.kind != "String" or v.name.startswith("proxy.")}
 
 
+LIMITS = {"input": ("min", "max", "rate"), "output": ("lowest", "highest", "fastest")}
+"""Of each Real variable of a causality."""
+
+
 def check(original, proxy):
     """Everything of the original is in the proxy, and what it has beside, and it is valid.
 
@@ -120,6 +128,9 @@ def check(original, proxy):
     expected = {name: kind for name, (kind, _) in OWN_PARAMETERS.items()}
     expected |= {f"proxy.hold.{name}": "Boolean" for name in outputs}
     expected |= {f"proxy.failsafe.{name}": v.kind for name, v in outputs.items()}
+    for causality, limits in LIMITS.items():
+        reals = [v for v in theirs.values() if (v.causality, v.kind) == (causality, "Real")]
+        expected |= {f"proxy.{limit}.{v.name}": "Real" for v in reals for limit in limits}
     expected |= {f"proxy.{name}": kind for name, kind in OWN_OUTPUTS.items()}
     assert {name: v.kind for name, v in own.items()} == expected
     told = {name.removeprefix("proxy.") for name, v in own.items() if v.causality == "output"}

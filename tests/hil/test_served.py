@@ -5,6 +5,7 @@ import math
 import re
 import signal
 from contextlib import ExitStack
+from hashlib import sha256
 
 import pytest
 from grasp_cosim import cli
@@ -152,6 +153,7 @@ def test_a_step_that_is_too_long_ends_its_session_alone(plant, clocked, lockstep
     with pytest.raises(RefusedError, match="the step is too long: must be at most 3600 s"):
         it.proxy.step(0.0, 1e300, starts(plant))
     assert it.said[-1] == f"the session is over at t = 0 s: {TOO_LONG}"
+    it.proxy.end()
     it.proxy.begin(2, starts(plant))
     it.proxy.step(0.0, STEP, starts(plant))
     assert (it.served.counters()["failures"], it.served.counters()["steps"]) == (1, 1)
@@ -167,7 +169,7 @@ def test_what_the_fmu_refuses_is_said(sensor, clocked):
 
 
 def test_its_own_clock_keeps_to_thirty_steps_a_second(sensor, clocked):
-    it = clocked(sensor, Service(watchdog_ns=10**13))
+    it = clocked(sensor, Service(watchdog_ns=10**13, silence_ns=10**13))
     it.proxy.begin(1, starts(sensor))
     it.proxy.step(0.0, 1 / 30, starts(sensor))
     it.wait(1000_000.0)
@@ -192,7 +194,8 @@ def test_by_its_own_clock_the_model_moves_between_requests(plant, clocked):
     assert (it.served.counters()["own_steps"], it.served.counters()["skipped"]) == (22, 1008)
 
 
-def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(plant, clocked):
+def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_the_next_session(plant, clocked):
+    """It is told, and forces that still come do nothing, though the answers arrive."""
     it = clocked(plant, Service(watchdog_ns=50 * MS, failsafe={"force[1]": 0.25}))
     it.proxy.begin(1, starts(plant))
     it.proxy.step(0.0, STEP, pushed(plant))
@@ -200,12 +203,57 @@ def test_the_watchdog_puts_the_inputs_to_what_is_safe_until_a_request_comes(plan
     assert it.served.counters()["watchdog"] == 0
     it.wait(51.0)
     assert it.served.counters()["watchdog"] == 1
-    assert "no request for 0.05 s: the inputs went to their failsafe values" in it.said
+    assert it.said[-1] == (
+        "no request for 0.05 s that told of an answer: the inputs are at their failsafe values "
+        "until the next session"
+    )
     velocity = it.proxy.step(0.1, STEP, pushed(plant))[2]
     expected = (-1.0 * 0.049 + 0.25 * 0.051) / 0.5  # the watchdog is before the step due with it
     assert velocity == pytest.approx(expected, rel=1e-9)
     it.wait(10.0)
-    assert it.proxy.step(0.11, STEP, pushed(plant))[2] < velocity
+    later = it.proxy.step(0.11, STEP, pushed(plant))[2]
+    assert later == pytest.approx(velocity + 0.25 * 0.01 / 0.5, rel=1e-9)
+    assert it.proxy.trips == 1
+    it.proxy.end()
+    it.proxy.begin(2, starts(plant))
+    it.proxy.step(0.0, STEP, pushed(plant))
+    it.wait(10.0)
+    assert it.proxy.step(0.01, STEP, pushed(plant))[2] < 0.0
+    assert it.proxy.trips == 0
+
+
+def test_requests_of_a_proxy_that_gets_no_answers_do_not_keep_the_inputs(plant, clocked):
+    it = clocked(plant, Service(watchdog_ns=50 * MS))
+    it.proxy.begin(1, starts(plant))
+    for k in range(60):
+        request = it.proxy.request(STEP_REQUEST, 1e-3 * k, pushed(plant), STEP, count=k)
+        it.served.answer(request, "test", it.now)
+        it.wait(1.0)
+    assert it.served.counters()["watchdog"] == 1
+    velocity = it.proxy.step(0.06, STEP, pushed(plant))[2]
+    assert velocity == pytest.approx(-1.0 * 0.05 / 0.5, rel=0.03)
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_session_that_says_nothing_is_over(plant, clocked, lockstep):
+    it = clocked(plant, Service(lockstep=lockstep, silence_ns=200 * MS))
+    it.proxy.begin(1, starts(plant))
+    it.wait(199.0)
+    assert it.served.counters()["sessions"] == 0
+    it.wait(2.0)
+    assert it.served.counters()["sessions"] == 1
+    assert it.said[-1] == "the session is over at t = 0 s: nothing came for 0.2 s"
+    assert it.served.due() is None
+
+
+def test_a_server_with_a_name_and_the_hash_of_its_fmu(plant, clocked):
+    it = clocked(plant, Service(name="left"))
+    it.proxy.begin(1, starts(plant))
+    assert (it.proxy.name, it.proxy.build) == ("left", sha256(plant.read_bytes()).hexdigest())
+    other = it.served.answer(it.proxy.hello(2, "right"), "test", it.now)
+    with pytest.raises(RefusedError, match="the peer is left, the proxy wants right"):
+        it.proxy.take(other)
+    assert it.said[-1].endswith("another name was refused: the two ports may be swapped")
 
 
 @pytest.mark.parametrize("lockstep", [True, False])

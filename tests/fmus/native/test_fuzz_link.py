@@ -7,7 +7,15 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from grasp_cosim.fmu_export.link import HELLO, INITIALISE, STEP, VERSION, LinkVariable, Signature
+from grasp_cosim.fmu_export.link import (
+    HELLO,
+    INITIALISE,
+    STEP,
+    VERSION,
+    LinkVariable,
+    Signature,
+    pack_hello,
+)
 from grasp_cosim.fmu_export.native.bench_header import bench_header
 from support import marks
 from support.native_proxies import write_sources
@@ -81,11 +89,11 @@ def test_a_proxy_whatever_its_peer_sends(tmp_path):
     def seeds():
         """Sessions that begin, and go on with answers, refusals, silence and other things."""
         welcome, outputs, silence = b"\x48\0\0\0", b"\x0a\0\0\0", b"\x10"
-        for settings in range(32):
+        for settings in (*range(32), *range(96, 128)):
             begun = bytes([settings]) + welcome + outputs
             yield begun + outputs * 12
             yield begun + outputs * 2 + silence * 40
-            for code in range(1, 6):
+            for code in range(1, 7):
                 refusal = bytes([code << 3 | 4]) + sized(b"the proxy has\none \xff") + b"\0"
                 yield bytes([settings]) + refusal
                 yield begun + refusal + (welcome + outputs) * 4
@@ -106,7 +114,7 @@ def test_a_peer_whatever_proxies_send(tmp_path):
         values = bytes(2 * 3 * 8)
         for settings in (0, 1):
             tag = bytes(32 * settings)
-            hello = b"\x0b" + sized(datagram(HELLO, EVERY_KIND.text.encode()) + tag)
+            hello = b"\x0b" + sized(datagram(HELLO, pack_hello("", *EVERY_KIND.parts())) + tag)
             begin = b"\x03" + sized(datagram(INITIALISE, values) + tag)
             step = b"\x27" + sized(datagram(STEP, values, 0.1) + tag)
             yield bytes([settings]) + hello + begin + step * 5

@@ -94,7 +94,7 @@ def test_a_loss_is_a_warning_in_the_log(fmu):
         (said,) = instance.log
         assert (said.status, said.category) == (WARNING, "logStatusWarning")
         assert said.text == (
-            f"bench, t = 0 s: 127.0.0.1:{peer.port} is lost, 1 missed in a row: "
+            f"bench, t = 0 s: 127.0.0.1:{peer.port} is lost: "
             "the peer failed: the motor is hot; proxy.on_loss = failsafe"
         )
 

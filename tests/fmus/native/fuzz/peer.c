@@ -19,10 +19,10 @@ static void make_plausible(const every_kind_link *link, unsigned what, uint8_t *
     size_t tag = link->sealer.keyed ? (size_t)EVERY_KIND_TAG_SIZE : 0;
     if (size < EVERY_KIND_HEAD_SIZE + tag)
         return;
-    memcpy(datagram, what & 64 ? "GRSP\1\0" : "GRSP\2\0", 6);
+    memcpy(datagram, what & 64 ? "GRSP\1\0" : "GRSP\3\0", 6);
     memcpy(datagram + EVERY_KIND_AT_INTERFACE, every_kind_hash(), 16);
     every_kind_put(datagram + EVERY_KIND_AT_SIZE, 4, size - tag - EVERY_KIND_HEAD_SIZE);
-    every_kind_put(datagram + EVERY_KIND_AT_ZERO, 4, 0);
+    every_kind_put(datagram + EVERY_KIND_AT_COUNT, 4, 0);
     if (datagram[EVERY_KIND_AT_KIND] == EVERY_KIND_HELLO) {
         memset(datagram + EVERY_KIND_AT_COOKIE, 0, 16); /* and the sequence */
     } else if (link->live && what & 4) {
@@ -86,6 +86,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     while (input < input_end) {
         unsigned what = take();
         judge(&link, what, now);
+        if (every_kind_link_watch(&link, now, 1000000000) && link.live && !link.tripped)
+            abort();
         now += what & 0x80 ? 2000000000 : 1000;
         judged++;
     }

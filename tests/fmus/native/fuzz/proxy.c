@@ -94,9 +94,14 @@ static size_t plausible(unsigned what, uint8_t *datagram)
     datagram[WIRE_AT_CODE] = (uint8_t)(what >> 2 & 7);
     if (datagram[WIRE_AT_KIND] == WIRE_WELCOME) {
         datagram[WIRE_AT_COOKIE] = (uint8_t)(1 + (what >> 5));
-        body = spoilt ? body : 0;
+        if (!spoilt) {
+            body = WIRE_NAME_SIZE + WIRE_BUILD_SIZE;
+            memset(datagram + WIRE_HEAD_SIZE, 0, body);
+        }
     }
+    wire_put(datagram + WIRE_AT_COUNT, 4, 0);
     if (datagram[WIRE_AT_KIND] == WIRE_OUTPUTS) {
+        wire_put(datagram + WIRE_AT_COUNT, 4, spoilt >> 3 & 1);
         body = spoilt & 1 ? body : ANSWER_SIZE;
         wire_put(datagram + WIRE_AT_SEQUENCE, 8,
                  wire_get(datagram + WIRE_AT_SEQUENCE, 8) - (spoilt >> 1 & 3));
@@ -159,10 +164,11 @@ int LLVMFuzzerInitialize(int *count, char ***words)
 static void set_texts(fmi2Component c, unsigned settings)
 {
     static const char *const on_loss[] = {"hold", "failsafe", "stop", "panic"};
-    fmi2ValueReference vrs[] = {PROXY_ON_LOSS, PROXY_KEY_FILE, PROXY_HOST};
-    fmi2String texts[] = {on_loss[settings & 3], settings & 4 ? key_file : "", "127.0.0.1"};
+    fmi2ValueReference vrs[] = {PROXY_ON_LOSS, PROXY_KEY_FILE, PROXY_HOST, PROXY_ON_LIMIT};
+    fmi2String texts[] = {on_loss[settings & 3], settings & 4 ? key_file : "", "127.0.0.1",
+                          settings & 32 ? "trip" : "clamp"};
     wire_sealer_init(&sealer, settings & 4 ? key : NULL, 32);
-    fmi2SetString(c, vrs, 3, texts);
+    fmi2SetString(c, vrs, 4, texts);
 }
 
 static void check(const Slave *s)
@@ -178,7 +184,11 @@ static void check(const Slave *s)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     fmi2CallbackFunctions callbacks = {logged, NULL, NULL, NULL, NULL};
-    fmi2ValueReference resume = PROXY_RESUME, output = PROXY_OUTPUTS;
+    fmi2ValueReference resume = PROXY_RESUME, output = PROXY_OUTPUTS, force = 0;
+    fmi2ValueReference limits[] = {PROXY_SENT_LIMITS, PROXY_SENT_LIMITS + 1, PROXY_SENT_LIMITS + 2,
+                                   PROXY_MEASURED_LIMITS, PROXY_MEASURED_LIMITS + 1,
+                                   PROXY_MEASURED_LIMITS + 2};
+    fmi2Real bounds[] = {-1.0, 3.0, 2.0, -1e3, 1e3, 5.0};
     fmi2Boolean resumes;
     fmi2Component c;
     double y;
@@ -192,11 +202,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     c = fmi2Instantiate("fuzz", fmi2CoSimulation, TOKEN, NULL, &callbacks, fmi2False, fmi2False);
     set_texts(c, settings);
     fmi2SetBoolean(c, &resume, 1, &resumes);
+    if (settings & 64) {
+        fmi2SetReal(c, limits, 6, bounds);
+    }
     fmi2SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0);
     fmi2EnterInitializationMode(c);
     fmi2GetReal(c, &output, 1, &y);
     fmi2ExitInitializationMode(c);
     for (k = 0; k < 12; k++) {
+        fmi2Real command = 0.75 * k;
+        fmi2SetReal(c, &force, 1, &command);
         fmi2DoStep(c, 0.5 * k, 0.5, fmi2True);
         check((const Slave *)c);
     }
