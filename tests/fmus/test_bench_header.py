@@ -345,11 +345,11 @@ class Proxies:
         values[4] = rng.choice((FAIL, SILENT)) if rng.random() < 0.02 else values[4]
         count = rng.choice((0, 0, 0, 1, 5, s._sequence, 2**32 - 1))
         if chosen < 0.2 or not s._sequence:
-            return s.request(INITIALISE, rng.choice((0.0, 2.5)), values, count=count)
+            return s.request(INITIALISE, rng.choice((0.0, 2.5)), values, counted=count)
         time, step = rng.uniform(-1.0, 1e6), rng.choice(STEPS)
         time = rng.choice((time, self.reached, self.reached + 1e-12))
         self.reached = time + step
-        return s.request(STEP, time, values, step, count=count)
+        return s.request(STEP, time, values, step, counted=count)
 
     def _hello(self, s):
         """One of the same interface, for this bench or another, of another, or version."""

@@ -28,7 +28,7 @@ from support.proxies import HandProxy, RefusedError
 
 KEY, OTHER_KEY = b"sixteen bytes...", b"another 16 bytes"
 HASH = b"0123456789abcdef"
-EXAMPLE = Message(STEP, 0, HASH, 2**63 + 1, 7, 3, 0.25, 1e-3, -5, b"12345678", count=2)
+EXAMPLE = Message(STEP, 0, HASH, 2**63 + 1, 7, 3, 0.25, 1e-3, -5, b"12345678", counted=2)
 
 U = LinkVariable("u", "Real", "input", "m")
 P = LinkVariable("p", "Boolean", "parameter")
@@ -338,10 +338,10 @@ def test_what_tells_of_newer_answers_is_what_acknowledges():
     seen = []
     for count in (0, 0, 1, 2, 3, 1, 0):
         bench.now += 1
-        bench(proxy.request(STEP, 0.0, VALUES, 0.1, count=count))
+        bench(proxy.request(STEP, 0.0, VALUES, 0.1, counted=count))
         seen.append(bench.peer.acknowledged_at == bench.now)
     assert seen == [True, True, False, False, False, True, True]
-    assert bench(proxy.request(STEP, 0.0, VALUES, 0.1, count=9)) is None  # more than there were
+    assert bench(proxy.request(STEP, 0.0, VALUES, 0.1, counted=9)) is None  # more than there were
     assert bench.counts()["malformed"] == 1
 
 

@@ -43,7 +43,7 @@ FOR_EVER = Clock(tick=40_000_000)
 
 
 def tripped(peer, m):
-    peer.send(peer.pack(m, OUTPUTS, Codec(SIGNATURE.answer).pack(1.0, 1, True), count=1))
+    peer.send(peer.pack(m, OUTPUTS, Codec(SIGNATURE.answer).pack(1.0, 1, True), counted=1))
 
 
 def shifted(lead):
@@ -338,7 +338,7 @@ def test_requests_tell_which_answers_have_arrived():
         peer.told(STEP, answer, miss, keep, send_kept_and_miss, answer)
         for _ in range(6):
             host.step()
-        assert [m.count for m in peer.got] == [0, 0, 0, 0, 1, 2, 1, 0]
+        assert [m.counted for m in peer.got] == [0, 0, 0, 0, 1, 2, 1, 0]
 
 
 # Limits

@@ -226,7 +226,7 @@ def test_requests_of_a_proxy_that_gets_no_answers_do_not_keep_the_inputs(plant, 
     it = clocked(plant, Service(watchdog_ns=50 * MS))
     it.proxy.begin(1, starts(plant))
     for k in range(60):
-        request = it.proxy.request(STEP_REQUEST, 1e-3 * k, pushed(plant), STEP, count=k)
+        request = it.proxy.request(STEP_REQUEST, 1e-3 * k, pushed(plant), STEP, counted=k)
         it.served.answer(request, "test", it.now)
         it.wait(1.0)
     assert it.served.counters()["watchdog"] == 1

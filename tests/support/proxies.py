@@ -101,7 +101,7 @@ class HandProxy:
             self.name, self.build = map(unpack_text, (m.body[:NAME_SIZE], m.body[NAME_SIZE:]))
             return []
         assert (m.kind, m.cookie) == (OUTPUTS, self._cookie)
-        self.outputs_time, self.trips = m.time, m.count
+        self.outputs_time, self.trips = m.time, m.counted
         values = self._codecs[1].unpack(m.body)
         assert values is not None
         return values

@@ -109,7 +109,7 @@ class ScriptedPeer:
     def pack(self, m, kind, body=b"", code=0, **changed):
         """The datagram of an answer to m."""
         answer = m._replace(kind=kind, code=code, interface=SIGNATURE.hash, body=body)
-        return self._sealer.pack(answer._replace(**{"step": 0.0, "count": 0, **changed}))
+        return self._sealer.pack(answer._replace(**{"step": 0.0, "counted": 0, **changed}))
 
     def outputs(self, m):
         """The OUTPUTS to m."""

@@ -188,7 +188,7 @@ _KINDS: dict[str, tuple[str, type[Value], Callable[[Any], bool]]] = {
 class Message(NamedTuple):
     """A datagram taken apart, as in HEAD; times in s, but `sent` in ns of the proxy's clock.
 
-    `count` is of INITIALISE and STEP the number of requests before it, back to the newest one whose
+    `counted` is of INITIALISE and STEP the number of requests before it, back to the newest one whose
     answer the proxy has; of OUTPUTS the number of trips of the peer; else 0.
     """
 
@@ -203,7 +203,7 @@ class Message(NamedTuple):
     sent: int
     body: bytes
     version: int = VERSION
-    count: int = 0
+    counted: int = 0
 
 
 class Sealer:
@@ -539,12 +539,12 @@ class Peer:
         values = self._request.unpack(m.body)
         stepping = not fresh and self._last is not None and self._last.kind == STEP
         too_late = m.kind == INITIALISE and stepping
-        lost = m.count >= m.sequence  # more than there were
+        lost = m.counted >= m.sequence  # more than there were
         if values is None or too_late or lost or (m.kind == STEP) != (m.step > 0.0):
             return self._count(MALFORMED)
         if fresh:
             self.trips = self._acknowledged = 0
-        acknowledged = m.sequence - 1 - m.count
+        acknowledged = m.sequence - 1 - m.counted
         if fresh or acknowledged > self._acknowledged:
             self._acknowledged, self.acknowledged_at = acknowledged, now
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
@@ -570,7 +570,7 @@ class Peer:
     ) -> bytes:
         """Return an answer to the request `m`."""
         fields = (kind, code, self.signature.hash, m.session, m.cookie, m.sequence)
-        return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body, count=count))
+        return self._sealer.pack(Message(*fields, time, 0.0, m.sent, body, counted=count))
 
 
 def _build(build: str) -> bytes:
