@@ -240,7 +240,7 @@ def test_round_trip_and_age():
         peer.clock.now += 3_000_000
         answer(peer, m)
 
-    with connected() as (host, peer):
+    with connected(greatest_lead=1.0) as (host, peer):
         peer.offset = 0.125
         peer.told(STEP, after_a_while, miss)
         host.step()

@@ -9,7 +9,6 @@ from grasp_cosim import simulate
 from grasp_cosim.hil.relay import DIRECTIONS, Conditions, Network
 from grasp_cosim.hil.served import Service
 from support.marks import slow
-from support.processes import kept_port
 from support.proxies import ANY_PORT, build_proxy, relaying, serving, wait_until
 
 ENGINE = "python"
@@ -146,38 +145,3 @@ def test_with_losses_and_jitter_the_grasp_completes_and_every_datagram_is_accoun
     for finger, force in ((1, 3.43), (2, -3.43)):
         assert result[f"plant.contact[{finger}]"][-1]
         assert result[f"plant.contact_force[{finger}]"][-1] == pytest.approx(force, rel=0.1)
-
-
-@pytest.mark.parametrize("resume", [slow(True), False])
-def test_the_peer_started_anew(slow_grasp, tmp_path, resume):
-    """It knows no session; a proxy that may resume begins another one, from the start values."""
-    fmu = slow_grasp.component("plant", "test").fmu
-    values = {
-        "plant.proxy.timeout": 0.05,
-        "plant.proxy.misses_tolerated": 2,
-        "plant.proxy.on_loss": "failsafe",
-        "plant.proxy.hold.gap[1]": True,
-        "plant.proxy.failsafe.gap[2]": 0.25,
-        "plant.proxy.resume": resume,
-    }
-    with kept_port() as port:
-        system = proxied(slow_grasp, "plant", tmp_path, port).with_values(values)
-        with serving(fmu, LOCKSTEP, ("127.0.0.1", port)):
-            session = simulate.session(system, engine=ENGINE)
-            session.step(20)
-        with session:
-            gap = session["plant.gap[1]"]
-            session.step(10)
-            assert session["plant.proxy.state"] == 3
-            assert (session["plant.gap[1]"], session["plant.gap[2]"]) == (gap, 0.25)
-            with serving(fmu, LOCKSTEP, ("127.0.0.1", port)):
-                session.step(5)
-                while resume and session["plant.proxy.state"] != 1:  # as a busy machine has it
-                    assert session.step(1)
-            result = session.result()
-    assert result["plant.proxy.state"][-1] == (1 if resume else 3)
-    assert (result["plant.gap[2]"][-1] == 0.25) != resume
-    sessions = result.metrics["proxies"]["plant"]["sessions"]
-    assert sessions >= 2 if resume else sessions == 1
-    assert any("plant: the peer was lost at t = " in line for line in result.log)
-    assert any("started anew" in line for line in result.log) == resume

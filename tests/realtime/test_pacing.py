@@ -22,7 +22,7 @@ from grasp_cosim import InputError, Realtime, SimulationError, simulate
 from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.master.master import CHUNK, Master
 from grasp_cosim.master.plan import Planner
-from grasp_cosim.realtime.pacer import SOME, SPIN_NS, Pacer, privileges
+from grasp_cosim.realtime.pacer import SOME, SPIN_NS, Pacer, permitted, privileges
 from grasp_cosim.recording.memory import MemoryListener
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -415,7 +415,7 @@ class Kernel:
 def test_what_was_granted_is_put_back(monkeypatch):
     kernel = Kernel(monkeypatch)
     with privileges(ALL) as found:
-        assert found.granted == ["CPU 0", "memory locked", "SCHED_FIFO, priority 20"]
+        assert found.granted == ["CPU 0", "memory locked", f"SCHED_FIFO, priority 20{permitted()}"]
         assert found.refused == []
         names = [name for name, *_ in kernel.asked]
         assert names == ["setaffinity", "mlockall", "setscheduler"]
@@ -458,14 +458,18 @@ def test_no_garbage_is_collected_on_the_way():
 
 
 @pytest.mark.parametrize(
-    ("runtime", "sleeps", "said"), [("950000", False, 1), ("950000", True, 0), ("-1", False, 0)]
+    ("runtime", "said"),
+    [
+        ("950000", " (the kernel permits it 95 % of each 1 s)"),
+        ("1000000", ""),
+        ("-1", ""),
+        ("", ""),
+    ],
 )
-def test_a_priority_that_the_kernel_breaks_off_is_said(
-    monkeypatch, tmp_path, runtime, sleeps, said
-):
-    """Where there is no time to sleep, and Linux limits such threads to a share of the time."""
-    monkeypatch.setattr("grasp_cosim.realtime.pacer.THROTTLE", tmp_path / "runtime")
-    (tmp_path / "runtime").write_text(runtime)
+def test_what_the_kernel_permits_of_a_priority_is_said(monkeypatch, tmp_path, runtime, said):
+    monkeypatch.setattr("grasp_cosim.realtime.pacer.KERNEL", tmp_path)
+    (tmp_path / "sched_rt_runtime_us").write_text(runtime)
+    (tmp_path / "sched_rt_period_us").write_text("1000000")
     Kernel(monkeypatch)
-    with privileges(Realtime(priority=20), sleeps) as found:
-        assert [line[:23] for line in found.refused] == ["SCHED_FIFO all the time"] * said
+    with privileges(Realtime(priority=20)) as found:
+        assert found.granted == [f"SCHED_FIFO, priority 20{said}"]

@@ -134,10 +134,15 @@ def wait_until(condition):
         time.sleep(0.001)
 
 
-@contextmanager
 def serving(fmu, how, address=("127.0.0.1", 0)):
-    """A server in a thread, stopped in the end."""
-    with Server(ServedFmu(exchanged(fmu), how), address) as server:
+    """A server of an FMU in a thread, stopped in the end."""
+    return serving_fmu(ServedFmu(exchanged(fmu), how), address)
+
+
+@contextmanager
+def serving_fmu(served, address=("127.0.0.1", 0)):
+    """The same of one that is ready to be served."""
+    with Server(served, address) as server:
         thread = threading.Thread(target=server.serve)
         thread.start()
         try:

@@ -101,7 +101,7 @@ def test_an_fmu_comes_with_its_names_and_units(grasp, fmus, tmp_path):
         ("components.plant.step.x", 1, ": must be components.plant.step"),
         ("components.plant.fmu", 1, " = 1: must be the path of an FMU"),
         ("components.plant.units.gap[1]", 1, " = 1: must be the name of a unit"),
-        ("realtime.overrun", "x", "overrun = 'x': must be one of catch-up, continue, stop"),
+        ("realtime.overrun", "x", "overrun = 'x': must be one of auto, catch-up, continue, stop"),
         ("realtime.priority", "100", "priority = 100: must be a whole number from 1 to 99"),
         ("input.interpolation", "held", "input.file = None: must be the path of a CSV"),
     ],

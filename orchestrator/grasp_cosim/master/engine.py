@@ -96,6 +96,7 @@ class CompiledLoop:
             np.array(plan.operations, np.int64),
             np.array(plan.connections, "i8, i8, f8, f8"),
             *(np.array(table, np.int64) for table in (plan.casts, buffers, drives)),
+            plan.watches,
             np.array(calls, _CALL),
         ]
         operations, *others, values, clock, warned = (
@@ -161,7 +162,8 @@ def _interpreted(plan: Plan) -> Loop:
     buffers = [memoryview(b) for b in plan.buffers]  # type: ignore[arg-type]
     values, clock = memoryview(plan.values), memoryview(plan.clock)  # type: ignore[arg-type]
     warned = memoryview(plan.warned)  # type: ignore[arg-type]
-    tables = plan.operations, plan.connections, plan.casts, plan.drives
+    watches = [memoryview(row) for row in plan.watches]
+    tables = plan.operations, plan.connections, plan.casts, plan.drives, watches
     calls = [call.python for call in plan.calls]
     over = partial(loop.run, *tables, calls, buffers, values, clock, warned)
     return lambda rows, *where: over(memoryview(rows.reshape(-1)), *where)
@@ -222,8 +224,8 @@ def _job() -> Job:
 def _constants() -> list[str]:
     """The numbers that the source shares with the other modules, as macros of a compiler."""
     where = {
-        loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE CALL STEP TOO_LONG EXACT WORST FULL HALTED "
-        "OVERRUN",
+        loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE WATCH CALL STEP TOO_LONG EXACT WORST FULL "
+        "HALTED OVERRUN WATCHED STALLED",
         shapes: "TRANSFER_2 TRANSFER_3 STEP_2 STEP_3 CLOCK PACE",
         timing: "ARRIVED LATE DUE BEGIN",
     }

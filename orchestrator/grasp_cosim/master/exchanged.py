@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ..interface.interface import Variable
 from ..system.connectors import read_at, taps
 from ..system.description import System
-from ..system.parts import Port
+from ..system.parts import PROXY_STATE, Port
 from ..system.validity import driven_inputs
 
 
@@ -71,11 +71,22 @@ def used(system: System) -> frozenset[Port]:
 
 
 def in_conditions(system: System) -> frozenset[Port]:
-    """The signals that conditions of events and faults name."""
+    """The signals that conditions of events, faults and limits name, and the states of proxies."""
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
-    return frozenset(
-        read_at(system, condition.port)[0] for condition in conditions if condition is not None
-    )
+    conditions += [limit.when for limit in system.limits]
+    named = {read_at(system, c.port)[0] for c in conditions if c is not None}
+    return frozenset(named | {*system.once(states_of_proxies)})
+
+
+def states_of_proxies(system: System) -> tuple[Port, ...]:
+    """The state of each component that is a proxy."""
+    ports = []
+    for component in system.components:
+        names = {v.name for v in component.loaded.of("output")}
+        name = next((n for n, own in component.rename.items() if own == PROXY_STATE), PROXY_STATE)
+        if name in names:
+            ports.append(Port(component.name, name))
+    return tuple(ports)
 
 
 def _with_whole_arrays(system: System, ports: set[Port]) -> frozenset[Port]:

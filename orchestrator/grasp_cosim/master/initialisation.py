@@ -3,6 +3,9 @@
 The ports and what depends on what make a graph. Where it has a loop, the loop is cut at the input
 it is entered by, and the values of the inputs that were cut are found by Newton's method.
 
+What a proxy puts out was measured: it is taken once its inputs are set, and held until the first
+step. A loop through one is cut there.
+
 Many FMUs have the outputs of their start only after initialisation mode: these are read then, and
 passed on along the same graph where they are others than before.
 """
@@ -10,6 +13,7 @@ passed on along the same graph where they are others than before.
 from collections.abc import Callable, Container, Mapping, Sequence
 from graphlib import TopologicalSorter
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -38,16 +42,43 @@ ADVICE = (
 )
 
 
-def order_ports(system: System) -> tuple[Sequence[Port], Sequence[Sequence[Port]]]:
+class Order(NamedTuple):
     """The order in which values are passed on in initialisation mode, and the loops in it.
 
     Each port is known when it is needed. An output depends on the inputs that its FMU declares for
     the initialisation, or else in general, or else on all. A loop is the path of its ports from the
-    input at which it was cut, first = last.
+    input at which it was cut, first = last. measured are outputs of proxies that were in a loop:
+    they depend on nothing any more.
     """
+
+    ports: Sequence[Port]
+    loops: Sequence[Sequence[Port]]
+    measured: Sequence[Port]
+
+
+def order_ports(system: System) -> Order:
+    """The order of a system."""
     graph = _graph(system)
-    loops = cut_loops(graph, {connection.target for connection in system.connections})
-    return tuple(TopologicalSorter(graph).static_order()), loops
+    proxies = {component.name for component in system.components if component.is_proxy}
+    inputs = {connection.target for connection in system.connections}
+    measured: list[Port] = []
+    while found := _measured_in_loops(graph, inputs, proxies):
+        for port in found:
+            graph[port] = []
+        measured += found
+    loops = cut_loops(graph, inputs)
+    return Order(tuple(TopologicalSorter(graph).static_order()), loops, measured)
+
+
+def _measured_in_loops(
+    graph: Mapping[Port, list[Port]], inputs: Container[Port], proxies: Container[str]
+) -> list[Port]:
+    """The outputs of proxies that are in a loop."""
+    if not proxies:
+        return []
+    loops = cut_loops({port: [*needed] for port, needed in graph.items()}, inputs)
+    ports = dict.fromkeys(port for loop in loops for port in loop)
+    return [port for port in ports if port.component in proxies and port not in inputs]
 
 
 def cut_loops(graph: dict[Port, list[Port]], inputs: Container[Port]) -> list[tuple[Port, ...]]:
@@ -121,9 +152,13 @@ class Propagation:
         system: System,
         instances: Sequence[Instance],
         faults: Mapping[Port, Callable[[float, int], float]],
+        step: int = INITIAL,
     ) -> None:
+        """At the start, or at a communication point where the loop is initialised anew."""
         self.system = system
-        self._ports, loops = system.once(order_ports)
+        self._step = step
+        self._ports, loops, self._measured = system.once(order_ports)
+        self._proxies = {c.name for c in system.components if c.is_proxy}
         self._cuts = [loop[0] for loop in loops]
         self._in_loops = {port for loop in loops for port in loop}
         paths = "; ".join(" -> ".join(map(str, path)) for path in loops)
@@ -140,9 +175,15 @@ class Propagation:
         InputError where a loop does not converge, or where loops are to be refused.
         """
         cuts, choice = self._cuts, self.system.initialisation
+        notes: list[str] = []
+        if self._measured:
+            notes = [
+                f"{choices(self._measured, NAMED)}: measured once at t = 0, before what goes round "
+                "to the inputs of the proxy arrives there"
+            ]
         if not cuts:
             self._pass_on({})
-            return self._check_dependencies()
+            return [*notes, *self._check_dependencies()]
         if choice.loops == "refuse":
             raise InputError(f"{self._loops}; {ADVICE}")
         for port in cuts:
@@ -166,7 +207,7 @@ class Propagation:
             f"{loops} at t = 0 through {choices(cuts, NAMED)}: {solution}, to a relative residual "
             f"of {residual:.1e}"
         )
-        return [line, *self._check_dependencies()]
+        return [*notes, line, *self._check_dependencies()]
 
     def after_exit(self) -> list[str]:
         """Read all outputs anew, out of initialisation mode, and pass on those that changed.
@@ -226,7 +267,7 @@ class Propagation:
         """Read outputs, component by component; return those that changed."""
         by_component: dict[str, list[Port]] = {}
         for port in outputs:
-            if self._variable(port).supported:
+            if self._variable(port).supported and port.component not in self._proxies:
                 by_component.setdefault(port.component, []).append(port)
         changed: set[Port] = set()
         for component, ports in by_component.items():
@@ -274,7 +315,8 @@ class Propagation:
         arriving = [self._arriving(self._connections[port]) for port in self._cuts]
         return np.array(arriving, np.float64)
 
-    def _pass_on(self, given: Mapping[Port, Value]) -> None:
+    def _pass_on(self, given: Mapping[Port, Value], again: bool = False) -> None:
+        """Pass all on, with values given for inputs; `again`, what was measured is held."""
         for (component, arriving), group in groupby(self._ports, self._end):
             instance, ports = self._instances[component], list(group)
             variables = [self._variable(port) for port in ports]
@@ -283,6 +325,8 @@ class Propagation:
                     given[p] if p in given else self._arriving(self._connections[p]) for p in ports
                 ]
                 instance.set(variables, values)
+            elif again and component in self._proxies:
+                continue
             else:
                 taken = [(p, v) for p, v in zip(ports, variables, strict=True) if v.supported]
                 ports = [port for port, _ in taken]
@@ -302,7 +346,7 @@ class Propagation:
         if (factor, offset) != (1.0, 0.0):
             number = factor * number + offset
         if connection.target in self._faults:
-            number = self._faults[connection.target](number, INITIAL)
+            number = self._faults[connection.target](number, self._step)
         return of_kind(self._kind(connection.target), number)
 
     def _check_dependencies(self) -> list[str]:
@@ -316,7 +360,7 @@ class Propagation:
         found: list[Port] = []
         for _ in range(len(self._ports) + 1):
             before = dict(self.values)
-            self._pass_on(given)
+            self._pass_on(given, again=True)
             moved = [
                 port
                 for port, value in self.values.items()

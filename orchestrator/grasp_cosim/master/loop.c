@@ -37,6 +37,10 @@ typedef struct { /* of drive.py; row is the last one until now */
     const double *samples;
 } Drive;
 
+typedef struct { /* the columns of loop.py */
+    double slot, relation, value, factor, offset, armed, held;
+} Watch;
+
 typedef struct { /* of fmi/instance.py, Native */
     int64_t shape;
     void (*function)(void);
@@ -58,6 +62,7 @@ typedef struct {
     const Cast *casts;
     const Buffer *buffers;
     Drive *drives;
+    Watch *watches;
     const Call *calls;
     double *values;
     int64_t width;
@@ -84,6 +89,8 @@ typedef struct { /* of realtime/pacer.py; times in ns */
     int64_t spin, slept, breath;     /* breath 0: no need to sleep for the sake of others */
     int64_t shifts, stops;           /* what a late step does to the schedule */
     int64_t arrived, late;
+    int64_t tolerance;               /* by which a step may be late where that stops the run */
+    int64_t stall;                   /* by which one may be at all; 0: whatever it is */
 } Pace;
 
 typedef int Python(void);
@@ -119,7 +126,8 @@ static int pace(Pace *p, int64_t step, double *head, const volatile int64_t *hal
     }
     due = p->base + (step - p->base_step) * p->numerator / p->denominator;
     p->late = now - due;
-    if (p->late > 0 && p->stops) return OVERRUN;
+    if (p->late > p->tolerance && p->stops) return OVERRUN;
+    if (p->stall && p->late > p->stall) return STALLED;
     if (p->late > 0 && p->shifts) {
         p->base = due = now;
         p->base_step = step;
@@ -221,6 +229,27 @@ static double drive(Drive *d, int64_t time) {
     return share * samples[row] + (1.0 - share) * samples[row + 1];
 }
 
+/* Count it where the condition of a watch holds; 1 where it is armed, which it is no more. */
+static int holds(Watch *w, const double *values) {
+    double signal = values[(int64_t)w->slot];
+    int is;
+
+    if (w->factor != 1.0 || w->offset != 0.0) signal = w->factor * signal + w->offset;
+    switch ((int)w->relation) { /* in the order of the relations in system/parts.py */
+    case 0: is = signal < w->value; break;
+    case 1: is = signal <= w->value; break;
+    case 2: is = signal > w->value; break;
+    case 3: is = signal >= w->value; break;
+    case 4: is = signal == w->value; break;
+    default: is = signal != w->value; break;
+    }
+    if (!is) return 0;
+    is = w->armed != 0.0;
+    w->armed = 0.0;
+    w->held += 1.0;
+    return is;
+}
+
 /* The communication point k in s. */
 static double point(const TimeGrid *grid, int64_t k) {
     return (double)(grid->start + k * grid->step) / grid->per_second;
@@ -272,6 +301,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, cons
             values[d->slot] = drive(d, grid->start + (k - operation->phase) * grid->step);
         }
         return 0;
+    case WATCH: return holds(&plan->watches[begin], values) ? WATCHED : 0;
     default: /* LOAD and LOAD_LONG */
         for (i = begin; i < end; i++) {
             const Cast *c = &plan->casts[i];

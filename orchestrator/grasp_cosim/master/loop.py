@@ -10,10 +10,15 @@ from typing import Any
 
 from ..base import checks
 
-COPY, SCALE, STORE, LOAD, LOAD_LONG, DRIVE, CALL, STEP = range(8)  # calls last
+COPY, SCALE, STORE, LOAD, LOAD_LONG, DRIVE, WATCH, CALL, STEP = range(9)  # calls last
 """Operations: over connections COPY and SCALE; over casts STORE into a buffer of another type, LOAD
-from one, LOAD_LONG with a check; over drives DRIVE; over calls CALL and STEP, which sets the clock
-before it.
+from one, LOAD_LONG with a check; over drives DRIVE; over watches WATCH; over calls CALL and STEP,
+which sets the clock before it.
+"""
+
+SLOT, RELATION, VALUE, FACTOR, OFFSET, ARMED, HELD = range(7)
+"""The columns of a watch: of which signal, compared how with what, after factor and offset; whether
+the loop ends where it holds, which it does once; in how many steps it has held.
 """
 
 TOO_LONG = 100
@@ -24,6 +29,9 @@ RAISED = 101
 
 FULL, HALTED, OVERRUN = 102, 103, 104
 """Of the compiled loop alone: the rows have no room left; it was halted; a late step ends it."""
+
+WATCHED, STALLED = 105, 106
+"""A condition that is watched holds; a step begins so late that all that is measured is of old."""
 
 EXACT = float(checks.EXACT)
 """Integers of a smaller magnitude are exact as a float64."""
@@ -37,6 +45,7 @@ def run(
     connections: Sequence[tuple[int, int, float, float]],
     casts: Sequence[tuple[int, int, int]],
     drives: Sequence[Any],
+    watches: Sequence[Sequence[float]],
     calls: Sequence[Callable[[], int]],
     buffers: Sequence[Any],
     values: Any,
@@ -86,6 +95,9 @@ def run(
                     time = grid_start + (k - phase) * grid_step
                     for drive in drives[begin:end]:
                         values[drive.slot] = drive.at(time)
+                elif what == WATCH:
+                    if holds(watches[begin], values):
+                        return k, operation, WATCHED
                 else:
                     for buffer, index, slot in casts[begin:end]:
                         value = float(buffers[buffer][index])
@@ -97,6 +109,21 @@ def run(
         row = (k - start) * width
         rows[row : row + width] = values
     return stop, 0, 0
+
+
+def holds(watch: Any, values: Any) -> bool:
+    """Count it where a watch's condition holds; True where it is armed, which it is no more."""
+    slot, relation, value = int(watch[SLOT]), int(watch[RELATION]), watch[VALUE]
+    signal = values[slot]
+    if watch[FACTOR] != 1.0 or watch[OFFSET] != 0.0:
+        signal = watch[FACTOR] * signal + watch[OFFSET]
+    relations = (signal < value, signal <= value, signal > value, signal >= value)
+    if not (*relations, signal == value, signal != value)[relation]:
+        return False
+    armed = bool(watch[ARMED])
+    watch[ARMED] = 0.0
+    watch[HELD] += 1.0
+    return armed
 
 
 def note_warning(warned: Any, call: int, time: float) -> None:

@@ -6,6 +6,7 @@ with events that the FMU handles with its master.
 The schemes, components with a longer step and time are in docs/system_files.md.
 """
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -14,14 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.checks import exact
-from ..base.errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError, choices
 from ..base.system_calls import cpus
 from ..exchange.listener import Texts
 from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of, length_until
 from ..interface.interface import Value
-from ..realtime.pacer import HaltError, OverrunError, Pacer
+from ..realtime.pacer import HaltError, OverrunError, Pacer, StallError
 from ..recording.result import Rejection
 from ..system.description import System
+from ..system.faults import INITIAL
 from ..system.parts import Component, Port
 from ..system.times import NANOSECONDS, in_seconds, seconds
 from . import loop
@@ -29,7 +31,8 @@ from .engine import Aside, CompiledLoop, Engine, make_loop
 from .exchanged import exchanged, used
 from .initialisation import Propagation
 from .plan import Planner
-from .scenario import Scenario, at_start, drives_of
+from .scenario import Scenario, driven_at, drives_of
+from .watches import Watches
 
 CHUNK = 4096
 """The most steps between two times that rows are handed on."""
@@ -49,6 +52,9 @@ LONG = 0.1
 SPARE = 5e7
 """ns that this thread may take at a time for what listeners have put off."""
 
+NEVER = 2**62
+"""A step that no run reaches."""
+
 SMALLEST = 1024
 """A step that is rejected is divided down to this part of it, then the run fails."""
 
@@ -66,8 +72,11 @@ class Master:
         receive: RowReceiver,
         engine: Engine = "auto",
         pacer: Pacer | None = None,
+        renew: Callable[[], Sequence[Instance]] | None = None,
     ) -> None:
+        """Renew closes the instances and loads others, for a loop that is initialised anew."""
         self.system = system
+        self._engine, self._renew_instances = engine, renew
         self.instances = tuple(instances)
         self.total_steps = system.total_steps
         self.steps_done = 0
@@ -83,18 +92,18 @@ class Master:
         if pacer:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
         self.scenario = Scenario(system, instances, self.slots, self.values)
-        self._drives = drives_of(system, self.slots)
+        interfaces = {instance.name: instance.interface for instance in instances}
+        self.watches = Watches(system, interfaces, self.slots)
         self._receive = receive
         self.meanwhile: Callable[[], None] = lambda: None
         """Called while the loop of a run in real time goes on without Python's lock."""
-        by_name, values = {i.name: i for i in instances}, self.values
-        planner = Planner(
-            system, by_name, self.slots, values, self.scenario, self.texts, self._drives, pacer
-        )
-        self.plan = planner.plan()
         self._pacer = pacer
-        self._loop = made = make_loop(self.plan, engine, None if pacer else self.total_steps)
-        self._alone = made if pacer and isinstance(made, CompiledLoop) and made.alone else None
+        self.renewed: list[float] = []
+        """The times in s at which the loop was initialised anew."""
+        self._pause = NEVER
+        self._aborted = ""
+        self._warned_before: list[str] = []
+        self._make_loop()
         affordable = max(ENOUGH, MOST_BYTES // (self.values.nbytes or 1))
         room = min(ROOM if self._alone else CHUNK, affordable)
         self._rows = np.empty((room, len(self.values)))
@@ -104,22 +113,50 @@ class Master:
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
 
+    def _make_loop(self) -> None:
+        """The loop over the instances of now."""
+        system, pacer = self.system, self._pacer
+        self._drives = drives_of(system, self.slots)
+        planner = Planner(
+            system,
+            {instance.name: instance for instance in self.instances},
+            self.slots,
+            self.values,
+            self.scenario,
+            self.texts,
+            self._drives,
+            self.watches.table,
+            pacer,
+        )
+        self.plan = planner.plan()
+        self._loop = made = make_loop(self.plan, self._engine, None if pacer else self.total_steps)
+        self._alone = made if pacer and isinstance(made, CompiledLoop) and made.alone else None
+
     def initialise(self) -> None:
         """Start values in, then outputs at the start that agree with its inputs.
 
         The row of the start has what the first step uses: outputs as they are out of initialisation
-        mode, and inputs that agree with them.
+        mode, and inputs that agree with them. SimulationError where a limit is exceeded there.
         """
-        start = in_seconds(self.system.start_ns)
+        self._initialise_at(0)
+        self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
+        self._handed_on_at = time.monotonic()
+        if reason := self.watches.at_start(self.values):
+            raise SimulationError(reason)
+
+    def _initialise_at(self, step: int) -> None:
+        """Initialise all instances at a communication point."""
+        start = in_seconds(self.system.time_ns(step))
         self.plan.clock[0] = start
         for component, instance in zip(self.system.components, self.instances, strict=True):
             driven = {
-                **at_start(self.system, self._drives, component.name),
+                **driven_at(self.system, self._drives, component.name, step),
                 **self.scenario.tuned_at_start(component.name),
             }
             stop = told_stop(self.system, component)
             instance.enter_initialization({**component.values, **driven}, stop, start)
-        propagation = Propagation(self.system, self.instances, self.scenario.fault_functions)
+        faults, at = self.scenario.fault_functions, step or INITIAL
+        propagation = Propagation(self.system, self.instances, faults, at)
         pairs = list(zip(self.system.components, self.instances, strict=True))
         in_event_mode = [i for c, i in pairs if c.loaded.event_mode and not c.integrated]
         try:
@@ -138,19 +175,18 @@ class Master:
         for component, instance in pairs:
             has_had_event = instance in in_event_mode or component.integrated
             if has_had_event and (ended := instance.the_end()) is not None:
-                self._end(instance, ended, 0)
+                self._end(instance, ended, step)
         for port, slot in self.slots.items():
             drive = self._drives.get(port)
-            value = drive.at(self._grid.start) if drive else values[port]
+            now = self._grid.start + step * self._grid.step
+            value = drive.at(now) if drive else values[port]
             if port in self.texts:
                 value = self.texts[port].number(str(value))
             if port in self._used:
-                exact(str(port), value, f"{value} at step 0")
+                exact(str(port), value, f"{value} at step {step}")
             self.values[slot] = float(value)
         for instance in self.instances:
             instance.quieten()
-        self._receive(np.zeros(1, np.int64), self.values[np.newaxis])
-        self._handed_on_at = time.monotonic()
 
     def _fetch_others(self, values: dict[Port, Value]) -> None:
         """What was not passed on: locals, say, or elements of connected arrays without a source."""
@@ -179,7 +215,7 @@ class Master:
 
     def warnings(self) -> list[str]:
         """Lines for the log on what the FMUs warned of, in the order of the components."""
-        lines = []
+        lines = [*self._warned_before]
         for instance in self.instances:
             returned = [
                 (count, first)
@@ -207,7 +243,12 @@ class Master:
         first = self.steps_done
         try:
             while self.steps_done < (end := min(first + steps, self.total_steps)):
-                self._chunk(end if self._alone else min(self._base + len(self._rows), end))
+                try:
+                    self._chunk(end if self._alone else min(self._base + len(self._rows), end))
+                except StallError as stall:
+                    self._after_stall(stall)
+                if self.steps_done == self._pause:
+                    self._at_pause()
         except HaltError:
             pass
         except OverrunError:
@@ -273,7 +314,7 @@ class Master:
     def _run(self, stop: int) -> None:
         step, operation = self.steps_done, 0
         try:
-            while step < (until := min(stop, self.total_steps)):
+            while step < (until := min(stop, self.total_steps, self._pause)):
                 rows = self._rows[step - self._base :]
                 step, operation, status = self._loop(rows, operation, step, until, *self._grid)
                 if status:
@@ -302,13 +343,15 @@ class Master:
 
         try:
             with Aside(hand_on, halt, self._cpus) as aside:
-                while step < (until := min(stop, self.total_steps)):
+                while step < (until := min(stop, self.total_steps, self._pause)):
                     row = (step - self._base) % len(self._rows)
                     step, operation, status = compiled(
                         self._rows, operation, step, until, *self._grid, row
                     )
                     if status == loop.OVERRUN:
                         raise pacer.overrun()
+                    if status == loop.STALLED:
+                        raise pacer.stall()
                     if status == loop.HALTED:
                         if pacer.halted() or aside.error:
                             raise HaltError
@@ -321,9 +364,71 @@ class Master:
         finally:
             self.steps_done = shared.done
 
+    def _note_watch(self, step: int, number: int) -> None:
+        """A condition holds at the end of a step: the run ends there, or the loop begins anew."""
+        if self.watches.entries[number].limit is None:
+            every = math.lcm(*(self.system.period(c.name) for c in self.system.components))
+            self._pause = min(self._pause, -(-(step + 1) // every) * every)
+        elif reason := self.watches.note(number, step + 1, self.values):
+            self._aborted, self._pause = reason, step + 1
+
+    def _at_pause(self) -> None:
+        """Where a condition asked for: abort the run, or initialise the loop anew."""
+        self._pause = NEVER
+        if self._aborted:
+            self.hand_on()
+            raise SimulationError(self._aborted)
+        self._begin_anew("a lost peer is back")
+
+    def _after_stall(self, stall: StallError) -> None:
+        """A step would begin too late: where each peer may come back all begin anew, else it ends.
+
+        So no command is worked out from what was measured before a stall.
+        """
+        self.hand_on()
+        proxies = [c for c in self.system.components if c.is_proxy]
+        every = math.lcm(*(self.system.period(c.name) for c in self.system.components))
+        resumes = all(c.of_proxy("resume") for c in proxies)
+        if not resumes or self.steps_done % every:
+            raise SimulationError(
+                f"{self.system.name}: the run stalled at t = "
+                f"{seconds(self.system.time_ns(self.steps_done))}: a step would begin "
+                f"{stall.late:.3g} s late, and {choices(c.name for c in proxies)} would get "
+                "commands from what was measured before; must be at most realtime.stall, or "
+                "proxy.resume = true"
+            ) from None
+        self._begin_anew(f"the run stalled for {stall.late:.3g} s")
+
+    def _begin_anew(self, reason: str) -> None:
+        """Load all FMUs again, and initialise them at the communication point reached.
+
+        SimulationError where that fails.
+        """
+        assert self._renew_instances is not None  # noqa: S101 - who has proxies has given it
+        self.hand_on()
+        step, now = self.steps_done, self.system.time_ns(self.steps_done)
+        self._warned_before = self.warnings()
+        self.plan.warned[:] = 0.0
+        try:
+            self.instances = tuple(self._renew_instances())
+            self.scenario.renew(self.instances)
+            self._make_loop()
+            self._initialise_at(step)
+        except InputError as error:
+            raise SimulationError(f"{error}; the loop was to be initialised anew") from error
+        self.scenario.apply_again(step)
+        self.watches.arm()
+        if self._pacer:
+            self._pacer.begin_anew()
+        self.renewed.append(in_seconds(now))
+        self.watches.log.append(f"t = {seconds(now)}: {reason}: the loop was initialised anew")
+
     def _resolve(self, step: int, operation: int, status: int) -> None:
         """Finish a step that was rejected, or has events; any other bad status ends the run."""
         kind, call, _, period, _ = self.plan.operations[operation]
+        if status == loop.WATCHED:
+            self._note_watch(step, call)
+            return
         if status == loop.TOO_LONG:
             self._too_long(step, operation)
         if status == loop.RAISED:

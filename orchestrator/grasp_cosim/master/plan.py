@@ -24,7 +24,7 @@ from ..system.parts import Connection, Port
 from ..system.times import in_seconds
 from ..system.validity import transforms
 from .exchanged import exchanged, used
-from .loop import CALL, COPY, DRIVE, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE
+from .loop import CALL, COPY, DRIVE, HELD, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE, WATCH
 from .scenario import Drive, Scenario
 
 LONG = 8
@@ -50,6 +50,8 @@ class Plan:
     casts: list[tuple[int, int, int]] = field(default_factory=list)
     buffers: list[npt.NDArray[Any]] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
+    watches: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, HELD + 1)))
+    """Conditions that the loop looks at after each step: those of Planner.watched, in its order."""
     calls: list[Call] = field(default_factory=list)
     owners: list[Instance | None] = field(default_factory=list)
     """By call, the instance that it is made to; None for a call of the master's own."""
@@ -73,6 +75,7 @@ class Planner:
     scenario: Scenario
     texts: Mapping[Port, Texts]
     drives: Mapping[Port, Drive]
+    watches: npt.NDArray[np.float64]
     pacer: Pacer | None = None
 
     def __post_init__(self) -> None:
@@ -89,7 +92,7 @@ class Planner:
         self.strings: dict[str, list[Port]] = {name: [] for name in self.instances}
         for port in self.texts:
             self.strings[port.component].append(port)
-        self.made = Plan(self.values, np.zeros(len(CLOCK)))
+        self.made = Plan(self.values, np.zeros(len(CLOCK)), watches=self.watches)
         self.view: Any = memoryview(self.values)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
     def plan(self) -> Plan:
@@ -117,6 +120,8 @@ class Planner:
             for name in names:
                 self._step(name)
                 self._stamp()
+        for i in range(len(self.watches)):
+            self._operation(WATCH, i, i + 1, 1, 0)
         waits, *others = self.made.calls
         if self.pacer is not None and all(c.native and not c.keeps_lock for c in others):
             native = self.pacer.native(self.system.total_steps)

@@ -50,7 +50,8 @@ _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
 class _Once:
     """What happens once: at a step from first on, before end, of its period, where `when` holds.
 
-    What it does gives lines for the log; `otherwise` is the one where it has not happened.
+    What it does gives lines for the log; `otherwise` is the one where it has not happened. Where it
+    sets values, these are to be set again in FMUs that are loaded anew.
     """
 
     first: int
@@ -59,6 +60,7 @@ class _Once:
     when: Condition | None
     happen: Callable[[int], Sequence[str]]
     otherwise: str = ""
+    sets: bool = False
 
     def due(self, step: int) -> float:
         """The first step from this one on at which it can happen."""
@@ -82,6 +84,7 @@ class Scenario:
     ) -> None:
         """Values holds the signals of now whenever a method is called, at the places in slots."""
         self.log: list[str] = []
+        self._applied: list[Callable[[int], Sequence[str]]] = []
         self._system, self._slots, self._values = system, slots, values
         self._instances = {instance.name: instance for instance in instances}
         self._passed = system.once(sourced)
@@ -107,7 +110,17 @@ class Scenario:
         first = first_step(at_ns, system.step_ns, system.start_ns)
         period = math.lcm(*(system.period(port.component) for port in event.set))
         happen, said = self._setter(place, event), f"{place} did not happen: {otherwise}"
-        self._pending.append(_Once(first, math.inf, period, event.when, happen, said))
+        self._pending.append(_Once(first, math.inf, period, event.when, happen, said, sets=True))
+
+    def renew(self, instances: Sequence[Instance]) -> None:
+        """Act on other instances of the same components from now on."""
+        self._instances.clear()
+        self._instances.update({instance.name: instance for instance in instances})
+
+    def apply_again(self, step: int) -> None:
+        """Set once more what events, and set(), have set before."""
+        for happen in self._applied:
+            happen(step)
 
     def before_step(self, step: int) -> None:
         """Do what is due at communication point `step`, before the step that begins there.
@@ -121,6 +134,7 @@ class Scenario:
             if once.due(step) == step and self._holds(once.when):
                 self._pending.remove(once)
                 self._note(step, once.happen(step))
+                self._applied += [once.happen] if once.sets else []
         self._due = self._next_step(step + 1)
 
     def _next_step(self, step: int) -> float:
@@ -141,9 +155,9 @@ class Scenario:
             self._instances[name].set(variables, values)
 
     def tuned_at_start(self, name: str) -> dict[str, Value]:
-        """The values at the start of the parameters of a component that stimuli drive."""
+        """The values of the parameters of a component that stimuli drive, at the start or now."""
         return {
-            tuning.port.variable: of_kind(tuning.variable.kind, tuning.at_start)
+            tuning.port.variable: of_kind(tuning.variable.kind, tuning.now)
             for tuning in self.tunings
             if tuning.port.component == name
         }
@@ -160,7 +174,9 @@ class Scenario:
         if port not in self._settable:
             check_setting(self._system, port, value, place)
             self._settable.add(port)
-        self._note(step, self._setter(place, Event({port: value}))(step))
+        happen = self._setter(place, Event({port: value}))
+        self._note(step, happen(step))
+        self._applied.append(happen)
 
     def pending(self) -> list[str]:
         """A line for each event that has not happened and each fault that has not begun."""
@@ -309,6 +325,11 @@ class Tuning:
         """The next step before which it gets another value."""
         return self.steps[self.taken] if self.taken < len(self.steps) else math.inf
 
+    @property
+    def now(self) -> float:
+        """The value that it has."""
+        return self.values[self.taken - 1] if self.taken else self.at_start
+
     def take(self) -> float:
         """The value that is due; it is taken to be set."""
         self.taken += 1
@@ -372,11 +393,12 @@ def drives_of(system: System, slots: dict[Port, int]) -> dict[Port, Drive]:
     return found
 
 
-def at_start(system: System, drives: dict[Port, Drive], name: str) -> dict[str, Value]:
-    """The values at the start of the inputs of a component that are driven."""
+def driven_at(system: System, drives: dict[Port, Drive], name: str, step: int) -> dict[str, Value]:
+    """The values at a communication point of the inputs of a component that are driven."""
     by_name = system.component(name, name).interface.by_name
+    grid = system.time_grid
     return {
-        port.variable: of_kind(by_name[port.variable].kind, drive.at(system.time_grid.start))
+        port.variable: of_kind(by_name[port.variable].kind, drive.at(grid.start + step * grid.step))
         for port, drive in drives.items()
         if port.component == name
     }

@@ -16,6 +16,7 @@ from ..base.progress import DELAY, Progress, phase
 from ..base.text import counted
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener
+from ..fmi.instance import Instance
 from ..fmi.process import load
 from ..interface.interface import Given
 from ..interface.units import IDENTITY
@@ -30,7 +31,7 @@ from ..metrics.metric import (
     metrics_of,
     needed,
 )
-from ..realtime.pacer import Pacer, Privileges, privileges
+from ..realtime.pacer import Pacer, Privileges, long_waits, privileges
 from ..recording.memory import EveryRow, MemoryListener
 from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.result import Known, Result
@@ -114,28 +115,32 @@ class Session:
         self._privileges = Privileges()
         self._stack = ExitStack()
         check_declared_steps(system)
-        self._remarks = (*system.notes, *system.once(remarks))
+        waits = long_waits(system, self.pacer.realtime) if self.pacer else []
+        self._remarks = (*system.notes, *system.once(remarks), *waits)
         self._tell(self._remarks)
         try:
             with interruptible(), _folder_kept():
                 self._begin(listeners, every, engine)
             self._tell(self._early())
-            if paced and self.pacer:
-                self._ask_for_privileges(paced, self.pacer)
+            if paced:
+                self._ask_for_privileges(paced)
         except BaseException:
             self._stack.close()
             raise
 
     def _begin(self, listeners: Sequence[Listener], every: int, engine: Engine) -> None:
         """Load the FMUs, initialise them and hand on the row of t = 0; the stack undoes it all."""
-        instances = []
+        self._instances: list[Instance] = []
+        self._stack.callback(self._close_instances)
         with phase(f"loading {len(self.system.components)} FMUs"):
-            for component in self.system.components:
-                LOGGER.info("%s", _loaded(component))
-                instances.append(load(component))
-                self._stack.callback(instances[-1].close)
+            self._load_instances()
         self._master = Master(
-            self.system, instances, lambda *rows: self._dispatch(*rows), engine, self.pacer
+            self.system,
+            self._instances,
+            lambda *rows: self._dispatch(*rows),
+            engine,
+            self.pacer,
+            self._renew_instances,
         )
         slots, texts = self._master.slots, self._master.texts
         receivers = (self._memory, *listeners)
@@ -148,10 +153,27 @@ class Session:
             self._master.initialise()
         self._initialised = True
 
-    def _ask_for_privileges(self, realtime: Realtime, pacer: Pacer) -> None:
+    def _load_instances(self) -> None:
+        for component in self.system.components:
+            LOGGER.info("%s", _loaded(component))
+            self._instances.append(load(component))
+
+    def _close_instances(self) -> None:
+        """Close them in the opposite order, all of them even where one fails."""
+        with ExitStack() as stack:
+            for instance in self._instances:
+                stack.callback(instance.close)
+        self._instances.clear()
+
+    def _renew_instances(self) -> Sequence[Instance]:
+        """Other instances of the same FMUs, for a loop that is initialised anew."""
+        self._close_instances()
+        self._load_instances()
+        return self._instances
+
+    def _ask_for_privileges(self, realtime: Realtime) -> None:
         """What a run in real time asks of the system; what that refuses is a warning."""
-        granted = privileges(realtime, pacer.sleeps or self._master.runs_alone)
-        self._privileges = self._stack.enter_context(granted)
+        self._privileges = self._stack.enter_context(privileges(realtime))
         for line in self._privileges.refused:
             LOGGER.warning("%s", line)
 
@@ -321,6 +343,8 @@ class Session:
             to_si={n: c for n, c in self._in_si.conversions.items() if n in columns},
             known=self._known(),
             ended_at=self.ended_at,
+            limits=master.watches.trips(),
+            initialised_anew=tuple(master.renewed),
         )
 
     def _of_proxies(self, step: float) -> list[str]:
@@ -365,6 +389,7 @@ class Session:
             *self._early(),
             *self._dispatch.log,
             *master.scenario.log,
+            *master.watches.log,
             *master.warnings(),
             *rejected,
             *master.ends,

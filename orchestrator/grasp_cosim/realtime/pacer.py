@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,13 +25,16 @@ from ..base.errors import InputError, choices
 from ..base.system_calls import NotPossible, cpus, lock_memory, pin, put_first
 from ..system.description import System
 from ..system.parts import Realtime
+from ..system.times import NANOSECONDS
 from .timing import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
 
 SPIN_NS = 200_000
 """Before the deadline the pacer does not sleep any more: it may be woken too late."""
 
-MOST_SPIN = 0.85
-"""The most of a period that it spins: a real-time priority is broken off where it never sleeps."""
+MOST_SPIN = 0.4
+"""The most of a period that it spins: Linux breaks a real-time priority off where there is hardly
+any sleep, for 40 to 50 ms in a second. At this share it never was, at 10 kHz.
+"""
 
 SLICE_NS = 50_000_000
 """The longest sleep between two looks at Ctrl-C."""
@@ -57,6 +60,17 @@ class HaltError(Exception):
     """The run was interrupted while it waited for the beginning of a step."""
 
 
+class StallError(Exception):
+    """A step would begin so late that the peers would get commands from what was measured before.
+
+    late is by how much, in s.
+    """
+
+    def __init__(self, late: float) -> None:
+        super().__init__(late)
+        self.late = late
+
+
 class _State(ctypes.Structure):
     """The state of a pacer, which compiled code goes on with: see master/loop.c."""
 
@@ -64,7 +78,7 @@ class _State(ctypes.Structure):
         (name, ctypes.c_int64)
         for name in (
             *("origin", "base", "base_step", "numerator", "denominator", "spin", "slept"),
-            *("breath", "shifts", "stops", "arrived", "late"),
+            *("breath", "shifts", "stops", "arrived", "late", "tolerance", "stall"),
         )
     ]
 
@@ -83,14 +97,22 @@ class Pacer:
         halted: Callable[[], bool] = lambda: False,
         clock: tuple[Callable[[], int], Callable[[float], None]] | None = None,
     ) -> None:
-        """InputError as of Realtime.period() and Meter, and where there is no such CPU."""
+        """InputError as of Realtime.period() and Meter, where there is no such CPU, or where steps
+        would be caught up with although a component is a proxy.
+        """
         last = max((os.cpu_count() or 1) - 1, *cpus(), 0)
         if realtime.cpu is not None and realtime.cpu > last:
             raise InputError(f"cpu = {realtime.cpu}: no such CPU here; must be from 0 to {last}")
+        proxies = [component.name for component in system.components if component.is_proxy]
+        if proxies and realtime.overrun == "catch-up":
+            raise InputError(
+                f"realtime: overrun = 'catch-up': a burst of steps would go to the hardware behind "
+                f"{choices(proxies)}; must be 'continue' or 'stop' where a component is a proxy"
+            )
+        realtime = resolved(realtime, bool(proxies))
         period = realtime.period(system.step_ns)
         self.meter = Meter(system, realtime, period)
-        self.sleeps = period > SPIN_NS
-        """True if there is time to sleep between two steps."""
+        self.realtime = realtime
         self.width = HEAD + len(self.meter.segments)
         """The number of values it needs in a row."""
         self.halted = halted
@@ -101,7 +123,9 @@ class Pacer:
         self._state = _State(
             self._now(), 0, -1, *self._period, min(SPIN_NS, int(MOST_SPIN * period)), 0,
             BREATH_NS if realtime.priority is not None else 0,
-            realtime.overrun == "continue", realtime.overrun == "stop",
+            realtime.overrun == "continue", realtime.overrun == "stop", 0, 0,
+            round(realtime.tolerance * NANOSECONDS),
+            round(realtime.stall * NANOSECONDS) if proxies else 0,
         )  # fmt: skip
         self._taken = self._recording = 0
         self.bind(np.zeros(self.width), lambda _: None)
@@ -139,6 +163,8 @@ class Pacer:
         now = self._arrive(step)
         due = self._due(step)
         head[ARRIVED], head[LATE] = now, state.late
+        if 0 < state.stall < state.late:
+            raise self.stall()
         if state.late > 0 and state.shifts:
             state.base, state.base_step, due = now, step, now
         if now + state.spin < due:
@@ -163,6 +189,14 @@ class Pacer:
         """The error where it is to stop, also of compiled code."""
         self.meter.end(self._state.arrived, self._state.late)
         return OverrunError()
+
+    def stall(self) -> StallError:
+        """The error where a step would begin too late, also of compiled code."""
+        return StallError(self._state.late / NANOSECONDS)
+
+    def begin_anew(self) -> None:
+        """Have the schedule begin with the next step."""
+        self._state.base_step = -1
 
     def record(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
         """Take the rows of steps, by the numbers they lead to; handing them on is recording."""
@@ -195,7 +229,7 @@ class Pacer:
         if state.base_step < 0:
             state.base, state.base_step, state.slept = arrived, step, arrived
         state.arrived, state.late = arrived, arrived - self._due(step)
-        if state.late > 0 and state.stops:
+        if state.late > state.tolerance and state.stops:
             raise self.overrun()
         return arrived
 
@@ -204,10 +238,19 @@ class Pacer:
         return int(self._state.base) + since * self._period[0] // self._period[1]
 
 
+def resolved(realtime: Realtime, has_proxies: bool) -> Realtime:
+    """The same with what follows on an overrun, where that is left to us."""
+    if realtime.overrun != "auto":
+        return realtime
+    return replace(realtime, overrun="continue" if has_proxies else "catch-up")
+
+
 LIMIT = "needs {}, or a limit that is high enough (ulimit {} in /etc/security/limits.conf)"
 
-THROTTLE = Path("/proc/sys/kernel/sched_rt_runtime_us")
-"""The part of a second for threads of a real-time priority, in us; -1 where Linux has no limit."""
+KERNEL = Path("/proc/sys/kernel")
+"""Where Linux says what threads of a real-time priority may take of each period: two files, in us;
+no more than that, -1 for no limit.
+"""
 
 
 @dataclass(frozen=True)
@@ -219,11 +262,10 @@ class Privileges:
 
 
 @contextmanager
-def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
+def privileges(realtime: Realtime) -> Iterator[Privileges]:
     """Asks for what is wanted, and keeps the garbage collector away; all is put back at the end.
 
-    Priority and CPU are those of the calling thread. sleeps says whether it will sleep between two
-    steps: if not, the kernel may break its priority off, which is then said.
+    Priority and CPU are those of the calling thread. What the kernel permits of a priority is said.
     """
     found = Privileges()
     thread, cpu, priority = threading.get_native_id(), realtime.cpu, realtime.priority
@@ -251,12 +293,29 @@ def privileges(realtime: Realtime, sleeps: bool = True) -> Iterator[Privileges]:
             except OSError as error:
                 found.refused.append(f"{name}: {error.strerror}; {remedy}")
             else:
-                found.granted.append(name)
-        with suppress(OSError):  # not Linux, which has no such limit
-            if priority is not None and not sleeps and int(THROTTLE.read_text()) >= 0:
-                found.refused.append(
-                    "SCHED_FIFO all the time: the period leaves no time to sleep, and the kernel "
-                    "stops such a thread for some ms in every second; sysctl "
-                    "kernel.sched_rt_runtime_us=-1 lifts that, or run without a priority"
-                )
+                found.granted.append(name + permitted() if name.startswith("SCHED") else name)
         yield found
+
+
+def permitted() -> str:
+    """What part of the time the kernel permits a thread of a real-time priority, in words."""
+    with suppress(OSError, ValueError):  # not Linux, which has no such limit
+        runtime, period = (
+            int((KERNEL / f"sched_rt_{name}_us").read_text()) for name in ("runtime", "period")
+        )
+        if 0 <= runtime < period:
+            return (
+                f" (the kernel permits it {100 * runtime / period:g} % of each {period / 1e6:g} s)"
+            )
+    return ""
+
+
+def long_waits(system: System, realtime: Realtime) -> list[str]:
+    """A line for each proxy that may wait for its peer for longer than a period."""
+    period = float(realtime.period(system.step_ns)) / NANOSECONDS
+    return [
+        f"{component.name}: proxy.timeout = {timeout:g} s is longer than the period of {period:g} "
+        "s: one answer that is lost makes the steps after it late"
+        for component in system.components
+        if component.is_proxy and (timeout := float(component.of_proxy("timeout"))) > period
+    ]

@@ -187,6 +187,7 @@ class Meter:
         Jacobi scheme all components take their inputs before the first one steps."""
         self._system, self._realtime, self._period = system, realtime, float(period)
         self._names = (*components, EXCHANGE)
+        self._culprits = {c.name: f"{c.name}'s peer" for c in system.components if c.is_proxy}
         self._every = {name: system.period(name) for name in components}
         self._file = TemporaryFile(prefix="grasp_times_")  # noqa: SIM115 - open as long as this
         finalize(self, self._file.close)
@@ -307,7 +308,13 @@ class Meter:
         spent = spent[worst, np.arange(len(overdue))]
         columns = (v.tolist() for v in (steps[overdue], late[overdue], worst, spent))
         return [
-            Overrun(step, self._time(step), by / NANOSECONDS, names[i], took / NANOSECONDS)
+            Overrun(
+                step,
+                self._time(step),
+                by / NANOSECONDS,
+                self._culprits.get(names[i], names[i]),
+                took / NANOSECONDS,
+            )
             for step, by, i, took in zip(*columns, strict=True)
         ]
 

@@ -10,8 +10,8 @@ Signals = Mapping[str, npt.NDArray[Any]]
 Times = npt.NDArray[np.float64]
 
 STATE = ".proxy.state"
-LOST = 3
-"""The value of proxy.state while the peer is lost."""
+LOST, BACK = 3, 4
+"""The values of proxy.state while the peer is lost, and once it answers again."""
 
 COUNTS = ("missed", "late", "out_of_order", "duplicated", "rejected", "sessions")
 

@@ -58,6 +58,18 @@ class Rejection:
     first: float
 
 
+class Trip(NamedTuple):
+    """A limit that was exceeded: its condition, what follows on it, when it first was, in s, by
+    which value, and at how many communication points.
+    """
+
+    limit: str
+    then: str
+    first: float
+    value: float
+    steps: int
+
+
 class View(NamedTuple):
     """How a result is shown beyond its numbers: a picture, which is drawn and may be written to a
     path, by the stem of its file, and whether it fits a result.
@@ -132,6 +144,10 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """Where it was read from; None of a run that was just done."""
     ended_at: float | None = None
     """The time of the last row in s where an FMU asked for the end before the stop time."""
+    limits: tuple[Trip, ...] = ()
+    """The limits of the system that were exceeded."""
+    initialised_anew: tuple[float, ...] = ()
+    """When the whole loop was initialised anew, in s, as a lost peer was back."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; KeyError, with the names nearest to it, where there is none."""
@@ -273,6 +289,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             "log": list(self.log),
             "rejections": {name: asdict(r) for name, r in self.rejections.items()},
             **({"timing": self.timing.as_dict()} if self.timing else {}),
+            **({"exceeded": [trip._asdict() for trip in self.limits]} if self.limits else {}),
+            **({"initialised_anew": list(self.initialised_anew)} if self.initialised_anew else {}),
             **self.origin,
         }
         write_json(Path(path), report)

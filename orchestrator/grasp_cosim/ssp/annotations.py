@@ -28,10 +28,12 @@ from ..base.checks import check_values
 from ..base.errors import InputError, choices, nearest
 from ..system.description import System
 from ..system.parts import (
+    Acceptance,
     Event,
     Fault,
     Initialisation,
     Isolation,
+    Limit,
     Logging,
     Port,
     Realtime,
@@ -92,6 +94,8 @@ class Extras:
     realtime: Realtime = Realtime()
     metrics: tuple[str, ...] = ()
     record: Record = Record()
+    limits: tuple[Limit, ...] = ()
+    verdict: Acceptance = Acceptance()
 
 
 def extras_of(system: System) -> Extras:

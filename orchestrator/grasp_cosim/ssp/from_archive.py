@@ -139,6 +139,8 @@ def read_ssp(
         extras.record,
         inputs=inputs,
         outputs=outputs,
+        limits=extras.limits,
+        verdict=extras.verdict,
     )
 
 

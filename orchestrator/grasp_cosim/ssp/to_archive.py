@@ -79,7 +79,8 @@ def _notes(system: System) -> Iterable[str]:
             if not variable.supported:
                 port = Port(component.name, variable.name)
                 yield f"{port} is of type {variable.nature}: it has no connector"
-    for parts, what in ((system.events, "event"), (system.faults, "fault")):
+    special = ((system.events, "event"), (system.faults, "fault"), (system.limits, "limit"))
+    for parts, what in special:
         if parts:
             yield f"only in the annotation: {counted(len(parts), what)}"
     if system.input:

@@ -182,6 +182,7 @@ def stated(system: Structure, name: str) -> frozenset[str]:
         for port in event.set:
             ports += system.elements(port)
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
+    conditions += [limit.when for limit in system.limits]
     ports += [condition.port for condition in conditions if condition]
     columns = system.input.columns if system.input else {}
     ports += [port for port, column in columns.items() if column.unit is None]

@@ -24,10 +24,15 @@ Isolation = Literal["none", "process"]
 ISOLATIONS: tuple[str, ...] = get_args(Isolation)
 Relation = Literal["<", "<=", ">", ">=", "==", "!="]
 RELATIONS: tuple[str, ...] = get_args(Relation)
-Overrun = Literal["catch-up", "continue", "stop"]
+Overrun = Literal["auto", "catch-up", "continue", "stop"]
+Then = Literal["abort", "warn"]
+THENS: tuple[str, ...] = get_args(Then)
 Loops = Literal["iterate", "refuse"]
 Logging = bool | tuple[str, ...]
 """What an FMU is to log beside warnings and errors: all, nothing, or some of its categories."""
+
+PROXY_STATE = "proxy.state"
+"""The output that tells a proxy from other FMUs, and what state its connection is in."""
 
 FINEST, COARSEST = 1e-13, 0.1
 """Relative tolerances of a solver: beyond the first one there is rounding alone."""
@@ -118,6 +123,19 @@ class Component:
         return (
             replace(self, fmu=self.native, native=None).interface if self.native else self.interface
         )
+
+    @property
+    def is_proxy(self) -> bool:
+        """True if a peer has its outputs, over a network."""
+        return PROXY_STATE in self._read[0].by_name
+
+    def of_proxy(self, setting: str) -> Value:
+        """The start value of a parameter of a proxy, by its name behind proxy."""
+        own = f"proxy.{setting}"
+        variable = self._read[0].by_name[own]
+        name = next((name for name, theirs in self.rename.items() if theirs == own), own)
+        value = self.values.get(name, variable.start)
+        return value in (True, "true", "1") if variable.kind == "Boolean" else value or ""
 
     @property
     def is_current(self) -> bool:
@@ -280,6 +298,46 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
+class Limit:
+    """A condition that must not hold at any communication point.
+
+    Where it does, the run is aborted there, or it goes on, and a warning tells of it.
+    """
+
+    when: Condition
+    then: Then = "abort"
+
+
+@dataclass(frozen=True, slots=True)
+class Acceptance:
+    """What a run with a bench, in real time or with limits may come to, and still pass.
+
+    lost: how often a peer was lost; missed, overruns, implausible: shares of the steps; trips of
+    peers; limited: commands that were clamped; lead: of a peer's clock in s; refused: what the
+    operating system did not grant; initialised_anew: how often the loop was; warnings: limits that
+    were exceeded.
+    """
+
+    lost: int = 0
+    missed: float = 0.01
+    implausible: float = 0.01
+    trips: int = 0
+    limited: int = 0
+    lead: float = 0.1
+    initialised_anew: int = 0
+    overruns: float = 0.01
+    refused: int = 0
+    warnings: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("lost", "trips", "limited", "initialised_anew", "refused", "warnings"):
+            whole(name, getattr(self, name), 0, must="a whole number, at least 0")
+        for name in ("missed", "implausible", "overruns"):
+            number(name, getattr(self, name), 0.0, 1.0, must="a share of the steps, from 0 to 1")
+        number("lead", self.lead, 0.0, must="a time in s, at least 0")
+
+
+@dataclass(frozen=True, slots=True)
 class Initialisation:
     """Options for algebraic loops at t = 0: refused, or iterated to a relative tolerance."""
 
@@ -300,20 +358,27 @@ class Realtime:
 
     factor is the speed relative to real time. overrun is what follows on a step that ends after the
     next one should have begun: "catch-up" keeps to the schedule, late steps are done without
-    waiting; "continue" shifts it by the delay; "stop" ends the run with a SimulationError. priority
-    is that of SCHED_FIFO, 1 to 99, cpu the number of the one to stay on, both None for as it is.
+    waiting; "continue" shifts it by the delay; "stop" ends the run with a SimulationError, where
+    the delay is more than tolerance, in s. "auto" is "catch-up", but "continue" where a component
+    is a proxy: a burst of steps is nothing for hardware. There a delay of more than stall, in s, is
+    a loss of all peers. priority is that of SCHED_FIFO, 1 to 99, cpu the number of the one to stay
+    on, both None for as it is.
     lock_memory keeps the process from being swapped out.
     """
 
     factor: float = 1.0
-    overrun: Overrun = "catch-up"
+    overrun: Overrun = "auto"
     priority: int | None = None
     cpu: int | None = None
     lock_memory: bool = False
+    tolerance: float = 0.0
+    stall: float = 0.1
 
     def __post_init__(self) -> None:
         number("factor", self.factor, 0.0, above=True, must="a finite number > 0")
         choice("overrun", self.overrun, get_args(Overrun))
+        number("tolerance", self.tolerance, 0.0, LONGEST, must="a time in s, at least 0")
+        number("stall", self.stall, 0.0, LONGEST, above=True, must="a time in s, over 0")
         if self.priority is not None:
             whole("priority", self.priority, 1, 99, must="a whole number from 1 to 99")
         if self.cpu is not None:

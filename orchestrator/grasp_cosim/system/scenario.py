@@ -1,5 +1,5 @@
-"""Events and faults as entries of the system file, and back; and their checks: they act on what
-exists, in a way that it permits. The format: docs/system_files.md.
+"""Events, faults and limits as entries of the system file, and back; and their checks: they act on
+what exists, in a way that it permits. The format: docs/system_files.md.
 """
 
 from __future__ import annotations
@@ -27,10 +27,12 @@ from .connectors import read_at, taps
 from .faults import FAULTS, RANDOM
 from .parts import (
     RELATIONS,
+    THENS,
     Condition,
     Connection,
     Event,
     Fault,
+    Limit,
     Port,
     as_lists,
     as_port,
@@ -77,6 +79,24 @@ def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> t
             )
         )
     return tuple(found)
+
+
+def read_limits(name: str, entries: Any) -> tuple[Limit, ...]:
+    """The limits of a list of entries; as read_events()."""
+    found = []
+    for place, entry in _entries(name, "limits", entries):
+        check_keys(place, entry, {"when", "then"})
+        condition = _condition(place, entry)
+        if condition is None:
+            raise InputError(f"{place}: no entry 'when'; must have one, like 'plant.gap[1] < 0.01'")
+        then = choice(f"{place}: then", entry.get("then", THENS[0]), THENS)
+        found.append(Limit(condition, then))
+    return tuple(found)
+
+
+def limit_entry(limit: Limit) -> dict[str, Any]:
+    """The entry that reads as this limit; it fits into JSON."""
+    return {"when": str(limit.when), "then": limit.then}
 
 
 def event_entry(event: Event) -> dict[str, Any]:
@@ -161,6 +181,8 @@ def check_scenario(system: Structure) -> None:
         _check_condition(system, event.when, place)
         for port, value in event.set.items():
             check_setting(system, port, value, f"{place}: set.{port}")
+    for i, limit in enumerate(system.limits):
+        _check_condition(system, limit.when, f"{system.name}: limits[{i}]")
     for i, fault in enumerate(system.faults):
         _check_fault(system, fault, f"{system.name}: faults[{i}]")
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from .parts import Component, Realtime
-from .scenario import event_entry, fault_entry
+from .parts import Acceptance, Component, Realtime
+from .scenario import event_entry, fault_entry, limit_entry
 from .stimuli import input_entry
 from .structure import Structure
 from .times import in_seconds
@@ -42,6 +42,10 @@ def settings(system: Structure) -> dict[str, Any]:
     ]
     entries["events"] = [event_entry(e) for e in system.events]
     entries["faults"] = [fault_entry(f) for f in system.faults]
+    if system.limits:
+        entries["limits"] = [limit_entry(limit) for limit in system.limits]
+    if system.verdict != Acceptance():
+        entries["verdict_limits"] = asdict(system.verdict)
     if system.realtime != Realtime():
         entries["realtime"] = asdict(system.realtime)
     if system.input:

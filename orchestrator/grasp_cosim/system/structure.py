@@ -14,11 +14,13 @@ from ..base.si_units import Unit
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion
 from .parts import (
+    Acceptance,
     Component,
     Connection,
     Event,
     Fault,
     Initialisation,
+    Limit,
     Port,
     Realtime,
     SystemInput,
@@ -46,7 +48,9 @@ class Structure:
     name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
     input drives inputs without a connection, and tunable parameters. metrics are names of groups of
     ours. record says what is recorded. inputs and outputs are those of the system itself, which an
-    archive may have, by name. as_read is settings.made_of() when it was read.
+    archive may have, by name. limits are conditions that must not hold, and verdict is what such a
+    run, or one with a bench or in real time, may come to. as_read is settings.made_of() when it was
+    read.
     """
 
     name: str
@@ -69,6 +73,8 @@ class Structure:
     record: Record = Record()
     inputs: Mapping[str, SystemInput] = field(default_factory=dict)
     outputs: Mapping[str, SystemOutput] = field(default_factory=dict)
+    limits: tuple[Limit, ...] = ()
+    verdict: Acceptance = Acceptance()
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property

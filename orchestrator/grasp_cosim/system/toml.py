@@ -30,6 +30,7 @@ from ..interface.read import read_interface
 from .changes import replaced, with_given, with_old_values
 from .parts import (
     ISOLATIONS,
+    Acceptance,
     Component,
     Connection,
     Initialisation,
@@ -39,7 +40,7 @@ from .parts import (
     as_port,
 )
 from .record import Record
-from .scenario import read_events, read_faults
+from .scenario import read_events, read_faults, read_limits
 from .stimuli import INTERPOLATIONS, Stimuli, read_stimuli
 from .structure import Structure, experiment
 from .times import in_nanoseconds
@@ -50,7 +51,7 @@ Place = Callable[[str], str]
 
 SECTIONS = (
     "experiment", "components", "connections", "initialisation", "events", "faults", "roles",
-    "presets", "input", "realtime", "metrics",
+    "presets", "input", "realtime", "metrics", "limits", "verdict",
 )  # fmt: skip
 """The entries of a system file, which are no names of components."""
 
@@ -63,6 +64,7 @@ PLACES: Mapping[str, Sequence[str]] = {
     "initialisation": Initialisation.__slots__,
     "roles": (),
     "realtime": Realtime.__slots__,
+    "verdict": Acceptance.__slots__,
     "input": ("file", "interpolation"),
 }
 """The sections that have single values, each with its entries, where these are always the same."""
@@ -120,6 +122,7 @@ def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[st
         "connections": connections,
         "events": read_events(path.name, file.get("events", [])),
         "faults": read_faults(path.name, file.get("faults", []), connections),
+        "limits": read_limits(path.name, file.get("limits", [])),
         "presets": file["presets"],
         "metrics": tuple(file.get("metrics", ())),
         "input": stimuli or found["input"],
@@ -151,10 +154,12 @@ def sections(
     for role, name in tables["roles"].items():
         text(place(f"roles.{role}"), name, "the name of a component")
     loops, pace = (was.initialisation, was.realtime) if was else (Initialisation(), Realtime())
+    verdict = was.verdict if was else Acceptance()
     return {
         **experiment(lambda key: place(f"experiment.{key}"), tables["experiment"]),
         "initialisation": _changed(place("initialisation"), loops, tables["initialisation"]),
         "realtime": _changed(place("realtime"), pace, tables["realtime"]),
+        "verdict": _changed(place("verdict"), verdict, tables["verdict"]),
         "roles": {**(was.roles if was else {}), **tables["roles"]},
         "input": _input(was.input if was else None, tables["input"], place, folder),
     }

@@ -188,8 +188,8 @@ _KINDS: dict[str, tuple[str, type[Value], Callable[[Any], bool]]] = {
 class Message(NamedTuple):
     """A datagram taken apart, as in HEAD; times in s, but `sent` in ns of the proxy's clock.
 
-    `counted` is of INITIALISE and STEP the number of requests before it, back to the newest one whose
-    answer the proxy has; of OUTPUTS the number of trips of the peer; else 0.
+    `counted` is of INITIALISE and STEP the number of requests before it, back to the newest one
+    whose answer the proxy has; of OUTPUTS the number of trips of the peer; else 0.
     """
 
     kind: int

@@ -553,23 +553,30 @@ static void proxy_note_miss(Slave *s)
     }
 }
 
-/* An answer came in time: the peer is lost where it tells that it tripped, or what time it is in */
-static void proxy_note_answer(Slave *s, double end)
+/* An answer came in time: 1 if it is of a loop that is closed. The peer is lost where it tells that it
+   tripped, or what time it is in, and then its outputs are not taken. */
+static int proxy_is_closed(Slave *s, double end)
 {
     Model *m = &s->model;
     const Client *c = &m->channel.client;
     double greatest = s->values[PROXY_GREATEST_LEAD];
-    m->state = CONNECTED;
-    m->missed = 0;
     m->lead = c->outputs_time - end;
     if (c->trips > 0) {
         text_put(proxy_say_loss(s), "its watchdog or a limit of its own tripped, it is in its safe state");
-        proxy_lose(s);
     } else if (!(fabs(m->lead) <= greatest)) {
         text_say(proxy_say_loss(s), "its clock is %g s %s: must be within %g s (proxy.greatest_lead)",
                  fabs(m->lead), m->lead > 0.0 ? "ahead" : "behind; does the run keep to the clock", greatest);
-        proxy_lose(s);
+    } else {
+        return 1;
     }
+    proxy_lose(s);
+    return 0;
+}
+
+static void proxy_note_answer(Slave *s)
+{
+    s->model.state = CONNECTED;
+    s->model.missed = 0;
 }
 
 /* Send inputs and parameters, wait for the outputs; without them, hold or lose */
@@ -585,12 +592,15 @@ static void proxy_exchange(Slave *s, double time, double h)
     }
     answered = channel_step(&m->channel, time, h, m->request, proxy_deadline(s, PROXY_TIMEOUT));
     proxy_note_sent(s, time + h);
+    if (answered && !proxy_is_closed(s, time + h)) {
+        return;
+    }
     if (!proxy_take(s) && answered) {
         m->channel.client.counters.missed++;
         answered = 0;
     }
     if (answered) {
-        proxy_note_answer(s, time + h);
+        proxy_note_answer(s);
     } else {
         proxy_note_miss(s);
     }
