@@ -170,8 +170,9 @@ def test_a_cpu_that_is_not_there_is_a_mistake(command, tmp_path):
 
 def test_what_is_refused_is_on_standard_error(command, monkeypatch, caplog):
     monkeypatch.delattr(os, "sched_setaffinity", raising=False)
-    code, out, _ = command(*PACED, "--set", "realtime.cpu=0", "--python", "--json")
-    assert code == 0
+    code, out, err = command(*PACED, "--set", "realtime.cpu=0", "--python", "--json")
+    assert code == 1
+    assert "verdict: privileges that the system refused: 1; must be at most 0" in err
     assert json.loads(out)["realtime"]["refused"] == caplog.messages
     assert caplog.messages == ["CPU 0: not possible on this operating system"]
 

@@ -8,7 +8,19 @@ TIME = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
 
 def diagnostics(**values):
     quiet = dict.fromkeys(
-        ("missed", "consecutive_missed", "late", "out_of_order", "duplicated", "rejected", "age"),
+        (
+            "missed",
+            "consecutive_missed",
+            "late",
+            "out_of_order",
+            "duplicated",
+            "rejected",
+            "age",
+            "trips",
+            "limited",
+            "implausible",
+            "lead",
+        ),
         [0.0] * 6,
     )
     usual = {**quiet, "state": [1] * 6, "sessions": [1] * 6, "round_trip_time": [0.001] * 6}
@@ -38,13 +50,15 @@ def test_of_one_that_is_recorded_in_part_there_are_no_figures():
 
 def test_a_loss_and_a_return_are_named():
     signals = diagnostics(
-        state=[1, 2, 3, 3, 1, 3], missed=[0, 1, 2, 3, 3, 4], consecutive_missed=[0, 1, 2, 3, 0, 1],
-        sessions=[1, 1, 1, 1, 2, 2], age=[0.0, 0.1, 0.2, 0.3, 0.0, -2.5],
+        state=[1, 2, 3, 4, 1, 3], missed=[0, 1, 2, 3, 0, 1], consecutive_missed=[0, 1, 2, 3, 0, 1],
+        age=[0.0, 0.1, 0.2, 0.3, 0.0, -2.5], lead=[0.0, 0.0, 0.0, -0.3, 0.0, 0.2],
+        trips=[0, 0, 1, 1, 0, 0], limited=[0, 1, 1, 2, 0, 3], implausible=[1] * 6,
     )  # fmt: skip
     (figures,) = proxy_figures(TIME, signals).values()
     assert figures["lost"] == [TIME[2], TIME[5]]
     assert figures["back"] == [TIME[4]]
     assert (figures["missed"], figures["most_in_a_row"], figures["ahead"]) == (4, 3, 2.5)
+    assert (figures["lead"], figures["sessions"]) == (0.3, 2)
     assert proxy_lines(TIME, signals, 0.1)[:-1] == [
         "arm: the peer was lost at t = 0.2 s and came back at t = 0.4 s; its outputs were "
         "meanwhile as proxy.on_loss says",
@@ -52,6 +66,9 @@ def test_a_loss_and_a_return_are_named():
         "proxy.on_loss says, and with proxy.resume = true it may come back",
         "arm: the peer was started anew, and its model set up from the start: 2 sessions in this "
         "run",
+        "arm: the peer put itself into its safe state 1 time",
+        "arm: 5 commands beyond the limits of the proxy: clamped",
+        "arm: 1 answer dropped that cannot have been measured",
         "arm: the peer's clock was up to 2.5 s ahead of the run, which did not keep up",
     ]
 

@@ -128,7 +128,10 @@ def run(
     if not result.came_to_its_end:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)
-    return 0 if result.signals else NEGATIVE  # as the log says
+    for criterion in result.verdict:
+        if not criterion.passed:
+            say(f"verdict: {criterion}")
+    return 0 if result.signals and result.passed else NEGATIVE  # as is said
 
 
 def _write(

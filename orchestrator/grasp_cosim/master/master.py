@@ -100,6 +100,8 @@ class Master:
         self._pacer = pacer
         self.renewed: list[float] = []
         """The times in s at which the loop was initialised anew."""
+        self.peers: dict[str, dict[str, str]] = {}
+        """The name and the build of the peer of each proxy."""
         self._pause = NEVER
         self._aborted = ""
         self._warned_before: list[str] = []
@@ -187,6 +189,7 @@ class Master:
             self.values[slot] = float(value)
         for instance in self.instances:
             instance.quieten()
+        self.peers = {c.name: _peer_of(c, i) for c, i in pairs if c.is_proxy}
 
     def _fetch_others(self, values: dict[Port, Value]) -> None:
         """What was not passed on: locals, say, or elements of connected arrays without a source."""
@@ -504,3 +507,13 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
         if status <= WARNING:
             clock[0] = end if clock[0] + length >= end - smallest / 2 else clock[0] + length
     raise instance.failure(status, float(clock[0]))
+
+
+def _peer_of(component: Component, instance: Instance) -> dict[str, str]:
+    """The name and the build of a proxy's peer, which it knows once it is initialised."""
+    by_name = instance.interface.by_name
+    own = {theirs: name for name, theirs in component.rename.items()}
+    names = {key: own.get(f"proxy.{key}", f"proxy.{key}") for key in ("name", "build")}
+    known = {key: name for key, name in names.items() if name in by_name}
+    values = instance.get([by_name[name] for name in known.values()])
+    return {key: str(value) for key, value in zip(known, values, strict=True)}

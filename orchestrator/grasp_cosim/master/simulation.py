@@ -345,6 +345,7 @@ class Session:
             ended_at=self.ended_at,
             limits=master.watches.trips(),
             initialised_anew=tuple(master.renewed),
+            peers=master.peers,
         )
 
     def _of_proxies(self, step: float) -> list[str]:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
@@ -31,7 +32,7 @@ from ..system.description import System
 from .arrow import ArrowListener
 from .csv import CsvListener
 from .memory import Rows, typed, writing
-from .result import OF_ANY, Known, Rejection, Result
+from .result import OF_ANY, Known, Rejection, Result, Trip
 from .run_json import MADE, MADE_BESIDE, ORIGIN, read_run_json, unreadable
 
 if TYPE_CHECKING:
@@ -212,7 +213,10 @@ def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
     """The date now, the versions of what makes the run, which FMUs those are, and the command."""
     from importlib.metadata import version
 
-    fmus = {c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool} for c in system.components}
+    fmus = {
+        c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool, "sha256": _hash(c.loaded.path)}
+        for c in system.components
+    }
     for c in system.components:
         if c.native:  # the FMU whose place it takes
             fmus[c.name]["native_twin_of"] = c.interface.guid
@@ -225,6 +229,11 @@ def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
         "fmus": fmus,
         "command": list(command),
     }
+
+
+def _hash(path: Path) -> str | None:
+    """The SHA-256 of a file; None of what is a folder."""
+    return sha256(path.read_bytes()).hexdigest() if path.is_file() else None
 
 
 # ------------------------------------------------------------------ read back
@@ -291,6 +300,9 @@ def load_run(folder: str | Path) -> Result:
         origin={key: written[key] for key in ORIGIN if key in written},
         to_si={name: Conversion(**c) for name, c in written.get("to_si", {}).items()},
         folder=folder,
+        limits=tuple(Trip(**trip) for trip in written.get("exceeded", ())),
+        initialised_anew=tuple(written.get("initialised_anew", ())),
+        peers=written.get("peers", {}),
     )
     _check_rows(rows, read, written)
     in_part = read.every > 1 or "record" in written

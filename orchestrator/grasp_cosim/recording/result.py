@@ -28,6 +28,7 @@ from .arrow import ArrowListener
 from .csv import CsvListener
 from .mdf import MdfListener
 from .proxies import proxy_figures
+from .verdict import Criterion, judge
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,6 +149,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
     """The limits of the system that were exceeded."""
     initialised_anew: tuple[float, ...] = ()
     """When the whole loop was initialised anew, in s, as a lost peer was back."""
+    peers: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """By component that is a proxy, the name and the build of the peer that it has had last."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; KeyError, with the names nearest to it, where there is none."""
@@ -242,6 +245,23 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         }
         return Figures(figures | ({"proxies": proxies} if proxies else {}))
 
+    @cached_property
+    def verdict(self) -> tuple[Criterion, ...]:
+        """The criteria of a run with a bench, in real time or with limits; none of any other."""
+        return judge(
+            self.settings,
+            self.last_step if len(self.time) else 0,
+            self._figures.get("proxies", {}),
+            self.timing,
+            len(self.limits),
+            len(self.initialised_anew),
+        )
+
+    @property
+    def passed(self) -> bool:
+        """True if each criterion of the verdict is within its limit."""
+        return all(criterion.passed for criterion in self.verdict)
+
     @property
     def came_to_its_end(self) -> bool:
         """True if it reached the stop time, or the end that an FMU asked for before."""
@@ -291,6 +311,8 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             **({"timing": self.timing.as_dict()} if self.timing else {}),
             **({"exceeded": [trip._asdict() for trip in self.limits]} if self.limits else {}),
             **({"initialised_anew": list(self.initialised_anew)} if self.initialised_anew else {}),
+            **({"peers": {n: dict(p) for n, p in self.peers.items()}} if self.peers else {}),
+            **({"verdict": [c.as_dict() for c in self.verdict]} if self.verdict else {}),
             **self.origin,
         }
         write_json(Path(path), report)

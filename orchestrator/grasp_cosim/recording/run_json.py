@@ -6,12 +6,14 @@ known of its signals. Every entry is checked before anything is made of it, down
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from ..base.checks import is_number, is_value, known
 from ..base.errors import InputError
 from ..realtime.timing import SPREAD_KEYS
+from ..system.parts import Acceptance
 from ..system.times import LONGEST, NANOSECONDS
 
 Check = Callable[[str, Any], None]
@@ -188,6 +190,8 @@ MADE_BESIDE: Mapping[str, Check] = {
     "start": TIME,
     "record": _each(TEXT),
     "realtime": _named(_or_null("a number, boolean or string", is_value)),
+    "limits": _each(_object({"when": TEXT, "then": TEXT})),
+    "acceptance": _object({}, {f.name: NUMBER for f in fields(Acceptance)}),
 }
 """Entries that say how the run was made; the latter may be missing."""
 
@@ -195,7 +199,11 @@ ORIGIN: Mapping[str, Check] = {
     "title": TEXT,
     "date": TEXT,
     "versions": _named(TEXT),
-    "fmus": _named(_object({}, {"guid": TEXT, "tool": TEXT_OR_NULL, "native_twin_of": TEXT})),
+    "fmus": _named(
+        _object(
+            {}, {"guid": TEXT, "tool": TEXT_OR_NULL, "native_twin_of": TEXT, "sha256": TEXT_OR_NULL}
+        )
+    ),
     "command": _each(TEXT),
 }
 """Those that say when it was made, and with what; they may be missing."""
@@ -221,6 +229,12 @@ BESIDE: Mapping[str, Check] = {
     "proxies": _named(_named(ANYTHING)),
     "ended_at": NUMBER,
     "timing": TIMING,
+    "exceeded": _each(
+        _object({"limit": TEXT, "then": TEXT, "first": NUMBER, "value": NUMBER, "steps": COUNT})
+    ),
+    "initialised_anew": _each(NUMBER),
+    "peers": _named(_named(TEXT)),
+    "verdict": _each(_named(ANYTHING)),
 }
 """What is known of that besides; these may be missing."""
 

@@ -35,7 +35,16 @@ from ..recording.result import Result
 from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter
-from .tables import Caption, caption, metrics_table, number, settings_html, summary, svg_button
+from .tables import (
+    Caption,
+    caption,
+    metrics_table,
+    number,
+    protocol_html,
+    settings_html,
+    summary,
+    svg_button,
+)
 from .timing import TIMING, draw_result, timing_html
 
 LOGGER = logging.getLogger(__name__)
@@ -121,7 +130,9 @@ def page_html(result: Result, *, scene: Scene | None = None, limit: int = LIMIT)
     """Return the page as text, see write_page."""
     shown = fit(result.time, {name: _drawn(column) for name, column in result.items()}, limit)
     timing = result.timing
+    protocol = ("Test protocol", protocol_html(result)) if result.verdict else None
     sections = {
+        "protocol": protocol,
         "scene": (scene.title, scene.html) if scene else None,
         "traces": ("Traces", _traces(result, shown, scene)),
         "metrics": ("Metrics", metrics_table(result)),

@@ -184,6 +184,44 @@ def settings_html(result: Result) -> str:
     )
 
 
+def protocol_html(result: Result) -> str:
+    """The verdict on a run, criterion by criterion, and what was tested: FMUs and peers."""
+    failed = [criterion for criterion in result.verdict if not criterion.passed]
+    verdict = f"Failed: {', '.join(c.what for c in failed)}." if failed else "Passed."
+    criteria = [
+        (
+            f"<td>{escape(c.what)}</td>"
+            f'<td data-head="limit">at most {escape(number(c.limit))} {escape(c.unit)}</td>'
+            f'<td data-head="measured">{escape(number(c.measured))} {escape(c.unit)}</td>'
+            f'<td data-head="verdict" class="{"pass" if c.passed else "fail"}">'
+            f"{'pass' if c.passed else 'fail'}</td>"
+        )
+        for c in result.verdict
+    ]
+    tested = [
+        (
+            f'<td>{escape(name)}</td><td data-head="FMU">{escape(component["fmu"])}</td>'
+            f'<td data-head="SHA-256" class="w hash">{escape(_hash_of(result, name))}</td>'
+            f'<td data-head="peer">{escape(peer.get("name", ""))}</td>'
+            f'<td data-head="build of the peer" class="w hash">{escape(peer.get("build", ""))}</td>'
+        )
+        for name, component in result.settings["components"].items()
+        for peer in [result.peers.get(name, {})]
+    ]
+    kind = "warn" if failed else "sum"
+    heads = "<th>criterion</th><th>limit</th><th>measured</th><th>verdict</th>"
+    what = "<th>component</th><th>FMU</th><th>SHA-256</th><th>peer</th><th>its build</th>"
+    return (
+        f'<p class="{kind} verdict">{escape(verdict)}</p>{table(heads, criteria, "cards")}'
+        f"<h3>What was tested</h3>{table(what, tested, 'cards')}"
+    )
+
+
+def _hash_of(result: Result, name: str) -> str:
+    fmu = result.origin.get("fmus", {}).get(name, {})
+    return fmu.get("sha256") or "unknown"
+
+
 def origin_rows(origin: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """When and with what the run was made, as far as that is known."""
     if "date" in origin:

@@ -12,9 +12,11 @@ def as_json(result: Result) -> dict[str, Any]:
     """The metrics of a run and their units, and its timing where it was paced."""
     timing = {"realtime": result.timing.as_dict()} if result.timing else {}
     missing = list(result.measured.missing)
+    verdict = [criterion.as_dict() for criterion in result.verdict]
     return {
         **result.metrics,
         "units": result.metric_units,
+        **({"verdict": verdict} if verdict else {}),
         **({"missing_metrics": missing} if missing else {}),
         **timing,
     }
@@ -33,6 +35,10 @@ def as_text(result: Result) -> str:
         for metric in result.measured.metrics
     ]
     lines += result.measured.missing
+    if result.verdict:
+        failed = [criterion for criterion in result.verdict if not criterion.passed]
+        said = f"failed {len(failed)} of" if failed else "passed all"
+        lines.append(f"{'verdict':22s}{said} {len(result.verdict)} criteria")
     return "\n".join([*lines, *(timing_lines(result.timing) if result.timing else ())])
 
 

@@ -45,7 +45,7 @@ def settings(system: Structure) -> dict[str, Any]:
     if system.limits:
         entries["limits"] = [limit_entry(limit) for limit in system.limits]
     if system.verdict != Acceptance():
-        entries["verdict_limits"] = asdict(system.verdict)
+        entries["acceptance"] = asdict(system.verdict)
     if system.realtime != Realtime():
         entries["realtime"] = asdict(system.realtime)
     if system.input:
