@@ -3,7 +3,8 @@
  *   grasp-cosim build --native --c-only controller_c GraspController
  *   grasp-cosim proxy fmus/build/GraspController.fmu --c-header controller_c/grasp_controller.h
  *   cc -std=c99 -O2 -ffp-contract=off -I controller_c docs/controller_target.c \
- *       controller_c/GraspController.c -o controller_target -lm
+ *       controller_c/GraspController.c controller_c/GraspController_text.c \
+ *       -o controller_target -lm
  *   ./controller_target 5504
  */
 #define GRASP_CONTROLLER_EXAMPLE_MAIN
@@ -33,14 +34,14 @@ static const char *control(double h, const grasp_controller_inputs *inputs,
     int fault;
     memcpy(&u, inputs, sizeof u);
     memcpy(&p, parameters, sizeof p);
-    fault = GraspController_check(&p, why);
+    fault = GraspController_check(&p, NULL);
     if (!fault)
-        fault = h > 0.0 ? GraspController_step(&p, &u, h, &state, why)
-                        : GraspController_initial_state(&p, &u, &state, why);
-    if (!fault)
-        fault = GraspController_outputs(&p, &u, &state, &y, why);
-    if (fault)
+        fault = h > 0.0 ? GraspController_step(&p, &u, h, &state, &y, NULL)
+                        : GraspController_initial_state(&p, &u, &state, &y, NULL);
+    if (fault) {
+        GraspController_explain(&p, &u, h, &state, why);
         return why;
+    }
     memcpy(outputs, &y, sizeof y);
     return NULL;
 }

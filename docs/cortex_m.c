@@ -26,6 +26,12 @@ static void read_inputs(uint32_t k, GraspController_Inputs *u)
     memcpy(u, recorded + k * ROW, sizeof *u); /* Here: what is measured */
 }
 
+/* Before the first step, and whenever something fails */
+static void write_safe(void)
+{
+    /* Here: actuators off */
+}
+
 static void write_outputs(uint32_t k, const GraspController_Outputs *y)
 {
     const double *output = (const double *)(y + 1), *expected = recorded + (k + 1) * ROW;
@@ -51,10 +57,10 @@ static void say(const char *what, uint32_t number)
     semihosting(0x04, (uintptr_t)digit);
 }
 
-static void fail(const char *why)
+static void fail(const char *why, uint32_t number)
 {
-    semihosting(0x04, (uintptr_t)why); /* Here: actuators off */
-    semihosting(0x04, (uintptr_t) "\n");
+    write_safe();
+    say(why, number);
     for (;;) semihosting(0x18, 0x20023);
 }
 
@@ -66,14 +72,15 @@ extern char stack_low[], stack_top[], data_low[], data_top[], data_in_flash[], b
 int main(void)
 {
     static const GraspController_Parameters p = GRASPCONTROLLER_PARAMETERS_DEFAULTS;
-    static char why[GRASPCONTROLLER_WHY_SIZE];
     uint32_t k, ticks, all = 0, longest = 0, late = 0;
     const char *unused = stack_low;
     GraspController_Inputs u;
     GraspController_State x;
     GraspController_Outputs y;
-    if (GraspController_check(&p, why))
-        fail(why);
+    int wrong;
+    write_safe();
+    if (GraspController_check(&p, &wrong))
+        fail("a parameter is refused: number ", (uint32_t)wrong);
     TIMER[1] = PERIOD - 1;
     TIMER[0] = 7; /* on, by the clock of the core, pending at its end */
     for (k = 0; k < STEPS; k++) {
@@ -82,10 +89,9 @@ int main(void)
         PENDING = SEEN;
         ticks = TIMER[2];
         read_inputs(k, &u);
-        if ((k == 0 ? GraspController_initial_state(&p, &u, &x, why)
-                    : GraspController_step(&p, &u, h, &x, why)) ||
-            GraspController_outputs(&p, &u, &x, &y, why))
-            fail(why);
+        if (k == 0 ? GraspController_initial_state(&p, &u, &x, &y, &wrong)
+                   : GraspController_step(&p, &u, h, &x, &y, &wrong))
+            fail("a step is refused: number ", (uint32_t)wrong);
         ticks = (ticks + PERIOD - TIMER[2]) % PERIOD;
         write_outputs(k, &y);
         all += ticks;
@@ -102,7 +108,7 @@ int main(void)
     semihosting(0x18, 0x20026);
 }
 
-static void fault(void) { fail("fault"); }
+static void fault(void) { fail("fault ", 0); }
 
 static void reset(void)
 {

@@ -467,8 +467,8 @@ def target(made_once):
     def fill(folder):
         header = bench_header("GripperPlant", *plant())
         write_c(folder, shipped_model("GripperPlant"))
-        block = str(folder / "GripperPlant.c")
-        compile_c(folder, header, "GripperPlant", NATIVE / "plant_target.c", *SANITISED, block)
+        block = [str(folder / f"GripperPlant{part}.c") for part in ("", "_text")]
+        compile_c(folder, header, "GripperPlant", NATIVE / "plant_target.c", *SANITISED, *block)
 
     return made_once("target", fill) / "program"
 

@@ -22,14 +22,14 @@ static const char *go_on(double h, const gripper_plant_inputs *inputs,
     int fault;
     memcpy(&u, inputs, sizeof u);
     memcpy(&p, parameters, sizeof p);
-    fault = GripperPlant_check(&p, why);
+    fault = GripperPlant_check(&p, NULL);
     if (!fault)
-        fault = h > 0.0 ? GripperPlant_step(&p, &u, h, &state, why)
-                        : GripperPlant_initial_state(&p, &u, &state, why);
-    if (!fault)
-        fault = GripperPlant_outputs(&p, &u, &state, &y, why);
-    if (fault)
+        fault = h > 0.0 ? GripperPlant_step(&p, &u, h, &state, &y, NULL)
+                        : GripperPlant_initial_state(&p, &u, &state, &y, NULL);
+    if (fault) {
+        GripperPlant_explain(&p, &u, h, &state, why);
         return why;
+    }
     memcpy(outputs, &y, sizeof y);
     return NULL;
 }

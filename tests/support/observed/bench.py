@@ -35,7 +35,7 @@ def build(folder):
     command = [
         "gcc", "-std=c99", "-O1", "-D_POSIX_C_SOURCE=200809L", f"-I{folder}",
         f"-DGRIPPER_PLANT_TIMEOUT_NS={int(WATCHDOG * 1e9)}", HERE / "observed_bench.c",
-        folder / "GripperPlant.c", "-o", folder / "bench", "-lm",
+        folder / "GripperPlant.c", folder / "GripperPlant_text.c", "-o", folder / "bench", "-lm",
     ]  # fmt: skip
     subprocess.run([*map(str, command)], check=True)
     return folder / "bench"

@@ -1,7 +1,7 @@
 """Writes the C of a block alone, for real-time targets: no FMI, no allocation, no stdio.
 
-c_only.h.in and c_only.c.in are its header and its code, for a block called Model; here they get the
-name and the variables. Members are called as in the C header of a proxy (bench_header.py), so that
+c_only*.in are its header and its code, for a block called Model; here they get the name and the
+variables. Members are called as in the C header of a proxy (bench_header.py), so that
 the structs of both are the same.
 """
 
@@ -34,7 +34,10 @@ _KINDS: dict[type[Scalar], Kind] = {float: "Real", int: "Integer", bool: "Boolea
 
 
 def c_only(model: Model) -> dict[str, bytes]:
-    """Return the files of a block alone in C, by name: NAME.h, NAME.c, main.c, what they include.
+    """Return the files of a block alone in C, by name.
+
+    NAME.h and NAME.c; NAME_text.c, which tells in words why something is refused; main.c, an
+    example; and what they include.
 
     UntranslatableError, one line, where the block holds what cannot be translated.
     """
@@ -63,11 +66,17 @@ def c_only(model: Model) -> dict[str, bytes]:
         "structs": structs(groups, _MEANINGS, starts, {v.name: v.description for v in variables}),
         "state_size": str(max(1, int(re.findall(r"N_STATE = (\d+)", block)[0]))),
         **{function: "\n".join(body) for function, body in lines.items()},
-        "command": f"cc {' '.join(flags)} -o {name} main.c {name}.c -lm",
+        "command": f"cc {' '.join(flags)} -o {name} main.c {name}.c {name}_text.c -lm",
         "format": " %.17g" * len(outputs.members),
         "arguments": "".join(f", (double)y->{member}" for _, member in outputs.members),
     }
-    files = {f"{name}.h": "c_only.h.in", f"{name}.c": "c_only.c.in", "main.c": "c_only_main.c.in"}
+    files = {
+        f"{name}.h": "c_only.h.in",
+        f"{name}.c": "c_only.c.in",
+        f"{name}_text.c": "c_only_text.c.in",
+        "given.h": "c_only_given.h.in",
+        "main.c": "c_only_main.c.in",
+    }
     written = {file: _filled(FOLDER / template, texts) for file, template in files.items()}
     return {file: text.encode() for file, text in {"block.h": block, **helpers, **written}.items()}
 

@@ -3,7 +3,6 @@
 #ifndef VARIABLE_H
 #define VARIABLE_H
 
-#include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -23,6 +22,20 @@ typedef struct {
     double low, high;
     double start;         /* of a String, its place among the texts */
 } Variable;
+
+#ifdef TEXT_NONE  /* no words: that something is refused is all that is told */
+
+typedef struct {
+    char none;
+} Text;
+
+#define text_put(text, more) ((void)(text), (void)(more))
+#define text_number(text, v) ((void)(text), (void)(v))
+#define text_general(text, v, digits) ((void)(text), (void)(v), (void)(digits))
+
+#else
+
+#include <stdarg.h>
 
 #ifndef TEXT_CAPACITY
 #define TEXT_CAPACITY 2048  /* bytes of a message with its NUL; what does not fit is cut off */
@@ -236,5 +249,7 @@ TEXT_LIKE_PRINTF static inline void text_say(Text *text, const char *format, ...
     text_put_list(text, format, list);
     va_end(list);
 }
+
+#endif /* TEXT_NONE */
 
 #endif
