@@ -69,11 +69,94 @@ static void fail(const char *why, uint32_t number)
 enum { DUE = 1 << 26, SEEN = 1 << 25 }; /* the timer's, in PENDING */
 extern char stack_low[], stack_top[], data_low[], data_top[], data_in_flash[], bss_low[], bss_top[];
 
+/* What is left of a period: a count of ticks since another is their difference. */
+static uint32_t ticks_since(uint32_t before)
+{
+    return (before + PERIOD - TIMER[2]) % PERIOD;
+}
+
+static uint32_t stack_used(void)
+{
+    const char *unused = stack_low;
+    while (*unused == 0x55)
+        unused++;
+    return (uint32_t)(stack_top - unused);
+}
+
+/* What a step costs that is refused, as an input is none */
+static void measure_refusal(const GraspController_Parameters *p, GraspController_Inputs u,
+                            GraspController_State *x)
+{
+    GraspController_Outputs y;
+    uint32_t before;
+    int wrong;
+    u.position_1 = NAN;
+    before = TIMER[2];
+    if (!GraspController_step(p, &u, h, x, &y, &wrong) || wrong)
+        fail("not refused: ", (uint32_t)wrong);
+    say("ticks of a refusal: ", ticks_since(before));
+    say("bytes of stack with a refusal: ", stack_used());
+}
+
+#ifdef WITH_LINK
+#include "grasp_controller.h"
+
+/* A session with a proxy whose datagrams are made here, keyed: what a STEP costs, from its datagram to
+ * that of the answer
+ */
+static grasp_controller_link link_to_proxy;
+static uint8_t datagram[2048], answer[GRASP_CONTROLLER_ANSWER_SIZE];
+
+static size_t packed(uint8_t kind, uint64_t sequence, double step, size_t body)
+{
+    memcpy(datagram, "GRSP", 4);
+    grasp_controller_put(datagram + GRASP_CONTROLLER_AT_VERSION, 2, GRASP_CONTROLLER_VERSION);
+    datagram[GRASP_CONTROLLER_AT_KIND] = kind;
+    memcpy(datagram + GRASP_CONTROLLER_AT_INTERFACE, grasp_controller_hash(), 16);
+    memcpy(datagram + GRASP_CONTROLLER_AT_COOKIE, answer + GRASP_CONTROLLER_AT_COOKIE, 8);
+    grasp_controller_put(datagram + GRASP_CONTROLLER_AT_SEQUENCE, 8, sequence);
+    grasp_controller_put_real(datagram + GRASP_CONTROLLER_AT_STEP, step);
+    grasp_controller_put(datagram + GRASP_CONTROLLER_AT_SIZE, 4, body);
+    return grasp_controller_seal(&link_to_proxy.sealer, datagram, GRASP_CONTROLLER_HEAD_SIZE + body);
+}
+
+static void measure_keyed_step(const GraspController_Parameters *p, GraspController_State *x)
+{
+    static const uint8_t key[] = "a key of thirty-two bytes, or so", random[] = "not at random...";
+    const size_t body = sizeof(GraspController_Inputs) / 8 * 8 + GRASP_CONTROLLER_PARAMETERS_SIZE;
+    GraspController_Inputs u;
+    GraspController_Outputs y;
+    uint32_t before;
+    size_t size, n;
+    grasp_controller_link_init(&link_to_proxy, random, key, 32);
+    grasp_controller_link_receive(&link_to_proxy, datagram,
+                                  packed(GRASP_CONTROLLER_HELLO, 0, 0.0, GRASP_CONTROLLER_HELLO_SIZE),
+                                  0, answer, &n);
+    memset(datagram, 0, sizeof datagram);
+    grasp_controller_link_receive(&link_to_proxy, datagram,
+                                  packed(GRASP_CONTROLLER_INITIALISE, 1, 0.0, body), 0, answer, &n);
+    if (!grasp_controller_link_answer(&link_to_proxy, 0.0, answer))
+        fail("no session ", 0);
+    size = packed(GRASP_CONTROLLER_STEP, 2, h, body);
+    while (!(PENDING & DUE)) __asm volatile("wfi");
+    PENDING = SEEN;
+    before = TIMER[2];
+    grasp_controller_link_receive(&link_to_proxy, datagram, size, 0, answer, &n);
+    memcpy(&u, recorded, sizeof u);
+    if (GraspController_step(p, &u, h, x, &y, NULL))
+        fail("refused ", 0);
+    memcpy(&link_to_proxy.outputs, &y, sizeof y);
+    n = grasp_controller_link_answer(&link_to_proxy, h, answer);
+    say("ticks of a keyed STEP: ", ticks_since(before));
+    say("bytes of its answer: ", (uint32_t)n);
+    say("bytes of stack with it: ", stack_used());
+}
+#endif
+
 int main(void)
 {
     static const GraspController_Parameters p = GRASPCONTROLLER_PARAMETERS_DEFAULTS;
     uint32_t k, ticks, all = 0, longest = 0, late = 0;
-    const char *unused = stack_low;
     GraspController_Inputs u;
     GraspController_State x;
     GraspController_Outputs y;
@@ -92,19 +175,21 @@ int main(void)
         if (k == 0 ? GraspController_initial_state(&p, &u, &x, &y, &wrong)
                    : GraspController_step(&p, &u, h, &x, &y, &wrong))
             fail("a step is refused: number ", (uint32_t)wrong);
-        ticks = (ticks + PERIOD - TIMER[2]) % PERIOD;
+        ticks = ticks_since(ticks);
         write_outputs(k, &y);
         all += ticks;
         longest = ticks > longest ? ticks : longest;
     }
-    while (*unused == 0x55)
-        unused++;
     say("steps: ", STEPS);
     say("steps begun late: ", late);
     say("ticks of the clock a step: ", all / STEPS);
     say("ticks of the longest: ", longest);
-    say("bytes of stack: ", (uint32_t)(stack_top - unused));
+    say("bytes of stack: ", stack_used());
     say("largest difference, 1e-18: ", (uint32_t)fmin(difference * 1e18, UINT32_MAX));
+    measure_refusal(&p, u, &x);
+#ifdef WITH_LINK
+    measure_keyed_step(&p, &x);
+#endif
     semihosting(0x18, 0x20026);
 }
 

@@ -93,7 +93,8 @@ static int run(const char *key)
 static int digest(void)
 {
     static uint8_t key[LARGEST], data[LARGEST];
-    uint8_t block[64], result[32];
+    uint8_t result[32];
+    every_kind_hmac_key prepared;
     uint32_t key_size = read_sized(key), size = read_sized(data);
     every_kind_sha256 sha;
     every_kind_sha256_begin(&sha);
@@ -101,8 +102,8 @@ static int digest(void)
     every_kind_sha256_add(&sha, data + size / 2, size - size / 2);
     every_kind_sha256_end(&sha, result);
     write_bytes(result, sizeof result);
-    every_kind_hmac_key(key, key_size, block);
-    every_kind_hmac(block, data, size, result);
+    every_kind_hmac_prepare(&prepared, key, key_size);
+    every_kind_hmac(&prepared, data, size, result);
     write_bytes(result, sizeof result);
     return 0;
 }

@@ -115,3 +115,65 @@ def test_the_example_runs_by_the_command_at_its_top(name, written):
 def test_libm_is_what_the_block_calls():
     text = "x = two(floored(x)) + exp(sqrt(x)); /* not log(x) */"
     assert called_of_libm(text) == ["exp", "floor", "sqrt"]
+
+
+REFUSES = r"""
+#include "GraspController.h"
+#include <stdio.h>
+#include <string.h>
+
+int main(void)
+{
+    GraspController_Parameters p = GRASPCONTROLLER_PARAMETERS_DEFAULTS;
+    GraspController_Inputs u = GRASPCONTROLLER_INPUTS_DEFAULTS, odd;
+    GraspController_State x, before, other;
+    GraspController_Outputs y, y_before;
+    char why[GRASPCONTROLLER_WHY_SIZE];
+    double values[] = {1e308, -1e308, 1e300, 0.0 / 0.0, 1.0 / 0.0};
+    int k, i, variable, fault;
+    GraspController_initial_state(&p, &u, &x, &y, NULL);
+    for (k = 0; k < 100; k++)
+        GraspController_step(&p, &u, 1e-3, &x, &y, NULL);
+    for (k = 0; k < 5; k++) {
+        for (i = 0; i < 6; i++) {
+            odd = u;
+            ((double *)&odd)[i] = values[k];
+            before = x, y_before = y, other = x;
+            fault = GraspController_step(&p, &odd, 1e-3, &x, &y, &variable);
+            if (fault) {
+                GraspController_explain(&p, &odd, 1e-3, &before, why);
+                printf("%d %d %d %s\n", k, i, variable, why);
+                if (memcmp(&x, &before, sizeof x) || memcmp(&y, &y_before, sizeof y))
+                    return 2;
+            } else if (GraspController_step(&p, &u, 1e-3, &x, &y, NULL)) {
+                return 3; /* it took what it cannot go on with */
+            }
+            x = other;
+        }
+    }
+    p.contact_force_stiffness = -1.0;
+    printf("%d ", GraspController_check(&p, &variable));
+    GraspController_explain(&p, &u, 0.0, &x, why);
+    printf("%d %s\n", variable, why);
+    return 0;
+}
+"""
+
+
+def test_what_is_refused_changes_nothing_and_is_told_by_a_code(written, tmp_path):
+    """Values that are none, and those that it could not go on with."""
+    folder = written("GraspController")
+    (tmp_path / "refuses.c").write_text(REFUSES)
+    files = [tmp_path / "refuses.c", *(folder / f"GraspController{e}.c" for e in ("", "_text"))]
+    command = ["gcc", "-std=c99", "-I", folder, *files, "-o", tmp_path / "refuses", "-lm"]
+    subprocess.run(command, check=True)
+    done = subprocess.run([tmp_path / "refuses"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    *steps, parameter = done.stdout.splitlines()
+    assert parameter == "1 27 contact_force.stiffness = -1.0 N/m: must be from 0 to 1e+06 N/m"
+    none = [line.split(" ", 3) for line in steps if line[0] in "34"]
+    assert [(int(i), int(variable)) for _, i, variable, _ in none] == [(i, i) for i in range(6)] * 2
+    assert none[0][3] == "position[1] = nan m: must be a finite number"
+    large = [line for line in steps if line.startswith("0 ")]
+    assert large
+    assert all(line.endswith("must be a finite number") or "too large" in line for line in large)

@@ -15,9 +15,14 @@ ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")
 SECTION = PAGE.partition("## The controller on a Cortex-M\n")[2].partition("\n## ")[0]
 COMMANDS = re.findall(r"^ {4}(.+)", SECTION, re.MULTILINE)
+(COMPILE,) = (c for c in COMMANDS if c.startswith("arm-none-eabi-gcc"))
+LINKED = f"{COMPILE} -DWITH_LINK"
+"""The same with a session of the link."""
 TABLE = [line.split(" | ") for line in re.findall(r"^\|(.*) \|$", SECTION, re.MULTILINE)]
 ADAPTIVE = {
     "GraspController": "GraspControllerAdaptive",
+    "grasp_controller": "grasp_controller_adaptive",
+    "GRASP_CONTROLLER": "GRASP_CONTROLLER_ADAPTIVE",
     "GRASPCONTROLLER": "GRASPCONTROLLERADAPTIVE",
     "published": "adaptive",
     "13-22": "13-27",
@@ -63,6 +68,7 @@ def test_the_figures_of_the_page(checkout, controller):
     source = (ROOT / "docs/cortex_m.c").read_text("utf-8")
     (checkout / "cortex_m.c").write_text(replaced(source, words), "utf-8")
     *before, compiled, size, emulated = [replaced(command, words) for command in COMMANDS]
+    linked = replaced(LINKED, words)
     for command in before:
         run(command)
     for core, other in ("M4F", {}), ("M7", M7):
@@ -76,12 +82,17 @@ def test_the_figures_of_the_page(checkout, controller):
         assert image["steps begun late"] == 0
         difference = image["largest difference, 1e-18"] * 1e-18
         assert difference < 1e-12
+        assert run(replaced(linked, other)) == ""
+        image |= said(run(replaced(emulated, other)))
+        assert image["bytes of its answer"] > 80 + 32
         column = TABLE[0].index(f"{core}, {controller}")
         page = [float(row[column].replace(",", "")) for row in TABLE[1:]]
         found = [
             image["ticks of the clock a step"] * TICK,
             image["ticks of the longest"] * TICK,
-            image["bytes of stack"],
+            image["ticks of a refusal"] * TICK,
+            image["ticks of a keyed STEP"] * TICK,
+            image["bytes of stack with it"],
             int(bytes_of[".data"]) + int(bytes_of[".bss"]),
             int(bytes_of[".text"]),
         ]
@@ -105,7 +116,7 @@ def rows(tmp_path, monkeypatch):
 def said_of(rows):
     """What the M7's image says of a record; the controller in it is compiled once."""
     Path("controller_c/recorded.h").write_text("".join(f"{','.join(row)},\n" for row in rows))
-    command, emulator = (replaced(command, M7) for command in (COMMANDS[3], COMMANDS[-1]))
+    command, emulator = (replaced(command, M7) for command in (COMPILE, COMMANDS[-1]))
     compiler, controller = shlex.split(command), "controller_c/GraspController.c"
     options = [word for word in compiler if word.startswith(("-m", "-std", "-O", "-f"))]
     compile_c([compiler[0], *options, "-c", controller], Path("controller.o"))
@@ -124,4 +135,4 @@ def test_an_image_finds_a_difference_and_steps_that_take_too_long(rows):
 
 def test_an_image_ends_where_an_input_is_none(rows):
     rows[-1][0] = "NAN"
-    assert said_of(rows).splitlines() == ["position[1] = nan m: must be a finite number", "failed"]
+    assert said_of(rows).splitlines() == ["a step is refused: number 0", "failed"]
