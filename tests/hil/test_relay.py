@@ -88,11 +88,11 @@ def relayed(net, arriving):
         send_until(now)
         numbers[direction] += 1
 
-        def send(what=(direction, numbers[direction]), taken=taken):
+        def send(_, what=(direction, numbers[direction]), taken=taken):
             sent.append((at[-1], *what))
             return taken
 
-        traffic.receive(direction, send, now)
+        traffic.receive(direction, b"", send, now)
     send_until(math.inf)
     return sent, log, traffic.counters
 
@@ -143,6 +143,52 @@ def test_what_is_sent_on_logged_and_counted_is_what_the_fates_say(net, arriving,
         assert c.dropped == c.lost + c.outage + c.overflow + c.unsent
 
 
+def test_each_direction_has_conditions_and_outages_of_its_own():
+    """Half a link: requests arrive, answers do not from 0.5 s on, nor in between."""
+    conditions = {"request": Conditions(loss=0.5), "reply": Conditions()}
+    outages = (Outage(0.5, math.inf, "s", "reply"), Outage(0.1, 0.2, "s", "reply"))
+    net = Network(conditions, outages, 3)
+    arriving = [(d, 10_000_000, True) for _ in range(50) for d in DIRECTIONS]
+    sent, log, counters = relayed(net, arriving)
+    assert counters["request"].outage == 0
+    assert 10 < counters["request"].lost < 40
+    assert counters["reply"].lost == 0
+    through = [e.number for e in log if e.direction == "reply" and e.fate == "passed"]
+    assert through == [n for n in range(1, 51) if not 0.1 <= 0.02 * n - 0.01 < 0.2 and n < 26]
+    assert len(sent) == counters["request"].delivered + counters["reply"].delivered
+
+
+def test_a_datagram_that_is_corrupted_has_another_bit():
+    """Always the same one for the same seed."""
+    net = Network({"request": Conditions(corrupt=0.4), "reply": Conditions()}, seed=2)
+    data = bytes(range(20))
+    traffic, through = module.Traffic(net), []
+    for number in range(1, 201):
+        traffic.receive("request", data, lambda d: through.append(d) or True, number)
+        traffic.receive("reply", data, lambda d: d == data, number)
+    traffic.send_due(1000)
+    wrong = [int.from_bytes(bytes(a ^ b for a, b in zip(d, data, strict=True))) for d in through]
+    assert all(bits.bit_count() <= 1 for bits in wrong)
+    assert traffic.counters["request"].corrupted == sum(bits > 0 for bits in wrong) > 60
+    assert len({*wrong}) > 40
+    assert (traffic.counters["reply"].corrupted, traffic.counters["reply"].unsent) == (0, 0)
+    again = [module.damaged(data, net.damage("request", n)) for n in range(1, 201)]
+    assert again == through
+
+
+@pytest.mark.parametrize(
+    ("text", "outage"),
+    [
+        ("100:200", Outage(100, 200)),
+        ("0.5s:2s", Outage(0.5, 2.0, "s")),
+        ("answers:0.9s:", Outage(0.9, math.inf, "s", "reply")),
+        ("requests:3:", Outage(3, math.inf, "requests", "request")),
+    ],
+)
+def test_outages_as_texts(text, outage):
+    assert Outage.read(text) == outage
+
+
 def test_fates_stay_what_they_were():
     """A seed in a report of today means the same next year, whatever was asked before."""
     net = network(1, delay=0.001, jitter=0.002, loss=0.3, duplicate=0.3, reorder=0.3)
@@ -181,7 +227,10 @@ def test_frequencies_are_those_asked_for(probability, direction):
         ({"reorder_by": 1.1e6}, "reorder_by = 1100000.0 s: must be from 0 to 1e+06 s"),
         ({"start": 0, "until": 5}, "outage from 0 until 5 requests: must begin at 1 or later"),
         ({"start": 5, "until": 5}, "outage from 5 until 5 requests: must begin at 1 or later"),
-        ({"start": 0, "until": math.inf, "by": "s"}, "outage from 0 until inf s: must begin at 0"),
+        (
+            {"start": -1, "until": math.inf, "by": "s"},
+            "outage from -1 until inf s: must begin at 0",
+        ),
         ({"seed": 0.5}, "seed = 0.5: must be a whole number, at least 0"),
     ],
 )
@@ -315,7 +364,7 @@ def test_the_command_relays_until_it_is_interrupted(capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert re.fullmatch(r"relaying 127\.0\.0\.1:[1-9][0-9]* -> 127\.0\.0\.1:5501\n", err)
     assert [line.split() for line in out.splitlines()] == [
-        [*asdict(Counters())], ["request", *"000000000"], ["reply", *"000000000"],
+        [*asdict(Counters())], ["request", *"0000000000"], ["reply", *"0000000000"],
     ]  # fmt: skip
     assert command("0.0.0.0:0", "5501") == 0
     note, listening = capsys.readouterr().err.splitlines()
@@ -333,7 +382,7 @@ def test_its_log_is_that_of_the_fates_and_its_counters_are_those_of_the_log(
     def run(relay):
         for number in range(40):
             for direction in DIRECTIONS:
-                relay._traffic.receive(direction, lambda: True, number)
+                relay._traffic.receive(direction, b"", lambda _: True, number)
         relay._traffic.send_due(10**9)
         signal.raise_signal(signal.SIGINT)
 
@@ -367,14 +416,21 @@ def test_its_log_is_that_of_the_fates_and_its_counters_are_those_of_the_log(
         ("0 1 --loss 1.5", "loss = 1.5: must be a probability, from 0 to 1"),
         ("0 1 --delay nan", "delay = nan s: must be from 0 to 1e+06 s"),
         ("0 1 --delay 2:1", "--delay '2:1': must be S or FROM:TO, in s, the longer last"),
+        ("0 1 --requests loss=2", "loss = 2.0: must be a probability, from 0 to 1"),
+        (
+            "0 1 --answers lost=0.1",
+            "--answers lost=0.1: must be delay, loss, duplicate,",
+        ),
+        ("0 1 --answers loss", "--answers 'loss': must be like loss=0.1,delay=0.001"),
+        ("0 1 --corrupt 2", "corrupt = 2.0: must be a probability, from 0 to 1"),
         ("0 1 --outage 5", "outage '5': must be FROM:UNTIL, in numbers of requests, as in 100:200"),
         ("0 1 --outage 1.5:2", "outage from 1.5 until 2.0 requests: must be whole numbers"),
         ("0 1 --outage 2s:1s", "outage from 2.0 until 1.0 s: must begin at 0 or later, and end"),
         ("0 1 --log {}/log.csv", "{}/log.csv: No such file or directory"),
-        ("0 x", "TO 'x': must be HOST:PORT, as in 127.0.0.1:5501, or PORT"),
+        ("0 x", "TO 'x': must be HOST:PORT, as in 127.0.0.1:5501 or [::1]:5501, or PORT"),
         ("65536 1", "127.0.0.1:65536: port must be from 0 to 65535"),
         ("0 127.0.0.1:65536", "127.0.0.1:65536: port must be from 1 to 65535"),
-        ("0 256.0.0.1:1", "256.0.0.1:1: no such host; must be an IPv4 address or a name that has"),
+        ("0 256.0.0.1:1", "256.0.0.1:1: no such host; must be an address or a name that has"),
         ("0 1 --seed -1", "Invalid value for '--seed': -1"),
     ],
 )

@@ -32,7 +32,7 @@ def test_a_plain_simulation_is_not_judged():
 def test_a_quiet_bench_passes():
     found = judged({}, {})
     assert failed(found) == set()
-    assert len(found) == 7
+    assert len(found) == 8
 
 
 @pytest.mark.parametrize(
@@ -85,15 +85,16 @@ def test_it_is_on_the_page_in_the_text_and_in_what_is_read_back(warned, tmp_path
     read = load_run(tmp_path)
     for found in (result, read):
         assert not found.passed
-        (criterion,) = found.verdict
+        (ended, criterion) = found.verdict
+        assert (ended.name, ended.passed) == ("unfinished", True)
         assert (criterion.name, criterion.measured) == ("warnings", 1.0)
         assert found.limits[0].steps > 0
     page = page_html(read)
     assert "Test protocol" in page
     assert "Failed: limits that were exceeded." in page
     assert read.origin["fmus"]["plant"]["sha256"] in page
-    assert "verdict               failed 1 of 1 criteria" in as_text(read)
-    assert as_json(read)["verdict"] == [criterion.as_dict()]
+    assert "verdict               failed 1 of 2 criteria" in as_text(read)
+    assert as_json(read)["verdict"] == [c.as_dict() for c in read.verdict]
 
 
 @pytest.fixture

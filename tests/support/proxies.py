@@ -134,15 +134,15 @@ def wait_until(condition):
         time.sleep(0.001)
 
 
-def serving(fmu, how, address=("127.0.0.1", 0)):
+def serving(fmu, how, address=("127.0.0.1", 0), rehearsed=None):
     """A server of an FMU in a thread, stopped in the end."""
-    return serving_fmu(ServedFmu(exchanged(fmu), how), address)
+    return serving_fmu(ServedFmu(exchanged(fmu), how), address, rehearsed)
 
 
 @contextmanager
-def serving_fmu(served, address=("127.0.0.1", 0)):
+def serving_fmu(served, address=("127.0.0.1", 0), rehearsed=None):
     """The same of one that is ready to be served."""
-    with Server(served, address) as server:
+    with Server(served, address, rehearsed=rehearsed) as server:
         thread = threading.Thread(target=server.serve)
         thread.start()
         try:

@@ -1,15 +1,16 @@
 """The commands of hardware in the loop: serve an FMU, relay through a bad network."""
 
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import click
 
 from ..base.errors import InputError
 from ..base.interruption import interrupts
+from ..hil.faults import MEANINGS, Rehearsed
 from ..hil.proxy import LONGEST_SILENCE, exchanged, shared_key
-from ..hil.relay import DIRECTIONS, Conditions, Network, Outage, Relay, csv_log
+from ..hil.relay import WORDS, Conditions, Network, Outage, Relay, csv_log
 from ..hil.served import DEFAULT_ADDRESS, ServedFmu, Server, Service
 from ..hil.sockets import is_loopback, read_address, text
 from ..system.times import in_nanoseconds
@@ -47,6 +48,7 @@ from .frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
     default=30.0,
     help="s without anything new after which a session is over.",
 )
+@click.option("--fault", metavar="WHAT@S", help=f"Fail so many s after the first step. {MEANINGS}.")
 @json_option
 def serve(
     fmu: Path,
@@ -59,6 +61,7 @@ def serve(
     name: str,
     sessions: int | None,
     silence: float,
+    fault: str | None,
     as_json: bool,
 ) -> int:
     """Serve FMU to a proxy, as a bench would, until interrupted.
@@ -69,6 +72,7 @@ def serve(
 
     \b
     Example: grasp-cosim serve fmus/build/GripperPlant.fmu --lockstep
+    A failure rehearsed: grasp-cosim serve fmus/build/GripperPlant.fmu --fault mute@0.9
     """
     service = Service(
         lockstep,
@@ -78,8 +82,9 @@ def serve(
         name=name,
         silence_ns=round(in_nanoseconds("--silence", silence)),
     )
+    rehearsed = None if fault is None else Rehearsed.read(fault)
     served = ServedFmu(exchanged(fmu), service, say)
-    with Server(served, (host, port), say) as server:
+    with Server(served, (host, port), say, rehearsed) as server:
         for note in served.notes:
             say(note)
         at = text(server.address)
@@ -101,13 +106,38 @@ def serve(
     return 0
 
 
-def _span(_: Any, __: Any, given: str) -> tuple[float, float]:
+def _span(option: str, given: str) -> tuple[float, float]:
     """The shortest and the longest delay in s."""
     with suppress(ValueError):
         low, high = (2 * [float(part) for part in given.split(":", 1)])[:2]
         if not high < low:
             return low, high
-    raise InputError(f"--delay {given!r}: must be S or FROM:TO, in s, the longer last")
+    raise InputError(f"{option} {given!r}: must be S or FROM:TO, in s, the longer last")
+
+
+CHANCES = ("loss", "duplicate", "reorder", "corrupt")
+
+
+def _of_one_way(option: str, given: str | None, both: Conditions) -> Conditions:
+    """The conditions of one direction: those of both, but for what is given, like loss=0.1."""
+    changed: dict[str, float] = {}
+    for entry in given.split(",") if given else ():
+        key, value = pair(
+            option, entry, f"like loss=0.1,delay=0.001, of {', '.join(CHANCES)}, delay"
+        )
+        if key == "delay":
+            low, high = _span(f"{option} delay", value)
+            changed |= {"delay": low, "jitter": high - low}
+        elif key in CHANCES:
+            try:
+                changed[key] = float(value)
+            except ValueError as error:
+                raise InputError(f"{option} {entry}: must be a probability, from 0 to 1") from error
+        else:
+            raise InputError(
+                f"{option} {entry}: must be delay, {', '.join(CHANCES[:-1])} or corrupt"
+            )
+    return replace(both, **changed)
 
 
 @click.command()
@@ -116,18 +146,20 @@ def _span(_: Any, __: Any, given: str) -> tuple[float, float]:
 @click.option(
     "--delay",
     default="0",
-    callback=_span,
     metavar="S|FROM:TO",
     help="Time that a datagram takes in s; anything from one to the other, or always as long.",
 )
 @click.option("--loss", type=float, default=0.0, help="Probability that a datagram is lost.")
 @click.option("--duplicate", type=float, default=0.0, help="Probability that it comes twice.")
 @click.option("--reorder", type=float, default=0.0, help="Probability that it takes 20 ms more.")
+@click.option("--corrupt", type=float, default=0.0, help="Probability that a bit of it changes.")
+@click.option("--requests", metavar="KEY=VALUE,...", help="Other values for requests alone.")
+@click.option("--answers", metavar="KEY=VALUE,...", help="Other values for answers alone.")
 @click.option(
     "--outage",
     "outages",
     multiple=True,
-    metavar="FROM:UNTIL",
+    metavar="[requests:|answers:]FROM:[UNTIL]",
     help="Nothing gets through: numbers of requests, or s since the first as in 0.5s:2s.",
 )
 @click.option(
@@ -141,7 +173,9 @@ def _span(_: Any, __: Any, given: str) -> tuple[float, float]:
 def relay(
     listen: str,
     to: str,
-    delay: tuple[float, float],
+    delay: str,
+    requests: str | None,
+    answers: str | None,
     outages: tuple[str, ...],
     seed: int,
     log: Path | None,
@@ -150,15 +184,22 @@ def relay(
 ) -> int:
     """Relay UDP datagrams through a bad network, until Ctrl-C.
 
-    They go from LISTEN to TO and back, both ways under the same conditions. Each of the two is
-    HOST:PORT, or PORT of this machine; LISTEN may be 0, for one that is free. The n-th datagram of
-    a direction has the same fate whenever the seed is the same. Counts are printed at the end.
+    They go from LISTEN to TO and back, both ways under the same conditions but for what --requests
+    and --answers say of one. Each of the two is HOST:PORT, or PORT of this machine; LISTEN may be
+    0, for one that is free. The n-th datagram of a direction has the same fate whenever the seed is
+    the same. Counts are printed at the end.
 
     \b
     Example: grasp-cosim relay 5600 127.0.0.1:5501 --delay 0.001 --loss 0.01 --seed 1
+    Half a link: grasp-cosim relay 5600 5501 --outage answers:0.9s: --requests loss=0.05
     """
-    both = Conditions(delay[0], delay[1] - delay[0], **chances)
-    network = Network(dict.fromkeys(DIRECTIONS, both), tuple(map(Outage.read, outages)), seed)
+    low, high = _span("--delay", delay)
+    both = Conditions(low, high - low, **chances)
+    conditions = {
+        WORDS["requests"]: _of_one_way("--requests", requests, both),
+        WORDS["answers"]: _of_one_way("--answers", answers, both),
+    }
+    network = Network(conditions, tuple(map(Outage.read, outages)), seed)
     host, port = read_address("LISTEN", listen)
     with (
         csv_log(log) as note,

@@ -27,7 +27,7 @@ _TEXT = (0, 1023)
 class Settings(NamedTuple):
     """The parameters proxy.*, but for those of the outputs: type, unit, limits, description."""
 
-    host: Annotated[str, "", _TEXT, "name or IPv4 address of the peer"] = "127.0.0.1"
+    host: Annotated[str, "", _TEXT, "name or address of the peer"] = "127.0.0.1"
     port: Annotated[int, "", (1, 65535), "its UDP port"] = PORT
     timeout: Annotated[
         float, "s", (1e-6, 3600.0), "longest wait for the outputs of a step, by the clock"

@@ -32,6 +32,9 @@ Direction = Literal["request", "reply"]
 
 DIRECTIONS: tuple[Direction, ...] = ("request", "reply")
 
+WORDS: Mapping[str, Direction] = {"requests": "request", "answers": "reply"}
+"""The directions as a command line names them."""
+
 LONGEST = 1e6
 """s, longest time of any kind: eleven days."""
 
@@ -47,7 +50,8 @@ class Conditions:
 
     A datagram that is not lost takes between delay and delay + jitter, uniformly distributed; with
     the probability reorder it is held back by reorder_by longer, so that later ones overtake it.
-    With the probability duplicate it comes twice, and each of the two has its own delay.
+    With the probability duplicate it comes twice, and each of the two has its own delay. With the
+    probability corrupt a bit of it is another one.
     InputError where a probability is not within 0 and 1, or a time, in s, not within 0 and LONGEST.
     """
 
@@ -57,9 +61,10 @@ class Conditions:
     duplicate: float = 0.0
     reorder: float = 0.0
     reorder_by: float = 0.02
+    corrupt: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("loss", "duplicate", "reorder"):
+        for name in ("loss", "duplicate", "reorder", "corrupt"):
             number(name, getattr(self, name), 0.0, 1.0, must="a probability, from 0 to 1")
         must = f"from 0 to {LONGEST:g} s"
         for name in ("delay", "jitter", "reorder_by"):
@@ -72,32 +77,51 @@ class Outage:
 
     By requests: begins when the request of number start arrives and ends when that of number until
     does; the first one is 1. That repeats exactly, whatever the timing. By s: time since the first
-    datagram. What was under way before still arrives. InputError where there is no such window.
+    datagram. What was under way before still arrives. With a direction it is of that alone.
+    InputError where there is no such window.
     """
 
     start: float
     until: float
     by: Literal["requests", "s"] = "requests"
+    direction: Direction | None = None
 
     def __post_init__(self) -> None:
         text, lowest = f"outage from {self.start!r} until {self.until!r} {self.by}", 0
         if self.by == "requests":
             lowest = 1
-            if self.start % 1 or self.until % 1:
+            if self.start % 1 or (self.until % 1 and self.until < math.inf):
                 raise InputError(f"{text}: must be whole numbers")
-        if not lowest <= self.start < self.until < math.inf:
+        if not lowest <= self.start < self.until:
             raise InputError(f"{text}: must begin at {lowest} or later, and end after that")
 
     @classmethod
     def read(cls, given: str) -> "Outage":
-        """The outage that a text says, 100:200 in requests, 0.5s:2s in s; InputError for none."""
-        found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)(s?):([0-9]+(?:\.[0-9]+)?)\2", given)
+        """The outage that a text says; InputError for none.
+
+        100:200 is in requests, 0.5s:2s in s; without an end it does not end; answers:0.5s: is of
+        the answers alone.
+        """
+        end = r"([0-9]+(?:\.[0-9]+)?)"
+        found = re.fullmatch(rf"(?:(requests|answers):)?{end}(s?):(?:{end}\3)?", given)
         if not found:
             raise InputError(
                 f"outage {given!r}: must be FROM:UNTIL, in numbers of requests, as in 100:200, or "
-                "in s, as in 0.5s:2s"
+                "in s, as in 0.5s:2s, without an end as in 2s:, and of one direction as in "
+                "answers:2s:"
             )
-        return cls(float(found[1]), float(found[3]), "s" if found[2] else "requests")
+        which, start, unit, until = found.groups()
+        return cls(
+            float(start),
+            math.inf if until is None else float(until),
+            "s" if unit else "requests",
+            None if which is None else WORDS[which],
+        )
+
+    def is_of(self, direction: Direction, requests: int, seconds: float) -> bool:
+        """True if a datagram of a direction does not get through, after so many requests and s."""
+        now = requests if self.by == "requests" else seconds
+        return self.direction in (None, direction) and self.start <= now < self.until
 
 
 class Passage(NamedTuple):
@@ -129,6 +153,19 @@ class Network:
         ways = [_passage(conditions, u[1], u[2]), _passage(conditions, u[4], u[5])]
         return () if u[0] < conditions.loss else tuple(ways[: 1 + (u[3] < conditions.duplicate)])
 
+    def damage(self, direction: Direction, number: int) -> float | None:
+        """Return which part of a datagram is before the bit that is damaged, if one is."""
+        u = _uniforms(self.seed, direction, number, "damage")
+        return u[1] if u[0] < self.conditions[direction].corrupt else None
+
+
+def damaged(data: bytes, part: float | None) -> bytes:
+    """Return a datagram with the bit behind a part of them another one; as it is for None."""
+    if part is None or not data:
+        return data
+    bit = int(part * 8 * len(data))
+    return data[: bit // 8] + bytes([data[bit // 8] ^ 1 << bit % 8]) + data[bit // 8 + 1 :]
+
 
 def _passage(conditions: Conditions, position: float, chance: float) -> Passage:
     held_back = chance < conditions.reorder
@@ -136,13 +173,13 @@ def _passage(conditions: Conditions, position: float, chance: float) -> Passage:
     return Passage(round((delay + conditions.reorder_by * held_back) * NANOSECONDS), held_back)
 
 
-def _uniforms(seed: int, direction: Direction, number: int) -> list[float]:
+def _uniforms(seed: int, direction: Direction, number: int, what: str = "") -> list[float]:
     """Six independent numbers, uniform in [0, 1), each always used for the same thing.
 
     A hash (BLAKE2b) of what they are for, as in a counter-based generator: there is no state that
     the order of arrival could change, and a higher loss leaves the delays of the rest as they were.
     """
-    purpose = repr((seed, direction, number)).encode()
+    purpose = repr((seed, direction, number, *([what] if what else []))).encode()
     digest = hashlib.blake2b(purpose, digest_size=48).digest()
     return [(int.from_bytes(digest[i : i + 8], "little") >> 11) * 2.0**-53 for i in range(0, 48, 8)]
 
@@ -151,7 +188,8 @@ def _uniforms(seed: int, direction: Direction, number: int) -> list[float]:
 class Counters:
     """One direction, exact at any time: received + duplicated = delivered + dropped + held.
 
-    Copies are delivered, too; reordered is what is delivered after a later one, lost or in an
+    Copies are delivered, too; reordered is what is delivered after a later one, corrupted what is
+    delivered with another bit; lost or in an
     outage what does not get through, overflow what finds MOST_HELD under way, unsent what this
     machine refuses to send, held what is still under way.
     """
@@ -160,6 +198,7 @@ class Counters:
     delivered: int = 0
     duplicated: int = 0
     reordered: int = 0
+    corrupted: int = 0
     lost: int = 0
     outage: int = 0
     overflow: int = 0
@@ -181,11 +220,15 @@ class Entry(NamedTuple):
     direction: Direction
     number: int
     copy: int
-    fate: Literal["passed", "held back", "lost", "outage", "overflow"]
+    fate: Literal["passed", "held back", "corrupted", "lost", "outage", "overflow"]
     delay: float | None
 
 
 Log = Callable[[Entry], object]
+
+
+Send = Callable[[bytes], bool]
+"""Sends a datagram on, and says whether this machine took it."""
 
 
 class Traffic:
@@ -198,19 +241,19 @@ class Traffic:
         self._begin: int | None = None
         self._newest = dict.fromkeys(DIRECTIONS, 0)
         self._arrivals = count()  # makes the earlier one the first of two that are due at once
-        self._held: list[tuple[int, int, Direction, int, Callable[[], bool]]] = []
+        self._held: list[tuple[int, int, Direction, int, Send, bytes]] = []
 
-    def receive(self, direction: Direction, send: Callable[[], bool], now: int) -> None:
+    def receive(self, direction: Direction, data: bytes, send: Send, now: int) -> None:
         """A datagram has arrived: decide what becomes of it, and count and log that.
 
-        `send` sends it on, and says whether this machine took it.
+        `send` sends it on, as it then is, and says whether this machine took it.
         """
         self._begin = now if self._begin is None else self._begin
         counters = self.counters[direction]
         counters.received += 1
         number, requests = counters.received, self.counters["request"].received
-        since = {"requests": requests, "s": (now - self._begin) / NANOSECONDS}
-        if any(o.start <= since[o.by] < o.until for o in self._network.outages):
+        seconds = (now - self._begin) / NANOSECONDS
+        if any(o.is_of(direction, requests, seconds) for o in self._network.outages):
             counters.outage += 1
             self._log(Entry(direction, number, 0, "outage", None))
             return
@@ -219,15 +262,22 @@ class Traffic:
             counters.lost += 1
             self._log(Entry(direction, number, 0, "lost", None))
         counters.duplicated += len(passages) > 1
+        part = self._network.damage(direction, number)
+        data = damaged(data, part)
         for copy, (delay_ns, held_back) in enumerate(passages):
             if len(self._held) >= MOST_HELD:
                 counters.overflow += 1
                 self._log(Entry(direction, number, copy, "overflow", None))
                 continue
             counters.held += 1
-            due = (now + delay_ns, next(self._arrivals), direction, number, send)
+            counters.corrupted += part is not None
+            due = (now + delay_ns, next(self._arrivals), direction, number, send, data)
             heapq.heappush(self._held, due)
-            fate: Literal["held back", "passed"] = "held back" if held_back else "passed"
+            fate: Literal["held back", "passed", "corrupted"] = (
+                "held back" if held_back else "passed"
+            )
+            if part is not None:
+                fate = "corrupted"
             self._log(Entry(direction, number, copy, fate, delay_ns / NANOSECONDS))
 
     def next_due(self) -> int | None:
@@ -237,8 +287,8 @@ class Traffic:
     def send_due(self, now: int) -> None:
         """Send on what is due by now, the earliest first."""
         while self._held and self._held[0][0] <= now:
-            *_, direction, number, send = heapq.heappop(self._held)
-            counters, sent = self.counters[direction], send()
+            *_, direction, number, send, data = heapq.heappop(self._held)
+            counters, sent = self.counters[direction], send(data)
             counters.held -= 1
             counters.unsent += not sent
             if sent:
@@ -250,7 +300,7 @@ class Traffic:
 class Relay(EventLoop):
     """Relays between its port and a peer while it runs; what is under way at the end stays so.
 
-    InputError where host or peer have no IPv4 address, the port is taken, the peer is out of reach
+    InputError where host or peer have no address, the port is taken, the peer is out of reach
     or is the relay itself. `log` gets an Entry per datagram, and one per copy; what it raises ends
     the relay.
     """
@@ -271,10 +321,10 @@ class Relay(EventLoop):
         self.peer = resolved(*peer, lowest_port=1)
         host, port = resolved(host, port)
         with connected(self.peer) as probe:
-            source, to = probe.getsockname()[0], probe.getpeername()
+            source, to = probe.getsockname()[0], probe.getpeername()[:2]
         here = to[0] == source or is_loopback(to)
-        everywhere = "0.0.0.0"  # noqa: S104  compared with, not listened on
-        if here and to[1] == port and host in (everywhere, to[0]):  # it would send to itself
+        everywhere = "0.0.0.0", "::"  # noqa: S104  compared with, not listened on
+        if here and to[1] == port and host in (*everywhere, to[0]):  # it would send to itself
             raise InputError(f"{text(self.peer)}: is the relay itself; must be the peer")
         super().__init__((host, port), self._traffic.next_due, self._traffic.send_due)
         self._stack.callback(lambda: [*map(self._forget, [*self._clients])])
@@ -311,13 +361,13 @@ class Relay(EventLoop):
                 towards_peer = connected(self.peer)
                 self.register(towards_peer, partial(self._reply, towards_peer, client))
             self._clients[client] = towards_peer  # the one heard last
-            send = partial(_sent, towards_peer, data)
-            self._traffic.receive("request", send, time.monotonic_ns())
+            send = partial(_sent, towards_peer, None)
+            self._traffic.receive("request", data, send, time.monotonic_ns())
 
     def _reply(self, towards_peer: socket.socket, client: Address) -> None:
         if found := received(towards_peer):
-            send = partial(_sent, self.port_socket, found[0], client)
-            self._traffic.receive("reply", send, time.monotonic_ns())
+            send = partial(_sent, self.port_socket, client)
+            self._traffic.receive("reply", found[0], send, time.monotonic_ns())
 
     def _forget(self, client: Address) -> None:
         towards_peer = self._clients.pop(client)
@@ -325,7 +375,7 @@ class Relay(EventLoop):
         towards_peer.close()
 
 
-def _sent(via: socket.socket, data: bytes, client: Address | None = None) -> bool:
+def _sent(via: socket.socket, client: Address | None, data: bytes) -> bool:
     """Send a datagram, to the peer where there is no client; False where this machine refuses."""
     try:
         if client:

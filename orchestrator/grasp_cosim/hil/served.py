@@ -26,6 +26,7 @@ from ..fmu_export.link import (
 from ..interface.interface import Interface, Value, Variable
 from ..master.master import finish_step
 from ..system.times import NANOSECONDS, Time, in_seconds, nearest_time
+from .faults import Rehearsal, Rehearsed, end_at_once
 from .proxy import link_signature
 from .sockets import Address, EventLoop, received, text
 
@@ -94,9 +95,10 @@ class ServedFmu:
         signature, self.notes = link_signature(interface)
         self._counts = dict.fromkeys(COUNTS, 0)
         self._service, self._say = service, say
+        self._signature = signature
+        self._build = sha256(interface.path.read_bytes()).hexdigest()
         try:
-            build = sha256(interface.path.read_bytes()).hexdigest()
-            self.peer = Peer(signature, service.key, name=service.name, build=build)
+            self.peer = self._made_peer()
         except ValueError as error:
             raise InputError(str(error)) from error
         self._failsafe = _failsafe(interface, self.peer, service.failsafe)
@@ -108,6 +110,10 @@ class ServedFmu:
         self._watching = False  # the watchdog, from the first step until it has tripped
         self._own_failure = ""
         self._unsaid = dict(DROPPED)
+
+    def _made_peer(self) -> Peer:
+        service = self._service
+        return Peer(self._signature, service.key, name=service.name, build=self._build)
 
     def close(self) -> None:
         """End the session under way, and free the FMU."""
@@ -211,6 +217,18 @@ class ServedFmu:
             self._values[i] = value
         self._fmu.set(self._values)
 
+    def forget(self) -> None:
+        """Be as one that was started anew, which knows no session; what was counted stays so."""
+        counters = self.peer.counters
+        self.peer = self._made_peer()
+        self.peer.counters = counters
+        self._end("the server is as new")
+
+    def break_off(self, reason: str) -> None:
+        """Have every request of the session fail."""
+        self._own_failure = reason
+        self._deadline, self._watching = None, False
+
     def _end(self, reason: str) -> None:
         was_one, self._in_session = self._in_session, False
         self._deadline, self._watching = None, False
@@ -238,15 +256,20 @@ def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> 
 
 
 class Server(EventLoop):
-    """Serves an FMU, which it closes in the end."""
+    """Serves an FMU, which it closes in the end; `rehearsed` is a failure that it is to show."""
 
     def __init__(
-        self, fmu: ServedFmu, address: Address = ("127.0.0.1", 0), say: Say = lambda _: None
+        self,
+        fmu: ServedFmu,
+        address: Address = ("127.0.0.1", 0),
+        say: Say = lambda _: None,
+        rehearsed: Rehearsed | None = None,
     ) -> None:
         """Bind the port, 0 for any that is free; InputError where that is not possible."""
         self.fmu = fmu
         self._say = say
-        super().__init__(address, fmu.due, fmu.look)
+        self._rehearsal = Rehearsal(rehearsed)
+        super().__init__(address, self._next, self._look_now)
         self._stack.callback(fmu.close)
         self.register(self.port_socket, self._receive)
 
@@ -254,15 +277,39 @@ class Server(EventLoop):
         """Serve until `stop`, or so many sessions."""
         self.run(lambda: sessions is not None and self.fmu.counters()["sessions"] >= sessions)
 
+    def _next(self) -> int | None:
+        if self._rehearsal.happened == "stop":
+            return None
+        moments = (self.fmu.due(), self._rehearsal.due())
+        return min((m for m in moments if m is not None), default=None)
+
+    def _look_now(self, now: int) -> None:
+        failure = self._rehearsal.happens(now)
+        if failure:
+            self._say(f"as --fault says: {failure}")
+        if failure == "kill":
+            end_at_once()
+        elif failure == "restart":
+            self.fmu.forget()
+        elif failure == "trip":
+            self.fmu.trip("as --fault says")
+        elif failure == "fail":
+            self.fmu.break_off("the model failed, as --fault says")
+        if self._rehearsal.happened != "stop":
+            self.fmu.look(now)
+
     def _receive(self) -> None:
         """Take one datagram: after it the clock is looked at again."""
         found = received(self.port_socket)
-        if found is None:  # an answer found nobody
-            return
+        if found is None or self._rehearsal.happened in ("stop", "deaf"):
+            return  # None: an answer found nobody
         datagram, source = found
-        answer = self.fmu.answer(datagram, text(source), time.monotonic_ns())
+        now, steps = time.monotonic_ns(), self.fmu.peer.counters.steps
+        answer = self.fmu.answer(datagram, text(source), now)
+        if self.fmu.peer.counters.steps > steps:
+            self._rehearsal.note_step(now)
         try:
-            if answer is not None:
+            if answer is not None and self._rehearsal.happened != "mute":
                 self.port_socket.sendto(answer, source)
         except OSError as error:  # to the proxy it is a lost datagram
             self._say(f"{text(source)}: not sent: {error.strerror or error}")

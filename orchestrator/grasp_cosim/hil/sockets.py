@@ -1,4 +1,7 @@
-"""UDP on IPv4: addresses, sockets there, and a loop at a port that waits for datagrams and time."""
+"""UDP: addresses, sockets there, and a loop at a port that waits for datagrams and time.
+
+An address is of IPv4 or IPv6. In a text with a port one of IPv6 is in brackets, as in [::1]:5501.
+"""
 
 import ipaddress
 import re
@@ -14,7 +17,7 @@ from ..base.errors import InputError
 from ..system.times import NANOSECONDS
 
 Address = tuple[str, int]
-"""IPv4 address and port."""
+"""Address, in numbers, and port."""
 
 LARGEST = 65_536
 """Bytes to take of a datagram; no UDP datagram has as many."""
@@ -26,8 +29,8 @@ class EventLoop:
     """Listens at a port once it is made; `run` calls the handlers. Leaving the context closes it.
 
     `due` returns when there is something to do next, in ns of the clock, None for not by time;
-    `look` does what is due at a time. InputError where the address has no IPv4 address of this
-    machine, or the port is taken.
+    `look` does what is due at a time. InputError where the address is none of this machine, or the
+    port is taken.
     """
 
     def __init__(
@@ -43,7 +46,7 @@ class EventLoop:
             self.register(woken, lambda: woken.recv(LARGEST))
             made = _socket(socket.socket.bind, resolved(*address), NOT_HERE)
             self.port_socket = stack.enter_context(made)
-            self.address: Address = self.port_socket.getsockname()
+            self.address: Address = self.port_socket.getsockname()[:2]
             self._stack = stack.pop_all()
 
     def register(self, readable: socket.socket, handler: Callable[[], Any]) -> None:
@@ -81,9 +84,10 @@ class EventLoop:
 def received(readable: socket.socket) -> tuple[bytes, Address] | None:
     """Return a datagram and its sender; None where what made the socket readable was none."""
     try:
-        return readable.recvfrom(LARGEST)
+        data, source = readable.recvfrom(LARGEST)
     except (BlockingIOError, ConnectionError):  # a broken datagram; nobody took an earlier one
         return None
+    return data, (str(source[0]), int(source[1]))
 
 
 def connected(peer: Address) -> socket.socket:
@@ -95,7 +99,8 @@ def _socket(
     attach: Callable[[socket.socket, Address], None], address: Address, wrong: str
 ) -> socket.socket:
     """Return a socket that does not block, attached to `address`; `wrong` is said if it cannot."""
-    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
+    made = socket.socket(family, socket.SOCK_DGRAM)
     try:
         attach(made, address)
     except OSError as error:
@@ -106,34 +111,43 @@ def _socket(
 
 
 def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
-    """Return IPv4 address and port; InputError where the host has none or the port is wrong."""
+    """Return address and port; InputError where the host has none or the port is wrong.
+
+    A name that has an address of IPv4 stands for that.
+    """
     if not lowest_port <= port <= 65_535:
         raise InputError(f"{text((host, port))}: port must be from {lowest_port} to 65535")
+    plain = host[1:-1] if host.startswith("[") and host.endswith("]") else host
     try:
-        found = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
+        if not plain:
+            raise OSError("no name")
+        found = socket.getaddrinfo(plain, port, socket.AF_UNSPEC, socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:
         raise InputError(
-            f"{text((host, port))}: no such host; must be an IPv4 address or a name that has one"
+            f"{text((host, port))}: no such host; must be an address or a name that has one"
         ) from error
-    return str(found[0][4][0]), port
+    chosen = next((f for f in found if f[0] == socket.AF_INET), found[0])
+    return str(chosen[4][0]), port
 
 
 def read_address(place: str, given: str) -> Address:
-    """The address that a text says, HOST:PORT, or PORT of this machine; place says whose.
+    """The address that a text says, HOST:PORT, [ADDRESS]:PORT, or PORT of this machine.
 
-    InputError where it is none.
+    place says whose. InputError where it is none.
     """
-    found = re.fullmatch(r"(?:(.+):)?([0-9]{1,5})", given)
+    found = re.fullmatch(r"(?:(\[[^][]+\]|[^:]+):)?([0-9]{1,5})", given)
     if not found:
-        raise InputError(f"{place} {given!r}: must be HOST:PORT, as in 127.0.0.1:5501, or PORT")
+        must = "must be HOST:PORT, as in 127.0.0.1:5501 or [::1]:5501, or PORT"
+        raise InputError(f"{place} {given!r}: {must}")
     return found[1] or "127.0.0.1", int(found[2])
 
 
 def text(address: Address) -> str:
-    """Return an address as in a command line, 127.0.0.1:5501."""
-    return f"{address[0]}:{address[1]}"
+    """Return an address as in a command line, 127.0.0.1:5501 or [::1]:5501."""
+    host, port = address
+    return f"[{host}]:{port}" if ":" in host and not host.startswith("[") else f"{host}:{port}"
 
 
 def is_loopback(address: Address) -> bool:
     """Return True if only this machine can send there."""
-    return ipaddress.ip_address(address[0]).is_loopback
+    return ipaddress.ip_address(address[0].partition("%")[0]).is_loopback

@@ -255,6 +255,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
             self.timing,
             len(self.limits),
             len(self.initialised_anew),
+            self.came_to_its_end,
         )
 
     @property

@@ -55,10 +55,12 @@ def judge(
     timing: Timing | None,
     exceeded: int,
     initialised_anew: int,
+    finished: bool = True,
 ) -> tuple[Criterion, ...]:
     """Return the criteria that apply to a run of so many steps; none to a plain simulation.
 
-    proxies are the figures of recording.proxies; exceeded is how many limits were.
+    proxies are the figures of recording.proxies; exceeded is how many limits were; finished says
+    that the run came to its end.
     """
     limits = Acceptance(**settings.get("acceptance", {}))
     found: list[tuple[str, str, float, str]] = []
@@ -74,6 +76,8 @@ def judge(
         found.append(("refused", "privileges that the system refused", refused, ""))
     if settings.get("limits"):
         found.append(("warnings", "limits that were exceeded", exceeded, ""))
+    if found:
+        found.insert(0, ("unfinished", "runs that did not come to their end", not finished, ""))
     return tuple(
         Criterion(name, what, _scaled(getattr(limits, name), unit), float(measured), unit)
         for name, what, measured, unit in found

@@ -315,7 +315,7 @@ class Acceptance:
     lost: how often a peer was lost; missed, overruns, implausible: shares of the steps; trips of
     peers; limited: commands that were clamped; lead: of a peer's clock in s; refused: what the
     operating system did not grant; initialised_anew: how often the loop was; warnings: limits that
-    were exceeded.
+    were exceeded; unfinished: 1 where the run did not come to its end.
     """
 
     lost: int = 0
@@ -328,9 +328,11 @@ class Acceptance:
     overruns: float = 0.01
     refused: int = 0
     warnings: int = 0
+    unfinished: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("lost", "trips", "limited", "initialised_anew", "refused", "warnings"):
+        counts = "lost", "trips", "limited", "initialised_anew", "refused", "warnings", "unfinished"
+        for name in counts:
             whole(name, getattr(self, name), 0, must="a whole number, at least 0")
         for name in ("missed", "implausible", "overruns"):
             number(name, getattr(self, name), 0.0, 1.0, must="a share of the steps, from 0 to 1")

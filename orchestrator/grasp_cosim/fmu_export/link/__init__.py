@@ -149,7 +149,7 @@ OTHER_INTERFACE, BUSY, UNKNOWN, FAILED, OTHER_VERSION, OTHER_NAME = range(1, 7)
 HEAD = struct.Struct("<4sHBB16sQQQddqII")
 TAG_SIZE = 32
 LARGEST = 65_507
-"""Bytes of a UDP datagram over IPv4."""
+"""Bytes of a UDP datagram over IPv4, which holds fewer than one over IPv6."""
 PORT = 5501
 """The default UDP port of a peer."""
 

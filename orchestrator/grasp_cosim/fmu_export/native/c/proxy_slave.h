@@ -83,7 +83,9 @@ static const char *const proxy_on_limit[] = {"clamp", "trip"};
 
 static Text *proxy_put_peer(Slave *s, Text *said)
 {
-    text_say(said, "%s:%d", slave_string(s, PROXY_HOST), (int)s->values[PROXY_PORT]);
+    const char *host = slave_string(s, PROXY_HOST);
+    int bare = strchr(host, ':') != NULL && *host != '[';  /* an address of IPv6 */
+    text_say(said, bare ? "[%s]:%d" : "%s:%d", host, (int)s->values[PROXY_PORT]);
     return said;
 }
 

@@ -30,6 +30,7 @@
 #endif
 
 typedef SOCKET Socket;
+typedef int NetLength;  /* of an address */
 #define NO_SOCKET INVALID_SOCKET
 #define net_yield() SwitchToThread()
 
@@ -46,6 +47,7 @@ typedef SOCKET Socket;
 #include <unistd.h>
 
 typedef int Socket;
+typedef socklen_t NetLength;  /* of an address */
 #define NO_SOCKET (-1)
 #define net_yield() sched_yield()
 
@@ -254,37 +256,59 @@ static int net_wait(Socket at, int64_t ns)
 
 #endif
 
-/* The address of a host, a number or a name: there is no deadline to the resolver of the system; 0,
-   and why not in the text */
-static int net_address(const char *host, int port, struct sockaddr_in *address, char *text)
+/* The address of a host: a name, or numbers, of IPv6 with brackets or without; of a name the one of IPv4,
+   where it has one. Its size, or 0 with the reason in the text */
+static NetLength net_address(const char *host, int port, struct sockaddr_storage *address, char *text)
 {
-    struct addrinfo how, *found = NULL;
+    struct addrinfo how, *all, *found, *chosen;
+    NetLength size = 0;
+    char plain[NET_HOST_SIZE];
+    size_t length = strlen(host);
+    if (length > 2 && length < sizeof plain && host[0] == '[' && host[length - 1] == ']') {
+        memcpy(plain, host + 1, length - 2);
+        plain[length - 2] = '\0';
+        host = plain;
+    }
     memset(&how, 0, sizeof how);
-    how.ai_family = AF_INET;
+    how.ai_family = AF_UNSPEC;
     how.ai_socktype = SOCK_DGRAM;
-    if (getaddrinfo(host, NULL, &how, &found)) {
-        net_copy_text(text, "no such host, or none with an IPv4 address");
+    if (getaddrinfo(host, NULL, &how, &all)) {
+        net_copy_text(text, "no such host, or none with an address");
         return 0;
     }
-    memcpy(address, found->ai_addr, sizeof *address);
-    address->sin_port = htons((uint16_t)port);
-    freeaddrinfo(found);
-    return 1;
+    chosen = all;
+    for (found = all; found; found = found->ai_next) {
+        if (found->ai_family == AF_INET) {
+            chosen = found;
+            break;
+        }
+    }
+    size = (NetLength)chosen->ai_addrlen;
+    memcpy(address, chosen->ai_addr, (size_t)size);
+    freeaddrinfo(all);
+    if (address->ss_family == AF_INET) {
+        ((struct sockaddr_in *)address)->sin_port = htons((uint16_t)port);
+    } else {
+        ((struct sockaddr_in6 *)address)->sin6_port = htons((uint16_t)port);
+    }
+    return size;
 }
 
-/* A socket connected to the host, or NO_SOCKET, and why in the text */
+/* A socket that receives from the host alone and does not block; NO_SOCKET, with the reason in the text */
 static Socket net_open(const char *host, int port, char *text)
 {
-    struct sockaddr_in address;
+    struct sockaddr_storage address;
+    NetLength size;
     Socket at = NO_SOCKET;
     net_copy_text(text, "there is no network");
     if (net_begin()) {
         return NO_SOCKET;
     }
-    if (net_address(host, port, &address, text)) {
-        at = socket(AF_INET, SOCK_DGRAM, 0);
+    size = net_address(host, port, &address, text);
+    if (size > 0) {
+        at = socket(address.ss_family, SOCK_DGRAM, 0);
         if (at != NO_SOCKET && !net_prepare(at)
-            && !connect(at, (const struct sockaddr *)&address, sizeof address)) {
+            && !connect(at, (const struct sockaddr *)&address, size)) {
             return at;
         }
         net_error_text(net_error(), text);

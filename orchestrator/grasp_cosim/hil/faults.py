@@ -1,0 +1,72 @@
+"""Failures of a bench that a server rehearses: which one, and when after the first step."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from ..base.errors import InputError, choices
+from ..system.times import NANOSECONDS
+
+Failure = Literal["kill", "stop", "mute", "deaf", "restart", "fail", "trip"]
+FAILURES: tuple[Failure, ...] = get_args(Failure)
+MEANINGS = (
+    "kill: the process ends at once; stop: it stands still; mute: it answers no more; deaf: it "
+    "hears no more; restart: another one takes its place, which knows no session; fail: its model "
+    "fails; trip: it puts its inputs to safe values"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsed:
+    """A failure, and the time in s after the first step at which it happens."""
+
+    failure: Failure
+    at: float
+
+    @classmethod
+    def read(cls, text: str) -> Rehearsed:
+        """The failure that a text says, like mute@0.9; InputError where it says none."""
+        found = re.fullmatch(r"(\w+)@([0-9.]+)", text)
+        known = next((f for f in FAILURES if found and f == found[1]), None)
+        try:
+            at = float(found[2]) if found else math.nan
+        except ValueError:
+            at = math.nan
+        if known is None or not at < math.inf:
+            must = f"must be WHAT@S, of {choices(FAILURES)}, in s after the first step"
+            raise InputError(f"--fault {text!r}: {must}")
+        return cls(known, at)
+
+
+class Rehearsal:
+    """A failure on its way; times are in ns of the server's clock."""
+
+    def __init__(self, rehearsed: Rehearsed | None) -> None:
+        self._rehearsed = rehearsed
+        self._at: int | None = None
+        self.happened: Failure | None = None
+
+    def note_step(self, now: int) -> None:
+        """Take note of a step: the first one starts the clock."""
+        if self._rehearsed and self._at is None:
+            self._at = now + round(self._rehearsed.at * NANOSECONDS)
+
+    def due(self) -> int | None:
+        """Return when it happens; None where that is not known, or it has."""
+        return None if self.happened else self._at
+
+    def happens(self, now: int) -> Failure | None:
+        """Return the failure that happens now, once."""
+        if self._rehearsed is None or self.happened or self._at is None or now < self._at:
+            return None
+        self.happened = self._rehearsed.failure
+        return self.happened
+
+
+def end_at_once() -> None:
+    """End this process as SIGKILL does: nothing is said to anybody."""
+    os._exit(137)
