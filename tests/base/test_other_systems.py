@@ -42,12 +42,13 @@ def test_every_module_can_be_imported(tmp_path):
     "arguments",
     [
         ("run", "system.toml", "--out", "out"),
-        ("run", "system.toml", "--realtime", "--set", "realtime.cpu=0"),
+        ("run", "system.toml", "--realtime", "--set", "realtime.cpu=0",
+         "--set", "verdict.refused=1"),
         ("run", "system.toml", "--set", "components.a.isolation=process"),
         ("sweep", "system.toml", "--vary", "a.gain=1,2", "--workers", "2", "--metrics", "mine.py"),
     ],
     ids=" ".join,
-)
+)  # fmt: skip
 def test_the_command_works(arguments, tmp_path):
     write_integrator(tmp_path)
     done = run("-m", "grasp_cosim", *arguments, cwd=tmp_path)

@@ -14,6 +14,7 @@ from ..comparison.page import write_comparison, write_qualification
 from ..comparison.qualify import component_of
 from ..comparison.qualify import qualify as run_qualification
 from ..interface.read import check_runs
+from ..recording.log_names import LogNames
 from ..report.page import write_report
 from ..system.description import FILES
 from ..system.toml import SECTIONS
@@ -33,6 +34,7 @@ from .options import (
     chosen_system,
     load_system,
     many_runs_option,
+    map_option,
     natively,
     preset_option,
     set_option,
@@ -162,6 +164,7 @@ def report(run: Path, out: Path | None, title: str | None, as_json: bool) -> int
 @click.option(
     "--bands", type=PATH, help="TOML file with bands, as qualify takes it. Default: derived from A."
 )
+@map_option
 @metrics_option
 @json_option
 def compare(
@@ -169,6 +172,7 @@ def compare(
     b: Path,
     out: Path | None,
     bands: Path | None,
+    names: LogNames,
     metric_files: tuple[Path, ...],
     as_json: bool,
 ) -> int:
@@ -177,17 +181,19 @@ def compare(
     It compares signals, metrics and settings, over the time that both have. A and B are folders
     that `run --out` wrote; systems (.toml or .ssp), which run as long as the other one; or files of
     signals from elsewhere: ASAM MDF (.mf4), or tables with the column time and names like
-    plant.gap[1], with a unit in brackets where it is not the usual one: "plant.gap[1] [mm]". The
-    exit code is 1 where anything is out of its band, or a run did not come to its end.
+    plant.gap[1], with a unit in brackets where it is not the usual one: "plant.gap[1] [mm]". Of a
+    log with other names --map says which is which, and how far its clock is off. The exit code is 1
+    where anything is out of its band, or a run did not come to its end.
 
     \b
     Example: grasp-cosim compare results_a results_b -o compare.html
+    With the log of a bench: grasp-cosim compare results bench.csv --map names.toml
     """
     if out:
         check_file(out)
     given, metrics = read_bands(bands) if bands else None, chosen_metrics(metric_files)
     with waiting(f"comparing {a} and {b}"):
-        found = compare_runs(a, b, bands=given, metrics=metrics)
+        found = compare_runs(a, b, bands=given, metrics=metrics, names=names)
         if out:
             write_comparison(found, out)
     if out:

@@ -13,11 +13,12 @@ import click
 
 from ..base.errors import InputError
 from ..base.progress import phase
+from ..recording.log_names import AS_THEY_ARE, read_log_names
 from ..system.connectors import reached
 from ..system.description import System, read_system
 from ..system.record import Record
 from ..system.stimuli import Stimuli, read_stimuli
-from .frame import pair, say, waiting
+from .frame import PATH, pair, say, waiting
 
 Command = Callable[..., Any]
 
@@ -48,6 +49,22 @@ set_option = click.option(
     metavar="PLACE=VALUE",
     help="Change a value of the system file, by its place there: plant.object_width=0.06, "
     "experiment.scheme=jacobi, components.plant.isolation=process.",
+)
+
+values_option = click.option(
+    "--values",
+    "fitted",
+    type=PATH,
+    help="TOML file with [values] by name, and [drives], as identify -o writes it.",
+)
+
+map_option = click.option(
+    "--map",
+    "names",
+    type=PATH,
+    callback=lambda _, __, path: read_log_names(path) if path else AS_THEY_ARE,
+    help="TOML file: which column of a log from elsewhere is which signal, in which unit, and the "
+    "offset of its time.",
 )
 
 swap_option = click.option(
@@ -203,6 +220,10 @@ def chosen_system(given: Mapping[str, Any]) -> System:
             from ..grasp.presets import with_preset
 
             system = with_preset(system, name)
+    if fitted := given.get("fitted"):
+        from ..grasp.identification.values import with_fitted
+
+        system = with_fitted(system, fitted)
     changed = system.with_settings(settings, option)
     for note in changed.notes[len(loaded.notes) :]:
         say(note)

@@ -10,8 +10,9 @@ from ..grasp.identification.identification import identify as run_identification
 from ..grasp.published.evaluation import evaluate as run_evaluation
 from ..grasp.published.evaluation import verdict
 from ..grasp.system import grasp_system
+from ..recording.log_names import LogNames
 from .frame import NEGATIVE, PATH, is_quiet, json_option, show
-from .options import controller_option, many_runs_option, set_option, set_values
+from .options import controller_option, many_runs_option, map_option, set_option, set_values
 
 
 @click.command()
@@ -58,30 +59,34 @@ def evaluate(
     metavar="|".join(GROUPS),
     help="Fit this; may be given several times.",
 )
+@map_option
 @set_option
 @click.option("-o", "--out", type=PATH, help="Folder for the values and the residuals.")
 @json_option
 def identify(
     log: Path | None,
     fit: tuple[str, ...],
+    names: LogNames,
     settings: tuple[str, ...],
     out: Path | None,
     as_json: bool,
 ) -> int:
-    """Fit the friction of the fingers to a LOG.
+    """Fit the friction of the fingers to a LOG, and masses, gains and the delay of their drives.
 
-    It is a run, as a table or .mf4, or a table of contact times, with the columns x_m, case,
-    finger, time. Tables are .csv, .arrow or .parquet files. Without LOG it is the contact times of
-    the published experiments.
+    It is a run or the log of a bench, as a table or .mf4, or a table of contact times, with the
+    columns x_m, case, finger, time. Tables are .csv, .arrow or .parquet files. Without LOG it is
+    the contact times of the published experiments. What was fitted goes into a run by --values.
 
     \b
     Example: grasp-cosim identify --fit coulomb --fit viscous --out identified
     From a run: grasp-cosim identify results/signals.csv --fit coulomb
+    From a bench: grasp-cosim identify bench.csv --map names.toml --fit mass --fit delay -o fitted
+    and with that: grasp-cosim run --preset bench --values fitted/values.toml
     """
     if out:
         check_folder(out)
     system = grasp_system().with_settings(set_values(settings), "--set {}".format)
-    found = run_identification(log, fit=fit, system=system, progress=not is_quiet())
+    found = run_identification(log, fit=fit, system=system, progress=not is_quiet(), names=names)
     for name, text in found.files().items() if out else ():
         write_text(Path(out or "", name), text)
     show(as_json, found.as_json(), found.text())

@@ -35,6 +35,7 @@ from .options import (
     record_option,
     swap_option,
     system_options,
+    values_option,
 )
 
 
@@ -53,6 +54,7 @@ from .options import (
     help="Drive inputs and tunable parameters by a table: time, then columns like plant.force.",
 )
 @record_option
+@values_option
 @metrics_option
 @native_option("as SYSTEM names them, but native for the built-in grasp.")
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")

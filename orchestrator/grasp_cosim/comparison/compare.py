@@ -13,10 +13,12 @@ from ..base.errors import InputError, choices
 from ..interface.units import Conversion
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, metrics_of
+from ..recording.log_names import AS_THEY_ARE, LogNames
 from ..recording.result import Result
 from ..system.description import FILES, System
 from ..system.times import in_seconds, nearest_time
 from .bands import SHARE, Band, Bands, Compared, metric_band, plain, signal_band
+from .offset import fit_offset, shifted
 from .side import Difference, Side, differences, read_side, side_of
 from .tube import ROUNDING, Curve, deviation
 
@@ -72,16 +74,19 @@ def compare(
     *,
     bands: Bands | None = None,
     metrics: Sequence[Metric] = (),
+    names: LogNames = AS_THEY_ARE,
 ) -> Comparison:
     """Compare two runs: each a result, a folder that `run --out` wrote, or a CSV or MDF file.
 
     One may be a system file, too: it is run, as long as the other run is.
     Bands that are not given are derived from a alone, as in a qualification. `metrics` are compared
-    beside those of the system. InputError where one cannot be read, or the two
-    have no time or no signal in common.
+    beside those of the system. `names` are those of the columns of a log from elsewhere, with the
+    offset of its time. InputError where one cannot be read, or the two have no time or no signal in
+    common.
     """
-    first, second = (_recorded(run, called) for run, called in ((a, "A"), (b, "B")))
+    first, second = (_recorded(run, called, names) for run, called in ((a, "A"), (b, "B")))
     first, second = first or _ran(a, second), second or _ran(b, first)
+    first, second, said = _on_one_clock(first, second, names)
     first, second = first.like(second), second.like(first)
     begin, end = _overlap(first, second)
     ours, theirs = first.part(begin, end), second.part(begin, end)
@@ -103,7 +108,7 @@ def compare(
         end=end,
         only=_only(ours.signals, theirs.signals),
         differences=differences(*runs) if runs else (),
-        notes=tuple(_notes(first, second, begin, end, changes)),
+        notes=(*said, *_notes(first, second, begin, end, changes)),
     )
 
 
@@ -177,11 +182,29 @@ def judge(
     )
 
 
-def _recorded(run: Result | str | Path, called: str) -> Side | None:
+def _on_one_clock(a: Side, b: Side, names: LogNames) -> tuple[Side, Side, list[str]]:
+    """Both sides, with the offset of a log's clock found where that is asked for; what it is."""
+    if names.file and a.result and b.result:
+        raise InputError(f"{names.file}: neither {a.name} nor {b.name} is a log from elsewhere")
+    if names.offset is not None:
+        return a, b, []
+    log, run = (a, b) if b.result else (b, a)
+    if run.result is None:
+        must = "one of the two must be a run of ours"
+        raise InputError(f"{names.file}: time.offset = 'fit': {must}")
+    alike = log.like(run)
+    changes = {name: run.change(name, alike) for name in alike.signals if name in run.signals}
+    offset = fit_offset(alike.converted(changes), run)
+    said = f"the clock of {log.name} is off: {offset:.6g} s were added to its times"
+    moved = shifted(log, offset)
+    return (moved, b, [said]) if log is a else (a, moved, [said])
+
+
+def _recorded(run: Result | str | Path, called: str, names: LogNames) -> Side | None:
     """The side of a result, which is `called` so, or of a file; None of a system."""
     if isinstance(run, Result):
         return side_of(run, called)
-    return None if Path(run).suffix.lower() in FILES else read_side(Path(run))
+    return None if Path(run).suffix.lower() in FILES else read_side(Path(run), names)
 
 
 def _ran(system: Result | str | Path, other: Side | None) -> Side:

@@ -16,6 +16,7 @@ from ..base.si_units import known_unit
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals, measure
 from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run
+from ..recording.log_names import AS_THEY_ARE, LogNames
 from ..recording.result import Result
 from ..recording.signals import LOGS, Log, read_log
 from ..system.settings import given_values
@@ -148,8 +149,8 @@ def side_of(run: Result, called: str) -> Side:
     )  # fmt: skip
 
 
-def read_side(path: Path) -> Side:
-    """The run in a folder, of its signals.csv or run.json; or the log in a file of LOGS.
+def read_side(path: Path, names: LogNames = AS_THEY_ARE) -> Side:
+    """The run in a folder, of its signals.csv or run.json; or the log in a file of LOGS, by names.
 
     InputError where it is missing, damaged or none of these.
     """
@@ -160,7 +161,7 @@ def read_side(path: Path) -> Side:
     if not path.is_file():
         raise InputError(f"{path}: no such run; must be {what}")
     if path.suffix.lower() in LOGS:
-        return _of_log(read_log(path))
+        return _of_log(read_log(path, names))
     check_nature(path, "run")
     raise InputError(f"{path}: must be {what} of signals")
 

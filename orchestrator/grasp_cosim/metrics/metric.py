@@ -34,7 +34,8 @@ from ..interface.units import Conversion
 Value = float | bool | None
 RESERVED = frozenset((
     "complete", "ended_at", "error", "index", "missing_metrics", "proxies",
-    "real_time_factor", "realtime", "scheme", "step", "steps", "stop", "units", "wall_time",
+    "real_time_factor", "realtime", "scheme", "step", "steps", "stop", "units", "verdict",
+    "wall_time",
 ))  # fmt: skip
 """Names beside metrics in what `run --json` prints, and in the table of a sweep."""
 

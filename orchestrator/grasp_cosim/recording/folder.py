@@ -31,6 +31,7 @@ from ..realtime.timing import Timing
 from ..system.description import System
 from .arrow import ArrowListener
 from .csv import CsvListener
+from .log_names import AS_THEY_ARE, LogNames
 from .memory import Rows, typed, writing
 from .result import OF_ANY, Known, Rejection, Result, Trip
 from .run_json import MADE, MADE_BESIDE, ORIGIN, read_run_json, unreadable
@@ -382,9 +383,12 @@ def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
 
 
 def load_log(
-    path: Path, note: Callable[[str], None] = lambda _: None, expects: Mapping[str, str] = NOTHING
+    path: Path,
+    note: Callable[[str], None] = lambda _: None,
+    expects: Mapping[str, str] = NOTHING,
+    names: LogNames = AS_THEY_ARE,
 ) -> Signals:
-    """The numbers in a log of any tool, by the names of its columns.
+    """The numbers in a log of any tool, by the names of its columns, or by others for these.
 
     They come in SI units where the run.json of the run beside it, or the units in the log, tell of
     others; else they are taken to be in SI, which `note` is told. InputError where it is missing,
@@ -398,7 +402,12 @@ def load_log(
         raise InputError(f"{path}: no such log; must be a {choices(LOGS)} file")
     if path.suffix.lower() not in LOGS:
         raise InputError(f"{path}: must be a {choices(LOGS)} file")
-    log = read_log(path)
+    if names.offset is None:
+        raise InputError(
+            f"{names.file}: time.offset = 'fit': there is no run to compare with; must be a number "
+            "of s"
+        )
+    log = read_log(path, names)
     for name, unit in expects.items():
         log.check_unit(name, unit)
     beside = path.with_name(SETTINGS)

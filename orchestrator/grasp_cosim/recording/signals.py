@@ -1,6 +1,7 @@
 """The signals that a run of ours has recorded, and logs of others, read from their files."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ import numpy.typing as npt
 from ..base.errors import InputError, nearest
 from ..base.text import from_cell
 from ..system.times import LONGEST
-from ..tables.column import Column
+from ..tables.column import Column, Table
 from ..tables.table import ARROW, TEXT, read_table
+from .log_names import AS_THEY_ARE, LogColumn, LogNames
 from .mdf import read_mdf
 from .memory import Columns
 
@@ -103,11 +105,12 @@ class Log(Mapping[str, npt.NDArray[np.float64] | npt.NDArray[np.bool_]]):
         return True
 
 
-def read_log(path: Path) -> Log:
-    """The log in a CSV, Arrow, Parquet or MDF file.
+def read_log(path: Path, names: LogNames = AS_THEY_ARE) -> Log:
+    """The log in a CSV, Arrow, Parquet or MDF file, with other names for its columns.
 
-    The time is in the column of that name, in s or in the unit behind it. InputError where the file
-    is damaged, has no time, or needs a package that is not installed.
+    The time is in the column of that name, in s or in the unit behind it; an offset that is to be
+    found is left out. InputError where the file is damaged, has no time or none of the columns that
+    are named, or needs a package that is not installed.
     """
     if path.suffix.lower() == ".mf4":
         time, signals, units = read_mdf(path)
@@ -115,9 +118,11 @@ def read_log(path: Path) -> Log:
             _of_mdf(path, number, name, units[name], values)
             for number, (name, values) in enumerate(signals.items(), start=1)
         ]
-        return Log(path, time, columns)
+        table = Table(str(path), columns, len(time))
+        return Log(path, time + (names.offset or 0.0), _named(table, columns, names))
     table = read_table(path)
-    clocks = [column for column in table.columns if column.is_time()]
+    clocks = [table.named(names.time)] if names.file else []
+    clocks = clocks or [column for column in table.columns if column.is_time()]
     if len(clocks) != 1:
         count = "no column" if not clocks else f"{len(clocks)} columns"
         raise InputError(
@@ -125,9 +130,31 @@ def read_log(path: Path) -> Log:
         )
     if not table.count:
         raise InputError(f"{path}: has no row below its names; must have one")
-    unit, values = clocks[0].time_unit(), np.asarray(clocks[0].numbers(), np.float64)
-    time = values * float(unit.numerator) / float(unit.denominator)
-    return Log(path, time, [column for column in table.columns if column is not clocks[0]])
+    clock = clocks[0] if names.time_unit is None else replace(clocks[0], unit=names.time_unit)
+    unit, values = clock.time_unit(), np.asarray(clock.numbers(), np.float64)
+    time = values * float(unit.numerator) / float(unit.denominator) + (names.offset or 0.0)
+    columns = [column for column in table.columns if column is not clocks[0]]
+    return Log(path, time, _named(table, columns, names))
+
+
+def _named(table: Table, columns: Sequence[Column], names: LogNames) -> list[Column]:
+    """The columns by the names of signals: those of the map, then the others by their own."""
+    mapped = [
+        _as_signal(table.named(entry.column), signal, entry)
+        for signal, entry in names.columns.items()
+    ]
+    used = {entry.column for entry in names.columns.values()} | {*names.columns}
+    return [*mapped, *(column for column in columns if column.name not in used)]
+
+
+def _as_signal(column: Column, signal: str, entry: LogColumn) -> Column:
+    """A column as the signal that it has."""
+    as_it_is = (entry.factor, entry.offset) == (1.0, 0.0)
+    values = column.values
+    if not as_it_is:
+        values = entry.factor * np.asarray(column.numbers(), np.float64) + entry.offset
+    unit = column.unit if entry.unit is None else entry.unit
+    return replace(column, name=signal, unit=unit, values=values)
 
 
 def _of_mdf(

@@ -108,9 +108,81 @@ def test_what_is_not_fitted_is_that_of_the_system(grasp):
 
 def test_stribeck_friction_comes_back(grasp):
     log = scipy_log({**TRUE, "plant.friction.viscous[2]": 8.0}, 0.4, 0.04)
-    found = {e.name: e.value for e in identified(grasp, log, *OF_A_LOG).estimates}
+    groups = "coulomb", "static", "viscous", "stribeck"
+    found = {e.name: e.value for e in identified(grasp, log, *groups).estimates}
     assert found["plant.friction.static[1]"] == pytest.approx(1.0, rel=0.02)
     assert found["plant.friction.stribeck_velocity"] == pytest.approx(0.04, rel=0.02)
+
+
+DRIVEN = {
+    "plant.finger_mass[1]": 0.7,
+    "plant.finger_mass[2]": 0.4,
+    "drive.gain[1]": 0.8,
+    "drive.gain[2]": 1.2,
+    "drive.delay": 0.004,
+    **TRUE,
+}
+
+
+def driven_log(*known):
+    """Fingers of other masses, whose drives are late and too weak or too strong, in scipy."""
+    true = {name: value for name, value in DRIVEN.items() if not name.startswith(known)}
+    time = np.arange(0.0, 4.0, 1e-3)
+    signals = {}
+    for j, way in ((1, -1.0), (2, 1.0)):
+        c, b = (TRUE[f"plant.friction.{n}[{j}]"] for n in ("coulomb", "viscous"))
+        mass, gain = true.get(f"plant.finger_mass[{j}]", MASS), true.get(f"drive.gain[{j}]", 1.0)
+        late = true.get("drive.delay", 0.0)
+
+        def command(t, c=c, gain=gain):
+            return (c + 1.5 + 0.9 * np.sin(9.0 * t) + 0.4 * np.sin(21.0 * t)) / gain
+
+        held = command(time)
+
+        def slope(t, x, held=held, late=late, mass=mass, gain=gain, c=c, b=b):
+            u = gain * held[max(int((t - late) / 1e-3 + 1e-9), 0)]
+            return [x[1], (u - c - b * x[1]) / mass]
+
+        solution = solve_ivp(
+            slope, (0.0, time[-1]), [0.0, 0.05], t_eval=time, rtol=1e-8, max_step=5e-4
+        )
+        signals[f"plant.position[{j}]"] = way * solution.y[0]
+        signals[f"plant.velocity[{j}]"] = way * solution.y[1]
+        signals[f"controller.force[{j}]"] = way * held
+    return Signals(time, signals), true
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("known", "groups"),
+    [
+        ("drive.gain", ("coulomb", "viscous", "mass", "delay")),
+        ("plant.finger_mass", ("coulomb", "viscous", "gain", "delay")),
+    ],
+)
+@pytest.mark.parametrize("measured", ["plant.velocity", "plant.position"])
+def test_masses_gains_and_the_delay_of_the_drives_come_back(grasp, known, groups, measured):
+    """Of the velocity, or of the position alone, with noise; there is no contact force."""
+    log, true = driven_log(known)
+    other = {"plant.velocity", "plant.position"} - {measured}
+    kept = {n: v for n, v in log.items() if not n.startswith(tuple(other))}
+    noise = {"plant.velocity": 1e-4, "plant.position": 2e-7}[measured]
+    random = np.random.default_rng(1)
+    kept = {
+        n: v + random.normal(0.0, noise, len(v)) if n.startswith(measured) else v
+        for n, v in kept.items()
+    }
+    found = identified(grasp, Signals(log.time, kept), *groups)
+    assert len(found.estimates) == 7
+    for e in found.estimates:
+        assert e.value == pytest.approx(true[e.name], rel=0.05, abs=3e-4), e.name
+
+
+def test_mass_and_gain_cannot_be_told_apart(grasp, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,plant.velocity[1]\n0,0\n")
+    with pytest.raises(InputError, match="the ratio of the two alone; must be one of them"):
+        identify(path, fit=("mass", "gain"), system=grasp)
 
 
 def without(log):

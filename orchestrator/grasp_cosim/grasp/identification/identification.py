@@ -1,14 +1,16 @@
-"""Fits the friction of the fingers to what was measured: contact times, or the signals of a log.
+"""Fits friction, masses and drives of the fingers to what was measured: contact times, or a log.
 
 Of a log it is the momentum of each finger over short windows. Free of the object a finger obeys
-m·x'' = u - sgn(x')·F(|x'|), so that over a window of length T
+m·x'' = g·u(t - d) - sgn(x')·F(|x'|), so that over a window of length T
 
-    r = (m·Δx' - ∫u dt) / T + sgn(x')·mean F(|x'|)
+    r = (m·Δx' - g·∫u(t - d) dt) / T + sgn(x')·mean F(|x'|)
     F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v
 
 is zero but for noise, in N. No signal is differentiated: noise of the velocity enters by its two
-ends over T. A window counts where the finger moves one way throughout, nothing touches it and no
-sample is missing; none belongs to two windows, so that white noise leaves them independent.
+ends over T. Only where a log has no velocity is it that of the position, by the slope of a parabola
+through SLOPE of its samples around each (Savitzky and Golay 1964), which shifts nothing in time. A
+window counts where the finger moves one way throughout, nothing touches it and no sample is
+missing; none belongs to two windows, so that white noise leaves them independent.
 """
 
 import logging
@@ -23,6 +25,7 @@ from ...base.errors import InputError, nearest
 from ...base.text import counted
 from ...metrics.metric import Signals
 from ...recording.folder import load_log
+from ...recording.log_names import AS_THEY_ARE, LogNames
 from ...system.description import System
 from ..metrics import FINGERS
 from ..presets import start_in_si
@@ -48,6 +51,9 @@ ASSUMPTIONS = (
 )
 
 FRICTION = "plant.friction."
+MASS = "plant.finger_mass"
+GAIN, DELAY = "drive.gain", "drive.delay"
+"""Of the drives: the force that acts is GAIN times the one that is commanded, DELAY later, in s."""
 
 
 def _each(name: str, *values: Any) -> list[Parameter]:
@@ -59,6 +65,9 @@ GROUPS = {
     "static": _each("static", "N", 1.5, 0.0, 10.0, 1.0),
     "viscous": _each("viscous", "N.s/m", 10.0, 0.0, 1000.0, 10.0),
     "stribeck": [Parameter(f"{FRICTION}stribeck_velocity", "m/s", 0.05, 1e-4, 1.0, 0.01)],
+    "mass": [Parameter(f"{MASS}[{j}]", "kg", 0.5, 1e-3, 100.0, 0.1) for j in FINGERS],
+    "gain": [Parameter(f"{GAIN}[{j}]", "1", 1.0, 0.05, 20.0, 0.1) for j in FINGERS],
+    "delay": [Parameter(DELAY, "s", 0.002, 0.0, 0.05, 0.002)],
     "ratio": [Parameter(RATIO, "1", 1.0, 0.2, 5.0, 0.1)],
 }
 """What can be fitted by name: a parameter for each finger, or one for both."""
@@ -115,9 +124,15 @@ class Identification:
         """The values as the table [values], and the residuals as CSV, by the names of files."""
         head = f"# {self.data}: root mean square of the residuals {self.fit.rms:.4g} {self.unit}"
         digits = {e.name: float(f"{e.value:.6g}") for e in self.fit.estimates}
-        lines = (f'"{e.name}" = {digits[e.name]}  # {_about(e)}' for e in self.fit.estimates)
+        tables: dict[str, list[str]] = {"values": [], "drives": []}
+        for e in self.fit.estimates:
+            table = "drives" if e.name.startswith("drive.") else "values"
+            name = e.name.removeprefix("drive.")
+            tables[table].append(f'"{name}" = {digits[e.name]}  # {_about(e)}')
+        lines = ["[values]", *tables["values"]]
+        lines += ["[drives]", *tables["drives"]] if tables["drives"] else []
         return {
-            "values.toml": "\n".join([head, "[values]", *lines, ""]),
+            "values.toml": "\n".join([head, *lines, ""]),
             "residuals.csv": table_csv(self.rows),
         }
 
@@ -128,8 +143,12 @@ def identify(
     fit: Sequence[str] = DEFAULT,
     system: System | None = None,
     progress: bool = False,
+    names: LogNames = AS_THEY_ARE,
 ) -> Identification:
     """Fit friction to a log: the contact times in a table, or the signals of a run.
+
+    Of signals it may also be masses, gains and the delay of the drives; `names` are those of the
+    columns of a log from elsewhere.
 
     Without `log` these are the contact times of the published experiments. `fit` are names of
     GROUPS; what is not fitted is as in `system`, by default the built-in grasp.
@@ -138,7 +157,7 @@ def identify(
     come to rest.
     """
     system = grasp_system() if system is None else system
-    if log is None or is_contacts(log):
+    if log is None or (not names.file and is_contacts(log)):
         contacts = published_contacts() if log is None else read_contacts(log)
         name = "the published experiments" if log is None else str(log)
         parameters = chosen(fit, tuple(GROUPS), name)
@@ -150,7 +169,11 @@ def identify(
         data = f"{name}, {len(rows)} contact times"
         return _identified(data, "s", found, rows, scatter(contacts))
     units = {f"{name}[{j}]": unit for name, unit in USED.items() for j in FINGERS}
-    signals = load_log(log, LOGGER.warning, units)
+    signals = load_log(log, LOGGER.warning, units, names)
+    if {"mass", "gain"} <= {*fit}:
+        raise InputError(
+            f"{log}: mass and gain: a log tells the ratio of the two alone; must be one of them"
+        )
     parameters = chosen(fit, OF_A_LOG, str(log))
     windows, found = identify_from_log(system, signals, parameters, str(log))
     rows = [{"finger": w.finger, "time": float(t)} for w in windows for t in w.time]
@@ -193,20 +216,37 @@ GAP = 1.5
 """Median steps between two samples; where it is more, one is missing."""
 
 
-USED = {"plant.velocity": "m/s", "controller.force": "N", "plant.contact_force": "N"}
-"""The signals of each finger, and the units of SI in which they are needed."""
+VELOCITY, POSITION = "plant.velocity", "plant.position"
+COMMAND, TOUCH = "controller.force", "plant.contact_force"
+USED = {VELOCITY: "m/s", POSITION: "m", COMMAND: "N", TOUCH: "N"}
+"""The signals of each finger, and the units of SI in which they are needed. Of velocity and
+position one is enough; without a contact force the finger is taken to be free.
+"""
+
+SLOPE = 0.01
+"""s; the samples that the slope of a position is taken from."""
 
 
 class Windows(NamedTuple):
-    """Of one finger: per window its start in s, its residual without friction in N, and its way,
-    1 or -1; and the speeds in m/s, a row per window.
+    """Of one finger: per window its start and end in s, the change of the velocity in m/s, and its
+    way, 1 or -1; the speeds in m/s, a row per window; and the whole log's times in s, with the
+    impulse of the commands up to each in N.s.
     """
 
     finger: int
     time: Vector
-    unexplained: Vector
+    end: Vector
+    change: Vector
     way: Vector
     speeds: Vector
+    times: Vector
+    impulses: Vector
+
+    def mean_force(self, delay: float) -> Vector:
+        """The mean of the commands over each window, of a delay in s before."""
+        before = np.interp(self.time - delay, self.times, self.impulses)
+        after = np.interp(self.end - delay, self.times, self.impulses)
+        return np.asarray((after - before) / (self.end - self.time))
 
 
 def identify_from_log(
@@ -218,7 +258,9 @@ def identify_from_log(
     InputError, naming the place, where a signal is missing or has what is no number, the time does
     not grow, or a finger does not move freely.
     """
-    windows = [_windows(system, log, j, place) for j in FINGERS]
+    # what was commanded before the log began is not known: such windows do not count
+    latest = max((p.high for p in parameters if p.name == DELAY), default=0.0)
+    windows = [_windows(log, j, latest, place) for j in FINGERS]
     names = [p.name for p in parameters]
 
     def at(x: Vector) -> Vector:
@@ -228,8 +270,7 @@ def identify_from_log(
     return windows, fitted(lambda points: [at(x) for x in points], parameters, place)
 
 
-def _windows(system: System, log: Signals, finger: int, place: str) -> Windows:
-    mass = start_in_si(system, f"plant.finger_mass[{finger}]")
+def _windows(log: Signals, finger: int, latest: float, place: str) -> Windows:
     step = _step(log.time, place)
     size = int(WINDOW / step + 1e-6) + 1
 
@@ -237,33 +278,56 @@ def _windows(system: System, log: Signals, finger: int, place: str) -> Windows:
         """A row per window."""
         return signal[: len(signal) // size * size].reshape(-1, size)
 
-    v, force, touch = (cut(_signal(log, f"{name}[{finger}]", place)) for name in USED)
+    v = cut(_velocity(log, finger, step, place))
+    command = _signal(log, f"{COMMAND}[{finger}]", place)
+    has_touch = f"{TOUCH}[{finger}]" in log
+    touch = _signal(log, f"{TOUCH}[{finger}]", place) if has_touch else np.zeros(len(log.time))
     time = cut(log.time)
     way = np.sign(v[:, 0])
     moving = (way[:, None] * v > SLOWEST).all(axis=1)
     whole = (np.diff(time) <= GAP * step).all(axis=1)
-    counts = whole & moving & (np.abs(touch) <= TOUCHED).all(axis=1)
+    counts = whole & moving & (np.abs(cut(touch)) <= TOUCHED).all(axis=1)
+    counts &= time[:, 0] >= log.time[0] + latest
     if not counts.any():
         raise InputError(
             f"{place}: finger {finger} does not move freely for {WINDOW:g} s, one way and faster "
             f"than {SLOWEST:g} m/s; must be a log in which it does"
         )
-    impulse = (force[:, :-1] * np.diff(time)).sum(axis=1)  # held between the samples
-    unexplained = (mass * (v[:, -1] - v[:, 0]) - impulse) / (time[:, -1] - time[:, 0])
-    return Windows(finger, time[counts, 0], unexplained[counts], way[counts], np.abs(v[counts]))
+    held = command[:-1] * np.diff(log.time)  # between the samples
+    impulses = np.append(0.0, np.cumsum(held))
+    v, ends, way = v[counts], time[counts], way[counts]
+    change = v[:, -1] - v[:, 0]
+    return Windows(
+        finger, ends[:, 0], ends[:, -1], change, way, np.abs(v), np.asarray(log.time), impulses
+    )
+
+
+def _velocity(log: Signals, finger: int, step: float, place: str) -> Vector:
+    """The velocity of a finger in m/s: as it was measured, or the slope of the position."""
+    velocity, position = f"{VELOCITY}[{finger}]", f"{POSITION}[{finger}]"
+    if velocity in log or position not in log:
+        return _signal(log, velocity, place)
+    from scipy.signal import savgol_filter
+
+    count = max(2 * round(0.5 * SLOPE / step) + 1, 5)
+    x = _signal(log, position, place)
+    if len(x) < count:
+        raise InputError(f"{place}: {counted(len(x), 'sample')}; must be at least {count}")
+    return np.asarray(savgol_filter(x, count, 2, deriv=1, delta=step))
 
 
 def _residuals(system: System, values: Mapping[str, float], w: Windows) -> Vector:
-    def of(name: str) -> float:
-        key = FRICTION + name
+    def of(key: str) -> float:
         return values[key] if key in values else start_in_si(system, key)
 
     j = f"[{w.finger}]"
-    coulomb, v_s = of(f"coulomb{j}"), of("stribeck_velocity")
-    static = max(coulomb, of(f"static{j}"))
+    coulomb, v_s = of(f"{FRICTION}coulomb{j}"), of(f"{FRICTION}stribeck_velocity")
+    static = max(coulomb, of(f"{FRICTION}static{j}"))
     friction = coulomb + (static - coulomb) * np.exp(-((w.speeds / v_s) ** 2))
-    friction += of(f"viscous{j}") * w.speeds
-    return np.asarray(w.unexplained + w.way * friction.mean(axis=1))
+    friction += of(f"{FRICTION}viscous{j}") * w.speeds
+    drive = values.get(f"{GAIN}{j}", 1.0) * w.mean_force(values.get(DELAY, 0.0))
+    acceleration = of(f"{MASS}{j}") * w.change / (w.end - w.time)
+    return np.asarray(acceleration - drive + w.way * friction.mean(axis=1))
 
 
 def _signal(log: Signals, name: str, place: str) -> Vector:
