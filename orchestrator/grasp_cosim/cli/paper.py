@@ -71,7 +71,7 @@ def identify(
     out: Path | None,
     as_json: bool,
 ) -> int:
-    """Fit the friction of the fingers to a LOG, and masses, gains and the delay of their drives.
+    """Fit friction, masses and drives of the fingers to a LOG.
 
     It is a run or the log of a bench, as a table or .mf4, or a table of contact times, with the
     columns x_m, case, finger, time. Tables are .csv, .arrow or .parquet files. Without LOG it is

@@ -18,6 +18,9 @@ Floats = npt.NDArray[np.float64]
 LEAST = 0.7
 """The correlation coefficient from which on a shift is believed."""
 
+WIDTH = 25
+"""Points of the grid around the coarse one, in which the least squares look: noise moves that."""
+
 POINTS = 20_000
 """The most points of the grid."""
 
@@ -91,8 +94,9 @@ def _refined(
             total += float(np.mean(difference**2)) / float(np.var(y))
         return total
 
+    near = WIDTH * step
     found = minimize_scalar(
-        distance, bounds=(coarse - 2.0 * step, coarse + 2.0 * step), method="bounded",
+        distance, bounds=(coarse - near, coarse + near), method="bounded",
         options={"xatol": 1e-4 * step},
     )  # fmt: skip
     return float(found.x)

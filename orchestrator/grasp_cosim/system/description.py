@@ -15,6 +15,7 @@ from .names import in_main_names
 from .native import natives
 from .parts import Component
 from .record import Record
+from .replay import replayed
 from .scenario import check_scenario
 from .settings import made_of
 from .stimuli import Stimuli, read_stimuli
@@ -43,7 +44,12 @@ class System(Structure):
 
     def __post_init__(self) -> None:
         check_steps(self)
-        if self.input:
+        if self.input and self.input.recorded is not None:
+            stimuli, note = replayed(self, self.input)
+            object.__setattr__(self, "input", stimuli)
+            others = tuple(n for n in self.notes if not n.startswith(f"{stimuli.file}: a recorded"))
+            object.__setattr__(self, "notes", (*others, note))
+        elif self.input:
             object.__setattr__(self, "input", driven_by_connectors(self, self.input))
         for name, part in in_main_names(self).items():
             object.__setattr__(self, name, part)

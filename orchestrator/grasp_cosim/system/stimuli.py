@@ -8,18 +8,20 @@ another one than the variable: `plant.force [kN]`.
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 from array import array
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from ..base.checks import choice
 from ..base.errors import InputError
-from .parts import Port, as_signal
+from .parts import Connection, Port, as_port, as_signal
 from .times import LONGEST, NANOSECONDS
 
 if TYPE_CHECKING:
@@ -27,6 +29,10 @@ if TYPE_CHECKING:
 
 Interpolation = Literal["linear", "held"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
+
+
+RECORDED, SETTINGS = "signals", "run.json"
+"""The stem of a file that a run records, and the file beside it that has its connections."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,9 @@ class Stimuli:
     partial: bool = field(default=False, compare=False)
     behind: Mapping[Port, Port] = field(default_factory=dict, compare=False)
     is_text_file: bool = True
+    recorded: tuple[Connection, ...] | None = field(default=None, compare=False)
+    """Of a file that a run has recorded, the connections of that: see replay.py."""
+    recorded_columns: Mapping[Port, Stimulus] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         """ValueError where the columns could not be read from a file."""
@@ -136,14 +145,53 @@ def read_stimuli(
         if port in ports:
             raise InputError(f"{column.heading} = {column.head!r}: appears twice; must appear once")
         ports[port] = column
+    recorded = recorded_connections(path)
+    if recorded is None:
+        columns = {port: _samples(column) for port, column in ports.items()}
+    else:
+        columns = _finite_ones(ports)
     return Stimuli(
         path.name,
         _times(time),
-        {port: _samples(column) for port, column in ports.items()},
+        columns,
         chosen,
         array("q", time.lines),
         is_text_file=time.is_text_file,
+        recorded=recorded,
+        recorded_columns=columns if recorded is not None else {},
     )
+
+
+def recorded_connections(path: Path) -> tuple[Connection, ...] | None:
+    """The connections of the run that has recorded a file; None where no run has.
+
+    InputError where its run.json is damaged.
+    """
+    beside = path.with_name(SETTINGS)
+    if path.stem != RECORDED or not beside.is_file():
+        return None
+    try:
+        entries: list[dict[str, Any]] = json.loads(beside.read_text("utf-8"))["connections"]
+        return tuple(
+            Connection(
+                as_port(str(beside), entry["from"]),
+                as_port(str(beside), entry["to"]),
+                entry["factor"],
+                entry["offset"],
+            )
+            for entry in entries
+        )
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{beside}: is damaged: {error}; must be that of a run") from error
+
+
+def _finite_ones(ports: Mapping[Port, Column]) -> dict[Port, Stimulus]:
+    """The columns that can be stimuli: a run records others as well."""
+    found = {}
+    for port, column in ports.items():
+        with suppress(InputError):
+            found[port] = _samples(column)
+    return found
 
 
 def _samples(column: Column) -> Stimulus:

@@ -75,6 +75,9 @@ GROUPS = {
 OF_A_LOG = tuple(name for name in GROUPS if name != "ratio")
 """What a log of the fingers says something about."""
 
+OF_TIMES = tuple(name for name in GROUPS if name not in ("mass", "gain", "delay"))
+"""What contact times do."""
+
 DEFAULT = ("coulomb", "viscous")
 
 
@@ -160,7 +163,7 @@ def identify(
     if log is None or (not names.file and is_contacts(log)):
         contacts = published_contacts() if log is None else read_contacts(log)
         name = "the published experiments" if log is None else str(log)
-        parameters = chosen(fit, tuple(GROUPS), name)
+        parameters = chosen(fit, OF_TIMES, name)
         found = identify_from_times(system, contacts, parameters, progress)
         rows = [
             {"condition": c.label, "case": c.case, "finger": c.finger, "measured": c.time}
