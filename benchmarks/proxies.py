@@ -88,7 +88,7 @@ def native_cost(folder: Path) -> None:
     _made("build", "--native", "--out", fmus)
     _made("build", "--native", "--c-only", code, "GraspController")
     _made("proxy", fmus / "GraspController.fmu", "--c-header", header)
-    sources = [TARGET, code / "GraspController.c"]
+    sources = [TARGET, *(code / f"GraspController{part}.c" for part in ("", "_text"))]
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-I", code]
     command = ["cc", *flags, *sources, "-o", target, "-lm"]
     subprocess.run(list(map(str, command)), check=True)

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import signal
 import subprocess
 from contextlib import contextmanager
 from functools import cache
@@ -177,3 +178,81 @@ def test_what_is_refused_changes_nothing_and_is_told_by_a_code(written, tmp_path
     large = [line for line in steps if line.startswith("0 ")]
     assert large
     assert all(line.endswith("must be a finite number") or "too large" in line for line in large)
+
+
+HOSTILE = r"""
+#include "$name.h"
+#include <stdio.h>
+
+int main(void)
+{
+    $name_Parameters p = $UPPER_PARAMETERS_DEFAULTS;
+    $name_Inputs u = $UPPER_INPUTS_DEFAULTS, odd;
+    $name_State x, begun;
+    $name_Outputs y;
+    double values[] = {1e308, -1e308, 1e300, 1e200, 1e155};
+    unsigned k, i, n;
+    if ($name_check(&p, NULL) || $name_initial_state(&p, &u, &begun, &y, NULL))
+        return 1;
+    for (k = 0; k < 5; k++) {
+        for (i = 0; i < $reals; i++) {
+            odd = u;
+            x = begun;
+            ((double *)&odd)[i] = values[k];
+            (void)$name_step(&p, &odd, 1e-3, &x, &y, NULL);
+            for (n = 0; n < 20; n++)
+                if ($name_step(&p, &u, 1e-3, &x, &y, NULL)) {
+                    printf("input %u = %g\n", i, values[k]);
+                    break;
+                }
+        }
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TRANSLATED)
+def test_no_single_input_leaves_a_state_that_cannot_go_on(name, written, tmp_path):
+    folder = written(name)
+    with model_of(name) as model:
+        fields = [f for f in declared(model.block) if f.causality == "input"]
+    if any(f.kind is not float for f in fields):
+        pytest.skip("not all inputs are Reals")
+    text = HOSTILE.replace("$name", name).replace("$UPPER", name.upper())
+    text = text.replace("$reals", str(sum(len(f.names) for f in fields)))
+    (tmp_path / "hostile.c").write_text(text)
+    command = ["gcc", "-std=c99", "-I", folder, tmp_path / "hostile.c", folder / f"{name}.c"]
+    subprocess.run([*command, "-o", tmp_path / "hostile", "-lm"], check=True)
+    done = subprocess.run([tmp_path / "hostile"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "")
+
+
+@pytest.mark.slow
+def test_the_example_writes_the_safe_state_whatever_ends_it(written):
+    """First, and last: at its end, on a signal, where a step is refused; after it nothing else."""
+    folder = written("GraspController")
+    source = (folder / "main.c").read_text()
+    waits = source.replace("/* Here: wait until the step is due */", "fflush(stdout);")
+    command = re.search(r"^ \* {5}(cc .*)$", source, re.MULTILINE)[1]
+    (folder / "slow.c").write_text(
+        waits.replace("fprintf(stderr", "fflush(stdout); fprintf(stdout")
+    )
+    subprocess.run(command.replace("main.c", "slow.c"), cwd=folder, shell=True, check=True)
+    program = folder / "GraspController"
+    whole = subprocess.run([program, "3", "1e-3"], capture_output=True, text=True)
+    lines = whole.stdout.splitlines()
+    assert (whole.returncode, lines[0], lines[-1], len(lines)) == (0, "safe", "safe", 6)
+    refused = subprocess.run([program, "3", "-1"], capture_output=True, text=True)
+    assert refused.returncode == 1
+    assert refused.stdout.splitlines()[0] == refused.stdout.splitlines()[-1] == "safe"
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        with subprocess.Popen(
+            [program, "2000000000"], stdout=subprocess.PIPE, text=True
+        ) as running:
+            assert running.stdout.readline() == "safe\n"
+            running.stdout.readline()
+            running.send_signal(number)
+            assert running.stdout.read().splitlines()[-1] == "safe"
+        assert running.returncode == 0
