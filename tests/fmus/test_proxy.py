@@ -46,6 +46,12 @@ def tripped(peer, m):
     peer.send(peer.pack(m, OUTPUTS, Codec(SIGNATURE.answer).pack(1.0, 1, True), counted=1))
 
 
+def still_busy(peer, m):
+    """For longer than a step of a lost proxy waits."""
+    peer.clock.now += 10**12
+    peer.send(peer.pack(m, link.REFUSE, b"", link.BUSY))
+
+
 def shifted(lead):
     """Outputs that belong to another time."""
 
@@ -490,7 +496,7 @@ def test_state_counts_and_outputs_are_what_the_answers_make_them(seed):
     tolerated, resume = random.randrange(4), random.random() < 0.5
     failsafe = {"failsafe.doubled": -1.0}
     acts = [answer, answer, miss, miss, keep, send_kept_and_answer, fail]
-    busy_for_ever = [refuse(link.BUSY)] * 40
+    busy_for_ever = [still_busy] * 40
     with connected(misses_tolerated=tolerated, resume=resume, **failsafe) as (host, peer):
         peer.told(HELLO, *busy_for_ever)
         is_lost, in_a_row, missed, shown = False, 0, 0, 3.0
@@ -530,10 +536,10 @@ def wait_for(host, peer, state):
 
 
 def test_a_lost_peer_gets_no_command_before_its_host_initialises_it_anew():
-    """Probes are HELLOs, which do not wait. A peer that welcomes is back, and that is all."""
+    """Probes are HELLOs. A peer that welcomes is back, and that is all."""
     with connected(resume=True) as (host, peer):
         lost(host, peer)
-        peer.told(HELLO, lambda p, m: None, busy, refuse(link.OTHER_NAME, b"other"))
+        peer.told(HELLO, nothing_yet, busy, still_busy)
         wait_for(host, peer, 4)
         for _ in range(3):
             host.step()

@@ -77,7 +77,7 @@ def test_compiles_without_a_warning_and_calls_what_it_lists(name, compiler, leve
     assert called <= {*listed[1].split(", ")}
     symbols = subprocess.check_output(["nm", "-g", f"{name}.o"], cwd=folder, text=True)
     defined = {line.split()[-1] for line in symbols.splitlines() if " U " not in line}
-    functions = ("check", "initial_state", "step")
+    functions = ("check", "initial_state", "step", "outputs")
     assert defined == {f"{name}_{function}" for function in functions}
 
 

@@ -26,7 +26,7 @@ static void equations(Model *m) {
     m->u.force_1 = *real(m, FORCE_RIGHT) / 1e3;
     m->u.force_2 = *real(m, FORCE_LEFT) / 1e3;
     m->p.initial_object_position = *real(m, START) / 1e3;
-    if (m->mode < EVENT) GripperPlant_initial_state(&m->p, &m->u, &m->x, NULL);
+    if (m->mode < EVENT) GripperPlant_initial_state(&m->p, &m->u, &m->x, &y, NULL);
     GripperPlant_outputs(&m->p, &m->u, &m->x, &y, NULL);
     *real(m, GAPS) = 1e3 * y.gap_1;
     m->v[GAPS][1].Float64 = 1e3 * y.gap_2;
@@ -43,10 +43,11 @@ static void equations(Model *m) {
 
 static void advance(Model *m, double end) {
     GripperPlant_Inputs u = m->u;
+    GripperPlant_Outputs y;
 
     u.force_1 *= 1.0 - *real(m, BRAKE);
     u.force_2 *= 1.0 - *real(m, BRAKE);
-    m->status = GripperPlant_step(&m->p, &u, end - m->time, &m->x, NULL);
+    m->status = GripperPlant_step(&m->p, &u, end - m->time, &m->x, &y, NULL);
     set_time(m, end);
 }
 

@@ -13,7 +13,7 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-#if defined(__GNUC__) && !defined(TEXT_NONE) /* a call with the same arguments need not be made again */
+#ifdef __GNUC__ /* a call with the same arguments need not be made again */
 double atan2(double, double) __attribute__((const));
 double cos(double) __attribute__((const));
 double exp(double) __attribute__((const));

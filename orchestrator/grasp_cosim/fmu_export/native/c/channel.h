@@ -7,7 +7,6 @@
 #include "sockets.h"
 
 #define CHANNEL_REPEAT 50000000  /* ns after which HELLO and INITIALISE are sent again */
-#define CHANNEL_PROBES 16        /* the datagrams that a step of a lost proxy takes, at most */
 #define CHANNEL_LOOKS 64         /* for an answer before it sleeps, as to be woken takes as long */
 
 enum { CHANNEL_NEW, GREETING, WELCOME, CHANNEL_INITIALISING, READY };  /* stages */
@@ -145,26 +144,21 @@ static int channel_greet(Channel *c, int64_t deadline)
     return c->stage > GREETING;
 }
 
-/* Ask a lost peer from time to time, without waiting, whether it is there again: by HELLO, which
-   carries no values. 1 once it welcomes a session, which is not begun. */
-static int channel_probe(Channel *c)
+/* Ask a lost peer, until the deadline, whether it is there again: by HELLO, which carries no values.
+   1 once it welcomes a session, which is not begun. */
+static int channel_probe(Channel *c, int64_t deadline)
 {
-    int i, error = 0, verdict = CLIENT_NOTHING;
     int64_t now = net_now();
     if (c->stage == CHANNEL_NEW && !channel_begin(c)) {
         return 0;
     }
-    if (c->stage == GREETING && now >= c->again) {
-        channel_send(c, c->pending, c->pending_size);
-        c->again = now + CHANNEL_REPEAT;
-    }
-    for (i = 0; c->stage == GREETING && i < CHANNEL_PROBES; i++) {
-        long size = net_receive(c->socket, c->datagram, sizeof c->datagram, &error);
-        if (size == NET_NOTHING) {
-            break;
+    for (; c->stage == GREETING && now < deadline; now = net_now()) {
+        if (now >= c->again) {
+            channel_send(c, c->pending, c->pending_size);
+            c->again = now + CHANNEL_REPEAT;
         }
-        verdict = channel_judge(c, size, error);
-        if (verdict == CLIENT_ANSWERED) {
+        if (channel_receive(c, (c->again < deadline ? c->again : deadline) - now)
+            == CLIENT_ANSWERED) {
             c->stage = WELCOME;
         }
     }

@@ -611,7 +611,7 @@ static void proxy_exchange(Slave *s, double time, double h)
 /* A lost peer that answers is back: its host must initialise all, before it gets a command again. */
 static void proxy_look_for(Slave *s)
 {
-    if (channel_probe(&s->model.channel)) {
+    if (channel_probe(&s->model.channel, proxy_deadline(s, PROXY_TIMEOUT))) {
         s->model.state = BACK;
         text_put(proxy_put_peer(s, slave_say(s)),
                  ": the peer answers again; it gets no commands before the loop is initialised anew");
