@@ -13,7 +13,6 @@ from grasp_cosim.fmu_export.native.bench_header import bench_header
 from grasp_cosim.fmu_export.native.c_only import write_c
 from grasp_cosim.fmu_export.package import shipped_model
 
-from ..processes import kept_port
 from .plant import SIGNATURE, START
 
 HERE = Path(__file__).parent
@@ -132,6 +131,3 @@ def stop(process):
 
 def go_on(process):
     process.send_signal(signal.SIGCONT)
-
-
-__all__ = ["WATCHDOG", "Bench", "Dac", "build", "end", "kept_port", "running", "safe", "wait_until"]
