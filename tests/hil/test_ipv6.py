@@ -7,7 +7,7 @@ import pytest
 from grasp_cosim import simulate
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.hil.served import Service
-from grasp_cosim.hil.sockets import is_loopback, read_address, resolved, text
+from grasp_cosim.hil.sockets import _address, is_loopback, read_address, resolved, text
 from support.proxies import ANY_PORT, build_proxy, relaying, serving
 
 
@@ -49,6 +49,14 @@ def test_numbers_with_brackets_and_without():
     assert [is_loopback((h, 1)) for h in ("::1", "fe80::1%lo", "::", "127.0.0.2")] == [
         True, False, False, True,
     ]  # fmt: skip
+
+
+def test_an_address_on_this_link_keeps_its_interface():
+    """As the system tells it of a socket, or of who sent a datagram."""
+    assert _address(("fe80::1%eth0", 5501, 0, 2)) == ("fe80::1%2", 5501)
+    assert _address(("fe80::1", 5501, 0, 2)) == ("fe80::1%2", 5501)
+    assert _address(("::1", 5501, 0, 0)) == ("::1", 5501)
+    assert _address(("127.0.0.1", 5501)) == ("127.0.0.1", 5501)
 
 
 @needs_ipv6

@@ -18,17 +18,28 @@ ENGINE = "python"
 
 def test_a_failure_happens_once_and_so_long_after_the_first_step():
     rehearsal = Rehearsal(Rehearsed.read("mute@0.5"))
-    assert (rehearsal.due(), rehearsal.happens(10**12)) == (None, None)
+    assert (rehearsal.due(True), rehearsal.happens(10**12, True)) == (None, None)
     rehearsal.note_step(100)
     rehearsal.note_step(200)
-    assert rehearsal.due() == 500_000_100
-    assert rehearsal.happens(500_000_099) is None
-    assert rehearsal.happens(500_000_100) == "mute"
-    assert rehearsal.happens(10**12) is None
-    assert (rehearsal.happened, rehearsal.due()) == ("mute", None)
+    assert rehearsal.due(False) == 500_000_100
+    assert rehearsal.happens(500_000_099, True) is None
+    assert rehearsal.happens(500_000_100, False) == "mute"
+    assert rehearsal.happens(10**12, True) is None
+    assert (rehearsal.happened, rehearsal.due(True)) == ("mute", None)
 
 
-@pytest.mark.parametrize("text", ["mute", "sulk@1", "mute@", "mute@-1", "mute@1.2.3", "@1"])
+@pytest.mark.parametrize("failure", ["fail", "trip"])
+def test_what_needs_a_session_waits_for_one(failure):
+    rehearsal = Rehearsal(Rehearsed(failure, 0.0))
+    rehearsal.note_step(100)
+    assert (rehearsal.due(False), rehearsal.happens(200, False)) == (None, None)
+    assert rehearsal.due(True) == 100
+    assert rehearsal.happens(200, True) == failure
+
+
+@pytest.mark.parametrize(
+    "text", ["mute", "mute@1000001", "sulk@1", "mute@", "mute@-1", "mute@1.2.3", "@1"]
+)
 def test_failures_that_are_none(text):
     with pytest.raises(InputError, match=rf"--fault '{text}': must be WHAT@S, of kill, stop"):
         Rehearsed.read(text)
@@ -51,6 +62,7 @@ def benched(grasp, folder, failure, **settings):
     [
         *((f, "2 missed in a row: no answer within 0.2 s") for f in ("stop", "mute", "deaf")),
         ("restart", "the peer does not know this session"),
+        ("replace", "the peer does not know this session"),
         ("fail", "the peer failed: the model failed, as --fault says"),
         ("trip", "its watchdog or a limit of its own tripped, it is in its safe state"),
     ],
@@ -99,3 +111,14 @@ def test_one_that_is_killed(grasp, tmp_path):
 
 def test_the_help_says_what_each_is():
     assert [part.partition(":")[0] for part in MEANINGS.split("; ")] == [*FAILURES]
+
+
+def test_a_bench_that_was_replaced_gets_no_commands(grasp, tmp_path):
+    """It is called otherwise: the proxy goes on asking, and is refused, to the end of the run."""
+    settings = {"on_loss": "hold", "resume": True, "timeout": 0.05}
+    with benched(grasp, tmp_path, "replace", **settings) as (system, server):
+        result = simulate(system.with_experiment(stop=0.04), engine=ENGINE)
+        counts = server.fmu.counters()
+    assert result.initialised_anew == ()
+    assert counts["other_name"] > 0
+    assert counts["steps"] <= 2

@@ -11,12 +11,18 @@ from typing import Literal, get_args
 from ..base.errors import InputError, choices
 from ..system.times import NANOSECONDS
 
-Failure = Literal["kill", "stop", "mute", "deaf", "restart", "fail", "trip"]
+Failure = Literal["kill", "stop", "mute", "deaf", "restart", "replace", "fail", "trip"]
+LONGEST = 1e6
+"""s until a failure, at most."""
+
 FAILURES: tuple[Failure, ...] = get_args(Failure)
+IN_SESSION: tuple[Failure, ...] = ("fail", "trip")
+"""Those of what is under way."""
+
 MEANINGS = (
     "kill: the process ends at once; stop: it stands still; mute: it answers no more; deaf: it "
-    "hears no more; restart: another one takes its place, which knows no session; fail: its model "
-    "fails; trip: it puts its inputs to safe values"
+    "hears no more; restart: it is as new, and knows no session; replace: another bench, of another "
+    "name, takes its place; fail: its model fails; trip: it puts its inputs to safe values"
 )
 
 
@@ -36,8 +42,10 @@ class Rehearsed:
             at = float(found[2]) if found else math.nan
         except ValueError:
             at = math.nan
-        if known is None or not at < math.inf:
-            must = f"must be WHAT@S, of {choices(FAILURES)}, in s after the first step"
+        if known is None or not at <= LONGEST:
+            must = (
+                f"must be WHAT@S, of {choices(FAILURES)}, up to {LONGEST:g} s after the first step"
+            )
             raise InputError(f"--fault {text!r}: {must}")
         return cls(known, at)
 
@@ -55,13 +63,16 @@ class Rehearsal:
         if self._rehearsed and self._at is None:
             self._at = now + round(self._rehearsed.at * NANOSECONDS)
 
-    def due(self) -> int | None:
-        """Return when it happens; None where that is not known, or it has."""
-        return None if self.happened else self._at
+    def due(self, in_session: bool) -> int | None:
+        """Return when it happens; None where that is not known, or it has, or has to wait."""
+        waits = self._rehearsed and self._rehearsed.failure in IN_SESSION and not in_session
+        return None if self.happened or waits else self._at
 
-    def happens(self, now: int) -> Failure | None:
-        """Return the failure that happens now, once."""
+    def happens(self, now: int, in_session: bool) -> Failure | None:
+        """Return the failure that happens now, once; some need a session to happen in."""
         if self._rehearsed is None or self.happened or self._at is None or now < self._at:
+            return None
+        if self._rehearsed.failure in IN_SESSION and not in_session:
             return None
         self.happened = self._rehearsed.failure
         return self.happened

@@ -321,7 +321,7 @@ class Relay(EventLoop):
         self.peer = resolved(*peer, lowest_port=1)
         host, port = resolved(host, port)
         with connected(self.peer) as probe:
-            source, to = probe.getsockname()[0], probe.getpeername()[:2]
+            source, to = probe.getsockname()[0], probe.getpeername()
         here = to[0] == source or is_loopback(to)
         everywhere = "0.0.0.0", "::"  # noqa: S104  compared with, not listened on
         if here and to[1] == port and host in (*everywhere, to[0]):  # it would send to itself

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from math import ceil, isclose, isfinite
 
@@ -35,6 +35,9 @@ BACKLOG = 1_000_000_000
 
 DEFAULT_ADDRESS: Address = ("127.0.0.1", PORT)
 """The address that a proxy looks at if nobody says otherwise."""
+
+ANOTHER = "another bench"
+"""The name of the bench that takes the place of one, where that is rehearsed."""
 
 MOST_LOST = 100_000
 """The most steps that are made up for at once."""
@@ -217,12 +220,17 @@ class ServedFmu:
             self._values[i] = value
         self._fmu.set(self._values)
 
-    def forget(self) -> None:
-        """Be as one that was started anew, which knows no session; what was counted stays so."""
-        counters = self.peer.counters
+    def forget(self, name: str | None = None) -> None:
+        """Be as one that was started anew, which knows no session; what was counted stays so.
+
+        With a name it is another bench.
+        """
+        before = self.peer
+        if name is not None:
+            self._service = replace(self._service, name=name)
         self.peer = self._made_peer()
-        self.peer.counters = counters
-        self._end("the server is as new")
+        self.peer.counters, self.peer.unknown = before.counters, before.unknown
+        self._end("the server is as new" if name is None else f"the server is now {name}")
 
     def break_off(self, reason: str) -> None:
         """Have every request of the session fail."""
@@ -280,17 +288,17 @@ class Server(EventLoop):
     def _next(self) -> int | None:
         if self._rehearsal.happened == "stop":
             return None
-        moments = (self.fmu.due(), self._rehearsal.due())
+        moments = (self.fmu.due(), self._rehearsal.due(self.fmu.peer.in_session))
         return min((m for m in moments if m is not None), default=None)
 
     def _look_now(self, now: int) -> None:
-        failure = self._rehearsal.happens(now)
+        failure = self._rehearsal.happens(now, self.fmu.peer.in_session)
         if failure:
             self._say(f"as --fault says: {failure}")
         if failure == "kill":
             end_at_once()
-        elif failure == "restart":
-            self.fmu.forget()
+        elif failure in ("restart", "replace"):
+            self.fmu.forget(ANOTHER if failure == "replace" else None)
         elif failure == "trip":
             self.fmu.trip("as --fault says")
         elif failure == "fail":

@@ -46,7 +46,7 @@ class EventLoop:
             self.register(woken, lambda: woken.recv(LARGEST))
             made = _socket(socket.socket.bind, resolved(*address), NOT_HERE)
             self.port_socket = stack.enter_context(made)
-            self.address: Address = self.port_socket.getsockname()[:2]
+            self.address: Address = _address(self.port_socket.getsockname())
             self._stack = stack.pop_all()
 
     def register(self, readable: socket.socket, handler: Callable[[], Any]) -> None:
@@ -87,7 +87,7 @@ def received(readable: socket.socket) -> tuple[bytes, Address] | None:
         data, source = readable.recvfrom(LARGEST)
     except (BlockingIOError, ConnectionError):  # a broken datagram; nobody took an earlier one
         return None
-    return data, (str(source[0]), int(source[1]))
+    return data, _address(source)
 
 
 def connected(peer: Address) -> socket.socket:
@@ -127,7 +127,15 @@ def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
             f"{text((host, port))}: no such host; must be an address or a name that has one"
         ) from error
     chosen = next((f for f in found if f[0] == socket.AF_INET), found[0])
-    return str(chosen[4][0]), port
+    return _address(chosen[4])[0], port
+
+
+def _address(found: tuple[Any, ...]) -> Address:
+    """The address as the system tells it: of one on this link with the number of the interface."""
+    host, port, *more = found
+    scope = more[1] if len(more) > 1 else 0
+    plain = str(host).partition("%")[0]
+    return (f"{plain}%{scope}" if scope else plain), int(port)
 
 
 def read_address(place: str, given: str) -> Address:
