@@ -21,8 +21,8 @@ IN_SESSION: tuple[Failure, ...] = ("fail", "trip")
 
 MEANINGS = (
     "kill: the process ends at once; stop: it stands still; mute: it answers no more; deaf: it "
-    "hears no more; restart: it is as new, and knows no session; replace: another bench, of another "
-    "name, takes its place; fail: its model fails; trip: it puts its inputs to safe values"
+    "hears no more; restart: it is as new, and knows no session; replace: another bench, of "
+    "another name, takes its place; fail: its model fails; trip: it puts its inputs to safe values"
 )
 
 
