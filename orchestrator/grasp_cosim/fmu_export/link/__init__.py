@@ -44,11 +44,12 @@ class Limit(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> "Limit":
-        """Read LOW:HIGH or LOW:HIGH:RATE, each part empty for none; ValueError if it is none."""
+        """Read LOW:HIGH or LOW:HIGH:RATE, parts empty for none.
+
+        ValueError where it is none, limits nothing, or leaves no number.
+        """
         parts = text.split(":")
-        must = (
-            f"{text!r}: must be LOW:HIGH or LOW:HIGH:RATE, as in -5:5:200, each part empty for none"
-        )
+        must = f"{text!r}: must be LOW:HIGH or LOW:HIGH:RATE, as in -5:5:200, not all of them empty"
         if len(parts) not in (2, 3):
             raise ValueError(must)
         try:
@@ -57,8 +58,12 @@ class Limit(NamedTuple):
             raise ValueError(must) from None
         pairs = zip(given, cls(), strict=False)
         limit = cls(*(default if value is None else value for value, default in pairs))
-        if not (limit.low <= limit.high and limit.rate > 0.0):
-            raise ValueError(f"{text!r}: the lower limit must be below the upper, the rate over 0")
+        if limit == cls():
+            raise ValueError(must)
+        if not (limit.low <= limit.high and limit.low < inf and limit.high > -inf):
+            raise ValueError(f"{text!r}: must leave numbers between the lower and the upper limit")
+        if not limit.rate > 0.0:
+            raise ValueError(f"{text!r}: the rate must be over 0")
         return limit
 
 
