@@ -216,7 +216,7 @@ def test_limits_as_texts(text, limit):
     ["5", "1:2:3:4", "a:1", "2:1", "0:1:0", "nan:1", "::", "-inf:inf", "inf:inf", ":-inf"],
 )
 def test_texts_that_are_no_limits(text):
-    with pytest.raises(ValueError, match="must (be|leave)"):
+    with pytest.raises(ValueError, match="must be"):
         Limit.read(text)
 
 

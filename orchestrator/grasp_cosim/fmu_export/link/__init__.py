@@ -60,10 +60,9 @@ class Limit(NamedTuple):
         limit = cls(*(default if value is None else value for value, default in pairs))
         if limit == cls():
             raise ValueError(must)
-        if not (limit.low <= limit.high and limit.low < inf and limit.high > -inf):
-            raise ValueError(f"{text!r}: must leave numbers between the lower and the upper limit")
-        if not limit.rate > 0.0:
-            raise ValueError(f"{text!r}: the rate must be over 0")
+        some_number = limit.low <= limit.high and limit.low < inf and limit.high > -inf
+        if not (some_number and limit.rate > 0.0):
+            raise ValueError(f"{text!r}: the lower limit must be below the upper, the rate over 0")
         return limit
 
 
