@@ -161,6 +161,26 @@ def test_the_first_library_that_zig_makes_for_a_target_goes_ahead(tmp_path, monk
     assert {line.split()[1] for line in lines} == {*names}
 
 
+def test_an_interrupt_while_a_compiler_is_started_ends_it(tmp_path, monkeypatch):
+    """It comes when the process is there, and nobody has been told of it yet."""
+    started, real = [], subprocess.Popen
+
+    def popen(*arguments, **keywords):
+        started.append(real(*arguments, **keywords))
+        signal.raise_signal(signal.SIGINT)
+        return started[0]
+
+    compiler = program(tmp_path / "cc", "exec sleep 3600")
+    monkeypatch.setattr(subprocess, "Popen", popen)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            made(tmp_path, compiler=compiler)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert started[0].wait(20.0) == -signal.SIGKILL
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_no_compiler_outlives_us(number, code, tmp_path):

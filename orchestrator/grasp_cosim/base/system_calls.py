@@ -86,12 +86,11 @@ def memory(size: int) -> mmap.mmap:
 
 
 @contextmanager
-def held_back(signals: Iterable[int]) -> Iterator[None]:
-    """Signals that come meanwhile come at the end, and not at all to processes started here.
+def deferred(signals: Iterable[int]) -> Iterator[None]:
+    """What Python does about signals that come meanwhile, it does at the end.
 
-    The mask of this thread is for those processes; another thread may take a signal all the same,
-    so what Python does then waits, too. Where there is no such mask, a process that is about to
-    start gets them.
+    For what must not be cut in two by a KeyboardInterrupt, such as starting a process and noting
+    that it is to be ended.
     """
     came: list[int] = []
     handlers: dict[int, Any] = {}
@@ -101,13 +100,24 @@ def held_back(signals: Iterable[int]) -> Iterator[None]:
     for number in python_handlers:
         signal.signal(number, lambda number, _: came.append(number))
     try:
-        with _masked(signals):
-            yield
+        yield
     finally:
         for number, handler in python_handlers.items():
             signal.signal(number, handler)
         for number in came:
             python_handlers[number](number, None)
+
+
+@contextmanager
+def held_back(signals: Iterable[int]) -> Iterator[None]:
+    """Signals that come meanwhile come at the end, and not at all to processes started here.
+
+    The mask of this thread is for those processes; another thread may take a signal all the same,
+    so what Python does then waits, too. Where there is no such mask, a process that is about to
+    start gets them.
+    """
+    with deferred(signals), _masked(signals):
+        yield
 
 
 @contextmanager

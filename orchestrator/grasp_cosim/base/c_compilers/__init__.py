@@ -19,6 +19,8 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, NamedTuple
 
+from ..interruption import SIGNALS
+from ..system_calls import deferred
 from . import cache
 
 if TYPE_CHECKING:
@@ -222,9 +224,10 @@ class _Compiling:
             number, job, folder = entry
             if len(self._running) < _processors() and not self._held_up(job.compiler):
                 self._waiting.remove(entry)
-                process = _started(job, folder)
-                future = self._threads.submit(_made, job, process, folder)
-                self._running[future] = _Running(number, job, process)
+                with deferred(SIGNALS):  # else it runs on where it was started and is not noted
+                    process = _started(job, folder)
+                    future = self._threads.submit(_made, job, process, folder)
+                    self._running[future] = _Running(number, job, process)
 
     def _held_up(self, compiler: Compiler) -> bool:
         """True while zig is at its first library for this target."""
