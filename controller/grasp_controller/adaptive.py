@@ -8,13 +8,10 @@ intensities as equal faces would give them, and fades as the fingers hold:
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, NamedTuple
-
-from block_variables import Output
+from typing import NamedTuple
 
 from . import holding, reflectance_ratio, series
 from . import simultaneous_contact as layer_3
-from .impact_reduction import Pair
 from .series import Inputs as Inputs
 
 
@@ -50,34 +47,9 @@ class Outputs(NamedTuple):
     virtual_position: series.VirtualPosition
     simultaneous_contact_force: series.SimultaneousContactForce
     impact_reduction_force: series.ImpactReductionForce
-    reflectance_ratio: Annotated[
-        float,
-        Output(
-            "alpha_1/alpha_2, reflectance of the right face to that of the left one, as learnt",
-            unit="1",
-            nominal=1.0,
-            depends_on=set(),
-        ),
-    ]
-    reflectance_ratio_standard_deviation: Annotated[
-        float,
-        Output(
-            "standard deviation of that ratio, by noise alone",
-            unit="1",
-            nominal=1.0,
-            depends_on=set(),
-        ),
-    ]
-    estimated_gap: Annotated[
-        Pair,
-        Output(
-            "l_j, gap as learnt",
-            unit="m",
-            nominal=0.1,
-            depends_on=set(),
-            depends_initially_on={"intensity[j]"},
-        ),
-    ]
+    reflectance_ratio: reflectance_ratio.Ratio
+    reflectance_ratio_standard_deviation: reflectance_ratio.RatioDeviation
+    estimated_gap: reflectance_ratio.EstimatedGap
     hold: holding.Hold
 
 
@@ -103,8 +75,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, free, low_pass)
     line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, free, low_pass)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
-    dimmed = estimate.dimmed
-    alike = (dimmed * xi_1, xi_2) if estimate.beta > 0.0 else (xi_1, dimmed * xi_2)
+    alike = reflectance_ratio.alike(estimate, u.intensity)
     f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)
     layers = series.advance(p, x.layers, u, f_s, h)
     return State(layers, line_1, line_2, estimate, closing, held)
@@ -113,8 +84,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u, and what has been learnt."""
     y = series.outputs(p, x.layers, u)
-    dimmed = x.estimate.dimmed
-    ratio = 1.0 / dimmed if x.estimate.beta > 0.0 else dimmed
+    ratio = reflectance_ratio.learnt(x.estimate)
     return Outputs(
         y.force,
         y.target_position,

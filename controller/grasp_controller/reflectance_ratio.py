@@ -12,9 +12,41 @@ Derivation: controller/README.md
 
 from dataclasses import dataclass
 from math import exp, inf, log, sqrt
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
-from block_variables import Group, Parameter
+from block_variables import Group, Output, Parameter
+
+from .impact_reduction import Pair
+
+Ratio: TypeAlias = Annotated[
+    float,
+    Output(
+        "alpha_1/alpha_2, reflectance of the right face to that of the left one, as learnt",
+        unit="1",
+        nominal=1.0,
+        depends_on=set(),
+    ),
+]
+RatioDeviation: TypeAlias = Annotated[
+    float,
+    Output(
+        "standard deviation of that ratio, by noise alone",
+        unit="1",
+        nominal=1.0,
+        depends_on=set(),
+    ),
+]
+EstimatedGap: TypeAlias = Annotated[
+    Pair,
+    Output(
+        "l_j, gap as learnt",
+        unit="m",
+        nominal=0.1,
+        depends_on=set(),
+        depends_initially_on={"intensity[j]"},
+    ),
+]
+"""What is learnt, as a controller puts it out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,12 +235,24 @@ def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
     return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain), exp(-abs(beta)))
 
 
+def alike(estimate: Estimate, xi: Pair) -> Pair:
+    """The intensities in V, that of the brighter face dimmed to what the darker one would give."""
+    xi_1, xi_2 = xi
+    dimmed = estimate.dimmed
+    return (dimmed * xi_1, xi_2) if estimate.beta > 0.0 else (xi_1, dimmed * xi_2)
+
+
+def learnt(estimate: Estimate) -> float:
+    """The ratio alpha_1/alpha_2."""
+    return 1.0 / estimate.dimmed if estimate.beta > 0.0 else estimate.dimmed
+
+
 def white(p: Params) -> float:
     """1/kappa of a white face, m.V^(1/n)."""
     return exp(log(p.gain) / p.diffusion_exponent)
 
 
-def gaps(p: Params, white: float, line_1: Line, line_2: Line) -> tuple[float, float]:
+def gaps(p: Params, white: float, line_1: Line, line_2: Line) -> Pair:
     """The gaps in m that light and slopes tell; without a slope, that to a white face."""
     return gap(p, line_1, white), gap(p, line_2, white)
 

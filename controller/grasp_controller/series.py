@@ -6,7 +6,7 @@ Cases and equations: controller/README.md
 """
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 from block_variables import Input, Output
 
@@ -26,21 +26,24 @@ class Params:
     contact_force: layer_1.Params = layer_1.Params()
 
 
+Position: TypeAlias = Annotated[
+    Pair, Input("x_j, position of the fingertip", unit="m", nominal=0.1)
+]
+Velocity: TypeAlias = Annotated[
+    Pair, Input("x_j', velocity of the fingertip", unit="m/s", nominal=0.1)
+]
+Intensity: TypeAlias = Annotated[
+    Pair, Input("xi_j, offset-compensated output of the proximity sensor", unit="V", nominal=0.1)
+]
+"""The samples that a controller of two fingers takes."""
+
+
 class Inputs(NamedTuple):
     """Samples of the gripper and of its sensors."""
 
-    position: Annotated[Pair, Input("x_j, position of the fingertip", unit="m", nominal=0.1)] = (
-        0.11,
-        -0.11,
-    )
-    velocity: Annotated[Pair, Input("x_j', velocity of the fingertip", unit="m/s", nominal=0.1)] = (
-        0.0,
-        0.0,
-    )
-    intensity: Annotated[
-        Pair,
-        Input("xi_j, offset-compensated output of the proximity sensor", unit="V", nominal=0.1),
-    ] = (0.03, 0.03)
+    position: Position = (0.11, -0.11)
+    velocity: Velocity = (0.0, 0.0)
+    intensity: Intensity = (0.03, 0.03)
 
 
 class State(NamedTuple):

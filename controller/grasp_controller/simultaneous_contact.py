@@ -55,8 +55,16 @@ def contrast(xi: float, other: float) -> float:
 
     Zero where both are zero.
     """
+    return tanh(relative(xi, other))
+
+
+def relative(xi: float, other: float) -> float:
+    """The difference of two intensities as a share of their sum, both from 0 V on: from -1 to 1.
+
+    Zero where both are zero.
+    """
     total = xi + other
-    return 0.0 if total == 0.0 else tanh((xi - other) / total)
+    return 0.0 if total == 0.0 else (xi - other) / total
 
 
 def desired_position(x: tuple[float, float]) -> float:

@@ -6,7 +6,7 @@ their symbols and their limits: plant/README.md.
 
 from dataclasses import dataclass
 from math import atan2, copysign, cos, sin, tan
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeAlias
 
 from block_variables import Output, Parameter
 
@@ -23,38 +23,61 @@ A box that does more than that within one rattles, and what is left of the sub-s
 """
 
 
+ObjectMass: TypeAlias = Annotated[
+    float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3, tunable=True)
+]
+ObjectHeight: TypeAlias = Annotated[
+    float, Parameter("H, height of the object", unit="m", low=1e-3, high=10.0)
+]
+ContactHeight: TypeAlias = Annotated[
+    float, Parameter("h, height of the fingertips above the floor", unit="m", low=0.0, high=10.0)
+]
+FloorFriction: TypeAlias = Annotated[
+    float,
+    Parameter("mu, friction of the object on the floor", unit="1", low=0.0, high=1.0, tunable=True),
+]
+
+
+class Standing:
+    """Of parameters of a box: the fingertips are at its height."""
+
+    if TYPE_CHECKING:  # declared, and so ordered, where the parameters are
+        object_height: float
+        contact_height: float
+
+    def __post_init__(self) -> None:
+        if self.contact_height > self.object_height:
+            raise ValueError(
+                f"contact_height = {self.contact_height!r} m: must be from 0 to object_height, "
+                f"{self.object_height:g}"
+            )
+
+
 @dataclass(frozen=True)
-class Params(fingers.Params):
+class Params(fingers.Params, Standing):
     """Parameters of every plant with a box; a value outside its range raises ValueError.
 
     A light box: mu·m·g = 0.15 N shift it, and it slides before it tilts, as mu < W/H and the
     fingers push at half its height.
     """
 
-    object_mass: Annotated[
-        float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3, tunable=True)
-    ] = 0.05
-    object_height: Annotated[
-        float, Parameter("H, height of the object", unit="m", low=1e-3, high=10.0)
-    ] = 0.1
-    contact_height: Annotated[
-        float,
-        Parameter("h, height of the fingertips above the floor", unit="m", low=0.0, high=10.0),
-    ] = 0.05
-    floor_friction: Annotated[
-        float,
-        Parameter(
-            "mu, friction of the object on the floor", unit="1", low=0.0, high=1.0, tunable=True
-        ),
-    ] = 0.3
+    object_mass: ObjectMass = 0.05
+    object_height: ObjectHeight = 0.1
+    contact_height: ContactHeight = 0.05
+    floor_friction: FloorFriction = 0.3
 
     def __post_init__(self) -> None:
         fingers.Params.__post_init__(self)
-        if self.contact_height > self.object_height:
-            raise ValueError(
-                f"contact_height = {self.contact_height!r} m: must be from 0 to object_height, "
-                f"{self.object_height:g}"
-            )
+        Standing.__post_init__(self)
+
+
+Tilt: TypeAlias = Annotated[
+    float,
+    Output("theta, tilt of the object, to the right", unit="rad", nominal=0.1, depends_on=set()),
+]
+Toppled: TypeAlias = Annotated[
+    bool, Output("the object has tilted past its balance", depends_on=set())
+]
 
 
 class Outputs(NamedTuple):
@@ -66,13 +89,8 @@ class Outputs(NamedTuple):
     contact_force: fingers.ContactForce
     contact: fingers.Contact
     object_position: fingers.ObjectPosition
-    tilt: Annotated[
-        float,
-        Output(
-            "theta, tilt of the object, to the right", unit="rad", nominal=0.1, depends_on=set()
-        ),
-    ]
-    toppled: Annotated[bool, Output("the object has tilted past its balance", depends_on=set())]
+    tilt: Tilt
+    toppled: Toppled
 
 
 class Shape(NamedTuple):

@@ -7,7 +7,7 @@ u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Card:
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil, copysign, nan
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeAlias
 
 from block_variables import Group, Input, Output, Parameter, check
 
@@ -44,6 +44,38 @@ class Actuator(Group, name="actuator"):
     ] = (0.0, 0.0)
 
 
+InitialPosition: TypeAlias = Annotated[
+    Pair,
+    Parameter("x_init,j, position of the fingertip at the start", unit="m", low=-10.0, high=10.0),
+]
+ObjectWidth: TypeAlias = Annotated[
+    float, Parameter("W, width of the object", unit="m", low=0.0, high=10.0)
+]
+InitialObjectPosition: TypeAlias = Annotated[
+    float, Parameter("x_m, centre of the object at the start", unit="m", low=-10.0, high=10.0)
+]
+"""Where every gripper and its object begin."""
+
+
+class Place:
+    """Of parameters that say where a gripper and its object begin: the object is between."""
+
+    if TYPE_CHECKING:  # declared, and so ordered, where the parameters are
+        initial_position: Pair
+        object_width: float
+        initial_object_position: float
+
+    def __post_init__(self) -> None:
+        right, left = self.initial_position
+        x_m, w = self.initial_object_position, self.object_width
+        if not left <= x_m - 0.5 * w <= x_m + 0.5 * w <= right:
+            raise ValueError(
+                f"object_width = {w!r} m at initial_object_position = {x_m!r} m: the object spans "
+                f"{x_m - 0.5 * w:g} to {x_m + 0.5 * w:g} m, must fit between the fingertips at "
+                f"{left:g} and {right:g} m"
+            )
+
+
 class Side(NamedTuple):
     """A finger and its face of the object, in the direction in which the finger opens."""
 
@@ -55,7 +87,7 @@ class Side(NamedTuple):
 
 
 @dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
-class Params:
+class Params(Place):
     """Parameters of every plant; a value outside its declared range raises ValueError.
 
     The paper's gripper and object: fingers 110 mm to either side, an object of 70 mm 30 mm off the
@@ -66,31 +98,15 @@ class Params:
     finger_mass: Annotated[
         Pair, Parameter("m_j, mass of the finger", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = (0.5, 0.5)
-    initial_position: Annotated[
-        Pair,
-        Parameter(
-            "x_init,j, position of the fingertip at the start", unit="m", low=-10.0, high=10.0
-        ),
-    ] = (0.11, -0.11)
-    object_width: Annotated[
-        float, Parameter("W, width of the object", unit="m", low=0.0, high=10.0)
-    ] = 0.07
-    initial_object_position: Annotated[
-        float, Parameter("x_m, centre of the object at the start", unit="m", low=-10.0, high=10.0)
-    ] = 0.03
+    initial_position: InitialPosition = (0.11, -0.11)
+    object_width: ObjectWidth = 0.07
+    initial_object_position: InitialObjectPosition = 0.03
     friction: finger_friction.Params = field(default=finger_friction.Params(), kw_only=True)
     actuator: Actuator = field(default=Actuator(), kw_only=True)
 
     def __post_init__(self) -> None:
         check(self)
-        right, left = self.initial_position
-        x_m, w = self.initial_object_position, self.object_width
-        if not left <= x_m - 0.5 * w <= x_m + 0.5 * w <= right:
-            raise ValueError(
-                f"object_width = {w!r} m at initial_object_position = {x_m!r} m: the object spans "
-                f"{x_m - 0.5 * w:g} to {x_m + 0.5 * w:g} m, must fit between the fingertips at "
-                f"{left:g} and {right:g} m"
-            )
+        Place.__post_init__(self)
 
     @cached_property
     def sides(self) -> tuple[Side, Side]:

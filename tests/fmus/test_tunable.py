@@ -26,6 +26,8 @@ def starts(name):
     at = {1: 0.0355, 2: 0.0355, 3: 0.0355} if "Hand" in name else {1: 0.0655, 2: -0.0055}
     forces = {k: -1.0 - 0.1 * k if x > 0.0 else 1.2 for k, x in at.items()}
     placed = {f"initial_position[{k}]": x for k, x in at.items()}
+    if name == "TandemPlant":
+        return placed | {"grip_force": -2.2, "wrist_command": 0.031, "wrist.delay": 0.003}
     return placed | {f"force[{k}]": force for k, force in forces.items()}
 
 

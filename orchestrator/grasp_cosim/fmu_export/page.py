@@ -208,16 +208,22 @@ def updated(card: str, blocks: Mapping[str, Block]) -> str:
 def variable_tables(blocks: Mapping[str, Block]) -> str:
     """The variables of a block as a Markdown table; of several, what all have, then what each adds.
 
-    The blocks are given by name. Those of a hand follow by themselves. A row that stood before is
-    named, and not shown again.
+    The blocks are given by name. Those of a gripper in tandem and of a hand follow by themselves. A
+    row that stood before is named, and not shown again.
     """
     rows = {name: [_row(f) for f in declared(block)] for name, block in blocks.items()}
     if len(rows) == 1:
         return _table(*rows.values())
+    tandems = {name: own for name, own in rows.items() if name.startswith("tandem")}
     hands = {name: own for name, own in rows.items() if name.startswith("hand")}
-    others = {name: own for name, own in rows.items() if name not in hands}
+    others = {name: own for name, own in rows.items() if name not in tandems | hands}
+    kinds = {
+        "all have": others,
+        "those of a gripper in tandem have": tandems,
+        "all of a hand of three fingers have": hands,
+    }
     parts: dict[str, list[str]] = {}
-    for who, group in (("all have", others), ("all of a hand of three fingers have", hands)):
+    for who, group in kinds.items():
         first, *rest = group.values() or [[]]
         common = [row for row in first if all(row in own for own in rest)]
         added = {f"`{n}` adds": [r for r in own if r not in common] for n, own in group.items()}

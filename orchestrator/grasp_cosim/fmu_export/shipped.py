@@ -31,6 +31,14 @@ SHIPPED: Mapping[str, Shipped] = {
         "Multiple impedance control of a grasp whose two faces may differ in colour",
         "grasp_controller.adaptive",
     ),
+    "GraspControllerTandem": Shipped(
+        "Grasp control of a gripper in tandem on a positioned wrist, whose faces may differ",
+        "grasp_controller.tandem",
+    ),
+    "GraspControllerTandemPublished": Shipped(
+        "Multiple impedance control of a gripper in tandem on a wrist whose force is measured",
+        "grasp_controller.tandem_published",
+    ),
     "GripperPlant": Shipped("Two-finger gripper and a rigid, fixed object", "gripper_plant.rigid"),
     "GripperPlantCompliant": Shipped(
         "Two-finger gripper and a fixed object that gives", "gripper_plant.compliant"
@@ -61,6 +69,10 @@ SHIPPED: Mapping[str, Shipped] = {
     "ProximitySensor": Shipped(
         "Optical proximity sensor of the reflected-light-intensity type, one channel",
         "proximity_sensor.channel",
+    ),
+    "TandemPlant": Shipped(
+        "Gripper whose fingers move in tandem on a positioned wrist, and a fixed or free object",
+        "gripper_plant.tandem",
     ),
 }
 """By the names of the FMUs, in alphabetical order."""

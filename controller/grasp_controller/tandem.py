@@ -1,0 +1,248 @@
+"""Grasp control of a gripper whose fingers move in tandem, on a wrist that is positioned.
+
+Layers 1 and 2 close the grip, layer 3 moves the wrist; nothing switches:
+
+    layer 3   X_c' = clip(g·(1 - h')·(T - X_c), ±v_max)               wrist_guidance.py
+    layer 2   M·w_v'' + D·w_v' + K·(1 - rho^2)^p·w_v = (f_p1 - f_p2)/2     the grip waits for it
+    layer 1   F = -2·D_i·(w' - w_v') - 2·K_i·(w - w_v)
+
+w = (x_1 - x_2)/2 is half the opening. Derivation: controller/README.md
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pow as power
+from math import tanh
+from typing import Annotated, NamedTuple, TypeAlias
+
+from block_variables import Group, Output, Parameter
+
+from . import contact_force as layer_1
+from . import holding, impedance, reflectance_ratio, wrist_guidance
+from . import impact_reduction as layer_2
+from . import simultaneous_contact as published
+from .impedance import Motion
+from .reflectance_ratio import EstimatedGap, Line, Ratio, RatioDeviation
+from .series import ImpactReductionForce
+from .series import Inputs as Inputs
+from .wrist_guidance import Wrist
+
+SOFTEST = 1e-6
+"""Share of K_a1 that pulls at least, so that there is a place where the grip would rest."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimultaneousContact(Group, name="simultaneous_contact"):
+    """While the wrist is off the middle by a tenth of d the grip pulls with 0.95 of K_a1.
+
+    At a third of d it is a half, at a half a fifth. A wrist of 2 Hz needs 8, and K_a1 = 10 N/m.
+    """
+
+    enabled: Annotated[
+        bool, Parameter("layer 3 on; off, the wrist stays where it is", tunable=True)
+    ] = True
+    patience: Annotated[
+        float,
+        Parameter(
+            "p, exponent by which the grip waits while the wrist is off the middle",
+            unit="1",
+            low=0.0,
+            high=100.0,
+            tunable=True,
+        ),
+    ] = 4.0
+
+
+@dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
+class Params:
+    """The parameters of the three layers, and of what is learnt."""
+
+    simultaneous_contact: SimultaneousContact = SimultaneousContact()
+    impact_reduction: layer_2.Params = layer_2.Params()
+    contact_force: layer_1.Params = layer_1.Params()
+    reflectance: reflectance_ratio.Params = reflectance_ratio.Params()
+    hold: holding.Params = holding.Params()
+    wrist: Wrist = Wrist()
+
+    @cached_property
+    def white(self) -> float:
+        """1/kappa of a white face, m.V^(1/n)."""
+        return reflectance_ratio.white(self.reflectance)
+
+
+class State(NamedTuple):
+    """Half the virtual opening, where the wrist is sent, where the object is seen and where the
+    fingertips were at the start, in m; what the last sample left behind; the fingers' lines, and
+    what they told.
+    """
+
+    virtual: Motion
+    wrist_command: float
+    target: float
+    fingertips: layer_2.Pair
+    intensity: layer_2.Pair
+    impact_reduction_force: layer_2.Pair
+    line_1: Line
+    line_2: Line
+    estimate: reflectance_ratio.Estimate
+    closing: float
+    hold: float
+
+
+GripForce: TypeAlias = Annotated[
+    float,
+    Output(
+        "F, force of the drive on half the opening; below 0 it closes",
+        unit="N",
+        nominal=1.0,
+        depends_on={"position", "velocity"},
+    ),
+]
+WristCommand: TypeAlias = Annotated[
+    float,
+    Output(
+        "X_c, commanded position of the wrist",
+        unit="m",
+        nominal=0.1,
+        depends_on=set(),
+        depends_initially_on={"position"},
+    ),
+]
+
+
+class Outputs(NamedTuple):
+    """The commands to grip and wrist, the inner signals, and what has been learnt."""
+
+    grip_force: GripForce
+    wrist_command: WristCommand
+    target_position: Annotated[
+        float,
+        Output(
+            "T, middle of the object as the light tells it, where the wrist is to be",
+            unit="m",
+            nominal=0.1,
+            depends_on=set(),
+            depends_initially_on={"position", "intensity"},
+        ),
+    ]
+    virtual_opening: Annotated[
+        float,
+        Output(
+            "w_v, virtual object of half the opening",
+            unit="m",
+            nominal=0.1,
+            depends_on=set(),
+            depends_initially_on={"position"},
+        ),
+    ]
+    impact_reduction_force: ImpactReductionForce
+    reflectance_ratio: Ratio
+    reflectance_ratio_standard_deviation: RatioDeviation
+    estimated_gap: EstimatedGap
+    hold: holding.Hold
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """Virtual opening and wrist as measured and at rest, so that nothing jumps at the start."""
+    floor = p.impact_reduction.intensity_floor
+    (x_1, x_2), (xi_1, xi_2) = u.position, u.intensity
+    line_1 = reflectance_ratio.first_point(p.reflectance, floor, x_1, xi_1)
+    line_2 = reflectance_ratio.first_point(p.reflectance, floor, -x_2, xi_2)
+    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
+    middle = _middle(u)
+    target = wrist_guidance.within(
+        middle + _way(p, line_1, line_2, _imbalance(estimate, u)), u.position
+    )
+    virtual = (_half_opening(u) if p.impact_reduction.enabled else 0.0), 0.0
+    nothing = (0.0, 0.0)
+    return State(
+        virtual, middle, target, u.position, u.intensity, nothing,
+        line_1, line_2, estimate, 0.0, 0.0,
+    )  # fmt: skip
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance virtual opening and wrist by h seconds (h > 0), the samples u held, and learn."""
+    (x_1, x_2), (v_1, v_2), (xi_1, xi_2) = u.position, u.velocity, u.intensity
+    closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
+    pressed = holding.hold(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
+    held = wrist_guidance.agreed(pressed, _imbalance(x.estimate, u))
+    free = 1.0 - held
+    floor = p.impact_reduction.intensity_floor
+    low_pass = reflectance_ratio.low_pass(p.reflectance, h)
+    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, free, low_pass)
+    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, free, low_pass)
+    estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
+    rho = _imbalance(estimate, u)
+    target = wrist_guidance.within(_middle(u) + _way(p, line_1, line_2, rho), x.fingertips)
+    wrist_command, pull = x.wrist_command, 1.0
+    if p.simultaneous_contact.enabled:
+        wrist_command = wrist_guidance.move(p.wrist, wrist_command, target, free, h)
+        pull = max(SOFTEST, power(1.0 - rho * rho, p.simultaneous_contact.patience))
+    f_p = layer_2.virtual_forces(p.impact_reduction, u.intensity, x.intensity, h)
+    virtual = _closed(p, x.virtual, pull, f_p, h)
+    return State(
+        virtual, wrist_command, target, x.fingertips, u.intensity, f_p,
+        line_1, line_2, estimate, closing, held,
+    )  # fmt: skip
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The commands for the samples u, and what has been learnt."""
+    ratio = reflectance_ratio.learnt(x.estimate)
+    return Outputs(
+        _grip_force(p, x.virtual, u),
+        x.wrist_command,
+        x.target,
+        x.virtual[0],
+        x.impact_reduction_force,
+        ratio,
+        ratio * x.estimate.deviation,
+        reflectance_ratio.gaps(p.reflectance, p.white, x.line_1, x.line_2),
+        x.hold,
+    )
+
+
+def _middle(u: Inputs) -> float:
+    """X in m: the wrist is where the middle of the fingertips is."""
+    return published.desired_position(u.position)
+
+
+def _half_opening(u: Inputs) -> float:
+    """W in m."""
+    x_1, x_2 = u.position
+    return 0.5 * (x_1 - x_2)
+
+
+def _imbalance(estimate: reflectance_ratio.Estimate, u: Inputs) -> float:
+    """rho: how much more light finger 1 has, as of faces that are alike, from -1 to 1."""
+    xi_1, xi_2 = reflectance_ratio.alike(estimate, u.intensity)
+    return published.relative(published.lit(xi_1), published.lit(xi_2))
+
+
+def _way(p: Params, line_1: Line, line_2: Line, rho: float) -> float:
+    """d·tanh(rho)/n: from the wrist to the object's middle, m."""
+    gap_1, gap_2 = reflectance_ratio.gaps(p.reflectance, p.white, line_1, line_2)
+    d = 0.5 * (gap_1 + gap_2) + p.reflectance.offset_distance
+    return d * tanh(rho) / p.reflectance.diffusion_exponent
+
+
+def _closed(p: Params, virtual: Motion, pull: float, f_p: layer_2.Pair, h: float) -> Motion:
+    """Half the virtual opening h seconds later, a share `pull` of K_a1 and f_p in N held.
+
+    With layer 2 off it is closed.
+    """
+    gains = p.impact_reduction
+    if not gains.enabled:
+        return 0.0, 0.0
+    f_1, f_2 = f_p
+    stiffness = pull * gains.stiffness
+    a = impedance.transition(gains.mass, gains.damping, stiffness, h)
+    half, rate = virtual
+    return impedance.advance(a, half, rate, 0.5 * (f_1 - f_2) / stiffness)
+
+
+def _grip_force(p: Params, virtual: Motion, u: Inputs) -> float:
+    """F in N, layer 1."""
+    v_1, v_2 = u.velocity
+    return 2.0 * layer_1.force(p.contact_force, _half_opening(u), 0.5 * (v_1 - v_2), virtual)

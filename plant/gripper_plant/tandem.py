@@ -1,0 +1,254 @@
+"""Two-finger gripper whose fingers move in tandem, on the wrist of an arm, and its object.
+
+X is where the wrist is, w half the opening:  x_1 = X + w,  x_2 = X - w,
+
+    M·w'' = F + f_c1 - f_c2 - friction                      F = u_1 - u_2, M of both fingers
+
+The wrist is positioned (wrist.py), the drive is told a force (drive.py). The object is fixed, or a
+box on a floor (box.py), and gives (contact_laws.py). Signs as in fingers.py: F < 0 closes.
+Card: plant/README.md
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, NamedTuple
+
+from block_variables import Input, Output, Parameter, check
+
+from . import box as standing
+from . import command_delay, contact_laws, drive, fingers, friction, wrist
+from .box import Box, Pushes, Shape
+from .command_delay import Line
+from .contact_laws import HuntCrossley, KelvinVoigt
+from .drive import Drive
+from .fingers import Pair as Pair
+from .friction import Motion
+from .wrist import Wrist
+
+LONGEST_STEP = fingers.LONGEST_STEP
+
+ITERATIONS = 16
+"""To find the forces that are held over a sub-step: each leaves 1/19 of the error, or less."""
+
+SAME_MOMENT = 1e-9
+"""Share of a step below which two moments in it are one."""
+
+NOWHERE = fingers.UNRESOLVED
+"""Where the wrist is after more sub-steps than a plant takes: so the step is refused."""
+
+
+@dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
+class Params(fingers.Place, standing.Standing):
+    """The paper's fingers, object and start, and the box of movable.py, on an arm of 5 Hz."""
+
+    moving_mass: Annotated[
+        float,
+        Parameter(
+            "M = 2·m, mass of both fingers, as the drive moves it",
+            unit="kg",
+            low=1e-3,
+            high=1e3,
+            tunable=True,
+        ),
+    ] = 1.0
+    initial_position: fingers.InitialPosition = (0.11, -0.11)
+    object_width: fingers.ObjectWidth = 0.07
+    initial_object_position: fingers.InitialObjectPosition = 0.03
+    object_fixed: Annotated[
+        bool, Parameter("the object is held fast; else it stands on a floor", tunable=True)
+    ] = False
+    object_mass: standing.ObjectMass = 0.05
+    object_height: standing.ObjectHeight = 0.1
+    contact_height: standing.ContactHeight = 0.05
+    floor_friction: standing.FloorFriction = 0.3
+    kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
+    hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
+    wrist: Wrist = Wrist()
+    drive: Drive = Drive()
+
+    def __post_init__(self) -> None:
+        check(self)
+        fingers.Place.__post_init__(self)
+        standing.Standing.__post_init__(self)
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The box and its floor."""
+        return Shape(
+            0.5 * self.object_width,
+            0.5 * self.object_height,
+            self.object_mass,
+            self.floor_friction,
+            self.contact_height,
+        )
+
+    @cached_property
+    def law(self) -> contact_laws.Law:
+        """The contact law that is chosen."""
+        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
+
+    @cached_property
+    def lightest(self) -> float:
+        """The mass with which a finger and the object move against each other, at least, kg."""
+        of_object = 0.0 if self.object_fixed else 2.0 / self.object_mass
+        return 1.0 / (2.0 / self.moving_mass + of_object + 2.0 * self.wrist.mobility)
+
+    @cached_property
+    def servo_rate(self) -> float:
+        """What sub-steps must resolve of the wrist and of the drive, 1/s."""
+        return max(self.wrist.rate, self.drive.omega)
+
+
+class Inputs(NamedTuple):
+    """Held over the step."""
+
+    grip_force: Annotated[
+        float,
+        Input(
+            "F, force of the drive on half the opening; below 0 it closes", unit="N", nominal=1.0
+        ),
+    ] = 0.0
+    wrist_command: Annotated[
+        float, Input("X_c, commanded position of the wrist", unit="m", nominal=0.1)
+    ] = 0.0
+
+
+class State(NamedTuple):
+    """Wrist and half the opening in m and m/s, what the drive's servo follows in m/s, contact
+    forces in N; the box; toppled so far; the commands that are on their way to the wrist.
+    """
+
+    wrist: Motion
+    opening: Motion
+    reference: float
+    contact_force: Pair
+    box: Box
+    toppled: bool
+    line: Line
+
+
+class Outputs(NamedTuple):
+    """Measured at the fingers, at the object and at the wrist."""
+
+    position: fingers.Position
+    velocity: fingers.Velocity
+    gap: fingers.Gap
+    contact_force: fingers.ContactForce
+    contact: fingers.Contact
+    object_position: fingers.ObjectPosition
+    tilt: standing.Tilt
+    toppled: standing.Toppled
+    wrist_position: Annotated[
+        float, Output("X, position of the wrist", unit="m", nominal=0.1, depends_on=set())
+    ]
+    wrist_velocity: Annotated[
+        float, Output("X', velocity of the wrist", unit="m/s", nominal=0.1, depends_on=set())
+    ]
+    wrist_force: Annotated[
+        float,
+        Output(
+            "f_c1 + f_c2, contact forces as a sensor at the wrist has them, without inertia",
+            unit="N",
+            nominal=1.0,
+            depends_on=set(),
+        ),
+    ]
+
+
+def initial_state(p: Params, u: Inputs) -> State:
+    """All at rest, the fingers free of the object; the wrist has been told to be where it is."""
+    x_1, x_2 = p.initial_position
+    middle = 0.5 * (x_1 + x_2)
+    box = Box(p.initial_object_position, 0.0, 0.0, 0.0)
+    line = command_delay.first(middle, p.wrist.delay)
+    return State((middle, 0.0), (0.5 * (x_1 - x_2), 0.0), 0.0, (0.0, 0.0), box, False, line)
+
+
+def step(p: Params, x: State, u: Inputs, h: float) -> State:
+    """Advance gripper, wrist and object by h seconds (h > 0), force and command held."""
+    if p.wrist.delay == 0.0:
+        return _advance(p, x, u.grip_force, u.wrist_command, h)
+    line = command_delay.entered(x.line, u.wrist_command, p.wrist.delay, h)
+    now = 0.0
+    for command, end in zip(line.value, line.end, strict=True):
+        until = h if end > h - SAME_MOMENT * h else end
+        if until > now + SAME_MOMENT * h:
+            x = _advance(p, x, u.grip_force, command, until - now)
+            now = until
+    return x._replace(line=command_delay.later(line, h))
+
+
+def outputs(p: Params, x: State, u: Inputs) -> Outputs:
+    """The outputs, as the sensors see them; no input reaches an output without a step."""
+    q, (middle, speed), (half, closing) = p.shape, x.wrist, x.opening
+    x_1, x_2 = middle + half, middle - half
+    right, left = standing.faces(q, x.box)
+    f_1, f_2 = x.contact_force
+    return Outputs(
+        (x_1, x_2),
+        (speed + closing, speed - closing),
+        (max(0.0, x_1 - right), max(0.0, left - x_2)),
+        x.contact_force,
+        (x_1 <= right, x_2 >= left),
+        standing.centre(q, x.box),
+        x.box.tilt,
+        x.toppled,
+        middle,
+        speed,
+        f_1 + f_2,
+    )
+
+
+def _advance(p: Params, x: State, told: float, command: float, h: float) -> State:
+    """H seconds with the drive told a force in N and the wrist to be somewhere in m."""
+    if x.wrist[0] != x.wrist[0]:  # it is nowhere
+        return x
+    n = fingers.count(max(_contact_rate(p, x, told, command, h), p.servo_rate), h)
+    if n > fingers.MOST:
+        return x._replace(wrist=NOWHERE)
+    d = h / n
+    a = wrist.transition(p.wrist, d)
+    for _ in range(n):
+        x = _substep(p, a, x, told, command, d)
+    return x
+
+
+def _substep(p: Params, a: wrist.Matrix, x: State, told: float, command: float, d: float) -> State:
+    """D seconds with all forces held; they and the ways under them are found by iteration."""
+    q, m, (middle, _), (half, speed) = p.shape, p.moving_mass, x.wrist, x.opening
+    right, left = standing.faces(q, x.box)
+    gap_1, gap_2 = middle + half - right, left - middle + half
+    f_1, f_2 = x.contact_force[0], -x.contact_force[1]
+    reference = drive.reference(p.drive, m, told, x.reference, speed, d)
+    driven = drive.force(p.drive, m, told, reference, speed)
+    at, opening, box = x.wrist, x.opening, x.box
+    for _ in range(ITERATIONS):
+        at = wrist.follow(p.wrist, a, x.wrist, command, f_1 - f_2, d)
+        opening = friction.move(half, speed, m, driven + f_1 + f_2, p.drive.law, d)
+        if not (p.object_fixed or x.toppled):
+            box = standing.advance(q, x.box, Pushes(f_2, f_1), d)
+        to_right, to_left = standing.faces(q, box)
+        to_1, to_2 = at[0] + opening[0] - to_right, to_left - at[0] + opening[0]
+        found_1 = contact_laws.mean_force(p.law, -gap_1, -to_1, d)
+        found_2 = contact_laws.mean_force(p.law, -gap_2, -to_2, d)
+        motor = drive.force(p.drive, m, told, reference, (opening[0] - half) / d)
+        near = contact_laws.settled(found_1, f_1) and contact_laws.settled(found_2, f_2)
+        if near and contact_laws.settled(abs(motor), abs(driven)):
+            break
+        f_1, f_2, driven = found_1, found_2, motor
+    toppled = x.toppled or abs(box.tilt) >= standing.balance(q)
+    if toppled:
+        box = Box(box.x, box.tilt, 0.0, 0.0)
+    return State(at, opening, reference, (f_1, 0.0 - f_2), box, toppled, x.line)
+
+
+def _contact_rate(p: Params, x: State, told: float, command: float, h: float) -> float:
+    """The fastest that a contact can do within h seconds, 1/s; 0 where no finger comes so far."""
+    q, (middle, v), (half, speed) = p.shape, x.wrist, x.opening
+    right, left = standing.faces(q, x.box)
+    m, p_d = p.moving_mass, p.drive
+    pushed = abs(drive.limited(p_d, told)) / m + p_d.omega * (abs(x.reference) + abs(speed))
+    accelerated = pushed + wrist.acceleration_bound(p.wrist, x.wrist, command)
+    ways = abs(v) + abs(speed) + abs(x.box.v) + q.h * abs(x.box.w) + 0.5 * h * accelerated
+    deepest = h * ways + max(right - middle - half, middle - half - left)
+    return contact_laws.rate(p.law, deepest, p.lightest)
