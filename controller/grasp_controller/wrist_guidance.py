@@ -37,7 +37,7 @@ class Wrist(Group, name="wrist"):
     bandwidth: Annotated[
         float,
         Parameter(
-            "omega/(2·pi), natural frequency of the wrist's servo; from 3 Hz on it is fast enough",
+            "omega/(2·pi), natural frequency of the wrist's servo",
             unit="Hz",
             low=0.1,
             high=1000.0,

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from .sweeps.sweep import sweep
     from .system.description import System
     from .system.parts import Realtime
+    from .tandem.system import tandem_system
 
 __all__ = [
     "InputError",
@@ -57,6 +58,7 @@ __all__ = [
     "qualify",
     "simulate",
     "sweep",
+    "tandem_system",
     "write_report",
     "write_ssp",
 ]
@@ -78,6 +80,7 @@ _HOMES = {
     "qualify": "comparison.qualify",
     "simulate": "master.simulation",
     "sweep": "sweeps.sweep",
+    "tandem_system": "tandem.system",
     "write_report": "report.page",
     "write_ssp": "ssp.to_archive",
 }

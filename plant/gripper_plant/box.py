@@ -135,6 +135,11 @@ def balance(q: Shape) -> float:
     return atan2(q.b, q.a)
 
 
+def topples(q: Shape, box: Box) -> bool:
+    """True for a box that is tilted past its balance."""
+    return box.tilt != 0.0 and abs(box.tilt) >= balance(q)
+
+
 def centre(q: Shape, box: Box) -> float:
     """Where the centre of the box is, m."""
     side = copysign(1.0, box.tilt)
@@ -143,12 +148,12 @@ def centre(q: Shape, box: Box) -> float:
 
 def faces(q: Shape, box: Box) -> tuple[float, float]:
     """Where the fingertips meet the right and the left face, m."""
+    if box.tilt == 0.0:
+        return box.x + q.b, box.x - q.b
     lean, width = q.h * tan(box.tilt), 2.0 * q.b / cos(box.tilt)
     if box.tilt > 0.0:
         return box.x + q.b + lean, box.x + q.b + lean - width
-    if box.tilt < 0.0:
-        return box.x - q.b + lean + width, box.x - q.b + lean
-    return box.x + q.b, box.x - q.b
+    return box.x - q.b + lean + width, box.x - q.b + lean
 
 
 def energy(q: Shape, box: Box) -> float:

@@ -91,11 +91,15 @@ def mean_force(law: Law, before: float, after: float, d: float) -> float:
     k, n, c, lam = law
     start, end = max(0.0, before), max(0.0, after)
     way = after - before
-    if abs(way) > SHORT * max(start, end):
-        spring = (energy(law, after) - energy(law, before)) / way
-    else:
+    if n == 1.0:
+        spring = 0.5 * k * (start + end)
+        if before < 0.0 or after < 0.0:
+            spring = spring * (end - start) / way
+    elif abs(way) <= SHORT * max(start, end):
         spring = k * power(0.5 * (start + end), n)
-    return max(0.0, spring * (1.0 + lam * way / d) + c * (end - start) / d)
+    else:
+        spring = (energy(law, after) - energy(law, before)) / way
+    return max(0.0, spring + (spring * lam * way + c * (end - start)) / d)
 
 
 def settled(found: float, before: float) -> bool:

@@ -103,7 +103,7 @@ def _substep(p: Params, q: Shape, x: State, forces: Pair, d: float) -> State:
         if contact_laws.settled(found_1, f_1) and contact_laws.settled(found_2, f_2):
             break
         f_1, f_2 = found_1, found_2
-    toppled = x.toppled or abs(box.tilt) >= standing.balance(q)
+    toppled = x.toppled or standing.topples(q, box)
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)
     return State((s_1, -s_2), (w_1, 0.0 - w_2), (f_1, 0.0 - f_2), box, toppled)

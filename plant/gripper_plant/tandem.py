@@ -113,9 +113,9 @@ class Inputs(NamedTuple):
     ] = 0.0
 
 
-class State(NamedTuple):
+class Body(NamedTuple):
     """Wrist and half the opening in m and m/s, what the drive's servo follows in m/s, contact
-    forces in N; the box; toppled so far; the commands that are on their way to the wrist.
+    forces in N; the box; toppled so far.
     """
 
     wrist: Motion
@@ -124,6 +124,12 @@ class State(NamedTuple):
     contact_force: Pair
     box: Box
     toppled: bool
+
+
+class State(NamedTuple):
+    """What moves, and the commands that are on their way to the wrist."""
+
+    body: Body
     line: Line
 
 
@@ -161,45 +167,47 @@ def initial_state(p: Params, u: Inputs) -> State:
     middle = 0.5 * (x_1 + x_2)
     box = Box(p.initial_object_position, 0.0, 0.0, 0.0)
     line = command_delay.first(middle, p.wrist.delay)
-    return State((middle, 0.0), (0.5 * (x_1 - x_2), 0.0), 0.0, (0.0, 0.0), box, False, line)
+    body = Body((middle, 0.0), (0.5 * (x_1 - x_2), 0.0), 0.0, (0.0, 0.0), box, False)
+    return State(body, line)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance gripper, wrist and object by h seconds (h > 0), force and command held."""
     if p.wrist.delay == 0.0:
-        return _advance(p, x, u.grip_force, u.wrist_command, h)
+        return x._replace(body=_advance(p, x.body, u.grip_force, u.wrist_command, h))
     line = command_delay.entered(x.line, u.wrist_command, p.wrist.delay, h)
-    now = 0.0
+    body, now = x.body, 0.0
     for command, end in zip(line.value, line.end, strict=True):
         until = h if end > h - SAME_MOMENT * h else end
         if until > now + SAME_MOMENT * h:
-            x = _advance(p, x, u.grip_force, command, until - now)
+            body = _advance(p, body, u.grip_force, command, until - now)
             now = until
-    return x._replace(line=command_delay.later(line, h))
+    return State(body, command_delay.later(line, h))
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The outputs, as the sensors see them; no input reaches an output without a step."""
-    q, (middle, speed), (half, closing) = p.shape, x.wrist, x.opening
+    q, body = p.shape, x.body
+    (middle, speed), (half, closing) = body.wrist, body.opening
     x_1, x_2 = middle + half, middle - half
-    right, left = standing.faces(q, x.box)
-    f_1, f_2 = x.contact_force
+    right, left = standing.faces(q, body.box)
+    f_1, f_2 = body.contact_force
     return Outputs(
         (x_1, x_2),
         (speed + closing, speed - closing),
         (max(0.0, x_1 - right), max(0.0, left - x_2)),
-        x.contact_force,
+        body.contact_force,
         (x_1 <= right, x_2 >= left),
-        standing.centre(q, x.box),
-        x.box.tilt,
-        x.toppled,
+        standing.centre(q, body.box),
+        body.box.tilt,
+        body.toppled,
         middle,
         speed,
         f_1 + f_2,
     )
 
 
-def _advance(p: Params, x: State, told: float, command: float, h: float) -> State:
+def _advance(p: Params, x: Body, told: float, command: float, h: float) -> Body:
     """H seconds with the drive told a force in N and the wrist to be somewhere in m."""
     if x.wrist[0] != x.wrist[0]:  # it is nowhere
         return x
@@ -213,12 +221,14 @@ def _advance(p: Params, x: State, told: float, command: float, h: float) -> Stat
     return x
 
 
-def _substep(p: Params, a: wrist.Matrix, x: State, told: float, command: float, d: float) -> State:
+def _substep(p: Params, a: wrist.Matrix, x: Body, told: float, command: float, d: float) -> Body:
     """D seconds with all forces held; they and the ways under them are found by iteration."""
-    q, m, (middle, _), (half, speed) = p.shape, p.moving_mass, x.wrist, x.opening
+    q, m, (middle, v), (half, speed) = p.shape, p.moving_mass, x.wrist, x.opening
     right, left = standing.faces(q, x.box)
     gap_1, gap_2 = middle + half - right, left - middle + half
-    f_1, f_2 = x.contact_force[0], -x.contact_force[1]
+    off = v - x.box.v - q.h * x.box.w  # of the wrist from the faces, m/s
+    f_1 = contact_laws.mean_force(p.law, -gap_1, -gap_1 - d * (speed + off), d)
+    f_2 = contact_laws.mean_force(p.law, -gap_2, -gap_2 - d * (speed - off), d)
     reference = drive.reference(p.drive, m, told, x.reference, speed, d)
     driven = drive.force(p.drive, m, told, reference, speed)
     at, opening, box = x.wrist, x.opening, x.box
@@ -236,13 +246,13 @@ def _substep(p: Params, a: wrist.Matrix, x: State, told: float, command: float, 
         if near and contact_laws.settled(abs(motor), abs(driven)):
             break
         f_1, f_2, driven = found_1, found_2, motor
-    toppled = x.toppled or abs(box.tilt) >= standing.balance(q)
+    toppled = x.toppled or standing.topples(q, box)
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)
-    return State(at, opening, reference, (f_1, 0.0 - f_2), box, toppled, x.line)
+    return Body(at, opening, reference, (f_1, 0.0 - f_2), box, toppled)
 
 
-def _contact_rate(p: Params, x: State, told: float, command: float, h: float) -> float:
+def _contact_rate(p: Params, x: Body, told: float, command: float, h: float) -> float:
     """The fastest that a contact can do within h seconds, 1/s; 0 where no finger comes so far."""
     q, (middle, v), (half, speed) = p.shape, x.wrist, x.opening
     right, left = standing.faces(q, x.box)

@@ -228,4 +228,4 @@ def test_the_map_has_all_rooms():
     text = PAGES["orchestrator/README.md"]
     rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
     assert sorted(rows) == ROOMS
-    assert groups() == ("grasp", "hand")
+    assert groups() == ("grasp", "hand", "tandem")

@@ -91,7 +91,7 @@ def test_the_fmu_gives_the_reference_to_the_last_bit(folder, folder_of, kind, na
 
 def test_an_importer_with_a_step_of_its_own_passes(folder, name):
     """The rules allow 0.1. An impact may lie between two samples, and so may a jump in the ratio of
-    two intensities, of which a controller learns; a gripper in tandem meets its box again and again.
+    two intensities, of which a controller learns; a gripper in tandem meets its box many times.
     """
     result = simulated(folder / f"{name}.fmu", folder, name, step_size=STEP_SIZE)
     assert result["time"][1] != STEP_SIZE

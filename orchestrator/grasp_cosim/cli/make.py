@@ -53,11 +53,12 @@ def build(
 ) -> int:
     """Build the FMUs, in Python or as C.
 
-    These are the plants, GripperPlant* and HandPlant*, ProximitySensor, GraspController* and
-    HandController*; the hand has three fingers, with --fingers as many as that, and the FMUs have
-    the number in their names. With BLOCK, a Python file, the FMU of that block alone is built:
-    spring_plant.py becomes SpringPlant.fmu (docs/your_plant.md). With --native, which translates
-    the blocks to C and compiles them, BLOCK may also be the name of one of ours.
+    These are the plants, GripperPlant*, TandemPlant and HandPlant*, ProximitySensor,
+    GraspController* and HandController*; the hand has three fingers, with --fingers as many as
+    that, and the FMUs have the number in their names. With BLOCK, a Python file, the FMU of that
+    block alone is built: spring_plant.py becomes SpringPlant.fmu (docs/your_plant.md). With
+    --native, which translates the blocks to C and compiles them, BLOCK may also be the name of one
+    of ours.
 
     It prints whether each file is new, changed or unchanged. Where pythonfmu has no binary for this
     machine, native FMUs are built beside them, too.

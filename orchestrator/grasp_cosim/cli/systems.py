@@ -38,6 +38,9 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
     "--fingers", type=int, help="Make a system of a hand with so many fingers, from 2 to 8."
 )
 @click.option("--angles", metavar="A,B,...", help="The directions of a hand's fingers in degrees.")
+@click.option(
+    "--tandem", is_flag=True, help="Make a system of a gripper in tandem, on the wrist of an arm."
+)
 @click.option("--force", is_flag=True, help="Replace a file that is there already.")
 @json_option
 def init(
@@ -46,6 +49,7 @@ def init(
     fmus: tuple[str, ...],
     fingers: int | None,
     angles: str | None,
+    tandem: bool,
     force: bool,
     as_json: bool,
 ) -> int:
@@ -58,6 +62,7 @@ def init(
     Example: grasp-cosim init my_system.toml --as plant=vendor.fmu
     An FMU alone: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
     A hand: grasp-cosim init hand.toml --fingers 3 --angles 0,90,225
+    A gripper on an arm: grasp-cosim init tandem.toml --tandem
     """
     if file.suffix.lower() != ".toml":
         raise InputError(f"{file}: must end in .toml, a system file")
@@ -71,12 +76,16 @@ def init(
     hand = fingers is not None or angles is not None
     if hand and (own or foreign):
         raise InputError("--fingers and --angles cannot be used with --fmu or --as")
+    if tandem and (own or foreign or hand):
+        raise InputError("--tandem cannot be used with --fmu, --as, --fingers or --angles")
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
     elif hand:
         text, notes = _hand(file.parent, fingers, angles)
+    elif tandem:
+        text = _tandem(file.parent)
     else:
         text, drafts = _grasp(file.parent, foreign)
     write_text(file, text)
@@ -135,6 +144,15 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
     built(folder, sized(len(directions)))
     note = faint(directions)
     return _from_below(hand_text(directions)), [note] if note else []
+
+
+def _tandem(folder: Path) -> str:
+    """The text of a gripper in tandem."""
+    from ..grasp.system import built
+    from ..tandem.system import SYSTEM
+
+    built(folder)
+    return _from_below(SYSTEM.read_text("utf-8"))
 
 
 def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Draft]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -45,11 +45,21 @@ BEFORE, AFTER, NEAR = 0.015, 0.03, 0.05
 """s before and after a contact in a close-up; contacts that are nearer than NEAR share one."""
 
 
+class Line(NamedTuple):
+    """A place in m that is drawn beside the target: its signal by role, and how."""
+
+    signal: str
+    label: str
+    color: str
+    style: str
+
+
 @np.errstate(over="ignore")  # of what is not drawn
-def draw_grasp(run: Result, path: Path | None = None) -> Figure:
+def draw_grasp(run: Result, path: Path | None = None, *beside: Line) -> Figure:
     """Gaps, contact forces, target and closing speed; on the right around the contacts.
 
-    With a `path` the figure is written there, see report.plot.save().
+    With a `path` the figure is written there, see report.plot.save(); places `beside` the target
+    are drawn with it.
     """
     spans = _around_contacts(run)
     figure = new_figure(7.2 + 2.9 * len(spans), 8.0)
@@ -62,6 +72,9 @@ def draw_grasp(run: Result, path: Path | None = None) -> Figure:
     _gaps(gaps, run, slice(None), FINGERS)
     finish(gaps, "gap to the object in mm", legend=False)
     draw_contact_forces(contact, run)
+    for line in beside:
+        place = 1e3 * run.by_role[line.signal]
+        target.plot(*drawn(run.time, place), line.style, color=line.color, label=line.label)
     draw_targets(target, [(run, "-", "")])
     target.set_xlabel("time in s")
     for (fingers, begin, end), column in zip(spans, rows[:, 1:].T, strict=True):

@@ -2,14 +2,18 @@
 
 import re
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..base.checks import choice
 from ..base.errors import InputError
 from ..base.files import FMU_FOLDER
 from ..fmu_export.build import shipped_fmus
+from ..interface.read import read_interface
 from ..metrics.metric import resolved
 from ..system.description import System
+from ..system.parts import Connection, Port
 from .presets import SYSTEM
 
 CONTROLLERS = {"published": "", "adaptive": "Adaptive"}
@@ -17,7 +21,14 @@ CONTROLLERS = {"published": "", "adaptive": "Adaptive"}
 names of their FMUs have behind GraspController, or HandController.
 """
 
+TANDEM = {"published": "Published", "adaptive": ""}
+"""The same of a gripper in tandem, behind GraspControllerTandem."""
+
+WRIST_FORCE = "wrist_force"
+"""What one law of a gripper in tandem measures and the other one does not."""
+
 _FMU = re.compile(r"(Grasp|Hand)Controller(?:Adaptive)?(\d?)")
+_TANDEM_FMU = re.compile(r"GraspControllerTandem(?:Published)?")
 
 
 def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> System:
@@ -37,12 +48,53 @@ def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> 
     if name in swapped:
         raise InputError(f"{place}: cannot be used with another FMU for {name}")
     now = system.component(name, place)
-    ours = _FMU.fullmatch(now.interface.identifier)
-    of, fingers = ours.groups() if ours else ("Grasp", "")
-    file = f"{of}Controller{CONTROLLERS[law]}{fingers}.fmu"
+    file, fingers = _file_of(now.interface.identifier, law)
     beside = now.fmu.with_name(file)
-    fmu = beside if beside.is_file() else shipped_fmus(int(fingers) if fingers else None) / file
+    fmu = beside if beside.is_file() else shipped_fmus(fingers) / file
+    if _TANDEM_FMU.fullmatch(now.interface.identifier):
+        return _in_tandem(system, name, fmu, place)
     return system.with_settings({f"components.{name}.fmu": fmu}, lambda _: place)
+
+
+def _file_of(identifier: str, law: str) -> tuple[str, int | None]:
+    """The FMU of a law for the same kind of gripper as that of a controller, and its fingers."""
+    if _TANDEM_FMU.fullmatch(identifier):
+        return f"GraspControllerTandem{TANDEM[law]}.fmu", None
+    ours = _FMU.fullmatch(identifier)
+    of, fingers = ours.groups() if ours else ("Grasp", "")
+    return f"{of}Controller{CONTROLLERS[law]}{fingers}.fmu", int(fingers) if fingers else None
+
+
+def _in_tandem(system: System, controller: str, fmu: Path, place: str) -> System:
+    """The system with another law of a gripper in tandem: one of them measures the wrist's force.
+
+    On the way from one to the other that input has a value, so that it has a source at all times.
+    """
+    measured = Port(controller, WRIST_FORCE)
+    source = Port(resolved("plant.", system.roles)[:-1], WRIST_FORCE)
+    held = system
+    if any(c.target == measured for c in system.connections):
+        held = _with_source(system, measured, 0.0)
+    settings: dict[str, Any] = {f"components.{controller}.fmu": fmu}
+    if WRIST_FORCE in read_interface(fmu).by_name:
+        return _with_source(
+            held.with_settings({**settings, str(measured): 0.0}, lambda _: place), measured, source
+        )
+    return held.with_settings(settings, lambda _: place)
+
+
+def _with_source(system: System, target: Port, source: Port | float) -> System:
+    """The system with a connection to an input, or a value of it, in the place of the other."""
+    component = system.component(target.component, system.name)
+    values = {name: v for name, v in component.values.items() if name != target.variable}
+    connections = [c for c in system.connections if c.target != target]
+    if isinstance(source, Port):
+        connections.append(Connection(source, target))
+    else:
+        values[target.variable] = source
+    changed = {c.name: c for c in system.components}
+    changed[component.name] = replace(component, values=values)
+    return replace(system, components=tuple(changed.values()), connections=tuple(connections))
 
 
 def controller_name(system: System) -> str:

@@ -58,8 +58,8 @@ def object_turn(signals: Signals) -> float:
     return float(np.abs(angle - angle[0]).max())
 
 
-def check(system: Any) -> None:
-    """InputError where the weights of a system's controller do not balance its fingers.
+def check(system: Any) -> tuple[str, ...]:
+    """No notes; InputError where the weights of a system's controller do not balance its fingers.
 
     Nothing is said of a plant or a controller of others, which has other parameters.
     """
@@ -77,6 +77,7 @@ def check(system: Any) -> None:
             f"{system.name}: {controller}.weight = {listed}: leaves {left:.3g} of the grasp as a "
             f"push to one side with the angles of {plant}; balanced by {least}"
         )
+    return ()
 
 
 METRICS = (

@@ -93,7 +93,7 @@ class Session:
         observed = system.shown
         self._metrics = chosen(metrics, system.metrics, observed, system.roles)
         self._asked = metrics_of(system.metrics, self._metrics)
-        check_groups(system)
+        notes = check_groups(system)
         self._in_si = in_si(system, self._asked)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every, bool(realtime))
@@ -116,7 +116,7 @@ class Session:
         self._stack = ExitStack()
         check_declared_steps(system)
         waits = long_waits(system, self.pacer.realtime) if self.pacer else []
-        self._remarks = (*system.notes, *system.once(remarks), *waits)
+        self._remarks = (*system.notes, *notes, *system.once(remarks), *waits)
         self._tell(self._remarks)
         try:
             with interruptible(), _folder_kept():

@@ -264,10 +264,13 @@ def metrics_of(names: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metri
     return tuple(found.values())
 
 
-def check_groups(system: Any) -> None:
-    """InputError where check() of a group's metrics.py has something against a System's values."""
-    for group in system.metrics:
-        getattr(higher(f"{group}.metrics"), "check", lambda _: None)(system)
+def check_groups(system: Any) -> list[str]:
+    """What check() of a group's metrics.py notes of a System's values.
+
+    InputError where it has something against them.
+    """
+    checks = (getattr(higher(f"{group}.metrics"), "check", None) for group in system.metrics)
+    return [note for check in checks if check for note in check(system)]
 
 
 def chosen(
