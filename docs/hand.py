@@ -1,5 +1,6 @@
-"""Draws docs/hand.svg: the hand closes in Case 1 and in Case 2, moved by two recorded runs; and
-docs/three_fingers.svg, two hands of three fingers seen from above.
+"""Draws docs/hand.svg: the hand closes in Case 1 and in Case 2, moved by two recorded runs;
+docs/three_fingers.svg, two hands of three fingers seen from above; and docs/tandem.svg, a gripper
+on an arm whose wrist stays, and one whose wrist goes to the middle.
 
 CSS moves each part from keyframe to keyframe along what was recorded. So the picture is sharp at
 any size, moves where a page shows it as an image, and stands still, at the end of the grasp, for
@@ -103,6 +104,71 @@ def _plane(k: int, title: str, run: Result) -> Iterator[Part]:
         when = "never touches" if touch is None else f"{touch:.2f} s"
         text = _text(middle + c * out, wrist + s * out + 5, when, "middle")
         yield _shown(f"w{k}{j}", text, time, float(time[-1]) - 1e-2 if touch is None else touch)
+
+
+BESIDE, LOWER, BEAM, NARROW = 1080.0, 216, 46, 16
+"""px: of a m of two grippers beside each other, the height of their picture, where a beam is, and
+of a finger.
+"""
+
+
+def tandem_svg(grippers: Sequence[tuple[str, Result]]) -> str:
+    """The animation of grippers in tandem beside each other, as SVG; runs of one length.
+
+    A run needs the signals of a grasp and those of the wrist, RATE rows a second or more.
+    """
+    parts = [part for k, (title, run) in enumerate(grippers) for part in _gripper(k, title, run)]
+    told = "; ".join(f"{title}: {_carried(run)}" for title, run in grippers)
+    return _animation(parts, grippers[0][1].time, LOWER + 34, told)
+
+
+def _gripper(k: int, title: str, run: Result) -> Iterator[Part]:
+    """A gripper on its arm with its title, its box, and what becomes of that."""
+    signals, time, floor = run.by_role, run.time, BEAM + 118
+    centre = WIDTH * (0.25 + 0.5 * k) - 18
+    place = {j: centre + BESIDE * signals[f"plant.position[{j}]"] for j in FINGERS}
+    wrist = centre + BESIDE * signals["plant.wrist_position"]
+    left, right = WIDTH * 0.5 * k + 14, WIDTH * 0.5 * (k + 1) - 14
+    yield (
+        _text(left, 22, title, "name")
+        + f'<line class="rule" x1="{left}" x2="{right}" y1="{floor}" y2="{floor}"/>',
+        "",
+    )
+    faces = {
+        j: signals[f"plant.position[{j}]"][0] - SIDE[j] * signals[f"plant.gap[{j}]"][0]
+        for j in FINGERS
+    }
+    width = BESIDE * float(faces[1] - faces[2])
+    box = (
+        f'<rect x="{-width / 2:.1f}" y="{floor - 78}" width="{width:.1f}" height="78" rx="3" '
+        'fill="var(--object)"/>'
+    )
+    yield _moved(f"b{k}", box, time, centre + BESIDE * signals["plant.object_position"])
+    arm = f'<rect x="-10" y="{BEAM - 16}" width="20" height="16" fill="var(--muted)"/>'
+    yield _moved(f"a{k}", arm, time, wrist)
+    beam = f'<rect x="0" y="{BEAM}" width="1" height="9" fill="var(--muted)"/>'
+    spread = place[1] - place[2] + 2 * NARROW
+    yield _moved(f"c{k}", beam, time, place[2] - NARROW, stretch=spread)
+    for j, touch in zip(FINGERS, run.metrics["time_to_contact"], strict=True):
+        x = 0 if j == 1 else -NARROW
+        number = _text(x + NARROW / 2, BEAM + 62, str(j), "on middle")
+        finger = (
+            f'<rect x="{x}" y="{BEAM + 9}" width="{NARROW}" height="102" rx="3" '
+            f'fill="var(--finger{j})"/>{number}'
+        )
+        yield _moved(f"g{k}{j}", finger, time, place[j])
+        when = "never" if touch is None else f"{touch:.2f} s"
+        label = _text(place[j][-1], floor + 20, when, "" if j == 1 else "end")
+        yield _shown(f"w{k}{j}", label, time, float(time[-1]) - 1e-2 if touch is None else touch)
+    outcome = _text(left, LOWER - 8, _carried(run), "")
+    yield _shown(f"q{k}", outcome, time, float(time[-1]) - 0.5)
+
+
+def _carried(run: Result) -> str:
+    shift = 1e3 * run.metrics["object_shift"]
+    apart = run.metrics["time_difference"]
+    touched = "one never touches" if apart is None else f"{apart:.2f} s apart"
+    return f"{touched}, box carried {shift:.1f} mm"
 
 
 def _row(k: int, title: str, run: Result) -> Iterator[Part]:

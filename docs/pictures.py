@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import tutorials
-from grasp_cosim import hand_system, simulate
+from grasp_cosim import hand_system, simulate, tandem_system
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.presets import with_case
 from grasp_cosim.grasp.published.compared import compared
@@ -29,7 +29,7 @@ from grasp_cosim.recording.folder import load_run
 from grasp_cosim.report.diagram import Link, diagram_svg
 from grasp_cosim.report.plot import headed, save
 from grasp_cosim.report.tables import Caption, about
-from hand import hand_svg, three_svg
+from hand import hand_svg, tandem_svg, three_svg
 
 HERE = Path(__file__).parent
 
@@ -58,6 +58,15 @@ def draw_three(folder: Path) -> None:
         rows.append((title, simulate(system, stop=3.0)))
     write_text(folder / "three_fingers.svg", three_svg(rows))
     draw_three_fingers(rows[1][1], folder / "three_fingers.png")
+
+
+def draw_tandem(folder: Path) -> None:
+    """tandem.svg: a gripper on an arm takes a free box, its wrist not moved and moved."""
+    rows = [
+        (title, simulate(with_case(tandem_system(), case), stop=3.0))
+        for case, title in ((1, "wrist not moved"), (2, "wrist moved"))
+    ]
+    write_text(folder / "tandem.svg", tandem_svg(rows))
 
 
 def draw_loop(folder: Path) -> None:
@@ -133,6 +142,7 @@ def draw_map(folder: Path) -> None:
 PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "hand": (draw_hand, ["hand.svg"]),
     "three": (draw_three, ["three_fingers.svg", "three_fingers.png"]),
+    "tandem": (draw_tandem, ["tandem.svg"]),
     "loop": (draw_loop, ["loop.svg"]),
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),

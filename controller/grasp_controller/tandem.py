@@ -168,10 +168,11 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     pressed = holding.hold(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
     held = wrist_guidance.agreed(pressed, _imbalance(x.estimate, u))
     free = 1.0 - held
+    counted = free * wrist_guidance.alike(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
     floor = p.impact_reduction.intensity_floor
     low_pass = reflectance_ratio.low_pass(p.reflectance, h)
-    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, free, low_pass)
-    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, free, low_pass)
+    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, counted, low_pass)
+    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, counted, low_pass)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     rho = _imbalance(estimate, u)
     target = wrist_guidance.within(_middle(u) + _way(p, line_1, line_2, rho), x.fingertips)

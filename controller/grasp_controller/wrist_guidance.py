@@ -5,7 +5,7 @@ whatever gap and colour are:
 
     rho  = (xi_1 - e^beta·xi_2)/(xi_1 + e^beta·xi_2)         d = mean gap + l_0
     T    = X + d·tanh(rho)/n                                 within the fingertips of the start
-    X_c' = clip(g·(1 - h')·(T - X_c), ±v_max)                g = 0.8/(2/omega + tau)
+    X_c' = clip(g·(1 - h')·(T - X_c), ±v_max)                g = 0.8/max(2/omega + tau, 0.06 s)
     h'   = h·(1 - min(1, (10·rho)^2))                        h of holding.py
 """
 
@@ -21,6 +21,14 @@ SHARE = 0.8
 
 T hardly depends on where the wrist is, so the lag is in no loop as long as d is right. Before its
 colours are learnt an object of alpha = 0.3 seems 2.9 times as far: a loop up to a share of 1.4.
+"""
+
+SHORTEST_LAG = 0.06
+"""s; a faster command gains nothing, as the grip takes 2 s, and follows every error of T."""
+
+ALIKE = 3.0
+"""Closing speed over the wrist's from which on both fingers move alike, as far as light and
+positions that are not in time with each other are concerned.
 """
 
 DISAGREEING = 10.0
@@ -67,7 +75,7 @@ class Wrist(Group, name="wrist"):
     @cached_property
     def gain(self) -> float:
         """g, 1/s."""
-        return SHARE / (1.0 / (pi * self.bandwidth) + self.delay)
+        return SHARE / max(1.0 / (pi * self.bandwidth) + self.delay, SHORTEST_LAG)
 
 
 def agreed(hold: float, rho: float) -> float:
@@ -77,6 +85,16 @@ def agreed(hold: float, rho: float) -> float:
     """
     disagreement = DISAGREEING * rho
     return hold * (1.0 - min(1.0, disagreement * disagreement))
+
+
+def alike(closing: float, moving: float) -> float:
+    """How much of a point counts for a line while the grip closes and the wrist moves, in m/s.
+
+    Positions that come late bend the line of a finger by how its speed changes. Only while the
+    wrist is at rest both fingers' lines are bent alike, and their ratio stays.
+    """
+    closed, moved = closing * closing, ALIKE * ALIKE * moving * moving
+    return closed / (closed + moved) if moved > 0.0 else 1.0
 
 
 def within(place: float, fingertips: tuple[float, float]) -> float:

@@ -8,9 +8,19 @@ class Tandem extends Grasp {
     this.x = x; // of this drawing
   }
 
-  target(pen, x, t) {
+  target(pen, x, t) { // the arm is where a grasp has its label
     this.wrist(pen, x, t);
-    super.target(pen, x, t);
+    if (!this.plan.target) return;
+    const at = x(this.at(this.plan.target, t));
+    pen.strokeStyle = pen.fillStyle = color("--ink");
+    pen.setLineDash([4, 4]);
+    pen.beginPath();
+    pen.moveTo(at, BEAM + DEEP);
+    pen.lineTo(at, FLOOR);
+    pen.stroke();
+    pen.setLineDash([]);
+    pen.textAlign = "left";
+    pen.fillText("target", at + 6, FLOOR - 9);
   }
 
   wrist(pen, x, t) {
