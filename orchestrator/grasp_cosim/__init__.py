@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from .hand.system import hand_system
     from .inspection.inspection import inspect_fmu
     from .master.simulation import Session, simulate
-    from .metrics.metric import Metric, metric
+    from .metrics.metric import AnyOf, Metric, metric
     from .recording.folder import load_run
     from .recording.result import Result
     from .report.page import write_report
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .tandem.system import tandem_system
 
 __all__ = [
+    "AnyOf",
     "InputError",
     "Metric",
     "Realtime",
@@ -64,6 +65,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "AnyOf": "metrics.metric",
     "Metric": "metrics.metric",
     "Realtime": "system.parts",
     "Result": "recording.result",

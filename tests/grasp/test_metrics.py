@@ -51,19 +51,21 @@ def every(step, end):
     return step * np.arange(round(end / step) + 1, dtype=np.float64)
 
 
-def pressed(force, end, step=1e-3, touch=0.1004):
-    """The metrics where fingers of 0.1 m/s touch, and a force of the time since then begins."""
+def pressing(force, end, step=1e-3, touch=0.1004):
+    """Fingers of 0.1 m/s touch, and a force of the time since then begins."""
     time = every(step, end)
-    return grasp_metrics(
+    return time, recorded(
         time,
-        recorded(
-            time,
-            lambda t: SURFACE + 0.1 * max(touch - t, 0.0),
-            lambda t: -0.1 if t < touch else 0.0,
-            lambda _: SURFACE,
-            lambda t: force(t - touch) if t >= touch else 0.0,
-        ),
+        lambda t: SURFACE + 0.1 * max(touch - t, 0.0),
+        lambda t: -0.1 if t < touch else 0.0,
+        lambda _: SURFACE,
+        lambda t: force(t - touch) if t >= touch else 0.0,
     )
+
+
+def pressed(force, end, step=1e-3, touch=0.1004):
+    """The metrics of that."""
+    return grasp_metrics(*pressing(force, end, step, touch))
 
 
 def impact(step):
@@ -260,6 +262,86 @@ def test_fingers_that_touch_from_the_start():
     assert metrics["time_to_contact"] == metrics["settling_time"] == [0.0, 0.0]
     assert metrics["impact_velocity"] == [None, None]
     assert metrics["impact_impulse"] == pytest.approx([1.5 * IMPACT_WINDOW] * 2, rel=1e-12)
+
+
+OF_FORCE = (
+    "impact_impulse", "peak_contact_force", "steady_contact_force", "force_difference",
+    "force_overshoot", "settling_time",
+)  # fmt: skip
+OF_CONTACT = (
+    "time_to_contact", "time_difference", "impact_impulse", "force_overshoot", "settling_time",
+)  # fmt: skip
+OF_GAP = ("remaining_gap", "smallest_gap", "impact_velocity")
+NO_CONTROLLER = 'no component is the controller; name it under [roles]: controller = "..."'
+
+
+def lost(names, why):
+    return f"no {', '.join(names)}: {why}"
+
+
+@pytest.mark.parametrize(
+    ("without", "missing", "others"),
+    [
+        ("plant.contact[", [], {}),
+        ("plant.velocity", [], {}),
+        ("plant.position", [], {}),
+        ("plant.gap", [lost(OF_GAP, "plant lacks gap[1]")], {"time_to_contact": 0.101}),
+        (
+            "plant.gap[2]",
+            [lost(OF_GAP, "plant lacks gap[2]")],
+            {"time_to_contact": 0.101, "time_difference": 0.0006},
+        ),
+        ("plant.contact_force", [lost(OF_FORCE, "plant lacks contact_force[1]")], {}),
+        (
+            ("plant.gap", "plant.contact["),
+            [
+                lost(OF_CONTACT, "plant has none of gap[1], contact[1]"),
+                lost(OF_GAP, "plant lacks gap[1]"),
+            ],
+            {},
+        ),
+        ("controller.", [lost(["target_position"], NO_CONTROLLER)], {}),
+        (
+            "plant.object",
+            [lost(("object_shift", "object_drift"), "plant lacks object_position")],
+            {},
+        ),
+    ],
+)
+def test_metrics_take_what_they_use(without, missing, others):
+    """Of fingers that touch at 0.1004 s with 0.1 m/s, and press with 2 N from then on.
+
+    Without a gap a contact begins with the sample that has it, at 0.101 s.
+    """
+    time, signals = pressing(lambda _: 2.0, end=0.5)
+    left = {name: column for name, column in signals.items() if not name.startswith(without)}
+    found = measure(Signals(time, left), METRICS)
+    assert found.missing == tuple(missing)
+    gone = {name for line in missing for name in line[3:].partition(":")[0].split(", ")}
+    expected = {
+        "time_to_contact": 0.1004, "time_difference": 0.0, "impact_velocity": 0.1,
+        "impact_impulse": 2.0 * IMPACT_WINDOW, "peak_contact_force": 2.0,
+        "steady_contact_force": 2.0, "force_difference": 0.0, "force_overshoot": 0.0,
+        "settling_time": 0.0, "target_position": 0.0, "object_shift": 0.0, "object_drift": 0.0,
+    } | others  # fmt: skip
+    values = {name: np.max(value) for name, value in found.values.items()}
+    assert values == pytest.approx({n: v for n, v in expected.items() if n not in gone}, abs=1e-9)
+
+
+def test_a_plant_that_tells_its_gaps_alone():
+    """That of finger 1 is 10.1 mm - 1 m/s² t², of which 2.0, 0.1 and -2.0 mm are left at 0.09, 0.10
+    and 0.11 s: it closes at 190 mm/s, and is used up 0.1 / 190 s after 0.10 s.
+    """
+    time = every(0.01, 0.2)
+    gaps = {"plant.gap[1]": 0.0101 - time * time, "plant.gap[2]": 0.005 + 0.01 * time}
+    values = grasp_metrics(time, gaps)
+    assert values == {
+        "time_to_contact": [pytest.approx(0.1 + 0.1 / 190.0, abs=1e-9), None],
+        "time_difference": None,
+        "remaining_gap": [None, pytest.approx(0.007)],
+        "smallest_gap": [None, pytest.approx(0.005)],
+        "impact_velocity": [pytest.approx(0.19, abs=1e-9), None],
+    }
 
 
 def test_the_object_has_the_metrics_that_the_plant_has_outputs_for():

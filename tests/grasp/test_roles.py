@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import System, load_run, simulate
-from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS
+from grasp_cosim.grasp.metrics import METRICS
 from grasp_cosim.grasp.presets import CASES, SYSTEM, with_case, with_preset
 from grasp_cosim.metrics.metric import Signals, measure
 from grasp_cosim.recording.result import UNITS
@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from support.marks import needs_pythonfmu
 
 LOST = (
-    'no metrics of the grasp: no component is the plant; name it under [roles]: plant = "gripper"',
+    "no metrics of the grasp but target_position: no component is the plant; name it under "
+    '[roles]: plant = "gripper"',
 )
 NAMES = {"plant": "gripper", "sensor_1": "right", "sensor_2": "left", "controller": "brain"}
 
@@ -53,13 +54,12 @@ def original(grasp):
     return simulate(with_case(grasp, 0), step=1e-3, stop=0.5)
 
 
-def test_without_a_plant_there_are_no_metrics_and_it_says_why(fmus, tmp_path):
+def test_without_a_plant_there_are_no_metrics_of_it_and_it_says_why(fmus, tmp_path):
     """It is called gripper, and nobody says so."""
     path = written(fmus, tmp_path, {"plant": "gripper"}, roles=False, presets=False)
     result = simulate(System.load(path), step=1e-3, stop=0.01)
     assert result.measured.missing == LOST
-    assert dict(result.measured.values) == {}
-    assert set(result.metrics) == set(UNITS)
+    assert set(result.metrics) == {"target_position", *UNITS}
     assert result.view.stem == "signals"
 
 
@@ -85,14 +85,16 @@ def test_with_roles_they_are_the_same_to_the_bit(original, fmus, tmp_path):
 def test_metrics_do_not_depend_on_the_names_of_components(original, chosen):
     """Not even where the controller is called plant, and the plant controller."""
     names = dict(zip(("plant", "controller"), chosen, strict=True))
-    signals = {name: original[name] for name in OBJECT_NEEDS}
+    signals = {name: original[name] for m in METRICS if not m.optional for name in m.reads}
     expected = measure(Signals(original.time, signals), METRICS)
     found = measure(Signals(original.time, renamed(signals, names), names), METRICS)
     assert found.values == expected.values
     assert found.missing == expected.missing == ()
-    without = {k: v for k, v in renamed(signals, names).items() if not k.endswith("contact[2]")}
+    whole = renamed(signals, names)
+    without = {name: column for name, column in whole.items() if "object_position" not in name}
     lacking = measure(Signals(original.time, without, names), METRICS)
-    assert lacking.missing == (f"no metrics of the grasp: {names['plant']} lacks contact[2]",)
+    said = f"no object_shift, object_drift: {names['plant']} lacks object_position"
+    assert lacking.missing == (said,)
 
 
 @pytest.mark.parametrize("presets", [True, False], ids=["own presets", "built-in presets"])

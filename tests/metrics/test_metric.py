@@ -5,8 +5,8 @@ import re
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Realtime, metric, simulate
-from grasp_cosim.grasp.metrics import METRICS, OBJECT_NEEDS
+from grasp_cosim import AnyOf, InputError, Realtime, metric, simulate
+from grasp_cosim.grasp.metrics import METRICS
 from grasp_cosim.metrics.metric import (
     RESERVED,
     MissingSignalError,
@@ -15,6 +15,7 @@ from grasp_cosim.metrics.metric import (
     chosen,
     load_metrics,
     measure,
+    needed,
 )
 from grasp_cosim.report.terminal import as_json
 
@@ -163,18 +164,20 @@ def test_a_function_that_raises_is_a_wrong_input_that_names_it_and_its_line():
 # ------------------------------------------------------------------------- what is missing
 
 
-def grasp_signals(without=""):
-    """Signals of a grasp that does not move, but for some of them."""
-    every = (*OBJECT_NEEDS, "controller.force[1]")
-    names = [n for n in every if not (without and n.startswith(without))]
-    return Signals(TIME, {name: np.zeros(3) for name in names})
+def grasp_signals():
+    """Signals of a grasp that does not move, and one more."""
+    names = {name for m in METRICS if not m.optional for name in m.reads} | {"controller.force[1]"}
+    return Signals(TIME, {name: np.zeros(3) for name in sorted(names)})
 
 
-def test_a_plant_that_does_not_tell_where_the_object_is_has_the_other_metrics():
-    found = measure(grasp_signals("plant.object_position"), METRICS)
+def test_metrics_that_lack_the_same_are_named_in_one_line():
+    whole = grasp_signals()
+    part = {n: c for n, c in whole.by_name.items() if not n.startswith("plant.object_position")}
+    own = made("carried", lambda _: 1.0, needs=("plant.object_position",))
+    found = measure(Signals(TIME, part), [*METRICS, own])
     lost = ["object_shift", "object_drift"]
     assert [*found.values, *lost] == [m.name for m in METRICS if not m.optional]
-    assert found.missing == tuple(f"no {name}: plant lacks object_position" for name in lost)
+    assert found.missing == (f"no {', '.join(lost)}, carried: plant lacks object_position",)
 
 
 def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles():
@@ -184,13 +187,65 @@ def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles():
         f"{names[component]}.{variable}": column
         for (component, _, variable), column in ((n.partition("."), run[n]) for n in run)
     }
-    line = "no metrics of the grasp: no component is the {}; name it under [roles]: {}"
+    line = "no {}: no component is the {}; name it under [roles]: {}".format
+    controller = line("target_position", "controller", 'controller = "law"')
     missing = measure(Signals(run.time, other), METRICS).missing
-    assert missing == (line.format("controller", 'controller = "law"'),)
+    assert missing == (line("metrics of the grasp", "plant", 'plant = "gripper"'), controller)
+    missing = measure(Signals(run.time, other, {"plant": "gripper"}), METRICS).missing
+    assert missing == (controller,)
     missing = measure(Signals(run.time, other, {"controller": "law"}), METRICS).missing
-    assert missing == (line.format("plant", 'plant = "gripper"'),)
+    lost = "metrics of the grasp but target_position"
+    assert missing == (line(lost, "plant", 'plant = "gripper"'),)
     roles = {"controller": "law", "plant": "gripper"}
     assert measure(Signals(run.time, other, roles), METRICS) == measure(run, METRICS)
+
+
+def test_the_component_that_has_most_is_named_for_a_role():
+    """Though it lacks what one of the metrics needs."""
+    moves, feels = (made(n, lambda _: 1.0, needs=(f"arm.{n}",)) for n in ("gap", "force"))
+    run = Signals(TIME, {"a.time": TIME, "plant.gap": GAP})
+    assert measure(run, [moves, feels]).missing == (
+        'no gap, force: no component is the arm; name it under [roles]: arm = "plant"',
+    )
+
+
+EITHER = AnyOf(("plant.gap[*]", "plant.contact[*]"))
+
+
+@pytest.mark.parametrize(
+    ("names", "elements", "reason"),
+    [
+        (("gap[1]", "gap[2]"), 2, None),
+        (("contact[1]", "contact[2]", "contact[3]"), 3, None),
+        (("gap[1]", "contact[1]", "contact[2]"), 1, None),
+        (("speed[1]", "speed[2]"), 1, "plant has none of gap[1], contact[1]"),
+    ],
+)
+def test_any_one_of_several_signals_will_do(names, elements, reason):
+    """A metric has as many elements as the first of them that is there."""
+    touch = made("touch", lambda _: [0.0] * elements, needs=[EITHER], entries=("finger *",))
+    found = measure(Signals(TIME, {f"plant.{name}": GAP for name in names}), [touch])
+    assert found.missing == ((f"no touch: {reason}",) if reason else ())
+    assert [m.columns for m in found.metrics] == (
+        [] if reason else [tuple(f"touch[{j}]" for j in range(1, elements + 1))]
+    )
+
+
+def test_signals_of_several_components_any_one_of_which_will_do_are_all_missed():
+    own = made("own", lambda _: 1.0, needs=[AnyOf(("plant.force", "arm.force", "Alt"))])
+    assert measure(signals(), [own]).missing == (
+        "no own: plant lacks force and no component is the arm; name it under [roles]: "
+        'arm = "..." and there is no signal Alt',
+    )
+
+
+def test_what_a_metric_uses_is_taken_where_it_is_there():
+    touch = made(
+        "touch", lambda _: [1.0], needs=[EITHER], uses=["plant.speed[*]", "plant.mass"], group="own"
+    )
+    names = ["arm.gap[1]", "arm.speed[1]", "arm.force[1]"]
+    assert needed([touch], names, {"plant": "arm"}) == {"arm.gap[1]", "arm.speed[1]"}
+    assert measure(Signals(TIME, {"plant.gap[1]": GAP}), [touch]).missing == ()
 
 
 def test_a_metric_of_its_own_says_what_it_lacks():
@@ -340,14 +395,22 @@ def test_a_function_is_a_metric_of_its_name_and_docstring():
     ("asked", "said"),
     [
         ("time_to_contct", "'time_to_contct': no such metric; did you mean time_to_contact"),
-        ("time_to_contact", "metrics: time_to_contact: is not available: "),
+        (
+            "time_to_contact",
+            "metrics: time_to_contact: is not available: no component is the plant; name it under "
+            '[roles]: plant = "arm"',
+        ),
+        (
+            "target_position",
+            "metrics: target_position: is not available: controller lacks target_position",
+        ),
         (3, "metrics: 3: must be a metric, a function or a name"),
         (lambda _: 1.0, "metric '<lambda>': must be a name"),
     ],
 )
 def test_what_is_no_metric_is_refused_in_one_line(asked, said):
     with pytest.raises(InputError) as raised:
-        chosen([asked], ["grasp"], ("a.y",), {})
+        chosen([asked], ["grasp"], ("a.y", "arm.gap[1]", "controller.force[1]"), {})
     assert said in str(raised.value)
     assert "\n" not in str(raised.value)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from comparison.made import write_fmu
-from grasp_cosim import InputError, System, metric, simulate
+from grasp_cosim import AnyOf, InputError, System, metric, simulate
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.interface.units import Conversion
 from grasp_cosim.metrics.in_si import InSi, in_si
@@ -101,6 +101,16 @@ def test_another_quantity_is_refused_in_one_line(load, units, asked, said):
         in_si(load(**units), asked)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_unit_of_what_need_not_be_there_counts_where_it_is(load):
+    """As one of several, in one unit for all, or as what is used besides."""
+    either = Metric("either", travel.function, needs={AnyOf(("room.y", "room.z")): "m"})
+    used = Metric("used", travel.function, uses={"room.y": "m", "room.z": "m"})
+    for m in (either, used):
+        assert in_si(load(x="N", y="mm"), [m]) == InSi({"room.y": MILLI}, ())
+        with pytest.raises(InputError, match=rf"room.y is in N; {m.name} must know its unit"):
+            in_si(load(y="N"), [m])
 
 
 def test_what_a_metric_may_read_without_a_unit_is_said(load):

@@ -1,7 +1,8 @@
 """Metrics of a grasp, from the recorded signals of a gripper plant and its controller.
 
-To add one, write a function under @of_grasp or @of_fingers. It gets signals by role: "plant" and
-"controller" are the components that play these roles. Values are in SI units.
+To add one, write a function under @of_grasp or @of_fingers, which say what it needs. It gets
+signals by role: "plant" and "controller" are the components that play these roles. Values are in SI
+units.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.text import in_milli
-from ..metrics.metric import Metric, Signals, Value, metric
+from ..metrics.metric import AnyOf, Metric, Need, Signals, Value, metric
 
 Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 FINGERS = (1, 2)
 ENTRIES = ("finger 1", "finger 2")
@@ -30,16 +32,30 @@ CLOSING = {1: -1.0, 2: 1.0}
 QUANTITIES: Mapping[str, str | None] = {
     "position": "m", "velocity": "m/s", "gap": "m", "contact_force": "N", "contact": None,
 }  # fmt: skip
-"""The outputs of every plant on each of its fingers, and their units."""
+"""The outputs of a plant on each of its fingers, and their units."""
 
-NEEDS: Mapping[str, str | None] = {
-    "controller.target_position": "m",
-    **{f"plant.{name}[{j}]": unit for name, unit in QUANTITIES.items() for j in FINGERS},
+
+def of_each(*quantities: str) -> dict[str, str | None]:
+    """The signals that are these quantities of each finger, and their units."""
+    return {f"plant.{name}[{j}]": QUANTITIES[name] for name in quantities for j in FINGERS}
+
+
+OBJECT_POSITION: Mapping[str, str | None] = {"plant.object_position": "m"}
+"""Where the object is."""
+
+TARGET_POSITION = "controller.target_position"
+"""Where the controller wants the object to be, in m."""
+
+TOUCH: Mapping[Need, str | None] = {
+    AnyOf((f"plant.gap[{j}]", f"plant.contact[{j}]")): None for j in FINGERS
 }
-"""The signals of a grasp, and their units."""
+"""What tells whether each finger touches."""
 
-OBJECT_NEEDS: Mapping[str, str | None] = {**NEEDS, "plant.object_position": "m"}
-"""The same with where the object is."""
+MOMENT = of_each(*QUANTITIES)
+"""What tells when each finger touches, and how fast, as far as it is there."""
+
+SHOWN = (*of_each("position", "velocity", "gap", "contact_force"), *OBJECT_POSITION)
+"""The signals without which a grasp is not drawn."""
 
 IMPACT_WINDOW = 0.02
 """s from first contact; an impact is over by then, the grasp presses within a second."""
@@ -56,7 +72,7 @@ _found: list[Metric] = []
 def of_grasp(name: str, unit: str | None, **more: Any) -> Callable[[Any], Metric]:
     """Make the function below a metric of the grasp; `more` as for metrics.metric.metric."""
     factor, shown = in_milli(unit)
-    how = {"factor": factor, "shown_unit": shown, "needs": NEEDS, "group": "grasp", **more}
+    how = {"factor": factor, "shown_unit": shown, "group": "grasp", **more}
 
     def enter(function: Callable[[Signals], Any]) -> Metric:
         made: Metric = metric(name, unit=unit, **how)(function)
@@ -84,22 +100,25 @@ def of_fingers(
 
 class FirstContact(NamedTuple):
     """When a finger first touches in s, how fast its gap closes then in m/s, the first row that
-    has it touching.
+    has it touching. There is no speed without a gap.
     """
 
     time: float
-    speed: float
+    speed: float | None
     row: int
 
 
-@of_fingers("time_to_contact", "s", none="nothing was touched")
+OF_CONTACT: Mapping[str, Any] = {"needs": TOUCH, "uses": MOMENT}
+
+
+@of_fingers("time_to_contact", "s", none="nothing was touched", **OF_CONTACT)
 def time_to_contact(signals: Signals, finger: int) -> float | None:
     """Moment where the gap of the last free sample runs out at its rate; None: never touches."""
     contact = first_contact(signals, finger)
     return contact.time if contact else None
 
 
-@of_grasp("time_difference", "s")
+@of_grasp("time_difference", "s", **OF_CONTACT)
 def time_difference(signals: Signals) -> float | None:
     """Time from the first finger's contact to the last one's; None where one never touches."""
     contacts = [first_contact(signals, j) for j in fingers_of(signals)]
@@ -107,26 +126,37 @@ def time_difference(signals: Signals) -> float | None:
     return max(times) - min(times) if len(times) == len(contacts) else None
 
 
-@of_fingers("remaining_gap", "m", label="gap left, no contact", reason=True)
+OF_GAP: Mapping[str, Any] = {"needs": of_each("gap"), "uses": of_each("contact"), "reason": True}
+
+
+@of_fingers("remaining_gap", "m", label="gap left, no contact", **OF_GAP)
 def remaining_gap(signals: Signals, finger: int) -> float | None:
     """Gap at the end of a finger that never touches; None where it does."""
-    return None if first_contact(signals, finger) else float(_gap(signals, finger)[-1])
+    return None if touching(signals, finger).any() else float(_gap(signals, finger)[-1])
 
 
-@of_fingers("smallest_gap", "m", label="smallest gap left", reason=True)
+@of_fingers("smallest_gap", "m", label="smallest gap left", **OF_GAP)
 def smallest_gap(signals: Signals, finger: int) -> float | None:
     """Smallest gap of a finger that never touches; None where it does."""
-    return None if first_contact(signals, finger) else float(_gap(signals, finger).min())
+    return None if touching(signals, finger).any() else float(_gap(signals, finger).min())
 
 
-@of_fingers("impact_velocity", "m/s")
+@of_fingers("impact_velocity", "m/s", needs=of_each("gap"), uses=MOMENT)
 def impact_velocity(signals: Signals, finger: int) -> float | None:
     """Rate at which the gap closes at first contact; None where it does not close."""
     contact = first_contact(signals, finger)
-    return contact.speed if contact and contact.speed > 0.0 else None
+    speed = contact.speed if contact else None
+    return speed if speed is not None and speed > 0.0 else None
 
 
-@of_fingers("impact_impulse", "N.s")
+OF_FORCE: Mapping[str, Any] = {"needs": of_each("contact_force")}
+OF_FORCE_SINCE_CONTACT: Mapping[str, Any] = {
+    "needs": {**TOUCH, **of_each("contact_force")},
+    "uses": MOMENT,
+}
+
+
+@of_fingers("impact_impulse", "N.s", **OF_FORCE_SINCE_CONTACT)
 def impact_impulse(signals: Signals, finger: int) -> float | None:
     """Impulse of the contact force over IMPACT_WINDOW from first contact, by trapezoids.
 
@@ -141,19 +171,19 @@ def impact_impulse(signals: Signals, finger: int) -> float | None:
     return float(np.trapezoid(np.interp(times, after, force), times))
 
 
-@of_fingers("peak_contact_force", "N")
+@of_fingers("peak_contact_force", "N", **OF_FORCE)
 def peak_contact_force(signals: Signals, finger: int) -> float:
     """Highest sample of the contact force."""
     return float(_force(signals, finger).max())
 
 
-@of_fingers("steady_contact_force", "N")
+@of_fingers("steady_contact_force", "N", **OF_FORCE)
 def steady_contact_force(signals: Signals, finger: int) -> float:
     """Mean contact force over the last STEADY_WINDOW."""
     return steady_force(signals, finger)
 
 
-@of_grasp("force_difference", "N")
+@of_grasp("force_difference", "N", **OF_FORCE)
 def force_difference(signals: Signals) -> float:
     """Largest difference between steady contact forces, of a hand each by the finger's weight."""
     forces = [
@@ -163,7 +193,7 @@ def force_difference(signals: Signals) -> float:
     return max(forces) - min(forces)
 
 
-@of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%")
+@of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%", **OF_FORCE_SINCE_CONTACT)
 def force_overshoot(signals: Signals, finger: int) -> float | None:
     """Share of the steady force by which the peak since contact exceeds it; 0 if never.
 
@@ -173,7 +203,7 @@ def force_overshoot(signals: Signals, finger: int) -> float | None:
     return None if steady is None or not len(force) else max(0.0, float(force.max()) / steady - 1.0)
 
 
-@of_fingers("settling_time", "s")
+@of_fingers("settling_time", "s", **OF_FORCE_SINCE_CONTACT)
 def time_to_settle(signals: Signals, finger: int) -> float | None:
     """Time from first contact until the force stays within SETTLED of the steady one.
 
@@ -196,20 +226,20 @@ def time_to_settle(signals: Signals, finger: int) -> float | None:
     return float(after[k] + fraction * (after[k + 1] - after[k]))
 
 
-@of_grasp("target_position", "m")
+@of_grasp("target_position", "m", needs={TARGET_POSITION: "m"})
 def target_position(signals: Signals) -> float:
     """Target of the controller at the end."""
-    return float(signals["controller.target_position"][-1])
+    return float(signals[TARGET_POSITION][-1])
 
 
-@of_grasp("object_shift", "m", needs=OBJECT_NEEDS)
+@of_grasp("object_shift", "m", needs=OBJECT_POSITION)
 def object_shift(signals: Signals) -> float:
     """Largest displacement of the object, either way."""
     ways = [np.abs(x - x[0]) for x in _centre(signals)]
     return float((ways[0] if len(ways) == 1 else np.hypot(*ways)).max())
 
 
-@of_grasp("object_drift", "m/s", needs=OBJECT_NEEDS)
+@of_grasp("object_drift", "m/s", needs=OBJECT_POSITION)
 def object_drift(signals: Signals) -> float | None:
     """Mean speed of the object over the last STEADY_WINDOW, either way; None in a shorter run."""
     time = signals.time
@@ -225,7 +255,7 @@ def _of_object(name: str, unit: str | None, output: str, label: str, description
     key = f"plant.{output}"
     how = {"label": label, "description": description, "optional": True}
 
-    @of_grasp(name, unit, needs={**NEEDS, key: unit}, **how)
+    @of_grasp(name, unit, needs={key: unit}, **how)
     def largest(signals: Signals) -> float | bool:
         found = np.abs(signals[key]).max()
         return bool(found) if unit is None else float(found)
@@ -241,19 +271,33 @@ METRICS = tuple(_found)
 
 
 def is_grasp(signals: Signals) -> bool:
-    """True if there are the signals of a gripper plant, its object and its controller."""
-    return all(name in signals for name in OBJECT_NEEDS)
+    """True if there are the signals of a gripper plant and its object that a picture shows."""
+    return all(name in signals for name in SHOWN)
 
 
 def fingers_of(signals: Signals) -> tuple[int, ...]:
-    """The numbers of the plant's fingers, from 1 on."""
-    name = "plant.gap[{}]".format
-    return tuple(takewhile(lambda j: name(j) in signals, count(1)))
+    """The numbers of the plant's fingers: FINGERS, or of a hand those that it tells of."""
+    return _listed(signals) if _is_of_hand(signals) else FINGERS
+
+
+def _is_of_hand(signals: Signals) -> bool:
+    """True if the plant has more fingers than a gripper, or an object that moves in the plane."""
+    in_plane = ("plant.object_position[1]", "plant.object_angle")
+    return any(name in signals for name in in_plane) or len(_listed(signals)) > len(FINGERS)
+
+
+def _listed(signals: Signals) -> tuple[int, ...]:
+    """The fingers, from 1 on, whose gaps the plant tells; else those of its contacts or forces."""
+
+    def there(quantity: str) -> tuple[int, ...]:
+        return tuple(takewhile(lambda j: f"plant.{quantity}[{j}]" in signals, count(1)))
+
+    return there("gap") or there("contact") or there("contact_force")
 
 
 def _closing(signals: Signals, finger: int) -> float:
     """The sign of a velocity that closes: of a hand, whose fingers count as they open, negative."""
-    return -1.0 if "plant.object_position[1]" in signals else CLOSING[finger]
+    return -1.0 if _is_of_hand(signals) else CLOSING[finger]
 
 
 def _centre(signals: Signals) -> list[Floats]:
@@ -298,8 +342,21 @@ def since_contact(signals: Signals, finger: int) -> tuple[Floats, Floats]:
     return signals.time[row:] - moment, _force(signals, finger)[row:]
 
 
+def touching(signals: Signals, finger: int) -> Flags:
+    """Whether a finger touches, by row: as its `contact` says, else where no gap is left."""
+    contact = f"plant.contact[{finger}]"
+    if contact in signals:
+        return signals[contact].astype(bool)
+    return _gap(signals, finger) <= 0.0
+
+
 def first_contact(signals: Signals, finger: int) -> FirstContact | None:
-    """First contact of a finger; None if it never touches. Most metrics ask for it."""
+    """First contact of a finger; None if it never touches. Most metrics ask for it.
+
+    Between the last free communication point and the first one in contact, the moment is where
+    the gap runs out at the rate of the last free point. Without a gap it is the first point in
+    contact: late by a step at most, but recorded, as are all later contacts.
+    """
     key = first_contact, finger
     if key not in signals.worked_out:
         signals.worked_out[key] = _first_contact(signals, finger)
@@ -308,42 +365,59 @@ def first_contact(signals: Signals, finger: int) -> FirstContact | None:
 
 
 def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
-    """First contact of a finger; None if it never touches.
-
-    Between the last free communication point and the first one in contact, the moment is where
-    the gap runs out at the rate of the last free point.
-    """
+    """First contact of a finger, worked out anew."""
     time = signals.time
-    touching = np.flatnonzero(signals[f"plant.contact[{finger}]"])
-    if not len(touching):
+    rows = np.flatnonzero(touching(signals, finger))
+    if not len(rows):
         return None
-    row = int(touching[0])
+    row = int(rows[0])
+    if f"plant.gap[{finger}]" not in signals:
+        return FirstContact(float(time[row]), None, row)
     k = max(row - 1, 0)
-    own = float(_closing(signals, finger) * signals[f"plant.velocity[{finger}]"][k])
-    speed = own - _surface_speed(signals, finger, k)
+    speed = _closing_speed(signals, finger, k)
     gap = max(float(_gap(signals, finger)[k]), 0.0)
     span = float(time[row] - time[k])
     wait = min(gap / speed, span) if speed > 0.0 else span
     return FirstContact(float(time[k]) + wait, speed, row)
 
 
-def _surface_speed(signals: Signals, finger: int, k: int) -> float:
-    """Speed in m/s at which the object's surface goes ahead of a finger that is free up to row k.
+def _closing_speed(signals: Signals, finger: int, k: int) -> float:
+    """Speed in m/s at which the gap of a finger that is free up to row k closes there.
 
-    What the finger moved less what the gap shrank, over the last whole step of the plant, which
-    may be longer than that of the system and holds its outputs in between. 0 where there was none.
+    That of the finger less that of the object's surface, which is the mean over the last step of
+    the plant: what the finger moved less what the gap shrank. Without a position and a velocity of
+    the finger it is the rate of the gap alone. 0 for a mean where there was no step.
+    """
+    step, gap = _last_step(signals, k), _gap(signals, finger)
+    position, velocity = (f"plant.{name}[{finger}]" for name in ("position", "velocity"))
+    if position not in signals or velocity not in signals:
+        return -_rate(signals.time, gap, step)
+    closing = _closing(signals, finger)
+    own = float(closing * signals[velocity][k])
+    return own - _rate(signals.time, closing * signals[position] + gap, step)
+
+
+def _rate(time: Floats, length: Floats, step: tuple[int, int] | None) -> float:
+    """Mean rate of a length in m/s from one row to another; 0 where there are none."""
+    if step is None:
+        return 0.0
+    first, last = step
+    return float((length[last] - length[first]) / (time[last] - time[first]))
+
+
+def _last_step(signals: Signals, k: int) -> tuple[int, int] | None:
+    """The rows where the last whole step of the plant up to row k begins and ends, if any.
+
+    It may be longer than that of the system, and the plant holds its outputs in between.
     """
     changed = np.zeros(k + 1, bool)  # the rows with other outputs of the plant than before
     changed[0] = True
-    for name in (f"plant.{q}[{j}]" for q in QUANTITIES for j in fingers_of(signals)):
-        values = signals[name][: k + 1]
+    outputs = (f"plant.{name}[{j}]" for name in QUANTITIES for j in fingers_of(signals))
+    for values in (signals[name][: k + 1] for name in outputs if name in signals):
         changed[1:] |= values[1:] != values[:-1]
     given = np.flatnonzero(changed)
     if len(given) < 2:
-        return 0.0
+        return None
     own = int(np.diff(given).min())
     last = k - (k - int(given[-1])) % own  # it may have stepped since, and nothing moved
-    rows = [last - own, last]
-    way = _closing(signals, finger) * signals[f"plant.position[{finger}]"][rows]
-    surface = way + _gap(signals, finger)[rows]
-    return float((surface[1] - surface[0]) / (signals.time[last] - signals.time[last - own]))
+    return last - own, last

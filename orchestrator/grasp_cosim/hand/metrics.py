@@ -1,6 +1,5 @@
 """Metrics of a hand: those of the grasp for all its fingers, and two of its own."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import count, takewhile
 from math import pi
@@ -10,18 +9,16 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..grasp.metrics import METRICS as OF_GRASP
-from ..grasp.metrics import QUANTITIES, fingers_of, steady_force
+from ..grasp.metrics import QUANTITIES, SHOWN, fingers_of, steady_force
 from ..grasp.presets import start_in_si
-from ..metrics.metric import Signals, metric, resolved
+from ..metrics.metric import ALL, Metric, Signals, expanded, metric, resolved
 from .weights import balance_weights, imbalance
 
-NEEDS: Mapping[str, str | None] = {
-    **{f"plant.{name}[*]": unit for name, unit in QUANTITIES.items()},
-    "plant.object_position[1]": "m",
-    "plant.object_position[2]": "m",
-    "plant.object_angle": "rad",
-}
-"""The signals of a hand, and their units."""
+OBJECT_POSITION = ("plant.object_position[1]", "plant.object_position[2]")
+"""Where the object is, which a grasp has as one signal."""
+
+OBJECT_ANGLE = "plant.object_angle"
+"""Which way the object is turned, in rad."""
 
 OTHERS = ("target_position",)
 """Metrics of the grasp that a hand has not: each of its fingers has a target of its own."""
@@ -29,7 +26,19 @@ OTHERS = ("target_position",)
 UNBALANCED = 1e-3
 """|sum n_k·e_k| from which a hand pushes its object aside, 3 mN of a usual grasp."""
 
-OF_HAND = {"needs": NEEDS, "group": "hand"}
+
+def as_of_hand(name: str) -> tuple[str, ...]:
+    """The signals of a hand in the place of one of a grasp: all fingers in that of the first."""
+    if name == "plant.object_position":
+        return OBJECT_POSITION
+    return () if name.endswith("[2]") else (name.replace("[1]", ALL),)
+
+
+def _of_hand(m: Metric) -> Metric:
+    """A metric of the grasp as one of a hand."""
+    needs, uses = (expanded(signals, as_of_hand) for signals in (m.needs, m.uses))
+    entries = ("finger *",) if m.entries else ()
+    return replace(m, needs=needs, uses=uses, entries=entries, group="hand")
 
 
 def is_disc(signals: Signals) -> bool:
@@ -44,17 +53,23 @@ def directions(signals: Signals) -> list[float]:
     return [signals.given(f"plant.angle[{k}]", a) for k, a in zip(fingers, even, strict=True)]
 
 
-@metric("net_force", unit="N", label="net force", **OF_HAND)
+@metric(
+    "net_force",
+    unit="N",
+    label="net force",
+    needs={f"plant.contact_force{ALL}": QUANTITIES["contact_force"]},
+    group="hand",
+)
 def net_force(signals: Signals) -> float:
     """Magnitude of the sum of the steady contact forces, each in its finger's direction."""
     forces = [steady_force(signals, k) for k in fingers_of(signals)]
     return float(abs(np.dot(forces, np.exp(1j * np.asarray(directions(signals))))))
 
 
-@metric("object_turn", unit="rad", label="object turn", **OF_HAND)
+@metric("object_turn", unit="rad", label="object turn", needs={OBJECT_ANGLE: "rad"}, group="hand")
 def object_turn(signals: Signals) -> float:
     """Largest turn of the object from where it was at the start, either way."""
-    angle = signals["plant.object_angle"]
+    angle = signals[OBJECT_ANGLE]
     return float(np.abs(angle - angle[0]).max())
 
 
@@ -81,11 +96,7 @@ def check(system: Any) -> tuple[str, ...]:
 
 
 METRICS = (
-    *(
-        replace(m, entries=("finger *",) if m.entries else (), **OF_HAND)  # type: ignore[arg-type]
-        for m in OF_GRASP
-        if not m.optional and m.name not in OTHERS
-    ),
+    *(_of_hand(m) for m in OF_GRASP if not m.optional and m.name not in OTHERS),
     net_force,
     object_turn,
 )
@@ -93,5 +104,7 @@ METRICS = (
 
 
 def is_hand(signals: Signals) -> bool:
-    """True if there are the signals of a hand and its object."""
-    return all(name.replace("*", "1") in signals for name in NEEDS)
+    """True if there are the signals of a hand and its object that a picture shows."""
+    shown = (name for one in SHOWN for name in as_of_hand(one))
+    each = [name.replace("*", str(k)) for name in shown for k in fingers_of(signals)]
+    return OBJECT_ANGLE in signals and all(name in signals for name in each)

@@ -41,9 +41,10 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     for metric in available(chosen, observed, system.roles)[0]:
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
         for need, wanted in metric.expects.items():
-            if wanted is None:
+            name = resolved(need, system.roles)
+            if wanted is None or name not in observed:
                 continue
-            name, quantity = resolved(need, system.roles), known_unit(wanted)
+            quantity = known_unit(wanted)
             if quantity is None or not quantity.si:
                 raise InputError(
                     f"{purpose}: needs {need} in {wanted!r}; must be a unit of SI like 'm' or "

@@ -44,6 +44,20 @@ ALL = "[*]"
 """Ends the name of an array of which a metric takes all elements."""
 
 
+@dataclass(frozen=True, slots=True)
+class AnyOf:
+    """The names of signals any one of which will do: AnyOf(("plant.gap", "plant.contact"))."""
+
+    names: tuple[str, ...]
+
+
+Need = str | AnyOf
+"""What there must be: a signal, or any one of several."""
+
+Needs = Collection[Need] | Mapping[Need, str | None]
+"""What a metric needs; a mapping gives the SI unit in which each is expected, or None."""
+
+
 class MissingSignalError(KeyError):
     """A signal that a metric needs was not recorded; its text says which and why."""
 
@@ -89,6 +103,9 @@ class Signals(Mapping[str, npt.NDArray[Any]]):
         """The number that a parameter was set to by the system, else the one given."""
         return float(self.start_values.get(resolved(name, self.roles), otherwise))
 
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and resolved(name, self.roles) in self.by_name
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.by_name)
 
@@ -105,13 +122,15 @@ class Metric:
 
     `unit` is that of the value ("1" for a share, None for true or false); in tables the value is
     shown times `factor` in `shown_unit`. `entries` name its values where it has several, like
-    ("finger 1", "finger 2"). `needs` are the signals without which there is no value; a mapping
+    ("finger 1", "finger 2"). `needs` are the signals without which there is no value, AnyOf where
+    one of several will do; `uses` are those that it reads besides where they are there. A mapping
     gives the SI unit in which each is expected, or None, so that one of another quantity is refused
     before a run. plant.gap[*] stands for all elements of an array, and the entry "finger *" then
-    for one each. Metrics of one `group` are there together or not at all, and why not is said once;
-    an `optional` one is left out in silence. A `reason` says why others have no value: it is left
-    out where it has none itself, and a qualification does not compare it. `none` says what having
-    no value means: "nothing was touched".
+    for one each. Each metric is there or not by its own needs, whatever others of its `group` lack;
+    why not is said once for all that lack the same. An `optional` one is left out in silence. A
+    `reason` says why others have no value: it is left out where it has none itself, and a
+    qualification does not compare it. `none` says what having no value means: "nothing was
+    touched".
     """
 
     name: str
@@ -122,7 +141,8 @@ class Metric:
     factor: float = 1.0
     shown_unit: str | None = None
     entries: tuple[str, ...] = ()
-    needs: Collection[str] = ()
+    needs: Needs = ()
+    uses: Needs = ()
     group: str = ""
     optional: bool = False
     reason: bool = False
@@ -150,8 +170,20 @@ class Metric:
 
     @property
     def expects(self) -> Mapping[str, str | None]:
-        """The units that it expects of signals, by name."""
-        return self.needs if isinstance(self.needs, Mapping) else {}
+        """The units that it expects of signals, by name: those of what it `uses` go first."""
+        return {**_units(self.needs), **_units(self.uses)}
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The names of all signals that it needs or uses."""
+        names = (name for need in (*self.needs, *self.uses) for name in names_of(need))
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """The arrays, like plant.gap[*], that it needs all elements of."""
+        names = (name for need in self.needs for name in names_of(need))
+        return tuple(name for name in names if name.endswith(ALL))
 
     def column_title(self, column: str) -> str:
         """The title of one of its columns: "time to contact, finger 1"."""
@@ -159,22 +191,18 @@ class Metric:
         return f"{self.title}, {self.entries[place]}" if self.entries else self.title
 
     def of(self, names: Collection[str], roles: Mapping[str, str]) -> Metric:
-        """The metric of so many elements as there are of its arrays in signals of these `names`."""
-        arrays = [need for need in self.needs if need.endswith(ALL)]
-        if not arrays:
+        """The metric of so many elements as its first array has in signals of these `names`."""
+        if not self.arrays:
             return self
-        element = arrays[0].replace("*", "{}").format
-        missing = next(j for j in count(1) if resolved(element(j), roles) not in names)
+        sizes = (_elements(array, names, roles) for array in self.arrays)
+        there = range(1, next((size for size in sizes if size), 1) + 1)
 
         def each(text: str) -> list[str]:
-            there = range(1, max(2, missing)) if "*" in text else (1,)
             return [text.replace("*", str(j)) for j in there]
 
-        needs: Collection[str] = [name for need in self.needs for name in each(need)]
-        if self.expects:
-            needs = {name: unit for need, unit in self.expects.items() for name in each(need)}
-        entries = tuple(entry for several in self.entries for entry in each(several))
-        return replace(self, needs=needs, entries=entries)
+        entries = dict.fromkeys(entry for several in self.entries for entry in each(several))
+        needs, uses = expanded(self.needs, each), expanded(self.uses, each)
+        return replace(self, needs=needs, uses=uses, entries=tuple(entries))
 
     def __call__(self, signals: Signals) -> Value | Sequence[Value]:
         """Return what its function does, so that other functions can call it."""
@@ -186,17 +214,53 @@ class Metric:
             return _from_text, (*self.origin, self.name)
         of_group = metrics_of([self.group]) if self.group in groups() else ()
         if any(self.function is m.function for m in of_group):
-            return _of_group, (self.group, self.name, self.needs, self.entries)
+            return _of_group, (self.group, self.name, self.needs, self.uses, self.entries)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
             return resolve_name, (f"{module}:{name}",)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
 
-def _of_group(group: str, name: str, needs: Any, entries: tuple[str, ...]) -> Metric:
+def _of_group(group: str, name: str, needs: Needs, uses: Needs, entries: tuple[str, ...]) -> Metric:
     """The metric of that name of a group of ours, in another process."""
     found = next(m for m in metrics_of([group]) if m.name == name)
-    return replace(found, needs=needs, entries=entries)
+    return replace(found, needs=needs, uses=uses, entries=entries)
+
+
+# ------------------------------------------------------------------------- what it reads
+
+
+def names_of(need: Need) -> tuple[str, ...]:
+    """The names of the signals any one of which a need is met by."""
+    return need.names if isinstance(need, AnyOf) else (need,)
+
+
+def expanded(needs: Needs, each: Callable[[str], Sequence[str]]) -> Needs:
+    """The needs with all the names that a function gives in the place of each, in their units.
+
+    Of AnyOf the first ones together are a need, and the second ones: all must have as many.
+    """
+    units = needs if isinstance(needs, Mapping) else dict.fromkeys(needs)
+    found: dict[Need, str | None] = {}
+    for need, unit in units.items():
+        if isinstance(need, AnyOf):
+            alternatives = zip(*map(each, need.names), strict=True)
+            found |= {AnyOf(names): unit for names in alternatives}
+        else:
+            found |= dict.fromkeys(each(need), unit)
+    return found if isinstance(needs, Mapping) else tuple(found)
+
+
+def _units(needs: Needs) -> dict[str, str | None]:
+    """The units of signals by name, where the needs tell them."""
+    told = needs if isinstance(needs, Mapping) else {}
+    return {name: unit for need, unit in told.items() for name in names_of(need)}
+
+
+def _elements(array: str, names: Collection[str], roles: Mapping[str, str]) -> int:
+    """How many elements of an array, like plant.gap[*], signals of these `names` have."""
+    element = array.replace("*", "{}").format
+    return next(j for j in count() if resolved(element(j + 1), roles) not in names)
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
@@ -285,6 +349,7 @@ def chosen(
     InputError where there is none of that name, or the signals of these `names` do not permit it.
     """
     usual, own = {m.name: m for m in metrics_of(of_groups)}, []
+    reasons = {m.name: reason for m, reason in _judged(usual.values(), names, roles)}
     for item in wanted:
         if isinstance(item, Metric):
             own.append(item)
@@ -294,7 +359,7 @@ def chosen(
             raise InputError(f"metrics: {item!r}: must be a metric, a function or a name")
         elif item not in usual:
             raise InputError(f"metrics: {item!r}: no such metric; {nearest(item, usual)}")
-        elif reason := lacking(usual[item].needs, names, roles):
+        elif reason := reasons[item]:
             raise InputError(f"metrics: {item}: is not available: {reason}")
     return tuple(own)
 
@@ -331,10 +396,10 @@ def _said(error: BaseException) -> str:
 
 
 def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
-    """The values of `metrics` in their order, and a line for each that cannot be had.
+    """The values of `metrics` in their order, and a line for each reason why others have none.
 
-    A line like "no metrics of the grasp: plant lacks contact[1]". A function that fails, or that
-    returns something else than a Metric may have, is a line like
+    A line like "no object_shift, object_drift: plant lacks object_position". A function that fails,
+    or that returns something else than a Metric may have, is a line like
     "metric 'own': own.py, line 12: ValueError: ...".
     """
     there, missing = available(metrics, signals.by_name, signals.roles)
@@ -358,17 +423,43 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
 def available(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> tuple[list[Metric], list[str]]:
-    """The metrics that signals of these `names` permit, and a line for each reason against one."""
-    sized = [m.of(names, roles) for m in metrics]
-    reasons = [(m, lacking(m.needs, names, roles)) for m in sized]
-    there = [m for m, reason in reasons if not reason]
-    in_part = {m.group for m in there}
-    missing: dict[str, str] = {}
-    for m, reason in reasons:
+    """The metrics that signals of these `names` permit, and a line for each reason against some."""
+    judged = _judged(metrics, names, roles)
+    lost: dict[str, list[Metric]] = {}
+    for m, reason in judged:
         if reason and not m.optional:
-            whole = m.group and m.group not in in_part
-            missing.setdefault(f"metrics of the {m.group}" if whole else m.name, reason)
-    return there, [f"no {what}: {reason}" for what, reason in missing.items()]
+            lost.setdefault(reason, []).append(m)
+    lines = [f"no {_together(some, judged)}: {reason}" for reason, some in lost.items()]
+    return [m for m, reason in judged if not reason], lines
+
+
+Judged = Sequence[tuple[Metric, str | None]]
+"""Metrics, each with the reason why it cannot be had, None where it can."""
+
+
+def _judged(metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]) -> Judged:
+    """The metrics of as many elements as there are, and why signals of these `names` lack them."""
+    sized = [m.of(names, roles) for m in metrics]
+    every = [need for m in sized for need in m.needs]
+    return [(m, lacking(m.needs, names, roles, every)) for m in sized]
+
+
+def _together(lost: Sequence[Metric], judged: Judged) -> str:
+    """The names of metrics that cannot be had for one reason, those of a group as in _in_group."""
+    by_group: dict[str, list[str]] = {}
+    for m in lost:
+        by_group.setdefault(m.group, []).append(m.name)
+    return ", ".join(_in_group(group, names, judged) for group, names in by_group.items())
+
+
+def _in_group(group: str, lost: Sequence[str], judged: Judged) -> str:
+    """The names of lost metrics of a group; where they are most of it, those that are left."""
+    of_group = [(m, reason) for m, reason in judged if m.group == group]
+    usual = [m for m, _ in of_group if not m.optional]
+    if not group or 2 * len(lost) <= len(usual):
+        return ", ".join(lost)
+    left = ", ".join(m.name for m, reason in of_group if not reason)
+    return f"metrics of the {group}{' but ' if left else ''}{left}"
 
 
 def needed(
@@ -378,26 +469,57 @@ def needed(
     there = available(metrics, names, roles)[0]
     if not all(m.group for m in there):
         return frozenset(names)
-    return frozenset(resolved(name, roles) for m in there for name in m.needs)
+    return frozenset(resolved(name, roles) for m in there for name in m.reads) & {*names}
 
 
-def lacking(needs: Iterable[str], names: Collection[str], roles: Mapping[str, str]) -> str | None:
-    """Why signals of these `names` do not have all that is needed; None where they do."""
-    needs = tuple(need.replace(ALL, "[1]") for need in needs)
+def lacking(
+    needs: Collection[Need],
+    names: Collection[str],
+    roles: Mapping[str, str],
+    every: Collection[Need] = (),
+) -> str | None:
+    """Why signals of these `names` do not have all that is needed; None where they do.
+
+    Where nobody plays a role, the component is named that has most of what the `needs`, or `every`
+    one of several metrics, ask of it.
+    """
     for need in needs:
-        if resolved(need, roles) in names:
+        if any(resolved(name, roles) in names for name in names_of(need)):
             continue
-        role, dot, variable = need.partition(".")
-        component = roles.get(role, role)
-        if not dot:
-            return f"there is no signal {need}"
-        there = {name.partition(".")[0] for name in names}
-        if component in there:
-            return f"{component} lacks {variable}"
-        wanted = [need.removeprefix(role) for need in needs if need.startswith(f"{role}.")]
-        able = [c for c in sorted(there) if all(f"{c}{variable}" in names for variable in wanted)]
-        return f'no component is the {role}; name it under [roles]: {role} = "{[*able, "..."][0]}"'
+        reasons = (_missed(of, names, roles, every or needs) for of in _by_role(need).values())
+        return " and ".join(dict.fromkeys(reasons))
     return None
+
+
+def _by_role(need: Need) -> dict[str, tuple[str, ...]]:
+    """The names of a need by their first parts."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name in names_of(need):
+        role = name.partition(".")[0]
+        found[role] = (*found.get(role, ()), name)
+    return found
+
+
+def _missed(
+    alternatives: Sequence[str],
+    names: Collection[str],
+    roles: Mapping[str, str],
+    every: Collection[Need],
+) -> str:
+    """Why there is none of several signals of one role."""
+    role, dot, _ = alternatives[0].partition(".")
+    component = roles.get(role, role)
+    if not dot:
+        return f"there is no signal {alternatives[0]}"
+    there = {name.partition(".")[0] for name in names}
+    if component in there:
+        listed = ", ".join(name.partition(".")[2] for name in alternatives)
+        return f"{component} {'has none of' if len(alternatives) > 1 else 'lacks'} {listed}"
+    of_role = {name for need in every for name in names_of(need) if name.startswith(f"{role}.")}
+    has = {c: sum(resolved(name, {role: c}) in names for name in of_role) for c in sorted(there)}
+    best = max(has, key=has.__getitem__, default="")
+    player = best if has.get(best) else "..."
+    return f'no component is the {role}; name it under [roles]: {role} = "{player}"'
 
 
 def resolved(name: str, roles: Mapping[str, str]) -> str:

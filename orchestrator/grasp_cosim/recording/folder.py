@@ -26,7 +26,7 @@ from ..base.text import counted
 from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.in_si import in_si
-from ..metrics.metric import ALL, Measured, Metric, Signals, metrics_of, resolved
+from ..metrics.metric import Measured, Metric, Signals, metrics_of, resolved
 from ..realtime.timing import Timing
 from ..system.description import System
 from .arrow import ArrowListener
@@ -351,8 +351,7 @@ def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
 def _sized(m: Metric, value: Any, roles: Mapping[str, str]) -> Metric:
     """The metric of as many elements of its arrays as it has values."""
     places = range(1, len(value) + 1) if isinstance(value, list) else ()
-    arrays = [need for need in m.needs if need.endswith(ALL)]
-    return m.of({resolved(n.replace("*", str(j)), roles) for n in arrays for j in places}, roles)
+    return m.of({resolved(n.replace("*", str(j)), roles) for n in m.arrays for j in places}, roles)
 
 
 def _as_recorded(written: Mapping[str, Any]) -> tuple[Metric, ...]:
