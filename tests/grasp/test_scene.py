@@ -53,6 +53,37 @@ def test_first_contacts_are_marked_and_have_buttons():
     np.testing.assert_allclose(spans["Both contacts"], (1.0 - 0.005, 1.2 + 0.03), atol=1e-9)
 
 
+def without(run, *starts):
+    """The run without the signals whose names begin so."""
+    left = {name: column for name, column in run.signals.items() if not name.startswith(starts)}
+    return replace(run, signals=left)
+
+
+def test_a_grasp_without_target_and_contact_is_shown_all_the_same():
+    """The contacts are where the gaps are used up; there is no target to draw."""
+    run = grasp_run()
+    gaps = {name: np.round(run.signals[name], 9) for name in ("plant.gap[1]", "plant.gap[2]")}
+    less = without(run, "controller.target", "plant.contact[")
+    less = replace(less, signals={**less.signals, **gaps})
+    assert less.view.stem == "grasp"
+    scene = grasp_scene(less)
+    assert scene is not None
+    np.testing.assert_allclose([c["t"] for c in scene.state["contacts"]], [1.0, 1.2], atol=1e-9)
+    assert set(scene.state["signals"]) <= set(less.signals)
+    assert "target" not in scene.state
+    assert "touches" not in scene.html
+    figure = pictures.draw_grasp(less)
+    (legend,) = figure.legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert names == ["finger 1", "finger 2", "centre of the object"]
+
+
+@pytest.mark.parametrize("quantity", ["position", "velocity", "gap", "contact_force", "object"])
+def test_a_grasp_without_what_is_drawn_is_shown_as_any_system(quantity):
+    less = without(grasp_run(), f"plant.{quantity}")
+    assert (less.view.stem, grasp_scene(less)) == ("signals", None)
+
+
 def test_contacts_begin_where_the_metrics_say_and_again_after_each_release():
     run = grasp_run()
     contact = run.signals["plant.contact[1]"].copy()

@@ -23,7 +23,7 @@ from ..report.plot import (
     one_legend,
 )
 from ..report.tables import caption
-from .metrics import CLOSING, FINGERS, first_contact
+from .metrics import CLOSING, FINGERS, TARGET_POSITION, first_contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,9 +144,12 @@ def draw_contact_forces(axes: Axes, run: Result) -> None:
 
 
 def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
-    """The target position against the centre of the object; runs as (result, style, label)."""
-    for result, style, label in runs:
-        target = 1e3 * result.by_role["controller.target_position"]
+    """The target position, of those that have one, against the centre of the object.
+
+    runs are as (result, style, label).
+    """
+    for result, style, label in (run for run in runs if TARGET_POSITION in run[0].by_role):
+        target = 1e3 * result.by_role[TARGET_POSITION]
         name = f"target, {label}" if label else "target"
         axes.plot(*drawn(result.time, target), style, color=TARGET, label=name)
     result = runs[0][0]

@@ -16,7 +16,7 @@ from ..base.si_units import known_unit
 from ..metrics.metric import resolved
 from ..recording.result import Result
 from ..report.page import Scene, Zoom
-from .metrics import FINGERS, fingers_of, first_contact, is_grasp
+from .metrics import FINGERS, TARGET_POSITION, fingers_of, first_contact, is_grasp, touching
 
 BEFORE, AFTER = 0.005, 0.03
 """s around a contact that a button zooms to."""
@@ -40,8 +40,10 @@ def grasp_scene(result: Result) -> Scene | None:
     """Return the scene of a result; None where it is no grasp."""
     if not is_grasp(result.by_role):
         return None
-    target = resolved("controller.target_position", result.roles)
-    made = scene_of_fingers(result, "Grasp", VIEW, [target], {"target": target})
+    target = resolved(TARGET_POSITION, result.roles)
+    targets = [target] if target in result.signals else []
+    state = {"target": target} if targets else {}
+    made = scene_of_fingers(result, "Grasp", VIEW, targets, state)
     return replace(made, negated=[made.state["contact_force"][2]])
 
 
@@ -94,12 +96,12 @@ def _text(name: str) -> str:
 
 def _signals(result: Result) -> dict[str, dict[int, str]]:
     """The signals that the animation is drawn from, by quantity and finger."""
-    quantities = ("position", "gap", "velocity", "contact_force", "contact")
-    fingers = fingers_of(result.by_role)
-    return {
-        **{q: {j: resolved(f"plant.{q}[{j}]", result.roles) for j in fingers} for q in quantities},
-        "actuator": _actuators(result),
-    }
+    run, fingers = result.by_role, fingers_of(result.by_role)
+    found: dict[str, dict[int, str]] = {}
+    for quantity in ("position", "gap", "velocity", "contact_force", "contact"):
+        of_finger = {j: f"plant.{quantity}[{j}]" for j in fingers}
+        found[quantity] = {j: resolved(n, result.roles) for j, n in of_finger.items() if n in run}
+    return {**found, "actuator": _actuators(result)}
 
 
 def _actuators(result: Result) -> dict[int, str]:
@@ -127,10 +129,10 @@ def _contacts(result: Result) -> list[Contact]:
     """
     found = []
     for j in fingers_of(result.by_role):
-        touching = np.asarray(result.by_role[f"plant.contact[{j}]"]).astype(bool)
-        begins = np.flatnonzero(touching[1:] & ~touching[:-1]) + 1
+        touches = touching(result.by_role, j)
+        begins = np.flatnonzero(touches[1:] & ~touches[:-1]) + 1
         first = first_contact(result.by_role, j)
-        later = begins if touching[0] else begins[1:]
+        later = begins if touches[0] else begins[1:]
         moments = ([first.time] if first else []) + result.time[later].tolist()
         found += [{"t": t, "finger": j} for t in moments]
     return sorted(found, key=lambda c: c["t"])
