@@ -74,6 +74,17 @@ def test_with_roles_they_are_the_same_to_the_bit(original, fmus, tmp_path):
     assert result.view.stem == "grasp"
 
 
+def test_a_plant_whose_contacts_have_other_names_has_the_same_metrics(original, grasp):
+    """Of every step, as its gaps are kept for them: a rigid finger touches where none is left."""
+    names = {f"components.plant.rename.touches[{j}]": f"contact[{j}]" for j in (1, 2)}
+    system = with_case(grasp.with_settings(names), 0)
+    result = simulate(system, step=1e-3, stop=0.5, every=10)
+    assert "plant.touches[1]" in result
+    assert of_the_grasp(result.metrics) == of_the_grasp(original.metrics)
+    assert result.measured.missing == ()
+    assert result.view.stem == "grasp"
+
+
 @given(
     st.lists(
         st.sampled_from(["plant", "controller", "sensor_1", "gripper", "a b", "x", "plant2", "p"]),

@@ -113,7 +113,10 @@ OF_CONTACT: Mapping[str, Any] = {"needs": TOUCH, "uses": MOMENT}
 
 @of_fingers("time_to_contact", "s", none="nothing was touched", **OF_CONTACT)
 def time_to_contact(signals: Signals, finger: int) -> float | None:
-    """Moment where the gap of the last free sample runs out at its rate; None: never touches."""
+    """Moment where the gap of the last free sample runs out at its rate; None: never touches.
+
+    Of a plant without gaps it is that of the first sample in contact, as in first_contact().
+    """
     contact = first_contact(signals, finger)
     return contact.time if contact else None
 
@@ -143,7 +146,10 @@ def smallest_gap(signals: Signals, finger: int) -> float | None:
 
 @of_fingers("impact_velocity", "m/s", needs=of_each("gap"), uses=MOMENT)
 def impact_velocity(signals: Signals, finger: int) -> float | None:
-    """Rate at which the gap closes at first contact; None where it does not close."""
+    """Rate at which the gap closes at first contact; None where it does not close.
+
+    Of a plant without positions or velocities it is a mean over its last free step.
+    """
     contact = first_contact(signals, finger)
     speed = contact.speed if contact else None
     return speed if speed is not None and speed > 0.0 else None
