@@ -128,6 +128,10 @@ def test_the_steps(checkout):
     for folder in ("lockstep", "sensors", "target"):
         found = columns(checkout / folder / "signals.csv")
         assert {name: found[name] for name in simulated} == simulated
+    on_an_arm = columns(checkout / "arm_simulated/signals.csv")
+    found = columns(checkout / "arm/signals.csv")
+    assert {name: found[name] for name in on_an_arm} == on_an_arm
+    assert (checkout / "controller_in_c/GraspControllerTandem.c").is_file()
     bench = columns(checkout / "bench/signals.csv")
     assert set(bench["plant.proxy.state"]) <= {"1", "2"}
     assert float(bench["plant.position[1]"][-1]) < 0.11

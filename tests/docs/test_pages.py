@@ -79,7 +79,7 @@ def test_command(user, command, monkeypatch):
 
 
 def test_there_is_something_to_try():
-    assert len(COMMANDS) == 25
+    assert len(COMMANDS) == 26
 
 
 @pytest.mark.slow
@@ -91,9 +91,10 @@ def test_the_example_of_the_readme(user, capsys):
 
 
 @needs_compiler
-def test_the_examples_of_a_hand_hold():
+@pytest.mark.parametrize("page", ["docs/hand.md", "docs/tandem.md"])
+def test_the_examples_of_another_gripper_hold(page):
     names = {}
-    for example in blocks("docs/hand.md", "python"):
+    for example in blocks(page, "python"):
         exec(example, names)
 
 

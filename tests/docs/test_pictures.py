@@ -42,7 +42,7 @@ def test_each_picture_is_shown_somewhere():
 
 
 def test_a_name_that_is_none(pictures):
-    with pytest.raises(SystemExit, match=r"^hnad: must be of hand, three, loop, evaluation, "):
+    with pytest.raises(SystemExit, match=r"^hnad: must be of hand, three, tandem, loop, "):
         pictures.main("hand", "hnad")
 
 
@@ -51,7 +51,7 @@ def test_a_name_that_is_none(pictures):
 @pytest.mark.parametrize(
     "name",
     [
-        *("hand", "three", "loop", "evaluation", "report"),
+        *("hand", "three", "tandem", "loop", "evaluation", "report"),
         pytest.param("maps", marks=only_whole("takes more than a minute")),
     ],
 )
