@@ -151,7 +151,7 @@ def initial_state(p: Params, u: Inputs) -> State:
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     middle = _middle(u)
     target = wrist_guidance.within(
-        middle + _way(p, line_1, line_2, _imbalance(estimate, u)), u.position
+        middle + _way(p, u, line_1, line_2, _imbalance(estimate, u)), u.position
     )
     virtual = (_half_opening(u) if p.impact_reduction.enabled else 0.0), 0.0
     nothing = (0.0, 0.0)
@@ -175,7 +175,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, counted, low_pass)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     rho = _imbalance(estimate, u)
-    target = wrist_guidance.within(_middle(u) + _way(p, line_1, line_2, rho), x.fingertips)
+    target = wrist_guidance.within(_middle(u) + _way(p, u, line_1, line_2, rho), x.fingertips)
     wrist_command, pull = x.wrist_command, 1.0
     if p.simultaneous_contact.enabled:
         wrist_command = wrist_guidance.move(p.wrist, wrist_command, target, free, h)
@@ -221,11 +221,14 @@ def _imbalance(estimate: reflectance_ratio.Estimate, u: Inputs) -> float:
     return published.relative(published.lit(xi_1), published.lit(xi_2))
 
 
-def _way(p: Params, line_1: Line, line_2: Line, rho: float) -> float:
-    """d·tanh(rho)/n: from the wrist to the object's middle, m."""
+def _way(p: Params, u: Inputs, line_1: Line, line_2: Line, rho: float) -> float:
+    """S·d·tanh(rho)/n: from the wrist to the object's middle, m."""
     gap_1, gap_2 = reflectance_ratio.gaps(p.reflectance, p.white, line_1, line_2)
-    d = 0.5 * (gap_1 + gap_2) + p.reflectance.offset_distance
-    return d * tanh(rho) / p.reflectance.diffusion_exponent
+    between = min(0.5 * (gap_1 + gap_2), _half_opening(u))
+    d = between + p.reflectance.offset_distance
+    noise = p.reflectance.intensity_noise
+    seen = wrist_guidance.sight(noise, line_1.intensity, line_2.intensity)
+    return seen * d * tanh(rho) / p.reflectance.diffusion_exponent
 
 
 def _closed(p: Params, virtual: Motion, pull: float, f_p: layer_2.Pair, h: float) -> Motion:

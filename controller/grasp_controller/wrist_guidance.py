@@ -3,8 +3,9 @@
 By Eq. (9) d·tanh(rho)/n is how far the middle of the object is from the wrist, to first order and
 whatever gap and colour are:
 
-    rho  = (xi_1 - e^beta·xi_2)/(xi_1 + e^beta·xi_2)         d = mean gap + l_0
-    T    = X + d·tanh(rho)/n                                 within the fingertips of the start
+    rho  = (xi_1 - e^beta·xi_2)/(xi_1 + e^beta·xi_2)         d = min(mean gap, w) + l_0
+    T    = X + S·d·tanh(rho)/n                               within the fingertips of the start
+    S    = product of xi_j^2/(xi_j^2 + (4·sigma)^2)          1 where both sensors see anything
     X_c' = clip(g·(1 - h')·(T - X_c), ±v_max)                g = 0.8/max(2/omega + tau, 0.06 s)
     h'   = h·(1 - min(1, (10·rho)^2))                        h of holding.py
 """
@@ -30,6 +31,9 @@ ALIKE = 3.0
 """Closing speed over the wrist's from which on both fingers move alike, as far as light and
 positions that are not in time with each other are concerned.
 """
+
+FAINT = 4.0
+"""Standard deviations of the noise, of an intensity that is seen by half: 1 mV, white in 2 m."""
 
 DISAGREEING = 10.0
 """1/|rho| from which on the sensors do not agree on a grasp: 10 %, some tenth of d."""
@@ -95,6 +99,16 @@ def alike(closing: float, moving: float) -> float:
     """
     closed, moved = closing * closing, ALIKE * ALIKE * moving * moving
     return closed / (closed + moved) if moved > 0.0 else 1.0
+
+
+def sight(noise: float, xi_1: float, xi_2: float) -> float:
+    """S: 1 where both intensities are far above the noise, 0 where one is not; all in V.
+
+    One that sees nothing, as a sensor that has failed, tells nothing of a middle.
+    """
+    least = FAINT * FAINT * noise * noise
+    seen_1, seen_2 = xi_1 * xi_1, xi_2 * xi_2
+    return seen_1 / (seen_1 + least) * (seen_2 / (seen_2 + least))
 
 
 def within(place: float, fingertips: tuple[float, float]) -> float:

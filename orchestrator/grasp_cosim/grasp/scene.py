@@ -36,14 +36,14 @@ Contact = Mapping[str, float]
 """A moment `t` in s at which a `finger` begins to touch."""
 
 
-def grasp_scene(result: Result) -> Scene | None:
-    """Return the scene of a result; None where it is no grasp."""
+def grasp_scene(result: Result, view: str = VIEW) -> Scene | None:
+    """Return the scene of a result, `view` saying what is seen; None where it is no grasp."""
     if not is_grasp(result.by_role):
         return None
     target = resolved(TARGET_POSITION, result.roles)
     targets = [target] if target in result.signals else []
     state = {"target": target} if targets else {}
-    made = scene_of_fingers(result, "Grasp", VIEW, targets, state)
+    made = scene_of_fingers(result, "Grasp", view, targets, state)
     return replace(made, negated=[made.state["contact_force"][2]])
 
 
