@@ -1,5 +1,7 @@
 """The gripper in tandem as a system: with its wrist moved it leaves a free box where it is."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, simulate, tandem_system
@@ -152,7 +154,74 @@ def test_the_command_writes_a_system_that_runs(command, tmp_path, monkeypatch):
     assert System.load("tandem.toml").with_experiment(stop=0.1) is not None
     code, _, said = command("init", "other.toml", "--tandem", "--fingers", "3")
     assert code == 2
-    assert "--tandem cannot be used with --fmu, --as, --fingers or --angles" in said
+    assert "--tandem cannot be used with --fmu, --fingers or --angles" in said
+
+
+VENDOR = '''"""A gripper on an arm in other words."""
+
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+from block_variables import Input, Output, Parameter
+from gripper_plant import tandem
+
+
+@dataclass(frozen=True)
+class Params:
+    offset: Annotated[float, Parameter("place of the object", unit="m", low=-1.0, high=1.0)] = 0.03
+
+
+class Inputs(NamedTuple):
+    gripForce: Annotated[float, Input("force of the drive", unit="N")] = 0.0
+    wristCommand: Annotated[float, Input("commanded position of the wrist", unit="m")] = 0.0
+
+
+Pair = tuple[float, float]
+
+
+class Outputs(NamedTuple):
+    pos: Annotated[Pair, Output("position of the finger", unit="m", depends_on=set())]
+    vel: Annotated[Pair, Output("velocity of the finger", unit="m/s", depends_on=set())]
+    distance: Annotated[Pair, Output("gap to the object", unit="m", depends_on=set())]
+
+
+State = tandem.State
+
+
+def placed(p):
+    return tandem.Params(initial_object_position=p.offset)
+
+
+def initial_state(p, u):
+    return tandem.initial_state(placed(p), tandem.Inputs(*u))
+
+
+def step(p, x, u, h):
+    return tandem.step(placed(p), x, tandem.Inputs(*u), h)
+
+
+def outputs(p, x, u):
+    y = tandem.outputs(placed(p), x, tandem.Inputs(*u))
+    return Outputs(y.position, y.velocity, y.gap)
+'''
+"""It tells neither forces nor contacts, nor where its wrist is."""
+
+
+@pytest.mark.slow
+def test_a_plant_of_others_has_the_metrics_that_it_permits(command, moved, tmp_path):
+    Path("vendor.py").write_text(VENDOR, encoding="utf-8")
+    assert command("build", "vendor.py", "--out", ".")[0] == 0
+    assert command("init", "mine.toml", "--tandem", "--as", "plant=Vendor.fmu")[0] == 0
+    run = simulate(System.load("mine.toml"))
+    assert run.metrics["time_to_contact"] == moved.metrics["time_to_contact"]
+    assert run.metrics["impact_velocity"] == moved.metrics["impact_velocity"]
+    assert "steady_contact_force" not in run.metrics
+    assert [said.partition(": ")[2] for said in run.measured.missing] == [
+        "plant lacks contact_force[1]",
+        "plant lacks object_position",
+        "plant lacks wrist_position",
+        "plant lacks wrist_velocity",
+    ]
 
 
 def test_a_law_that_there_is_not_is_refused(tandem):

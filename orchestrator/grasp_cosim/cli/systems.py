@@ -76,18 +76,16 @@ def init(
     hand = fingers is not None or angles is not None
     if hand and (own or foreign):
         raise InputError("--fingers and --angles cannot be used with --fmu or --as")
-    if tandem and (own or foreign or hand):
-        raise InputError("--tandem cannot be used with --fmu, --as, --fingers or --angles")
+    if tandem and (own or hand):
+        raise InputError("--tandem cannot be used with --fmu, --fingers or --angles")
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
         text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
     elif hand:
         text, notes = _hand(file.parent, fingers, angles)
-    elif tandem:
-        text = _tandem(file.parent)
     else:
-        text, drafts = _grasp(file.parent, foreign)
+        text, drafts = _built_in(file.parent, tandem, foreign)
     write_text(file, text)
     left = to_do(text)
     if not left and file.is_file():
@@ -146,26 +144,21 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
     return _from_below(hand_text(directions)), [note] if note else []
 
 
-def _tandem(folder: Path) -> str:
-    """The text of a gripper in tandem."""
+def _built_in(
+    folder: Path, tandem: bool, foreign: Mapping[str, Path]
+) -> tuple[str, dict[str, Draft]]:
+    """The text of a built-in system, with foreign FMUs in the place of components."""
+    from ..grasp.presets import SYSTEM as GRASP
     from ..grasp.system import built
-    from ..tandem.system import SYSTEM
+    from ..tandem.system import SYSTEM as TANDEM
 
-    built(folder)
-    return _from_below(SYSTEM.read_text("utf-8"))
-
-
-def _grasp(folder: Path, foreign: Mapping[str, Path]) -> tuple[str, dict[str, Draft]]:
-    """The text of the built-in grasp, with foreign FMUs in the place of components."""
-    from ..grasp.presets import SYSTEM, built_in_presets
-    from ..grasp.system import built
-
-    built_in = System.load(SYSTEM, built(folder))
-    text = _from_below(SYSTEM.read_text("utf-8"))
+    file = TANDEM if tandem else GRASP
+    built_in = System.load(file, built(folder))
+    text = _from_below(file.read_text("utf-8"))
     drafts = {}
     for name, fmu in foreign.items():
         built_in.component(name, f"--as {name}")
-        keys = [key.partition(".") for preset in built_in_presets().values() for key in preset]
+        keys = [key.partition(".") for preset in built_in.presets.values() for key in preset]
         preset = [variable for component, _, variable in keys if component == name]
         drafts[name] = replacing(built_in, name, fmu, shown(fmu, folder), preset)
         text = drafts[name].put_into(text)
