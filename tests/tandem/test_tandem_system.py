@@ -172,17 +172,17 @@ class Params:
 
 
 class Inputs(NamedTuple):
-    gripForce: Annotated[float, Input("force of the drive", unit="N")] = 0.0
-    wristCommand: Annotated[float, Input("commanded position of the wrist", unit="m")] = 0.0
+    gripForce: Annotated[float, Input("force of the drive", unit="N", nominal=1.0)] = 0.0
+    wristCommand: Annotated[float, Input("commanded position", unit="m", nominal=0.1)] = 0.0
 
 
 Pair = tuple[float, float]
 
 
 class Outputs(NamedTuple):
-    pos: Annotated[Pair, Output("position of the finger", unit="m", depends_on=set())]
-    vel: Annotated[Pair, Output("velocity of the finger", unit="m/s", depends_on=set())]
-    distance: Annotated[Pair, Output("gap to the object", unit="m", depends_on=set())]
+    pos: Annotated[Pair, Output("position of the finger", unit="m", nominal=0.1, depends_on=set())]
+    vel: Annotated[Pair, Output("its velocity", unit="m/s", nominal=0.1, depends_on=set())]
+    distance: Annotated[Pair, Output("gap to the object", unit="m", nominal=0.1, depends_on=set())]
 
 
 State = tandem.State
