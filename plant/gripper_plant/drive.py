@@ -91,7 +91,7 @@ def force(p: Drive, mass: float, told: float, reference: float, speed: float) ->
 
 
 def reference(p: Drive, mass: float, told: float, before: float, speed: float, d: float) -> float:
-    """v_r in m/s d seconds later, F = told in N held, the gripper at w' = speed in m/s."""
+    """v_r in m/s d seconds later, F = told in N held, the gripper at w' = speed in m/s by then."""
     if p.kind == Kind.FORCE:
         return speed
     ahead = p.force_limit / (mass * p.omega)

@@ -229,8 +229,8 @@ def _substep(p: Params, a: wrist.Matrix, x: Body, told: float, command: float, d
     off = v - x.box.v - q.h * x.box.w  # of the wrist from the faces, m/s
     f_1 = contact_laws.mean_force(p.law, -gap_1, -gap_1 - d * (speed + off), d)
     f_2 = contact_laws.mean_force(p.law, -gap_2, -gap_2 - d * (speed - off), d)
-    reference = drive.reference(p.drive, m, told, x.reference, speed, d)
-    driven = drive.force(p.drive, m, told, reference, speed)
+    mean = x.reference + 0.5 * d * told / m
+    driven = drive.force(p.drive, m, told, mean, speed)
     at, opening, box = x.wrist, x.opening, x.box
     for _ in range(ITERATIONS):
         at = wrist.follow(p.wrist, a, x.wrist, command, f_1 - f_2, d)
@@ -241,7 +241,7 @@ def _substep(p: Params, a: wrist.Matrix, x: Body, told: float, command: float, d
         to_1, to_2 = at[0] + opening[0] - to_right, to_left - at[0] + opening[0]
         found_1 = contact_laws.mean_force(p.law, -gap_1, -to_1, d)
         found_2 = contact_laws.mean_force(p.law, -gap_2, -to_2, d)
-        motor = drive.force(p.drive, m, told, reference, (opening[0] - half) / d)
+        motor = drive.force(p.drive, m, told, mean, (opening[0] - half) / d)
         near = contact_laws.settled(found_1, f_1) and contact_laws.settled(found_2, f_2)
         if near and contact_laws.settled(abs(motor), abs(driven)):
             break
@@ -249,6 +249,7 @@ def _substep(p: Params, a: wrist.Matrix, x: Body, told: float, command: float, d
     toppled = x.toppled or standing.topples(q, box)
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)
+    reference = drive.reference(p.drive, m, told, x.reference, opening[1], d)
     return Body(at, opening, reference, (f_1, 0.0 - f_2), box, toppled)
 
 
