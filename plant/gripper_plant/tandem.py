@@ -225,7 +225,7 @@ def _substep(p: Params, a: wrist.Matrix, x: Body, told: float, command: float, d
     """D seconds with all forces held; they and the ways under them are found by iteration."""
     q, m, (middle, v), (half, speed) = p.shape, p.moving_mass, x.wrist, x.opening
     right, left = standing.faces(q, x.box)
-    gap_1, gap_2 = middle + half - right, left - middle + half
+    gap_1, gap_2 = half + middle - right, half - middle + left
     off = v - x.box.v - q.h * x.box.w  # of the wrist from the faces, m/s
     f_1 = contact_laws.mean_force(p.law, -gap_1, -gap_1 - d * (speed + off), d)
     f_2 = contact_laws.mean_force(p.law, -gap_2, -gap_2 - d * (speed - off), d)
@@ -234,11 +234,11 @@ def _substep(p: Params, a: wrist.Matrix, x: Body, told: float, command: float, d
     at, opening, box = x.wrist, x.opening, x.box
     for _ in range(ITERATIONS):
         at = wrist.follow(p.wrist, a, x.wrist, command, f_1 - f_2, d)
-        opening = friction.move(half, speed, m, driven + f_1 + f_2, p.drive.law, d)
+        opening = friction.move(half, speed, m, driven + (f_1 + f_2), p.drive.law, d)
         if not (p.object_fixed or x.toppled):
             box = standing.advance(q, x.box, Pushes(f_2, f_1), d)
         to_right, to_left = standing.faces(q, box)
-        to_1, to_2 = at[0] + opening[0] - to_right, to_left - at[0] + opening[0]
+        to_1, to_2 = opening[0] + at[0] - to_right, opening[0] - at[0] + to_left
         found_1 = contact_laws.mean_force(p.law, -gap_1, -to_1, d)
         found_2 = contact_laws.mean_force(p.law, -gap_2, -to_2, d)
         motor = drive.force(p.drive, m, told, mean, (opening[0] - half) / d)
@@ -261,5 +261,5 @@ def _contact_rate(p: Params, x: Body, told: float, command: float, h: float) -> 
     pushed = abs(drive.limited(p_d, told)) / m + p_d.omega * (abs(x.reference) + abs(speed))
     accelerated = pushed + wrist.acceleration_bound(p.wrist, x.wrist, command)
     ways = abs(v) + abs(speed) + abs(x.box.v) + q.h * abs(x.box.w) + 0.5 * h * accelerated
-    deepest = h * ways + max(right - middle - half, middle - half - left)
+    deepest = h * ways + max(right - middle - half, middle - left - half)
     return contact_laws.rate(p.law, deepest, p.lightest)

@@ -125,6 +125,8 @@ def follow(p: Wrist, a: Matrix, x: Motion, command: float, push: float, d: float
     acceleration = copysign(most, wanted) if most > 0.0 and abs(wanted) > most else wanted
     after = velocity + acceleration * d
     fastest = p.speed_limit
+    if most > 0.0 and fastest > 0.0:  # one that has been lowered is braked to
+        fastest = max(fastest, abs(velocity) - most * d)
     if fastest > 0.0 and abs(after) > fastest:
         return _up_to_speed(x, acceleration, copysign(fastest, after), d)
     if acceleration == wanted:
