@@ -12,7 +12,7 @@ whatever gap and colour are:
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import expm1, pi
+from math import copysign, expm1, pi
 from typing import Annotated
 
 from block_variables import Group, Parameter, check
@@ -122,6 +122,10 @@ def within(place: float, fingertips: tuple[float, float]) -> float:
 
 def move(p: Wrist, command: float, target: float, free: float, h: float) -> float:
     """X_c in m h seconds later, exactly for a target T in m that is held; `free` is 1 - h'."""
-    way = -expm1(-p.gain * free * h) * (target - command)
-    furthest = p.speed_limit * h
-    return command + min(max(way, -furthest), furthest)
+    gain, fastest = p.gain * free, p.speed_limit
+    off = target - command
+    far = abs(off)
+    at_limit = min(h, (far - fastest / gain) / fastest) if gain * far > fastest else 0.0
+    limited = fastest * at_limit
+    way = limited - expm1(-gain * (h - at_limit)) * (far - limited)
+    return command + copysign(way, off)

@@ -48,7 +48,7 @@ CASES = {
     "free": FREE,
     "both limits": replace(NEAR, v_max=0.05, a_max=0.8),
     "delay": replace(FREE, tau=0.0137),
-    "underdamped": replace(FREE, zeta=0.4),
+    "underdamped": replace(FREE, zeta=0.5),
     "overdamped": replace(NEAR, zeta=3.0),
     "compliance": replace(NEAR, compliance=1e-3),
     "compliance, free": replace(FREE, compliance=1e-3),
@@ -309,7 +309,7 @@ def test_contacts_push_only_and_nothing_gives_energy(begin, history):
             stored(p, before) + stored(p, x) + abs(force * closed) + abs(y.wrist_force * carried)
         )
         flat = before.body.box.tilt == x.body.box.tilt == 0.0
-        assert stored(p, x) - stored(p, before) - work <= (1e-9 if flat else 1e-5) * scale
+        assert stored(p, x) - stored(p, before) - work <= (1e-9 if flat else 1e-5) * scale + 1e-15
 
 
 def mirrored(p):
