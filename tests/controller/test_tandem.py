@@ -152,6 +152,14 @@ def test_a_grasp_is_one_as_far_as_both_sensors_agree(hold, rho, agreed):
     assert wrist_guidance.agreed(hold, rho) == pytest.approx(agreed, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("closing", "moving", "alike"),
+    [(0.0, 0.0, 1.0), (0.1, 0.0, 1.0), (0.0, 0.1, 0.0), (-0.3, 0.1, 0.5), (0.3, -0.3, 0.1)],
+)
+def test_points_count_as_far_as_the_wrist_is_slower_than_the_grip(closing, moving, alike):
+    assert wrist_guidance.alike(closing, moving) == pytest.approx(alike, abs=1e-12)
+
+
 def grasped(rho):
     """At rest on the object, pressed, with so much more light on the right."""
     u = Inputs((0.035, -0.035), (0.0, 0.0), (1.0 + rho, 1.0 - rho))

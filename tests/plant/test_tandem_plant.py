@@ -121,16 +121,17 @@ def run(g, h, changes=CHANGES, stop=STOP):
 def as_the_reference(g, h, changes=CHANGES, stop=STOP, *, moment, place, force, late=1e-3):
     """Contacts within a moment in s, places in m, forces within a share of the highest one.
 
-    The plant's force is the mean over its last sub-step, `late` at most in s.
+    The plant's force is the mean over its last sub-step, `late` at most in s. Where the moment is
+    None contacts may come and go within a step, of which its end does not tell.
     """
     expected = reference(g, changes, stop)
     rows, first = run(g, h, changes, stop)
-    times = np.array(expected.contact_time, float)
-    assert first == pytest.approx(times, abs=moment, nan_ok=True)
-    every = round(h / FINE)
+    if moment is not None:
+        times = np.array(expected.contact_time, float)
+        assert first == pytest.approx(times, abs=moment, nan_ok=True)
+    every, back = round(h / FINE), round(late / FINE)
     states = expected.states[::every]
     assert rows[:, [0, 2, 4]] == pytest.approx(states[:, [0, 2, 4]], abs=place)
-    back = round(late / FINE)
     allowed = force * expected.forces.max()
     for k in range(1, len(rows)):
         lately = expected.forces[max(0, k * every - back) : k * every + 1]
@@ -189,15 +190,7 @@ def inputs(draw):
 @examples(60)
 @given(grippers(), inputs(), st.sampled_from([1e-3, 5e-3, 2e-2]))
 def test_any_gripper_goes_as_in_continuous_time(g, changes, h):
-    """But for what comes and goes within a step, of which its end does not tell."""
-    expected = reference(g, changes)
-    rows, _ = run(g, h, changes)
-    every = round(h / FINE)
-    states = expected.states[::every]
-    assert rows[:, [0, 2, 4]] == pytest.approx(states[:, [0, 2, 4]], abs=1e-4)
-    assert rows[-1, 6:] == pytest.approx(
-        expected.forces[-1], abs=0.02 * expected.forces.max() + 1e-6
-    )
+    as_the_reference(g, h, changes, moment=None, place=1e-4, force=0.02, late=5e-3)
 
 
 def in_motion(p, half, closing, box=0.0, tilted=0.0):

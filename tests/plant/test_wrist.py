@@ -111,6 +111,19 @@ def test_a_way_at_both_limits_takes_its_time():
     assert seen[490] == pytest.approx((0.0782, 0.2), abs=1e-9)
 
 
+def test_it_speeds_up_to_its_limit_within_a_step_and_no_further():
+    """From 0.1 to 0.2 m/s with 1 m/s^2 over 15 mm, then 20 mm at that."""
+    p = Wrist(0.1, 1.0, speed_limit=0.2, acceleration_limit=1.0)
+    found = wrist.follow(p, wrist.transition(p, 0.2), (0.0, 0.1), 100.0, 0.0, 0.2)
+    assert found == pytest.approx((0.035, 0.2), abs=1e-12)
+
+
+@pytest.mark.parametrize(("limit", "bound"), [(0.0, 4.0 * pi * pi * 0.5 + 2.0 * pi), (0.3, 0.3)])
+def test_its_bound_is_what_a_servo_of_1_hz_wants_at_half_a_metre(limit, bound):
+    p = Wrist(1.0, 0.5, acceleration_limit=limit)
+    assert wrist.acceleration_bound(p, (0.2, -1.0), -0.3) == pytest.approx(bound, rel=1e-12)
+
+
 def test_a_wrist_that_gives_way_does_by_its_compliance():
     """By c for each newton of the finger that presses alone."""
     p = Params(

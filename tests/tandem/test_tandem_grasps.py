@@ -68,7 +68,7 @@ STUDIES = {
     "limits": Study(values=wrist(speed_limit=0.25, acceleration_limit=2.5)),
     "steps 5 ms": Study(step=5e-3),
     "speed servo": Study(presets=("fixed", "gripper")),
-    "arm, gripper, bench": Study(0.015, forces=0.5, presets=("arm", "gripper", "bench")),
+    "arm, gripper, bench": Study(0.015, 0.0105, forces=0.5, presets=("arm", "gripper", "bench")),
 }
 
 
