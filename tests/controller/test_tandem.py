@@ -71,6 +71,14 @@ def test_it_is_whatever_the_colours(alpha, gaps):
     )
 
 
+def test_far_off_the_middle_the_target_is_drawn_in():
+    """To d·tanh(rho)/n, here of rho = 0.5 at white faces."""
+    u = Inputs((0.16, -0.14), (0.0, 0.0), (0.06, 0.02))
+    d = 0.5 * sum((0.0024 / xi) ** (1.0 / N) for xi in u.intensity)
+    y = tandem.outputs(SURE, tandem.initial_state(SURE, u), u)
+    assert y.target_position == pytest.approx(0.01 + d * np.tanh(0.5) / N, abs=1e-9)
+
+
 def placed(samples):
     """As a gripper has them at the start: the right fingertip is not left of the left one."""
     first, *rest = samples
@@ -158,6 +166,24 @@ def test_a_grasp_is_one_as_far_as_both_sensors_agree(hold, rho, agreed):
 )
 def test_points_count_as_far_as_the_wrist_is_slower_than_the_grip(closing, moving, alike):
     assert wrist_guidance.alike(closing, moving) == pytest.approx(alike, abs=1e-12)
+
+
+def test_half_a_grasp_is_half_of_the_force_on_each_finger():
+    """P = -F/2 and the rate of x_1 - x_2, low-passed: P_0 at rest, and at half of w_0."""
+    u = Inputs((0.035, -0.035), (0.0, 0.0), (0.4, 0.4))
+    x = tandem.initial_state(Params(), u)._replace(virtual=(0.035 - 0.1 / 98.0, 0.0))
+    assert tandem.step(Params(), x, u, 0.02).hold == pytest.approx(0.5, abs=1e-9)
+    closing = u._replace(velocity=(-1e-3, 1e-3))
+    x = x._replace(virtual=(x.virtual[0], -1e-3))
+    assert tandem.step(Params(), x, closing, 0.02).hold == pytest.approx(0.4, abs=1e-9)
+
+
+def test_while_the_wrist_moves_nothing_is_learnt():
+    samples = approach((0.5, 1.0))
+    carried = [u._replace(velocity=tuple(v + 1.0 for v in u.velocity)) for u in samples]
+    still, moving = (run(Params(), s)[-1][0] for s in (samples, carried))
+    assert moving.line_1.weight < 0.01 * still.line_1.weight
+    assert moving.line_2.weight < 0.01 * still.line_2.weight
 
 
 def grasped(rho):

@@ -342,6 +342,31 @@ def test_the_mirrored_gripper_does_exactly_the_mirrored_thing(g, history, height
         assert (seen.wrist_force, seen.toppled) == (-y.wrist_force, y.toppled)
 
 
+@pytest.mark.parametrize("case", ["all at once", "compliance, free"])
+def test_the_mirrored_grasp_has_the_mirrored_bits(case):
+    """From free flight into a grasp, both fingers pressing."""
+    g = CASES[case]
+    image = replace(g, x_m=-g.x_m)
+    rows, _ = run(g, 5e-3)
+    seen, _ = run(image, 5e-3, tuple((t, f, -x) for t, f, x in CHANGES))
+    assert rows[:, 6:].min(1).max() > 0.5
+    assert np.array_equal(seen[:, [0, 1, 4, 5]], -rows[:, [0, 1, 4, 5]])
+    assert np.array_equal(seen[:, [2, 3]], rows[:, [2, 3]])
+    assert np.array_equal(seen[:, 6:], rows[:, :5:-1])
+
+
+@pytest.mark.parametrize(("force", "speed"), [(-3.0, 0.0), (0.0, 0.3), (0.0, -0.3)])
+def test_one_long_step_meets_the_contact_that_short_ones_do(force, speed):
+    """Whether the drive brings a finger there, or the wrist that swings and is told nothing new."""
+    p = replace(plant_of(NEAR), wrist=Wrist(1.0, 0.0))
+    x = tandem.initial_state(p, Inputs())
+    x = x._replace(body=x.body._replace(wrist=(0.0, speed)))
+    u = Inputs(force, 0.0)
+    fine = after(p, x, u, 2e-4, 600).body
+    assert fine.opening[1] > 0.05
+    assert tandem.step(p, x, u, 0.12).body.opening == pytest.approx(fine.opening, abs=2e-3)
+
+
 def test_at_the_start_all_rests_where_it_was_put():
     """The wrist in the middle of the fingertips, and as it was told."""
     p = Params(initial_position=(0.12, -0.1), wrist=Wrist(delay=0.05))
@@ -362,6 +387,7 @@ def test_a_push_near_the_top_topples_the_box_for_good():
     x = after(p, tandem.initial_state(p, Inputs()), Inputs(0.0, 0.12), 5e-3, 60)
     y = tandem.outputs(p, x, Inputs())
     assert (y.toppled, y.tilt > 0.0) == (True, True)
+    assert (x.body.box.v, x.body.box.w) == (0.0, 0.0)
     assert after(p, x, Inputs(-1.0, -0.1), 5e-3, 20).body.box == x.body.box
 
 
