@@ -101,11 +101,18 @@ def test_the_wrist_is_sent_no_further_than_the_fingertips_were(samples, h, speed
 
 
 @pytest.mark.parametrize("seen", [(0.0, 0.05), (0.05, 0.0)])
-def test_a_dead_sensor_sends_it_to_the_other_side_and_no_further(seen):
-    u = Inputs(intensity=seen)
-    trace = run(Params(), [u] * 2000)
-    assert abs(trace[-1][1].wrist_command) <= 0.11
-    assert trace[-1][1].wrist_command * (seen[0] - seen[1]) > 0.0
+def test_a_dead_sensor_sends_it_nowhere(seen):
+    """As it tells nothing of a middle."""
+    trace = run(Params(), [Inputs(intensity=seen)] * 2000)
+    assert abs(trace[-1][1].wrist_command) < 1e-3
+
+
+@pytest.mark.parametrize("dark", [0.1, 0.01])
+def test_dark_faces_are_no_further_than_the_fingers_are_apart(dark):
+    """Though they seem to be, by their light: d is half the opening at most, and l_0."""
+    u = Inputs(intensity=(0.03 * dark, 0.01 * dark))
+    y = tandem.outputs(SURE, tandem.initial_state(SURE, u), u)
+    assert y.target_position == pytest.approx(0.115 * np.tanh(0.5) / N, rel=1e-6)
 
 
 # How the wrist is sent there

@@ -29,7 +29,7 @@ def after(p, force, h, n, x=None):
     [
         (Drive(), -3.0, -3.0),
         (Drive(force_limit=2.0), -3.0, -2.0),
-        (Drive(force_limit=2.0), 5.0, 2.0),
+        (Drive(force_limit=0.5), 5.0, 0.5),
         (Drive(friction=0.5), -3.0, -2.5),
         (Drive(force_limit=2.0, friction=0.5), -3.0, -1.5),
         (Drive(friction=0.5), -0.5, 0.0),
