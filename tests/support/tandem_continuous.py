@@ -106,7 +106,6 @@ class Solution:
     states: np.ndarray
     forces: np.ndarray
     contact_time: tuple
-    accelerations: np.ndarray
 
 
 def solve(p, changes, times):
@@ -118,7 +117,7 @@ def solve(p, changes, times):
     due = [t + p.tau for t in starts]
     bounds = sorted({*starts, *due, times[-1]})
     modes, first = Modes(), [None, None]
-    states, forces, accelerations = [], [], []
+    states, forces = [], []
     times = np.asarray(times)
     for begin, end in pairwise(bounds):
         if begin >= times[-1]:
@@ -135,18 +134,17 @@ def solve(p, changes, times):
                     first[j] = t
             inside = times[(times >= t) & (times < part.t[-1])]
             for s in inside:
-                _record(p, modes, held, part.sol(s), states, forces, accelerations)
+                _record(p, modes, held, part.sol(s), states, forces)
             t, y = float(part.t[-1]), part.y[:, -1]
             fired = [len(met) > 0 for met in part.t_events]
     y = _passed(p, modes, held, y, fired)
-    _record(p, modes, held, y, states, forces, accelerations)
-    return Solution(np.array(states), np.array(forces), tuple(first), np.array(accelerations))
+    _record(p, modes, held, y, states, forces)
+    return Solution(np.array(states), np.array(forces), tuple(first))
 
 
-def _record(p, modes, held, y, states, forces, accelerations):
+def _record(p, modes, held, y, states, forces):
     states.append(np.array(y))
     forces.append(_forces(p, modes, held, State(*y)).n)
-    accelerations.append(_slope(p, modes, held, y)[1])
 
 
 def _until_event(p, modes, held, t, end, y):
