@@ -168,7 +168,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     pressed = holding.hold(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
     held = wrist_guidance.agreed(pressed, _imbalance(x.estimate, u))
     free = 1.0 - held
-    counted = free * wrist_guidance.alike(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
+    counted = free * wrist_guidance.steadiness(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
     floor = p.impact_reduction.intensity_floor
     low_pass = reflectance_ratio.low_pass(p.reflectance, h)
     line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, counted, low_pass)

@@ -27,7 +27,7 @@ colours are learnt an object of alpha = 0.3 seems 2.9 times as far: a loop up to
 SHORTEST_LAG = 0.06
 """s; a faster command gains nothing, as the grip takes 2 s, and follows every error of T."""
 
-ALIKE = 3.0
+STEADY = 3.0
 """Closing speed over the wrist's from which on both fingers move alike, as far as light and
 positions that are not in time with each other are concerned.
 """
@@ -91,13 +91,13 @@ def agreed(hold: float, rho: float) -> float:
     return hold * (1.0 - min(1.0, disagreement * disagreement))
 
 
-def alike(closing: float, moving: float) -> float:
+def steadiness(closing: float, moving: float) -> float:
     """How much of a point counts for a line while the grip closes and the wrist moves, in m/s.
 
     Positions that come late bend the line of a finger by how its speed changes. Only while the
     wrist is at rest both fingers' lines are bent alike, and their ratio stays.
     """
-    closed, moved = closing * closing, ALIKE * ALIKE * moving * moving
+    closed, moved = closing * closing, STEADY * STEADY * moving * moving
     return closed / (closed + moved) if moved > 0.0 else 1.0
 
 

@@ -172,7 +172,7 @@ def test_a_grasp_is_one_as_far_as_both_sensors_agree(hold, rho, agreed):
     [(0.0, 0.0, 1.0), (0.1, 0.0, 1.0), (0.0, 0.1, 0.0), (-0.3, 0.1, 0.5), (0.3, -0.3, 0.1)],
 )
 def test_points_count_as_far_as_the_wrist_is_slower_than_the_grip(closing, moving, alike):
-    assert wrist_guidance.alike(closing, moving) == pytest.approx(alike, abs=1e-12)
+    assert wrist_guidance.steadiness(closing, moving) == pytest.approx(alike, abs=1e-12)
 
 
 def test_half_a_grasp_is_half_of_the_force_on_each_finger():
