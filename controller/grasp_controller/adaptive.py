@@ -56,24 +56,22 @@ class Outputs(NamedTuple):
 def initial_state(p: Params, u: Inputs) -> State:
     """As the published law starts, with nothing learnt."""
     floor = p.impact_reduction.intensity_floor
-    (x_1, x_2), (xi_1, xi_2) = u.position, u.intensity
-    line_1 = reflectance_ratio.first_point(p.reflectance, floor, x_1, xi_1)
-    line_2 = reflectance_ratio.first_point(p.reflectance, floor, -x_2, xi_2)
+    line_1, line_2 = reflectance_ratio.first_points(p.reflectance, floor, u.position, u.intensity)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     return State(series.initial_state(p, u), line_1, line_2, estimate, 0.0, 0.0)
 
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance the virtual objects by h seconds (h > 0), the samples u held, and learn from them."""
-    (x_1, x_2), (v_1, v_2) = u.position, u.velocity
-    xi_1, xi_2 = u.intensity
+    v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     u_1, u_2 = series.outputs(p, x.layers, u).force
     held = holding.hold(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
     floor = p.impact_reduction.intensity_floor
-    free, low_pass = 1.0 - held, reflectance_ratio.low_pass(p.reflectance, h)
-    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, free, low_pass)
-    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, free, low_pass)
+    free, lines = 1.0 - held, (x.line_1, x.line_2)
+    line_1, line_2 = reflectance_ratio.both_moved(
+        p.reflectance, lines, floor, u.position, u.intensity, free, h
+    )
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     alike = reflectance_ratio.alike(estimate, u.intensity)
     f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)

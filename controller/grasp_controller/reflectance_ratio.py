@@ -143,6 +143,10 @@ class Line(NamedTuple):
     variance: float
 
 
+Lines = tuple[Line, Line]
+"""A line per finger: right, left."""
+
+
 class LowPass(NamedTuple):
     """T_f·x_f' = x - x_f by Euler backward: the share of a sample in x_f, and how many steps white
     noise stays alike in it, the sum of its autocorrelation.
@@ -222,6 +226,24 @@ def _travel(line: Line, at: float, y: float) -> float:
     dy = y - line.y
     seen = (dy if ds > 0.0 else -dy) * line.per_y
     return _clamped(seen, 0.0, way)
+
+
+def first_points(p: Params, floor: float, position: Pair, xi: Pair) -> Lines:
+    """The lines of fingers on one axis, right and left, at places in m that see xi in V."""
+    (x_1, x_2), (xi_1, xi_2) = position, xi
+    return first_point(p, floor, x_1, xi_1), first_point(p, floor, -x_2, xi_2)
+
+
+def both_moved(
+    p: Params, lines: Lines, floor: float, position: Pair, xi: Pair, believed: float, h: float
+) -> Lines:
+    """Those lines h seconds later, see moved()."""
+    (line_1, line_2), (x_1, x_2), (xi_1, xi_2) = lines, position, xi
+    filtered = low_pass(p, h)
+    return (
+        moved(p, line_1, floor, x_1, xi_1, believed, filtered),
+        moved(p, line_2, floor, -x_2, xi_2, believed, filtered),
+    )
 
 
 def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:

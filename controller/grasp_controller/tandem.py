@@ -145,9 +145,7 @@ class Outputs(NamedTuple):
 def initial_state(p: Params, u: Inputs) -> State:
     """Virtual opening and wrist as measured and at rest, so that nothing jumps at the start."""
     floor = p.impact_reduction.intensity_floor
-    (x_1, x_2), (xi_1, xi_2) = u.position, u.intensity
-    line_1 = reflectance_ratio.first_point(p.reflectance, floor, x_1, xi_1)
-    line_2 = reflectance_ratio.first_point(p.reflectance, floor, -x_2, xi_2)
+    line_1, line_2 = reflectance_ratio.first_points(p.reflectance, floor, u.position, u.intensity)
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     middle = _middle(u)
     target = wrist_guidance.within(
@@ -163,16 +161,16 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance virtual opening and wrist by h seconds (h > 0), the samples u held, and learn."""
-    (x_1, x_2), (v_1, v_2), (xi_1, xi_2) = u.position, u.velocity, u.intensity
+    v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     pressed = holding.hold(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
     held = wrist_guidance.agreed(pressed, _imbalance(x.estimate, u))
     free = 1.0 - held
     counted = free * wrist_guidance.steadiness(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
-    floor = p.impact_reduction.intensity_floor
-    low_pass = reflectance_ratio.low_pass(p.reflectance, h)
-    line_1 = reflectance_ratio.moved(p.reflectance, x.line_1, floor, x_1, xi_1, counted, low_pass)
-    line_2 = reflectance_ratio.moved(p.reflectance, x.line_2, floor, -x_2, xi_2, counted, low_pass)
+    floor, lines = p.impact_reduction.intensity_floor, (x.line_1, x.line_2)
+    line_1, line_2 = reflectance_ratio.both_moved(
+        p.reflectance, lines, floor, u.position, u.intensity, counted, h
+    )
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     rho = _imbalance(estimate, u)
     target = wrist_guidance.within(_middle(u) + _way(p, u, line_1, line_2, rho), x.fingertips)
