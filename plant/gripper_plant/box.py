@@ -39,11 +39,14 @@ FloorFriction: TypeAlias = Annotated[
 
 
 class Standing:
-    """Of parameters of a box: the fingertips are at its height."""
+    """Of parameters of a box on its floor: the fingertips are at its height."""
 
     if TYPE_CHECKING:  # declared, and so ordered, where the parameters are
+        object_width: float
+        object_mass: float
         object_height: float
         contact_height: float
+        floor_friction: float
 
     def __post_init__(self) -> None:
         if self.contact_height > self.object_height:
@@ -119,7 +122,7 @@ class Pushes(NamedTuple):
     right: float
 
 
-def shape(p: Params) -> Shape:
+def shape(p: Standing) -> Shape:
     """The box and its floor as the parameters have them."""
     return Shape(
         0.5 * p.object_width,

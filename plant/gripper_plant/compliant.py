@@ -5,7 +5,6 @@ Card: plant/README.md
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Annotated, NamedTuple
 
 from block_variables import Output, Parameter
@@ -23,7 +22,7 @@ ITERATIONS = 8
 
 
 @dataclass(frozen=True)
-class Params(fingers.Params):
+class Params(fingers.Params, contact_laws.Giving):
     """A paper cup: the grasp of 3.1 N takes 6 mm of it, and 10 mm are too much."""
 
     kelvin_voigt: KelvinVoigt = KelvinVoigt()
@@ -34,11 +33,6 @@ class Params(fingers.Params):
             "squeeze above which the object is damaged", unit="m", low=0.0, high=10.0, tunable=True
         ),
     ] = 0.01
-
-    @cached_property
-    def law(self) -> contact_laws.Law:
-        """The contact law that is chosen."""
-        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
 
 
 class State(NamedTuple):

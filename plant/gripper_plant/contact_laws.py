@@ -5,9 +5,10 @@ lambda = 0 or c = 0. Card: plant/README.md
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pow as power
 from math import sqrt
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from block_variables import Group, Parameter
 
@@ -64,6 +65,19 @@ def law(kelvin_voigt: KelvinVoigt, hunt_crossley: HuntCrossley) -> Law:
     if hunt_crossley.enabled:
         return hunt_crossley.stiffness, hunt_crossley.exponent, 0.0, hunt_crossley.damping
     return kelvin_voigt.stiffness, 1.0, kelvin_voigt.damping, 0.0
+
+
+class Giving:
+    """Of parameters of an object that gives."""
+
+    if TYPE_CHECKING:  # declared, and so ordered, where the parameters are
+        kelvin_voigt: KelvinVoigt
+        hunt_crossley: HuntCrossley
+
+    @cached_property
+    def law(self) -> Law:
+        """The contact law that is chosen."""
+        return law(self.kelvin_voigt, self.hunt_crossley)
 
 
 def rate(law: Law, deepest: float, m: float) -> float:

@@ -34,7 +34,7 @@ else:
 
 
 @dataclass(frozen=True)
-class Params(hand_fingers.Params):
+class Params(hand_fingers.Params, contact_laws.Giving):
     """A light object, which 0.15 N shift and 3 mN.m turn, with the walls of movable.py."""
 
     face_length: Annotated[
@@ -72,11 +72,6 @@ class Params(hand_fingers.Params):
     ] = 0.02
     kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
     hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
-
-    @cached_property
-    def law(self) -> contact_laws.Law:
-        """The contact law that is chosen."""
-        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
 
     @cached_property
     def drag(self) -> float:

@@ -23,16 +23,11 @@ ITERATIONS = 16
 
 
 @dataclass(frozen=True)
-class Params(standing.Params):
+class Params(standing.Params, contact_laws.Giving):
     """Walls ten times as stiff as those of the paper cup in compliant.py: the box moves instead."""
 
     kelvin_voigt: KelvinVoigt = KelvinVoigt(stiffness=10000.0, damping=20.0)
     hunt_crossley: HuntCrossley = HuntCrossley(stiffness=200000.0)
-
-    @cached_property
-    def law(self) -> contact_laws.Law:
-        """The contact law that is chosen."""
-        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
 
     @cached_property
     def lightest(self) -> float:

@@ -38,7 +38,7 @@ NOWHERE = fingers.UNRESOLVED
 
 
 @dataclass(frozen=True)  # no slots: what is worked out from the parameters is kept
-class Params(fingers.Place, standing.Standing):
+class Params(fingers.Place, standing.Standing, contact_laws.Giving):
     """The paper's fingers, object and start, and the box of movable.py, on an arm of 5 Hz."""
 
     moving_mass: Annotated[
@@ -74,18 +74,7 @@ class Params(fingers.Place, standing.Standing):
     @cached_property
     def shape(self) -> Shape:
         """The box and its floor."""
-        return Shape(
-            0.5 * self.object_width,
-            0.5 * self.object_height,
-            self.object_mass,
-            self.floor_friction,
-            self.contact_height,
-        )
-
-    @cached_property
-    def law(self) -> contact_laws.Law:
-        """The contact law that is chosen."""
-        return contact_laws.law(self.kelvin_voigt, self.hunt_crossley)
+        return standing.shape(self)
 
     @cached_property
     def lightest(self) -> float:
