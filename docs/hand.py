@@ -152,10 +152,7 @@ def _gripper(k: int, title: str, run: Result) -> Iterator[Part]:
     for j, touch in zip(FINGERS, run.metrics["time_to_contact"], strict=True):
         x = 0 if j == 1 else -NARROW
         number = _text(x + NARROW / 2, BEAM + 62, str(j), "on middle")
-        finger = (
-            f'<rect x="{x}" y="{BEAM + 9}" width="{NARROW}" height="102" rx="3" '
-            f'fill="var(--finger{j})"/>{number}'
-        )
+        finger = _rect(x, BEAM + 9, NARROW, 102, j) + number
         yield _moved(f"g{k}{j}", finger, time, place[j])
         when = "never" if touch is None else f"{touch:.2f} s"
         label = _text(place[j][-1], floor + 20, when, "" if j == 1 else "end")

@@ -71,7 +71,7 @@ def _in_tandem(system: System, controller: str, fmu: Path, place: str) -> System
     On the way from one to the other that input has a value, so that it has a source at all times.
     """
     measured = Port(controller, WRIST_FORCE)
-    source = Port(resolved("plant.", system.roles)[:-1], WRIST_FORCE)
+    source = Port(system.roles.get("plant", "plant"), WRIST_FORCE)
     held = system
     if any(c.target == measured for c in system.connections):
         held = _with_source(system, measured, 0.0)

@@ -1,16 +1,16 @@
 """Metrics of a gripper in tandem: those of the grasp, and two of its wrist; what is noted of it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..grasp.metrics import METRICS as OF_GRASP
 from ..grasp.metrics import is_grasp
 from ..grasp.presets import start_in_si
-from ..metrics.metric import Signals, metric, resolved
+from ..metrics.metric import Signals, metric
 
 LONGEST_LAG = 0.165
 """s, 2/omega + tau of a wrist that is in the middle before the grip arrives: 2 Hz, or 3 Hz with
@@ -50,48 +50,73 @@ def is_tandem(signals: Signals) -> bool:
     return is_grasp(signals) and WRIST in signals
 
 
+class Known(NamedTuple):
+    """What a system says of its wrist, as it is and as its law counts on it; None where it does
+    not: natural frequencies in Hz, delays in s.
+    """
+
+    bandwidth: float | None
+    delay: float | None
+    counted_bandwidth: float | None
+    counted_delay: float | None
+
+
 def check(system: Any) -> tuple[str, ...]:
     """What is to be noted of a system's wrist: where the law counts on another one, or it is slow.
 
     Nothing is said of a plant or a controller of others, which has other parameters.
     """
-    names = {role: resolved(f"{role}.", system.roles)[:-1] for role in ("plant", "controller")}
+    names = {role: system.roles.get(role, role) for role in ("plant", "controller")}
+    plant, controller = names.values()
     variables = {c.name: c.interface.by_name for c in system.components}
-
-    def given(role: str, parameter: str) -> float | None:
-        there = parameter in variables.get(names[role], ())
-        return start_in_si(system, f"{role}.{parameter}") if there else None
-
-    def label(role: str, parameter: str, unit: str) -> str:
-        return f"{names[role]}.{parameter} = {given(role, parameter):g} {unit}"
-
-    bandwidth, counted_on = (
-        given("plant", "wrist.bandwidth"),
-        given("controller", "wrist.bandwidth"),
+    there = [
+        start_in_si(system, f"{role}.{parameter}") if parameter in variables.get(name, ()) else None
+        for role, name in names.items()
+        for parameter in ("wrist.bandwidth", "wrist.delay")
+    ]
+    known = Known(*there)
+    published = "wrist_force" in variables.get(controller, ())
+    return (
+        *_slow(controller, known),
+        *_otherwise(plant, controller, known),
+        *(_not_following(plant, known) if published else ()),
     )
-    delay, expected = given("plant", "wrist.delay"), given("controller", "wrist.delay")
-    notes = []
-    lag = 1.0 / (pi * counted_on) + expected if counted_on and expected is not None else 0.0
+
+
+def _slow(controller: str, known: Known) -> Iterator[str]:
+    """A wrist that is in the middle after the grip, as far as the law knows."""
+    bandwidth, delay = known.counted_bandwidth, known.counted_delay
+    if bandwidth is None or delay is None:
+        return
+    lag = 1.0 / (pi * bandwidth) + delay
     if lag > LONGEST_LAG:
-        notes.append(
-            f"{label('controller', 'wrist.bandwidth', 'Hz')}, delay = {expected:g} s: the wrist "
+        yield (
+            f"{controller}.wrist.bandwidth = {bandwidth:g} Hz, delay = {delay:g} s: the wrist "
             f"lags by {lag:.3g} s, and one finger may touch before it is in the middle; up to "
             f"{LONGEST_LAG:g} s both touch at once"
         )
-    if bandwidth is not None and counted_on is not None and bandwidth < counted_on:
-        notes.append(
-            f"{label('plant', 'wrist.bandwidth', 'Hz')}: the law counts on more, "
-            f"{label('controller', 'wrist.bandwidth', 'Hz')}"
+
+
+def _otherwise(plant: str, controller: str, known: Known) -> Iterator[str]:
+    """A wrist that is slower, or later, than the law counts on."""
+    hz, counted_hz = known.bandwidth, known.counted_bandwidth
+    if hz is not None and counted_hz is not None and hz < counted_hz:
+        yield (
+            f"{plant}.wrist.bandwidth = {hz:g} Hz: the law counts on more, "
+            f"{controller}.wrist.bandwidth = {counted_hz:g} Hz"
         )
-    if delay is not None and expected is not None and delay > expected:
-        notes.append(
-            f"{label('plant', 'wrist.delay', 's')}: the law counts on less, "
-            f"{label('controller', 'wrist.delay', 's')}"
+    delay, counted_delay = known.delay, known.counted_delay
+    if delay is not None and counted_delay is not None and delay > counted_delay:
+        yield (
+            f"{plant}.wrist.delay = {delay:g} s: the law counts on less, "
+            f"{controller}.wrist.delay = {counted_delay:g} s"
         )
-    published = "wrist_force" in variables.get(names["controller"], ())
-    if published and bandwidth is not None and bandwidth < FOLLOWING:
-        notes.append(
-            f"{label('plant', 'wrist.bandwidth', 'Hz')}: the published law wants a wrist of "
+
+
+def _not_following(plant: str, known: Known) -> Iterator[str]:
+    """A wrist that is too slow for the published law."""
+    if known.bandwidth is not None and known.bandwidth < FOLLOWING:
+        yield (
+            f"{plant}.wrist.bandwidth = {known.bandwidth:g} Hz: the published law wants a wrist of "
             f"{FOLLOWING:g} Hz; GraspControllerTandem is for slower ones"
         )
-    return tuple(notes)

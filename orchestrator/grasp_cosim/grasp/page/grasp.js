@@ -100,15 +100,19 @@ class Grasp {
   target(pen, x, t) {
     if (!this.plan.target) return;
     const at = x(this.at(this.plan.target, t));
+    this.targetLine(pen, at, MIDDLE - TALL / 2 - 8);
+    pen.textAlign = "center";
+    pen.fillText("target", at, MIDDLE - TALL / 2 - 18);
+  }
+
+  targetLine(pen, at, top) { // from a height down to the floor
     pen.strokeStyle = pen.fillStyle = color("--ink");
     pen.setLineDash([4, 4]);
     pen.beginPath();
-    pen.moveTo(at, MIDDLE - TALL / 2 - 8);
+    pen.moveTo(at, top);
     pen.lineTo(at, FLOOR);
     pen.stroke();
     pen.setLineDash([]);
-    pen.textAlign = "center";
-    pen.fillText("target", at, MIDDLE - TALL / 2 - 18);
   }
 
   finger(pen, face, j) {

@@ -3,22 +3,11 @@
 const BEAM = 30, DEEP = 12, ARM = 26; // px: top and height of the beam, width of the arm
 
 class Tandem extends Grasp {
-  axis(pen, x, width, scale) {
-    super.axis(pen, x, width, scale);
-    this.x = x; // of this drawing
-  }
-
   target(pen, x, t) { // the arm is where a grasp has its label
     this.wrist(pen, x, t);
     if (!this.plan.target) return;
     const at = x(this.at(this.plan.target, t));
-    pen.strokeStyle = pen.fillStyle = color("--ink");
-    pen.setLineDash([4, 4]);
-    pen.beginPath();
-    pen.moveTo(at, BEAM + DEEP);
-    pen.lineTo(at, FLOOR);
-    pen.stroke();
-    pen.setLineDash([]);
+    this.targetLine(pen, at, BEAM + DEEP);
     pen.textAlign = "left";
     pen.fillText("target", at + 6, FLOOR - 9);
   }
