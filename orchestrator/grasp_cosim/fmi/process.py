@@ -444,17 +444,23 @@ class _Worker:
             step = float(self._shared.step[0])
             if step != self._step:
                 self._step, self._advance = step, self._instance.stepper(self._shared.clock, step)
-            status = self._advance.python()
+            status = self._made(self._advance)
         if status <= WARNING or status == EARLY:
             for call in self._outputs:
-                self._check(call.python())
+                self._check(self._made(call))
+        return status
+
+    def _made(self, call: Call) -> int:
+        """The status of a call; a fork that the FMU made in it has nothing to do with our memory."""
+        status = call.python()
+        end_fork(self._owner)
         return status
 
     def _pass_on(self) -> None:
         for pending, call in self._inputs:
             if pending[0]:
                 pending[0] = False
-                self._check(call.python())
+                self._check(self._made(call))
 
     def _check(self, status: int) -> None:
         if status > WARNING:
