@@ -451,7 +451,7 @@ class _Worker:
         return status
 
     def _made(self, call: Call) -> int:
-        """The status of a call; a fork that the FMU made in it ends before it touches our memory."""
+        """The status of a call; a fork that the FMU made in it ends, and writes nothing."""
         status = call.python()
         end_fork(self._owner)
         return status
