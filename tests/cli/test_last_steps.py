@@ -18,9 +18,9 @@ CRASH = "abort()"
 FILE = '[experiment]\nstep = 0.1\nstop = 1.0\n[components.a]\nfmu = "talker.fmu"\n'
 
 
-def run(folder, *arguments, isolation="none"):
-    """The command in that folder; what it prints, and its exit code."""
-    (folder / "talk.toml").write_text(f'{FILE}isolation = "{isolation}"\n', "utf-8")
+def run(folder, *arguments, isolation="none", other=""):
+    """The command in that folder; what it prints, and its exit code. other is more of the file."""
+    (folder / "talk.toml").write_text(f'{FILE}isolation = "{isolation}"\n{other}', "utf-8")
     command = [sys.executable, "-m", "grasp_cosim", "run", "talk.toml", *arguments]
     return subprocess.run(
         command, cwd=folder, env=os.environ, capture_output=True, text=True, timeout=120
@@ -93,3 +93,17 @@ def test_a_fork_that_comes_back_does_nothing(tmp_path, where, isolation):
     assert json.loads(done.stdout)["complete"] is True
     check_whole(tmp_path / "out")
     assert len(Path(tmp_path, "out/signals.csv").read_text().splitlines()) == 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("isolation", ["none", "process"])
+def test_a_fork_that_comes_back_late_writes_no_values(tmp_path, isolation):
+    """Both ends of the memory that is shared with the process of an FMU: neither is the fork's."""
+    talker(tmp_path, "-DAT_STEP=if (!fork()) usleep(300)")
+    talker(tmp_path, name="other")
+    other = '[components.b]\nfmu = "other.fmu"\nisolation = "process"\n'
+    done = run(tmp_path, "--step", "0.01", "--stop", "2", "--out", "out", isolation=isolation, other=other)
+    assert (done.returncode, done.stderr) == (0, "")
+    result = load_run(tmp_path / "out")
+    assert result["a.y"] == pytest.approx(result.time)
+    assert result["b.y"] == pytest.approx(result.time)

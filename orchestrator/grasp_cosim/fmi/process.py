@@ -250,6 +250,7 @@ class ProcessInstance:
             self._inputs.bind(variables, data)
 
         def put() -> int:
+            end_fork(self._owner)  # of an FMU in this process; the memory is not its own
             self._fresh = False
             shared[:] = data
             pending[0] = True
@@ -267,6 +268,7 @@ class ProcessInstance:
         shared = self._shared
 
         def advance() -> int:
+            end_fork(self._owner)
             shared.clock[:] = clock
             shared.step[0] = step
             return self._pass_values(STEP)
