@@ -102,7 +102,8 @@ def test_a_fork_that_comes_back_late_writes_no_values(tmp_path, isolation):
     talker(tmp_path, "-DAT_STEP=if (!fork()) usleep(300)")
     talker(tmp_path, name="other")
     other = '[components.b]\nfmu = "other.fmu"\nisolation = "process"\n'
-    done = run(tmp_path, "--step", "0.01", "--stop", "2", "--out", "out", isolation=isolation, other=other)
+    more = ("--step", "0.01", "--stop", "2", "--out", "out")
+    done = run(tmp_path, *more, isolation=isolation, other=other)
     assert (done.returncode, done.stderr) == (0, "")
     result = load_run(tmp_path / "out")
     assert result["a.y"] == pytest.approx(result.time)
