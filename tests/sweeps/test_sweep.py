@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 from grasp_cosim import InputError, System, metric, sweep
 from grasp_cosim.metrics.metric import load_metrics
@@ -126,6 +127,12 @@ def test_what_is_refused_before_any_run(system, mine, tmp_path):
             sweep(system, rows, metrics=mine, **more)
     with pytest.raises(InputError, match="has no metric"):
         sweep(system, [{"a.gain": 1.0}])
+
+
+def test_a_filtered_frame_gets_the_result_of_each_row(system, mine):
+    frame = pd.DataFrame({"a.gain": [1.0, 2.0, 3.0, 4.0]}).query("`a.gain` % 2 == 0")
+    joined = frame.join(sweep(system, frame, metrics=mine, workers=1).to_pandas()[["end"]])
+    assert joined["end"].tolist() == pytest.approx([0.4, 0.8], rel=1e-12)
 
 
 def test_a_row_that_does_not_fit_is_an_error_of_its_own(system, mine):

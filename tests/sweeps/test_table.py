@@ -5,8 +5,10 @@ from fractions import Fraction
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import xarray as xr
 from grasp_cosim import InputError
 from grasp_cosim.metrics.metric import metric
 from grasp_cosim.sweeps.rows import as_rows, grid, settings_of, unit_of, varied
@@ -267,3 +269,84 @@ def test_a_row_that_does_not_fit_is_refused(grasp):
     ):
         with pytest.raises(InputError, match=said):
             settings_of(grasp, [row])
+
+
+FRAME = pd.DataFrame({"a.p": [1.5, 2.5], "experiment.scheme": ["jacobi", None]})
+
+
+class Polars:
+    """What polars has of a frame."""
+
+    def to_dicts(self):
+        return pa.Table.from_pandas(FRAME).to_pylist()
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        FRAME,
+        Polars(),
+        pa.Table.from_pandas(FRAME, preserve_index=False),
+        np.array([(1.5, "jacobi"), (2.5, "")], [("a.p", "f8"), ("experiment.scheme", "U8")]),
+        {"a.p": (v for v in (1.5, 2.5)), "experiment.scheme": np.array(["jacobi", ""])},
+    ],
+    ids=["pandas", "polars", "pyarrow", "structured", "columns"],
+)
+def test_rows_are_those_of_any_table(given):
+    rows = as_rows(given)
+    assert rows == [{"a.p": 1.5, "experiment.scheme": "jacobi"}, {"a.p": 2.5}]
+    assert [type(row["a.p"]) for row in rows] == [float, float]
+
+
+def test_the_coordinates_of_a_dataset_vary_too():
+    data = xr.Dataset({"b.q": ("a.p", [1.0, 2.0])}, {"a.p": [3.0, 4.0]})
+    assert as_rows(data) == [{"a.p": 3.0, "b.q": 1.0}, {"a.p": 4.0, "b.q": 2.0}]
+
+
+@pytest.mark.parametrize("one", [0.5, "jacobi", np.float64(0.5), np.array(0.5), True])
+def test_a_value_beside_lists_is_that_of_each_row(one):
+    plain = one.tolist() if isinstance(one, np.ndarray | np.generic) else one
+    assert as_rows({"a": one, "b": [1, 2]}) == [{"a": plain, "b": 1}, {"a": plain, "b": 2}]
+    assert as_rows({"a": one}) == [{"a": plain}]
+    assert grid({"a": one, "b": (1, 2)}) == as_rows({"a": one, "b": [1, 2]})
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"a": [1, 2, 3], "b": [1, 2]}, "a has 3 values, b has 2 values; must all have as many"),
+        ([{"a": 1.0}, 2.0], r"row 1 = 2.0: must be rows, mappings of places to values, or columns"),
+        (np.zeros((2, 2)), r"row 0 = array\(\[0\., 0\.\]\): must be rows"),
+        (1.0, r"rows = 1.0: must be rows"),
+        (None, r"rows = None: must be rows"),
+        (pd.DataFrame([[1.0]]), "0: must be a place in the system, a text"),
+        (pd.Series({"a": 1.0}), "a Series; must be a DataFrame"),
+    ],
+)
+def test_what_is_no_rows_is_said_in_a_line(given, said):
+    with pytest.raises(InputError, match=f"^sweep: {said}[^\n]*$"):
+        as_rows(given)
+
+
+@pytest.mark.parametrize(
+    ("index", "in_a_file"),
+    [
+        (pd.Index([6, 2], name="run"), [6, 2]),
+        (pd.Index(["left", "right"]), ["left", "right"]),
+        (pd.MultiIndex.from_tuples([(1, "a"), (2, "b")]), [0, 1]),
+    ],
+    ids=["numbers", "texts", "several"],
+)
+def test_runs_come_back_under_the_index_of_the_frame(index, in_a_file):
+    outcomes = [Outcome(0, {"late": True}), Outcome(1, {}, "a: failed")]
+    table = made([{"a.p": 1.5}, {"a.p": 2.5}], outcomes, {"a.p": "N"}, [], index)
+    found = table.to_pandas()
+    pd.testing.assert_index_equal(found.index, index)
+    assert found.attrs["units"]["a.p"] == "N"
+    assert table.columns["index"] == in_a_file
+    assert table.errors == {1: "a: failed"}
+
+
+def test_a_cell_of_pandas_that_is_not_there_leaves_the_system_its_value():
+    frame = pd.DataFrame({"a": pd.array([1, None], "Int64"), "b": [pd.NaT, 2.0]})
+    assert as_rows(frame) == [{"a": 1}, {"b": 2.0}]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from ..base.checks import point_advice
 from ..base.errors import InputError
 from ..base.si_units import known_unit
+from ..base.text import counted, on_one_line
 from ..interface.interface import Value
 from ..interface.units import IDENTITY, Conversion
 from ..system.description import System
@@ -32,12 +34,20 @@ TIMES = tuple(f"experiment.{key}" for key in ("start", "step", "stop"))
 MOST = 100_000
 """Runs of a sweep at most."""
 
+FEW = 60
+"""Characters of a value in a message."""
+
+ROWS = "must be rows, mappings of places to values, or columns by place, or a data frame"
+
 FORM = "PLACE=START:END:COUNT or PLACE=VALUE,VALUE,..."
 
 
-def grid(varied: Mapping[str, Iterable[Value]]) -> list[dict[str, Value]]:
-    """A row for every combination of the values of each place; the last place varies fastest."""
-    values = [list(each) for each in varied.values()]
+def grid(varied: Mapping[str, Iterable[Value] | Value]) -> list[dict[str, Value]]:
+    """A row for every combination of the values of each place; the last place varies fastest.
+
+    A single value is that of each row.
+    """
+    values = [_values(each) for each in varied.values()]
     return [dict(zip(varied, row, strict=True)) for row in itertools.product(*values)]
 
 
@@ -65,28 +75,91 @@ def varied(text: str) -> tuple[str, list[Value]]:
 
 
 def as_rows(given: Any) -> list[dict[str, Value]]:
-    """The rows of a table, read or in a file, of columns by place, of a DataFrame, or of rows.
+    """The rows of a table, read or in a file, of columns by place, of a data frame, or of rows.
 
-    A cell that is None, NaN or empty leaves that place as the system has it. InputError where
-    nothing varies, or there are more than MOST rows.
+    A data frame is one of pandas or polars, a table of pyarrow, a structured array of NumPy, or a
+    Dataset of xarray. Beside columns a single value is that of each row. A cell that is None, NaN
+    or empty leaves that place as the system has it. InputError where these are no rows, nothing
+    varies, or there are more than MOST.
     """
     if isinstance(given, str | Path):
         given = read_rows(Path(given))
-    if isinstance(given, Table):
-        rows = _rows_in(given)
-    elif hasattr(given, "to_dict"):
-        rows = given.to_dict("records")
-    elif isinstance(given, Mapping):
-        columns = [list(column) for column in given.values()]
-        rows = [dict(zip(given, row, strict=True)) for row in zip(*columns, strict=True)]
-    else:
-        rows = [dict(row) for row in given]
+    rows = [*map(_row, count(), _listed(given))]
     if not 1 <= len(rows) <= MOST:
         raise InputError(f"sweep: {len(rows)} rows; must be 1 to {MOST}")
     if not any(rows):
         raise InputError("sweep: nothing varies; the rows must have at least one column")
-    plain_rows = [{place: _plain(place, value) for place, value in row.items()} for row in rows]
-    return [{k: value for k, value in row.items() if value is not None} for row in plain_rows]
+    return rows
+
+
+def labels_of(given: Any) -> Any:
+    """The index of a pandas DataFrame, under which the runs come back; None of other rows."""
+    return given.index if hasattr(given, "iloc") else None
+
+
+def _listed(given: Any) -> Iterable[Any]:
+    """What should be rows, of whatever has them."""
+    if isinstance(given, Table):
+        return _rows_in(given)
+    if hasattr(given, "to_dataframe"):  # a Dataset of xarray, whose coordinates vary as well
+        given = given.to_dataframe().reset_index()
+    if hasattr(given, "to_dicts"):
+        return given.to_dicts()  # type: ignore[no-any-return]  # of polars
+    if hasattr(given, "to_pylist"):
+        return given.to_pylist()  # type: ignore[no-any-return]  # of pyarrow
+    if hasattr(given, "iloc"):  # of pandas
+        if given.ndim == 1:
+            raise InputError("sweep: a Series; must be a DataFrame, with a column for each place")
+        return given.to_dict("records")  # type: ignore[no-any-return]
+    if names := getattr(getattr(given, "dtype", None), "names", None):
+        return [dict(zip(names, row, strict=True)) for row in given.ravel().tolist()]
+    if isinstance(given, Mapping):
+        return _of_columns(given)
+    if isinstance(given, Iterable):
+        return given
+    raise InputError(f"sweep: rows = {_short(given)}: {ROWS}")
+
+
+def _of_columns(given: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The rows of columns by place, a single value being that of each row."""
+    columns = {place: _values(column) for place, column in given.items()}
+    long = {place: len(columns[place]) for place in columns if not _single(given[place])}
+    if len({*long.values()}) > 1:
+        said = ", ".join(f"{place} has {counted(n, 'value')}" for place, n in long.items())
+        raise InputError(f"sweep: {said}; must all have as many, or a single one")
+    length = next(iter(long.values()), 1)
+    whole = [columns[place] if place in long else columns[place] * length for place in columns]
+    return [dict(zip(columns, row, strict=True)) for row in zip(*whole, strict=True)]
+
+
+def _single(given: Any) -> bool:
+    """True for one value, where several may be, too."""
+    listed = isinstance(given, Iterable) and not isinstance(given, str)
+    return not listed or getattr(given, "ndim", 1) == 0
+
+
+def _values(given: Any) -> list[Any]:
+    """The values of a column, or the single one."""
+    return [given] if _single(given) else list(given)
+
+
+def _row(number: int, given: Any) -> dict[str, Value]:
+    """A row by place, without the places that it leaves; InputError where it is none."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"sweep: row {number} = {_short(given)}: {ROWS}")
+    row = {}
+    for place, value in given.items():
+        if not isinstance(place, str):
+            raise InputError(f"sweep: {place!r}: must be a place in the system, a text")
+        if (found := _plain(place, value)) is not None:
+            row[place] = found
+    return row
+
+
+def _short(value: Any) -> str:
+    """A value in a message."""
+    text = on_one_line(repr(value))
+    return f"{text[:FEW]}..." if len(text) > FEW else text
 
 
 def read_rows(path: Path) -> Table:
@@ -180,8 +253,10 @@ def _to_si(column: Column) -> Conversion:
 
 def _plain(place: str, value: Any) -> Value | None:
     """A value without NumPy's types, a time like "1/30" in s; None where there is none."""
-    plain_value = value.item() if isinstance(value, np.generic) else value
-    if plain_value is None or plain_value == "" or plain_value != plain_value:
+    plain_value = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    if type(plain_value).__name__ == "NAType" or plain_value is None or plain_value == "":
+        return None
+    if plain_value != plain_value:
         return None
     is_fraction = isinstance(plain_value, Fraction) or "/" in str(plain_value)
     if is_fraction and place in TIMES:

@@ -36,7 +36,7 @@ from ..recording.memory import writing
 from ..recording.result import Result
 from ..system.description import System
 from ..system.settings import settings
-from .rows import Row, as_rows, check_units, read_rows, settings_of, unit_of
+from .rows import Row, as_rows, check_units, labels_of, read_rows, settings_of, unit_of
 from .table import Outcome, Table, check_format, made
 
 AHEAD = 100
@@ -66,12 +66,14 @@ def sweep(
     """Run the system once for each row, and return a table of rows and metrics.
 
     rows are mappings of places, as with_settings() has them, to values in SI units; or columns by
-    place, a pandas DataFrame, or the path of a table. metrics are worked out beside those of the
-    system. The table is written to `out`, a .csv or .parquet file; until all are done, finished
-    runs are kept beside it, and the same call goes on. workers are processes here, by default one
-    for each processor; an executor of concurrent.futures takes their place, and gets the FMUs. The
-    table is the same to the bit in each case; a run that fails is an error in its row. native is as
-    of System.natively().
+    place, where a single value is that of each row; or a data frame, as of as_rows(); or the path
+    of a table. The index of a pandas DataFrame is that of the table's to_pandas().
+
+    metrics are worked out beside those of the system. The table is written to `out`, a .csv or
+    .parquet file; until all are done, finished runs are kept beside it, and the same call goes on.
+    workers are processes here, by default one for each processor; an executor of concurrent.futures
+    takes their place, and gets the FMUs. The table is the same to the bit in each case; a run that
+    fails is an error in its row. native is as of System.natively().
 
     InputError where the rows do not fit the system, nothing would be measured, or `out` has runs of
     something else; SimulationError where processes do not start or a run cannot be kept;
@@ -109,7 +111,8 @@ def sweep(
                     keep(store, outcome)
                 done[outcome.index] = outcome
                 bar.update()
-        table = made(rows_in_si, [done[i] for i in range(len(rows_in_si))], units, measured)
+        outcomes = [done[i] for i in range(len(rows_in_si))]
+        table = made(rows_in_si, outcomes, units, measured, labels_of(rows))
         if file:
             table.write(file)
     return table

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -69,6 +69,8 @@ class Table:
     units: Mapping[str, str | None]
     measured: tuple[Metric, ...] = ()
     """The metrics whose columns there are."""
+    labels: Any = field(default=None, compare=False, repr=False)
+    """The index of the pandas DataFrame whose rows these are; None of other rows."""
 
     def __len__(self) -> int:
         return len(self.columns["index"])
@@ -114,11 +116,15 @@ class Table:
         return found
 
     def to_pandas(self) -> pd.DataFrame:
-        """The table as a DataFrame, with the units in its `attrs`; InputError without pandas."""
+        """The table as a DataFrame, under the index of the one whose rows these are, if it is one.
+
+        The units are in its `attrs`. InputError without pandas.
+        """
         pandas = extra_module("pandas", "it holds tables", "pandas")
         frame = pandas.DataFrame({name: list(values) for name, values in self.columns.items()})
         frame.attrs["units"] = dict(self.units)
-        return frame.set_index("index")
+        numbered: pd.DataFrame = frame.set_index("index")
+        return numbered if self.labels is None else numbered.set_axis(self.labels)
 
     def write(self, path: str | Path) -> None:
         """Write CSV, or Parquet by its suffix, in one piece; equal tables make equal bytes.
@@ -155,11 +161,15 @@ def made(
     outcomes: Sequence[Outcome],
     units: Mapping[str, str | None],
     metrics: Sequence[Metric],
+    labels: Any = None,
 ) -> Table:
-    """The table of rows and what came of each; `units` are those of the places that vary."""
+    """The table of rows and what came of each; `units` are those of the places that vary.
+
+    `labels` are as those of a Table; where they are whole numbers or texts, `index` has them.
+    """
     varied = tuple(dict.fromkeys(place for row in rows for place in row))
     measured = tuple(dict.fromkeys(name for o in outcomes for name in o.metrics))
-    columns: dict[str, Sequence[Any]] = {"index": [o.index for o in outcomes]}
+    columns: dict[str, Sequence[Any]] = {"index": _index(labels, len(rows))}
     columns |= {place: [row.get(place) for row in rows] for place in varied}
     columns |= {name: [o.metrics.get(name) for o in outcomes] for name in measured}
     if any(o.ended_at is not None for o in outcomes):
@@ -168,7 +178,14 @@ def made(
     columns["error"] = [o.error for o in outcomes]
     of_metrics = {m.name: m.unit for m in metrics}
     found = {name: of_metrics.get(name.partition("[")[0]) for name in measured}
-    return Table(columns, varied, measured, {**units, **found}, tuple(metrics))
+    return Table(columns, varied, measured, {**units, **found}, tuple(metrics), labels)
+
+
+def _index(labels: Any, count: int) -> Sequence[Any]:
+    """What a file has of the labels; the numbers of the rows, where it cannot have them."""
+    listed = [] if labels is None else labels.tolist()
+    kinds = {type(label) for label in listed}
+    return listed if kinds in ({int}, {str}) else list(range(count))
 
 
 def check_format(path: Path) -> None:
