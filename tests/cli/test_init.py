@@ -111,6 +111,14 @@ def test_values_and_presets_are_in_the_units_of_the_fmu(fmus_here, tmp_path):
     assert bench[2].endswith("# TODO: in the unit that it has")
 
 
+def test_an_fmu_that_was_built_here_needs_no_process_of_its_own(fmus_here):
+    fmu = "fmus/build/GripperPlantCompliant.fmu"
+    assert fmus_here("init", "a.toml", "--as", f"plant={fmu}")[0] == 0
+    assert fmus_here("init", "alone.toml", "--fmu", f"plant={fmu}")[0] == 0
+    for file in ("a.toml", "alone.toml"):
+        assert System.load(file).component("plant", "test").isolation == "none"
+
+
 @pytest.mark.slow
 @needs_gcc
 def test_fmus_alone(fmus_here, tmp_path):

@@ -95,6 +95,23 @@ def test_no_force_is_proposed_for_a_position(plant):
     assert not {"position[1]", "position[2]"} & matches(plant, theirs).keys()
 
 
+@pytest.mark.parametrize(
+    ("theirs", "others"),
+    [
+        ("position[{}]", "finger_position[{}]"),  # of which `finger` says nothing
+        ("Position{}", "x_{}"),
+        ("position_{}", "Plant.Pos.{}"),
+    ],
+)
+def test_the_very_name_and_the_same_words_go_before_others_of_the_same_meaning(
+    plant, theirs, others
+):
+    outputs = [output(name.format(j), "m") for j in (1, 2) for name in (others, theirs)]
+    assert names(plant, *outputs, certain=True) == {
+        f"position[{j}]": theirs.format(j) for j in (1, 2)
+    }
+
+
 def test_three_fingers_are_not_those_of_two(plant):
     assert names(plant, *(output(f"position{j}", "m") for j in (1, 2, 3))) == {}
 

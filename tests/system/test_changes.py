@@ -165,6 +165,20 @@ def test_names_that_are_given_go_before(vendor, tmp_path):
         vendor.swap("plant", tmp_path / "c.fmu", rename={"gap": "weg"})
 
 
+def test_scalars_that_are_named_as_elements_are_an_array(tmp_path):
+    """By its name in rename, which the next version keeps, and in units."""
+    force, gap = PLANT["force"], PLANT["gap"]
+    several = {f"Gaps[{j}]": gap for j in (1, 2)} | {"Gaps[1].far": gap, "force": force}
+    fmus = [write_fmu(tmp_path / f"{n}.fmu", {**PLANT, **several}, {}) for n in ("one", "two")]
+    system = write_system(tmp_path)
+    for fmu in fmus:
+        more = {"rename": {"way": "Gaps"}, "units": {"way": "mm"}} if fmu == fmus[0] else {}
+        system = system.swap("plant", fmu, **more)
+        plant = system.component("plant", "test").interface.by_name
+        assert [plant[f"way[{j}]"].unit for j in (1, 2)] == ["mm", "mm"]
+        assert "Gaps[1].far" in plant
+
+
 def test_a_unit_that_the_new_fmu_declares_otherwise_is_not_kept(vendor, tmp_path):
     grams = {**VENDOR, "mass": PLANT["mass"] + ' unit="1"'}
     fmu = write_fmu(tmp_path / "kg.fmu", grams, {})

@@ -293,6 +293,6 @@ def component_of(found: System, name: str, system: System) -> Component:
 def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface) -> None:
     """InputError where the candidate's variables get names that the original does not have."""
     for new, name in rename.items():
-        for called in theirs.arrays[new].names if new in theirs.arrays else (new,):
+        for called in theirs.elements(new):
             entry = f"rename: {new!r} = {name!r}"
             known(f"{entry}: the original has no variable", called, ours.by_name, see=ours.listing)

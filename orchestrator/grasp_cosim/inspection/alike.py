@@ -1,8 +1,8 @@
 """Which variable of a foreign FMU is meant by one of a system: by its name, number and unit.
 
 GapRight and GapLeft are gap[1] and gap[2], and so are l_1 and l_2, or the elements of an array: x
-points right, and finger 1 is the right one. Names of the same meaning come first; what is left may
-have a word more or less, which is to be checked.
+points right, and finger 1 is the right one. The very name comes first, then the same words, then
+words of the same meaning; what is left may have a word more or less, which is to be checked.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 from ..interface.interface import Interface, Variable
@@ -65,10 +66,26 @@ class _Reading(NamedTuple):
     """A variable, with its name read as that of a number, of so many, or of no number."""
 
     variable: Variable
-    meaning: frozenset[str]
+    text: str
+    """What is left of its name without the number."""
     number: int | None = None
     many: int = 1
     doubt: str = ""
+
+    @property
+    def place(self) -> tuple[int | None, int]:
+        """Which one it is, and of how many."""
+        return self.number, self.many
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The words of its name, as they stand there."""
+        return _words(self.text)
+
+    @property
+    def meaning(self) -> frozenset[str]:
+        """The meanings of its words."""
+        return _meaning(self.text)
 
 
 def matches(ours: Interface, theirs: Interface) -> dict[str, Match]:
@@ -85,7 +102,7 @@ def matches(ours: Interface, theirs: Interface) -> dict[str, Match]:
             (v, r.variable.name): Match(r.variable, r.doubt or doubt)
             for v, own in left.items()
             for r in its
-            if r.variable.name not in taken and alike(own, r)
+            if r.variable.name not in taken and own.place == r.place and alike(own, r)
             if _may_be(ours, own.variable, theirs, r.variable)
         }
         ends = Counter(name for key in pairs for name in zip("ab", key, strict=True))
@@ -96,8 +113,10 @@ def matches(ours: Interface, theirs: Interface) -> dict[str, Match]:
     # of ours the likeliest reading, a number where there is one
     mine = {r.variable.name: r for r in _readings(ours)}
     its = [*_readings(theirs)]
-    pair(lambda a, b: a[1:4] == b[1:4])
-    pair(lambda a, b: a[2:4] == b[2:4] and (a[1] < b[1] or a[1] > b[1]), "by its name")
+    pair(lambda a, b: a.variable.name == b.variable.name)
+    pair(lambda a, b: a.words == b.words)
+    pair(lambda a, b: a.meaning == b.meaning)
+    pair(lambda a, b: a.meaning < b.meaning or a.meaning > b.meaning, "by its name")
     return found
 
 
@@ -128,12 +147,12 @@ def _readings(interface: Interface) -> Iterator[_Reading]:
         for rest, _, number in _numbered(v.name):
             numbers.setdefault(rest, set()).add(number)
     for v in variables:
-        yield _Reading(v, _meaning(v.name))
+        yield _Reading(v, v.name)
         for rest, word, number in _numbered(v.name):
             all_ = numbers[rest]
             doubt = "which is 1, which 2" if 0 in all_ or word in ("a", "b") else ""
             if len(all_) > 1:
-                yield _Reading(v, _meaning(rest), number + (0 in all_), len(all_), doubt)
+                yield _Reading(v, rest, number + (0 in all_), len(all_), doubt)
 
 
 def _numbered(name: str) -> Iterator[tuple[str, str, int]]:
@@ -153,9 +172,16 @@ def candidates(
     return [v for v in free if v.supported and _may_be(ours, variable, theirs, v)]
 
 
+@cache
+def _words(name: str) -> tuple[str, ...]:
+    """The words in a name, in small letters."""
+    return tuple(word.lower() for word in _WORD.findall(name))
+
+
+@cache
 def _meaning(name: str) -> frozenset[str]:
     """The meanings of the words in a name; of those that say nothing if there are no others."""
-    words = [word.lower() for word in _WORD.findall(name)]
+    words = _words(name)
     plain = [w if w in _MEANING or w.endswith("ss") else w.removesuffix("s") for w in words]
     telling: Iterable[str] = [w for w in plain if w not in _NOISE] or plain
     return frozenset(_MEANING.get(w, w) for w in telling if not w.isdigit())

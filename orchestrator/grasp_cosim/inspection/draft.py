@@ -131,7 +131,7 @@ def replacing(system: Structure, name: str, fmu: Path, path: str, presets: Itera
     ]
     rename += [_lost(draft, v, v.name in needed) for v in variables if v.name not in found]
     tables = [
-        _component(name, path),
+        _component(name, path, theirs),
         _table(f"[components.{name}.rename]  # the system's name = the FMU's", rename),
         _table(
             f"[components.{name}.units]  # what the FMU does not declare",
@@ -230,7 +230,7 @@ def _listed(name: str, interface: Interface, path: str) -> str:
     lines += comments[:MOST]
     if len(comments) > MOST:
         lines.append(f"# and {len(comments) - MOST} more: grasp-cosim inspect {path}")
-    tables = _component(name, path), _table(f"[components.{name}.values]", lines)
+    tables = _component(name, path, interface), _table(f"[components.{name}.values]", lines)
     return "".join(f"{text}\n\n" for text in tables if text)[:-1]
 
 
@@ -281,9 +281,11 @@ def _line(key: str, value: str, comment: str = "") -> str:
     return f"{_key(key)} = {value}{comment and f'  # {comment}'}"
 
 
-def _component(name: str, path: str) -> str:
+def _component(name: str, path: str, fmu: Interface) -> str:
+    """The first table of a component: one made here needs no process of its own."""
     trust = _line("isolation", '"process"', "in a process of its own, until you trust its binary")
-    return f"[components.{name}]\n{_line('fmu', _quoted(path))}\n{trust}"
+    lines = [_line("fmu", _quoted(path)), "" if fmu.ours else trust]
+    return _table(f"[components.{name}]", lines)
 
 
 def _names(draft: Draft, name: str) -> str:

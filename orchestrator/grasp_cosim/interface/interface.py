@@ -1,6 +1,7 @@
 """The interface that an FMU declares: its variables, units and capabilities."""
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -343,8 +344,21 @@ class Interface:
 
     def sample(self, name: str) -> Variable | None:
         """The variable of a name; of an array its first element. None where there is none."""
-        names = self.arrays[name].names if name in self.arrays else (name,)
+        names = self.elements(name)
         return self.by_name.get(names[0]) if names else None
+
+    def elements(self, name: str) -> tuple[str, ...]:
+        """The names of the variables that a name stands for: of an array its elements.
+
+        Scalars that an FMU names like these, Gaps[1] and Gaps[2], are Gaps. Any other name stands
+        for itself.
+        """
+        if name in self.arrays:
+            return self.arrays[name].names
+        if name in self.by_name:
+            return (name,)
+        element = re.compile(rf"{re.escape(name)}\[\d+(,\d+)*\]")
+        return tuple(filter(element.fullmatch, self.by_name)) or (name,)
 
     def capability(self, flag: str) -> Value | None:
         """The value of a capability, under the name that FMI 2.0 or 3.0 has for it."""
@@ -457,7 +471,8 @@ class Interface:
         """The same under other names: rename maps a new name to the FMU's own.
 
         place says where the table comes from. InputError where an own name does not exist or is
-        renamed twice, or a new one is taken. An array is renamed whole, or by elements.
+        renamed twice, or a new one is taken. An array is renamed whole, or by elements; so are
+        scalars that are named as its elements.
         """
         key = ("rename", *rename.items())
         return self.kept(key, lambda: self._renamed(rename, place)) if rename else self
@@ -478,11 +493,9 @@ class Interface:
         arrays: dict[str, str] = {}
         elements: dict[str, str] = {}
         for new, own in rename.items():
-            if array := self.arrays.get(own):
+            if own in self.arrays:
                 arrays[own] = new
-                elements.update(zip(element_names(new, array.shape), array.names, strict=True))
-            else:
-                elements[new] = own
+            elements |= {new + its.removeprefix(own): its for its in self.elements(own)}
         for new, own in elements.items():
             entry = f"{place}: {new!r} = {own!r}"
             known(f"{entry}: {self.short} has no variable", own, self.by_name, see=self.listing)
@@ -532,11 +545,7 @@ class Interface:
 
     def _in_units(self, units: Mapping[str, str], place: str) -> "Interface":
         defined = dict(self.units)
-        units = {
-            element: unit
-            for name, unit in units.items()
-            for element in (self.arrays[name].names if name in self.arrays else [name])
-        }
+        units = {element: unit for name, unit in units.items() for element in self.elements(name)}
         for name, unit in units.items():
             entry = f"{place}: {name!r} = {unit!r}"
             known(f"{entry}: {self.short} has no variable", name, self.by_name, see=self.listing)
