@@ -16,7 +16,16 @@ import pytest
 from grasp_cosim import InputError, System, metric, sweep
 from grasp_cosim.metrics.metric import load_metrics
 from grasp_cosim.sweeps.rows import grid
-from grasp_cosim.sweeps.sweep import Task, cluster, opened, packed, run_packed, run_row, write_line
+from grasp_cosim.sweeps.sweep import (
+    Task,
+    cluster,
+    identity_of,
+    opened,
+    packed,
+    run_packed,
+    run_row,
+    write_line,
+)
 from recording.rows import full_disk
 from support.native_fmus import needs_gcc, talker
 from support.native_systems import integrator, write_integrator
@@ -223,17 +232,70 @@ def test_kept_runs_are_bound_to_what_they_are_of(system, mine, tmp_path):
     sweep(system, rows, metrics=mine, out=out, workers=1)
     whole = out.read_bytes()
     (tmp_path / "t.csv.rows").write_bytes(b'{"runs of": "others"}\n')
-    with pytest.raises(InputError, match="has runs of another system, other FMUs or other rows"):
+    with pytest.raises(
+        InputError, match="has runs that differ in all that is known of them; remove it"
+    ):
         sweep(system, rows, metrics=mine, out=out, workers=1)
     (tmp_path / "t.csv.rows").unlink()
     sweep(system, rows, metrics=mine, out=out, workers=1)
     assert out.read_bytes() == whole
 
 
-def test_two_at_a_time_are_refused(system, mine, tmp_path):
-    from grasp_cosim.sweeps.sweep import opened
+SHARE = 0.5
 
-    with opened(tmp_path / "t.csv", "x", {}), pytest.raises(InputError, match="another process"):
+
+def half(value):
+    return SHARE * value
+
+
+def share(run):
+    return half(run["a.x"][-1])
+
+
+def quarter(run):
+    return 0.5 * half(run["a.x"][-1])
+
+
+@pytest.mark.parametrize(
+    ("change", "differs"),
+    [
+        ({"function": quarter}, "metric 'share', its code"),
+        ({"SHARE": 0.25}, "metric 'share', its half"),
+        ({"rows": [{"a.gain": 1.0}]}, "the rows"),
+        ({"stop": 0.2}, "the system's stop"),
+        ({"fmu": b"of another maker"}, "the FMU of a"),
+    ],
+)
+def test_what_decides_a_row_is_what_kept_runs_are_of(
+    system, tmp_path, monkeypatch, change, differs
+):
+    def named(system, rows, function, **_):
+        return identity_of(Task(system), rows, [metric("share")(function)])
+
+    given = {"system": system, "rows": [{"a.gain": 2.0}], "function": share}
+    with opened(tmp_path / "t.csv", named(**given), {}) as file:
+        before = Path(file.name).read_bytes()
+    (tmp_path / "t.csv.rows").write_bytes(before)  # as of runs that were interrupted
+    with opened(tmp_path / "t.csv", named(**given), {}):
+        pass
+    (tmp_path / "t.csv.rows").write_bytes(before)
+    monkeypatch.setitem(globals(), "SHARE", change.get("SHARE", SHARE))
+    if "stop" in change:
+        change = {"system": system.with_experiment(stop=change["stop"])}
+    elif "fmu" in change:
+        (component,) = system.components
+        component.fmu.write_bytes(change["fmu"])
+    with (
+        pytest.raises(
+            InputError, match=rf"t\.csv\.rows: has runs that differ in {differs}; remove"
+        ),
+        opened(tmp_path / "t.csv", named(**given | change), {}),
+    ):
+        pass
+
+
+def test_two_at_a_time_are_refused(system, mine, tmp_path):
+    with opened(tmp_path / "t.csv", {}, {}), pytest.raises(InputError, match="another process"):
         sweep(system, [{"a.gain": 1.0}], metrics=mine, out=tmp_path / "t.csv", workers=1)
 
 
@@ -289,10 +351,10 @@ def test_a_file_of_runs_that_finds_no_room_is_said(tmp_path):
 @pytest.mark.parametrize("line", [b"\0\0\0", b"null", b"{}", b'{"index": "0", "metrics": {}}'])
 def test_a_damaged_line_of_what_is_kept_is_said(tmp_path, line):
     path = tmp_path / "t.csv.rows"
-    path.write_bytes(b'{"runs of": "these"}\n' + line + b'\n{"index": 1, "metrics": {}}\n')
+    path.write_bytes(b'{"runs of": {"x": "1"}}\n' + line + b'\n{"index": 1, "metrics": {}}\n')
     with (
         pytest.raises(InputError, match=r"t\.csv\.rows: line 2 is damaged; remove the file, or"),
-        opened(tmp_path / "t.csv", "these", {}),
+        opened(tmp_path / "t.csv", {"x": "1"}, {}),
     ):
         pass
 

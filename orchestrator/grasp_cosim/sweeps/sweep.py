@@ -12,19 +12,21 @@ import json
 import os
 import pickle
 import threading
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from importlib.metadata import version
 from io import FileIO
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..base.checks import extra_module
-from ..base.errors import InputError, SimulationError
+from ..base.errors import InputError, SimulationError, choices
 from ..base.files import make_folder
+from ..base.identity import parts_of
 from ..base.parallel import Crew, Lost, deliver
 from ..base.progress import Progress, phase
 from ..base.scratch import SUFFIX, Lock, ScratchFolder
@@ -44,6 +46,9 @@ AHEAD = 100
 
 KILLED = "KilledWorker"
 """The name of Dask's error where a run ended its worker, several times; the others go on."""
+
+FEW = 3
+"""Things in which runs differ that are named at most."""
 
 CONNECT = 10.0
 """s, to find the scheduler and a worker of a cluster."""
@@ -101,7 +106,8 @@ def sweep(
     settings_of_runs = settings_of(task.system, rows_in_si)
     file = Path(out) if out is not None else None
     done: dict[int, Outcome] = {}
-    with opened(file, _identity(task, settings_of_runs), done) if file else nullcontext() as store:
+    identity = identity_of(task, settings_of_runs, all_metrics) if file else {}
+    with opened(file, identity, done) if file else nullcontext() as store:
         to_do = [(i, row) for i, row in enumerate(settings_of_runs) if i not in done]
         results = _elsewhere(executor, task, to_do) if executor else _here(task, to_do, workers)
         bar = Progress("sweep", len(rows_in_si), shown=progress, initial=len(done))
@@ -293,11 +299,12 @@ def write_line(file: FileIO, line: bytes) -> None:
 
 
 @contextmanager
-def opened(table: Path, identity: str, done: dict[int, Outcome]) -> Iterator[FileIO]:
+def opened(table: Path, identity: Mapping[str, str], done: dict[int, Outcome]) -> Iterator[FileIO]:
     """The file of the runs that are `done`, which these are read from, for one process at a time.
 
     It is made where there is none, and removed without an error. The lock goes with the process,
-    however that ends. InputError where another process has it, or it is of other runs.
+    however that ends. InputError where another process has it, or it is of other runs: `identity`
+    has a hash of each thing that decides them, by what it is called.
     """
     check_format(table)
     path = table.with_name(f"{table.name}.rows")
@@ -316,8 +323,8 @@ def opened(table: Path, identity: str, done: dict[int, Outcome]) -> Iterator[Fil
                     write_line(file, head)
             elif first != head:
                 raise InputError(
-                    f"{path}: has runs of another system, other FMUs or other rows; remove it, or "
-                    "name another --out"
+                    f"{path}: has runs that differ in {_difference(first, identity)}; remove it, "
+                    "or name another --out"
                 )
             if lines and not lines[-1].endswith(b"\n"):  # torn by a kill
                 file.truncate(path.stat().st_size - len(lines.pop()))
@@ -343,9 +350,27 @@ def _outcome(path: Path, number: int, line: bytes) -> Outcome:
     return outcome
 
 
-def _identity(task: Task, rows: Sequence[Row]) -> str:
-    """A hash of all that decides the results."""
-    metrics = [m.origin or m.name for m in task.metrics]
-    decisive = {"system": settings(task.system), "rows": rows, "metrics": metrics}
-    contents = [c.fmu.read_bytes() for c in task.system.components]
-    return _hash_of(json.dumps(decisive, sort_keys=True).encode(), *contents)
+def _difference(first: bytes, identity: Mapping[str, str]) -> str:
+    """What the runs that the first line of a file tells of differ in."""
+    try:
+        was = dict(json.loads(first)["runs of"])
+    except (ValueError, TypeError, KeyError):
+        was = {}
+    names = [n for n in {**identity, **was} if was.get(n) != identity.get(n)]
+    return choices(names, FEW) if was else "all that is known of them"
+
+
+def identity_of(task: Task, rows: Sequence[Row], metrics: Sequence[Metric]) -> dict[str, str]:
+    """A hash of each thing that decides the results, by what it is called in a message."""
+    decisive = {"the rows": rows, "the version of grasp-cosim": version("grasp-cosim")}
+    decisive |= {f"the system's {key}": value for key, value in settings(task.system).items()}
+    fmus = {f"the FMU of {c.name}": c.fmu.read_bytes() for c in task.system.components}
+    return {
+        **{name: _hash_of(json.dumps(v, sort_keys=True).encode()) for name, v in decisive.items()},
+        **{name: _hash_of(content) for name, content in fmus.items()},
+        **{
+            f"metric {m.name!r}, its {part}": found
+            for m in metrics
+            for part, found in parts_of(m.function).items()
+        },
+    }
