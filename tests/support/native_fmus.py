@@ -401,19 +401,29 @@ TALKER = Model(
 )
 
 
-def talker(folder, *options, version="2.0", kinds=("CoSimulation",), name="talker", **more):
+def talker(
+    folder, *options, version="2.0", kinds=("CoSimulation",), name="talker", capabilities=CAPABLE,
+    **more,
+):  # fmt: skip
     """The FMU of models/talker.c as folder/NAME.fmu, compiled with options such as -DDEAF.
 
     more are other fields of its Model.
     """
-    xml = description("talker", version, replace(TALKER, **more), kinds)
+    xml = description("talker", version, replace(TALKER, **more), kinds, capabilities)
     options = ("-lm", *options)
     library = library_of("talker", version, "CoSimulation" in kinds, False, options)
     return pack(folder / f"{name}.fmu", version, "talker", xml, library)
 
 
 def state_space(
-    folder, name="ss", types=False, more="", kind="CoSimulation", binary=True, complete=False
+    folder,
+    name="ss",
+    types=False,
+    more="",
+    kind="CoSimulation",
+    binary=True,
+    complete=False,
+    capabilities=CAPABLE,
 ):
     """The FMU name.fmu in folder: m inputs u, n states x, r outputs y, 3 of each at the start.
 
@@ -421,7 +431,7 @@ def state_space(
     is CoSimulation or ModelExchange. One without a binary needs no compiler.
     """
     library = library_of("state_space", "3.0", complete=complete) if binary else b""
-    xml = description("state_space", "3.0", _state_space(types), [kind], more=more)
+    xml = description("state_space", "3.0", _state_space(types), [kind], capabilities, more=more)
     return pack(folder / f"{name}.fmu", "3.0", "state_space", xml, library)
 
 

@@ -15,6 +15,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -159,6 +160,19 @@ class Dispatcher:
         if wrong:
             raise SimulationError(wrong)
 
+    def saved(self) -> tuple[Any, ...]:
+        """What the rows until now came to, for restore()."""
+        told = len(self._runaways), self._divergence.saved(), self._unwatched.saved()
+        return told, self._energy.saved(), self.pending
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what was saved; what the listeners got is their own concern."""
+        (lines, divergence, unwatched), energy, self.pending = saved
+        del self._runaways[lines:]
+        self._divergence.restore(divergence)
+        self._unwatched.restore(unwatched)
+        self._energy.restore(energy)
+
     def _check(
         self, steps: npt.NDArray[np.int64], outputs: npt.NDArray[np.float64]
     ) -> tuple[int, str]:
@@ -269,6 +283,14 @@ class Unwatched:
         self._limits = np.where(is_integer, float(EXACT), np.inf)
         self._log: dict[int, str] = {}
 
+    def saved(self) -> dict[int, str]:
+        """What was said until now, for restore()."""
+        return dict(self._log)
+
+    def restore(self, saved: dict[int, str]) -> None:
+        """Go back to what was saved."""
+        self._log = dict(saved)
+
     @property
     def log(self) -> list[str]:
         """A line for each of these signals, in the order of the system."""
@@ -342,8 +364,17 @@ class Divergence:
                 for port, signal in outputs.items()
             ]
         )
-        self._reached: list[list[int]] = [[] for _ in outputs]
+        self._reached: list[tuple[int, ...]] = [() for _ in outputs]
         self._over = False
+
+    def saved(self) -> tuple[Any, ...]:
+        """What the rows until now came to, for restore()."""
+        return self._scales.copy(), self._limits.copy(), [*self._reached], self._over
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what was saved."""
+        self._scales[:], self._limits[:], reached, self._over = saved
+        self._reached = [*reached]
 
     def __call__(
         self,
@@ -382,7 +413,7 @@ class Divergence:
             first = peaks[np.flatnonzero(peaks)[0]]
             self._limits[i] = self._scales[i] = max(self._scales[i], first)
         while (row := int(np.searchsorted(peaks, self._limits[i]))) < len(peaks):
-            self._reached[i].append(int(steps[row]))
+            self._reached[i] = *self._reached[i], int(steps[row])
             limit, scale = float(self._limits[i]), float(self._scales[i])
             if limit >= FAR * max(1.0, scale) or _grows(self._reached[i]):
                 return row

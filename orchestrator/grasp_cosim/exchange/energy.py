@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -135,6 +136,16 @@ class ExchangeEnergy:
         self._ledgers = [_Ledger(bond, column, transforms) for bond in bonds]
         self._rows = 0
 
+    def saved(self) -> tuple[Any, ...]:
+        """The sums until now, for restore()."""
+        return self._rows, [ledger.carried for ledger in self._ledgers]
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what was saved."""
+        self._rows, carried = saved
+        for ledger, sums in zip(self._ledgers, carried, strict=True):
+            ledger.carried = sums
+
     def __call__(self, rows: Floats) -> Floats:
         """Energies as (len(rows), len(bonds)) of rows as (n, all columns)."""
         energies = np.empty((len(self.signals), len(rows)))
@@ -160,22 +171,22 @@ class _Ledger:
         self._answerer = [column[bond.source], column[bond.seen or bond.position]]
         self._of_force = transforms.get(bond.force, IDENTITY)
         self._of_seen = transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY
-        self._moved = self._answered = np.empty((2, 0))
-        self._total = np.zeros(1)
+        self.carried = np.empty((2, 0)), np.empty((2, 0)), np.zeros(1)
+        """The last that moved, the last that answered, and the sum."""
 
     def add(self, first: int, rows: Floats) -> Floats:
         """The energy at each of the rows, which are those of the steps from first on."""
         earned = np.zeros(len(rows))
-        held, position = moved = _joined(self._moved, rows[:, self._mover].T)
+        last_moved, last_answered, sum_ = self.carried
+        held, position = moved = _joined(last_moved, rows[:, self._mover].T)
         _add_last(earned, held[1:] * np.diff(position))
         # A source with a step of its own answers for what it saw at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
-        force, seen = answered = _joined(self._answered, self._in_units(rows[ends, self._answerer]))
+        force, seen = answered = _joined(last_answered, self._in_units(rows[ends, self._answerer]))
         _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * np.diff(seen))
-        self._moved, self._answered = moved[:, -1:], answered[:, -1:]
         # One sum after the other from the carried total on: the same bits for any blocks.
-        total = np.cumsum(np.concatenate((self._total, self._scale * earned)))
-        self._total = total[-1:]
+        total = np.cumsum(np.concatenate((sum_, self._scale * earned)))
+        self.carried = moved[:, -1:], answered[:, -1:], total[-1:]
         return total[1:]
 
     def _in_units(self, answered: Floats) -> Floats:

@@ -73,6 +73,14 @@ class Clocks:
                     self._interval[reference] = clock.interval
                     self._due[reference] = begin + clock.shift
 
+    def saved(self) -> tuple[dict[int, Fraction], ...]:
+        """The ticks that were and are to come, for restore()."""
+        return dict(self._interval), dict(self._last), dict(self._due)
+
+    def restore(self, saved: tuple[dict[int, Fraction], ...]) -> None:
+        """Go back to what was saved."""
+        self._interval, self._last, self._due = map(dict, saved)
+
     @property
     def next(self) -> float:
         """The time of the next tick in s; inf where none is known."""

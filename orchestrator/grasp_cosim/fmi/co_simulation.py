@@ -287,6 +287,16 @@ class Fmi3Instance(LoadedInstance):
         self._assign(others, fetch=False)
         self._slave.enterInitializationMode(self.tolerance, startTime=start, stopTime=stop)
 
+    def saved(self) -> Any:
+        """As LoadedInstance, with what the last step said."""
+        return super().saved(), self._flags.tobytes(), float(self._last[0]), float(self._limit[0])
+
+    def restore(self, saved: Any) -> None:
+        """As LoadedInstance."""
+        own, flags, self._last[0], self._limit[0] = saved
+        self._flags[:] = np.frombuffer(flags, np.bool_)
+        super().restore(own)
+
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         bound, address = self._stepping(clock, step, ctypes.c_bool(True), *self._places())
         time = memoryview(clock)  # type: ignore[arg-type]

@@ -100,6 +100,22 @@ class EventInstance(Fmi3Instance):
                 else:
                     self._event()
 
+    def saved(self) -> Any:
+        """As Fmi3Instance, with the events and clocks."""
+        events = self._events.saved(), self._clocks.saved(), self._point, self._next
+        passed = [inputs.passed for inputs in self._inputs_at_events]
+        return super().saved(), events, self._started, dict(self._pending), passed
+
+    def restore(self, saved: Any) -> None:
+        """As Fmi3Instance."""
+        own, (events, clocks, self._point, self._next), self._started, pending, passed = saved
+        self._events.restore(events)
+        self._clocks.restore(clocks)
+        self._pending = dict(pending)
+        for inputs, last in zip(self._inputs_at_events, passed, strict=True):
+            inputs.passed = last
+        super().restore(own)
+
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """As Instance.transfer: inputs that are not continuous arrive by an event."""
         if action == "get" or all(_is_continuous(v) for v in variables):
@@ -243,7 +259,7 @@ class _PartOfInputs(ConnectedInputs):
     def expect(self, values: Sequence[Value | None]) -> None:
         """The FMU has these values now, as far as they are known."""
         if None not in values:
-            self._passed = np.array(values, self._part.dtype).tobytes()
+            self.passed = np.array(values, self._part.dtype).tobytes()
 
     def coming(self) -> npt.NDArray[Any]:
         """As ConnectedInputs.coming()."""

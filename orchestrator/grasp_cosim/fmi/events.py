@@ -53,6 +53,14 @@ class Events:
         self._clocks, self._refuse = clocks, refuse
         self._in_a_row, self._last = 0, -math.inf
 
+    def saved(self) -> tuple[int, float]:
+        """What was counted, for restore()."""
+        return self._in_a_row, self._last
+
+    def restore(self, saved: tuple[int, float]) -> None:
+        """Go back to what was saved."""
+        self._in_a_row, self._last = saved
+
     def count(self, time: float, near: float, step: float, following: float = math.inf) -> None:
         """Count an event at a time, which is close upon another that was at most `near` before.
 
@@ -103,7 +111,8 @@ class ConnectedInputs:
     def __init__(self, data: npt.NDArray[Any], call: Call) -> None:
         """The call passes data on."""
         self._data, self._call = data, call
-        self._passed = b""
+        self.passed = b""
+        """What the FMU has."""
 
     def coming(self) -> npt.NDArray[Any]:
         """The values to come."""
@@ -111,9 +120,9 @@ class ConnectedInputs:
 
     def changed(self) -> bool:
         """True if the FMU has other values."""
-        return self.coming().tobytes() != self._passed
+        return self.coming().tobytes() != self.passed
 
     def pass_on(self) -> int:
         """Set them; the FMI status."""
-        self._passed = self.coming().tobytes()
+        self.passed = self.coming().tobytes()
         return self._call.python()

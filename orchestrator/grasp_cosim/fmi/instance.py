@@ -108,6 +108,18 @@ class Instance(Protocol):
         is an event that cannot be handled.
         """
 
+    def saved(self) -> Any:
+        """Its state between two steps, for restore(), kept until nothing refers to it any more.
+
+        InputError where the FMU does not give it; SimulationError where it fails.
+        """
+
+    def restore(self, saved: Any) -> None:
+        """Go back to a state that was saved, also after a failure, any number of times.
+
+        SimulationError where the FMU fails, or did so in a way that nothing may follow.
+        """
+
     def last_successful_time(self) -> float | None:
         """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
 
@@ -158,6 +170,14 @@ class Inputs:
         """True once the buffers hold what the FMU gets."""
         self._given: dict[Variable, Value] = {}
         self._bound: list[tuple[Sequence[Variable], npt.NDArray[Any]]] = []
+
+    def saved(self) -> dict[Variable, Value]:
+        """What was set one by one, for restore(); the buffers are their owner's."""
+        return dict(self._given)
+
+    def restore(self, saved: Mapping[Variable, Value]) -> None:
+        """Go back to what was saved."""
+        self._given = dict(saved)
 
     def set(self, variable: Variable, value: Value) -> None:
         """Note a value that is about to be set; one of a parameter is not kept."""

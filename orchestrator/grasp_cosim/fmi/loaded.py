@@ -33,6 +33,7 @@ from ..interface.obstacles import of_binary, of_loading, this_machine
 from ..system.parts import Logging
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, WARNING, Inputs
 from .messages import SEVERE, Messages
+from .states import States
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
 _NATIVE_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int)
@@ -127,6 +128,7 @@ class LoadedInstance(ABC):
         self._folder: ScratchFolder | None = None
         self._python = False
         self._slave: Any = None
+        self._kept_states: States | None = None
         if obstacle := of_binary(interface):
             raise InputError(f"{name}: {interface.called} {obstacle}")
         try:
@@ -274,10 +276,10 @@ class LoadedInstance(ABC):
                 self._worst = error.status
                 reason = as_reason(self._messages.reasons())
                 LOGGER.warning("%s: %s%s", self.name, error, reason)
-        # fmi2Fatal is what pythonfmu makes of any call refused: our Python FMUs outlive it
-        outlives_fatal = self._python and self.interface.ours
         if self._slave is not None:
-            if self._worst < FATAL or outlives_fatal:
+            if self._may_be_called:
+                if self._kept_states:
+                    self._kept_states.close()
                 self._free()
             else:
                 _never_freed.append(self._slave)
@@ -286,6 +288,13 @@ class LoadedInstance(ABC):
             if resources in sys.path:  # pythonfmu puts it there and leaves it
                 sys.path.remove(resources)
             self._folder.cleanup()
+
+    @property
+    def _may_be_called(self) -> bool:
+        """False after fmi2Fatal, but where pythonfmu makes that of any call refused: our own Python
+        FMUs outlive it.
+        """
+        return self._worst < FATAL or (self._python and self.interface.ours)
 
     def _free(self) -> None:
         """Free the instance, and the library with it."""
@@ -404,6 +413,48 @@ class LoadedInstance(ABC):
         getter = getattr(self._slave, f"get{self._suffix(variable.type)}")
         size = variable.element.size if variable.element else 1
         return list(getter([variable.reference], size))
+
+    def saved(self) -> Any:
+        if self._kept_states is None:
+            self._kept_states = self._bind_states()
+        status, state = self._kept_states.take()
+        if state is None:
+            raise self.failure(status, self._time())
+        arrays = {reference: [*elements] for reference, elements in self._arrays.items()}
+        return state, self._worst, arrays, self._inputs.saved(), self._messages.saved()
+
+    def restore(self, saved: Any) -> None:
+        state, worst, arrays, inputs, messages = saved
+        if not self._may_be_called:
+            raise self._error("cannot go back after what it returned", self._time())
+        assert self._kept_states is not None  # noqa: S101 - it has given the state
+        status = self._kept_states.put(state)
+        if status > WARNING:
+            raise self.failure(status, self._time())
+        self._worst = worst
+        self._arrays = {reference: [*elements] for reference, elements in arrays.items()}
+        self._inputs.restore(inputs)
+        self._messages.restore(messages)
+
+    def _bind_states(self) -> States:
+        """The functions for states; InputError where the FMU has none."""
+        if not self.interface.has_states:
+            raise self._has_no_state("cannot be saved (canGetAndSetFMUstate)")
+        form = "FMUstate" if self._major == "2" else "FMUState"
+        kind = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
+        instance = ctypes.c_void_p(self._slave.component)
+        get, set_, free = (
+            partial(self._symbol(f"{action}{form}", kind), instance)
+            for action in ("Get", "Set", "Free")
+        )
+        return States(get, set_, free)
+
+    def _has_no_state(self, why: str) -> InputError:
+        """The error where the state is asked for."""
+        return InputError(
+            f"{self.name}: the state of {self.interface.path.name} {why}; must be a co-simulation "
+            "FMU with fmi2GetFMUstate or fmi3GetFMUState"
+        )
 
     def the_end(self) -> float | None:
         if not self._wants_the_end():

@@ -12,8 +12,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..base.scratch import without_scratch
 from ..system.parts import Logging
@@ -47,12 +46,11 @@ class Message(NamedTuple):
     time: float
 
 
-@dataclass(slots=True)
-class _Tally:
+class _Tally(NamedTuple):
     """The first message of a severity, and how many there were."""
 
     first: Message
-    count: int = 0
+    number: int
 
 
 class Messages:
@@ -101,7 +99,17 @@ class Messages:
         if message.status > OK:
             self.count += 1
             self._last.append(message)
-            self._tallies.setdefault(message.status, _Tally(message)).count += 1
+            first, number = self._tallies.get(message.status, (message, 0))
+            self._tallies[message.status] = _Tally(first, number + 1)
+
+    def saved(self) -> tuple[Any, ...]:
+        """What was logged until now, for restore()."""
+        return [*self._last], dict(self._tallies), self.count, self.unasked
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what was saved: what was logged since is taken back."""
+        last, tallies, self.count, self.unasked = saved
+        self._last, self._tallies = deque(last, KEPT), dict(tallies)
 
     @contextmanager
     def ignored(self) -> Iterator[None]:
@@ -130,10 +138,10 @@ class Messages:
         s on. It is told where the FMU did not log as many.
         """
         lines = [
-            f"{self._component}: {self._in_words(tally.first)}{_followed(tally.count)}"
+            f"{self._component}: {self._in_words(tally.first)}{_followed(tally.number)}"
             for _, tally in sorted(self._tallies.items())
         ]
-        logged = self._tallies[WARNING].count if WARNING in self._tallies else 0
+        logged = self._tallies[WARNING].number if WARNING in self._tallies else 0
         if returned > logged:
             lines.append(
                 f"{self._component}: a call returned a warning at t = {first:.9g} s"

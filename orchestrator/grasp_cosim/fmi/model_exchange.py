@@ -120,6 +120,10 @@ class ModelInstance(LoadedInstance):
             super().set(variables, values)
             self._given |= given
 
+    def saved(self) -> Any:
+        """InputError: the solver's own state cannot be saved."""
+        raise self._has_no_state("cannot be saved, as it is integrated by CVode")
+
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """As Instance.transfer: inputs arrive as the next step begins."""
         call = super().transfer(action, variables, data)

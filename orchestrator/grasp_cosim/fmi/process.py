@@ -26,6 +26,7 @@ import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
+from itertools import count
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -138,8 +139,26 @@ class _SharedMemory:
         element = dtype(interface.version, variables[0].type)
         return self._view(np.bool_, 1, begin), self._view(element, count, begin + 8)
 
+    def saved(self) -> bytes:
+        """What is in the room that was given out, for restore()."""
+        return self._memory[: self._used]
+
+    def restore(self, saved: bytes) -> None:
+        """Go back to what was saved."""
+        self._memory[: len(saved)] = saved
+
     def _view(self, element: npt.DTypeLike, count: int, offset: int) -> npt.NDArray[Any]:
         return np.frombuffer(self._memory, element, count, offset)
+
+
+class _KeptThere:
+    """A state that the other process keeps, by its number, until nothing here refers to it."""
+
+    def __init__(self, number: int, released: deque[int]) -> None:
+        self.number, self._released = number, released
+
+    def __del__(self) -> None:
+        self._released.append(self.number)
 
 
 class ProcessInstance:
@@ -158,6 +177,7 @@ class ProcessInstance:
         self._owner = os.getpid()
         self._messages = Messages(name, logging, lambda: float(self._shared.clock[0]))
         self._fresh = False
+        self._released: deque[int] = deque()
         self._inputs = Inputs()
         if not POSIX:
             raise InputError(
@@ -241,6 +261,21 @@ class ProcessInstance:
         for variable, value in zip(variables, values, strict=True):
             self._inputs.set(variable, value)
         self._ask("set", list(variables), list(values))
+
+    def saved(self) -> Any:
+        """As Instance.saved(), with what is on the way."""
+        released = [self._released.popleft() for _ in range(len(self._released))]
+        state = _KeptThere(self._ask("keep_state", released), self._released)
+        way = self._fresh, self._shared.saved()
+        return state, way, self._inputs.saved(), self._messages.saved()
+
+    def restore(self, saved: Any) -> None:
+        state, (fresh, shared), inputs, messages = saved
+        self._ask("restore_state", state.number)
+        self._fresh = fresh
+        self._shared.restore(shared)
+        self._inputs.restore(inputs)
+        self._messages.restore(messages)
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """As Instance.transfer: inputs arrive with the next step, and outputs come with it."""
@@ -411,6 +446,8 @@ class _Worker:
         self._instance: Instance
         self._inputs: list[tuple[Any, Call]] = []
         self._outputs: list[Call] = []
+        self._states: dict[int, Any] = {}
+        self._number = count()
         self._step: float | None = None
         self._advance: Call
 
@@ -474,9 +511,20 @@ class _Worker:
             return None
         if method == "transfer":
             return self._transfer(*arguments)
+        if method == "keep_state":
+            return self._keep_state(*arguments)
+        if method == "restore_state":
+            return self._instance.restore(self._states[arguments[0]])
         if method in ("get", "set"):
             self._pass_on()
         return getattr(self._instance, method)(*arguments)
+
+    def _keep_state(self, released: Sequence[int]) -> int:
+        """Keep the state of now, and those that were released no more; its number."""
+        for number in released:
+            del self._states[number]
+        self._states[number := next(self._number)] = self._instance.saved()
+        return number
 
     def _transfer(self, action: str, variables: Sequence[Variable]) -> None:
         pending, data = self._shared.add(self._instance.interface, variables)

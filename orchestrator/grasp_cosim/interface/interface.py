@@ -370,6 +370,11 @@ class Interface:
         """True if the communication step may vary."""
         return self.capability("canHandleVariableCommunicationStepSize") is True
 
+    @property
+    def has_states(self) -> bool:
+        """True if its state can be saved and restored."""
+        return self.capability("canGetAndSetFMUstate") is True
+
     @cached_property
     def input_clocks(self) -> tuple[Variable, ...]:
         """The clocks that a master has to tick."""

@@ -20,6 +20,7 @@ from threading import Thread
 from typing import Any, Literal, Self, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from ..base import calls as shapes
 from ..base.c_compilers import CompilerError, Job, cache, compile_all, find_compiler
@@ -106,9 +107,18 @@ class CompiledLoop:
         words = np.array(whole, np.int64)
         self._kept = plan, callbacks, tables, words
         self.shared = _Shared()
+        self._drives = tables[4]
         self.alone = all(call.native and not call.keeps_lock for call in plan.calls)
         self._places = words.ctypes.data, ctypes.addressof(self.shared)
         self._run = library(any(call.keeps_lock for call in plan.calls)).run
+
+    def saved(self) -> npt.NDArray[np.int64]:
+        """The rows of the drives, for restore(): all that the loop keeps for itself."""
+        return self._drives.copy()
+
+    def restore(self, saved: npt.NDArray[np.int64]) -> None:
+        """Go back to what was saved."""
+        self._drives[:] = saved
 
     def __call__(
         self,

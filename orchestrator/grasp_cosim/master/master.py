@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -264,6 +265,42 @@ class Master:
         if self._enough() or wraps or not np.isfinite(fresh).all():
             self.hand_on()
         return self.steps_done - first
+
+    def saved(self) -> Any:
+        """All that decides what comes, and the rows that wait, for restore().
+
+        InputError where an FMU does not give its state; SimulationError where it fails.
+        """
+        plan, made = self.plan, self._loop
+        told = len(self.ends), dict(self.rejections), self.watches.saved(), self.scenario.saved()
+        arrays = [array.copy() for array in (plan.values, plan.clock, plan.warned, *plan.buffers)]
+        drives = [drive.row for drive in plan.drives]
+        compiled = made.saved() if isinstance(made, CompiledLoop) else None
+        at = self.steps_done, self.total_steps, self._base, self._pause
+        instances = [instance.saved() for instance in self.instances]
+        return at, told, arrays, drives, compiled, self._waiting().copy(), instances
+
+    def restore(self, saved: Any) -> None:
+        """Go back to what was saved; SimulationError where an FMU fails."""
+        at, told, arrays, drives, compiled, waiting, instances = saved
+        plan, made = self.plan, self._loop
+        for instance, state in zip(self.instances, instances, strict=True):
+            instance.restore(state)
+        self.steps_done, self.total_steps, self._base, self._pause = at
+        self._handed_on, self._aborted = self._base, ""
+        self._rows[: len(waiting)] = waiting
+        lines, rejections, watches, scenario = told
+        del self.ends[lines:], plan.raised[:]
+        self.rejections = dict(rejections)
+        self.watches.restore(watches)
+        self.scenario.restore(scenario)
+        own = plan.values, plan.clock, plan.warned, *plan.buffers
+        for array, before in zip(own, arrays, strict=True):
+            array[:] = before
+        for drive, row in zip(plan.drives, drives, strict=True):
+            drive.row = row
+        if isinstance(made, CompiledLoop):
+            made.restore(compiled)
 
     def hand_on(self) -> None:
         """Hand on the rows that wait; SimulationError where a value is not finite."""

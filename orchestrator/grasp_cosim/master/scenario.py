@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,16 +25,13 @@ from ..interface.interface import Given, Value, Variable
 from ..interface.units import IDENTITY
 from ..system.connectors import read_at
 from ..system.description import System
-from ..system.faults import FAULTS, INITIAL, Act, Draws
+from ..system.faults import FAULTS, INITIAL, Act, Draws, Remembering
 from ..system.names import main_port
 from ..system.parts import Condition, Event, Fault, Port, literal
 from ..system.scenario import check_setting
 from ..system.times import Time, first_step, seconds
 from ..system.validity import driven_inputs, driven_parameters, is_linear, samples_of
 from .exchanged import sourced
-
-FaultFunction = Callable[[float, int], float]
-"""Changes a value passed at a step number."""
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -116,6 +113,22 @@ class Scenario:
         """Act on other instances of the same components from now on."""
         self._instances.clear()
         self._instances.update({instance.name: instance for instance in instances})
+
+    def saved(self) -> tuple[Any, ...]:
+        """What has happened, for restore(); what was set is in the FMUs."""
+        happened = len(self.log), len(self._applied), [*self._pending], self._due
+        faults = [function.saved() for function in self.fault_functions.values()]
+        return happened, faults, [tuning.taken for tuning in self.tunings]
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what was saved."""
+        (lines, applied, pending, self._due), faults, taken = saved
+        del self.log[lines:], self._applied[applied:]
+        self._pending = [*pending]
+        for function, fault in zip(self.fault_functions.values(), faults, strict=True):
+            function.restore(fault)
+        for tuning, count in zip(self.tunings, taken, strict=True):
+            tuning.taken = count
 
     def apply_again(self, step: int) -> None:
         """Set once more what events, and set(), have set before."""
@@ -237,49 +250,75 @@ class Window:
     def __init__(self, fault: Fault, step_ns: Time, start_ns: Time = 0) -> None:
         self.fault = fault
         self._earliest = first_step(fault.start_ns, step_ns, start_ns)
-        self._first: float = (self._earliest or INITIAL) if fault.when is None else math.inf
         self._end: float = math.inf
         if fault.end_ns is not None:
             self._end = first_step(fault.end_ns, step_ns, start_ns)
-        self._begun = False
+        first: float = (self._earliest or INITIAL) if fault.when is None else math.inf
+        self.acting = False, first
+        """Whether it has begun, and from which step on it acts."""
 
     def acts(self, step: int) -> bool:
         """Return True if the fault acts on the values passed in this step."""
-        return self._first <= step < self._end
+        return self.acting[1] <= step < self._end
 
     def ends(self, place: str) -> list[_Once]:
         """Its beginning, and its end where it has one."""
         name = f"{self.fault.target}: {self.fault.kind}"
 
         def begin(step: int) -> Sequence[str]:
-            self._begun, self._first = True, min(self._first, step)
+            self.acting = True, min(self.acting[1], step)
             return [f"{name} begins"]
 
         otherwise = f"{place} did not begin: {name}"
         found = [_Once(self._earliest, self._end, 1, self.fault.when, begin, otherwise)]
         if self._end < math.inf:
             said = f"{name} ends"
-            end = _Once(int(self._end), math.inf, 1, None, lambda _: [said] * self._begun)
+            end = _Once(int(self._end), math.inf, 1, None, lambda _: [said] * self.acting[0])
             found.append(end)
         return found
 
 
+class FaultFunction:
+    """Changes a value passed at a step number: the faults of a connection, one after the other."""
+
+    def __init__(self) -> None:
+        self._chain: list[tuple[Act, Window]] = []
+
+    def add(self, act: Act, window: Window) -> None:
+        """Add a fault to the end."""
+        self._chain.append((act, window))
+
+    def __call__(self, value: float, step: int) -> float:
+        """What becomes of the value."""
+        for act, window in self._chain:
+            value = act(value, step, window.acts(step))
+        return value
+
+    def saved(self) -> list[tuple[Any, ...]]:
+        """When the faults began, and what they remember, for restore()."""
+        return [
+            (window.acting, act.saved() if isinstance(act, Remembering) else None)
+            for act, window in self._chain
+        ]
+
+    def restore(self, saved: list[tuple[Any, ...]]) -> None:
+        """Go back to what was saved."""
+        for (act, window), (acting, memory) in zip(self._chain, saved, strict=True):
+            window.acting = acting
+            if isinstance(act, Remembering):
+                act.restore(memory)
+
+
 def fault_functions(windows: Sequence[Window], step_ns: Time) -> Mapping[Port, FaultFunction]:
     """Return for each connection that has faults, by target, all of them one after the other."""
-    chains: dict[Port, list[tuple[Act, Window]]] = {}
+    functions: dict[Port, FaultFunction] = {}
     kinds: Counter[tuple[Port, str]] = Counter()
     for window in windows:
         fault, key = window.fault, (window.fault.target, window.fault.kind)
         act = FAULTS[fault.kind].start(fault.parameters, Draws(fault, kinds[key]), step_ns)
-        chains.setdefault(fault.target, []).append((act, window))
+        functions.setdefault(fault.target, FaultFunction()).add(act, window)
         kinds[key] += 1
-    return {target: partial(_in_turn, chain) for target, chain in chains.items()}
-
-
-def _in_turn(chain: Sequence[tuple[Act, Window]], value: float, step: int) -> float:
-    for act, window in chain:
-        value = act(value, step, window.acts(step))
-    return value
+    return functions
 
 
 @dataclass(slots=True)

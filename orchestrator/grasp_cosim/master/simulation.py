@@ -5,8 +5,8 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass, field, replace
 from numbers import Integral
 from typing import Any
 
@@ -62,6 +62,16 @@ GROWTH = 8
 """Times as many steps as before one look that there are at most before the next."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """The state of a session at a time in s, from Session.save()."""
+
+    session: "Session" = field(repr=False)
+    time: float
+    master: Any = field(repr=False)
+    records: Sequence[Any] = field(repr=False)
+
+
 class Session:
     """A run that its user advances. A context manager: leaving it ends and frees the FMUs.
 
@@ -97,6 +107,7 @@ class Session:
         self._in_si = in_si(system, self._asked)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every, bool(realtime))
+        self._has_listeners = bool(listeners)
         self._whole: EveryRow | None = None
         needs = needed(self._asked, observed, system.roles) | of_proxies(observed)
         if every > 1 or not needs <= system.kept:
@@ -113,13 +124,14 @@ class Session:
         paced = system.realtime if realtime is True else realtime
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
+        self._guard: Callable[[], AbstractContextManager[object]] = _guarded
         self._stack = ExitStack()
         check_declared_steps(system)
         waits = long_waits(system, self.pacer.realtime) if self.pacer else []
         self._remarks = (*system.notes, *notes, *system.once(remarks), *waits)
         self._tell(self._remarks)
         try:
-            with interruptible(), _folder_kept():
+            with _guarded():
                 self._begin(listeners, every, engine)
             self._tell(self._early())
             if paced:
@@ -145,6 +157,11 @@ class Session:
         slots, texts = self._master.slots, self._master.texts
         receivers = (self._memory, *listeners)
         self._dispatch = Dispatcher(self.system, slots, receivers, every, texts, self._whole)
+        self._records: list[Dispatcher | MemoryListener | EveryRow] = [
+            self._dispatch,
+            self._memory,
+            *([self._whole] if self._whole else []),
+        ]
         if self.pacer:
             self.pacer.spare = self._dispatch.spare
         self._stack.callback(self._hand_over)  # before the FMUs are ended, and after:
@@ -152,6 +169,8 @@ class Session:
         with phase("initialising"), self._failures():  # where the row of t = 0 is not finite
             self._master.initialise()
         self._initialised = True
+        if all(map(_leaves_the_process_alone, self.system.components)):
+            self._guard = nullcontext
 
     def _load_instances(self) -> None:
         for component in self.system.components:
@@ -273,7 +292,7 @@ class Session:
             state = "closed" if self._closed else "broken off by a failure or an interruption"
             raise InputError(f"{self.system.name}: the session is {state}; must be a new one")
         try:
-            with interruptible(), _folder_kept(), self._failures():
+            with self._guard(), self._failures():
                 yield
         except InputError:  # which was found before any FMU was called
             raise
@@ -317,6 +336,43 @@ class Session:
         with self._in_use():
             for variable, own in values.items():
                 self._master.scenario.set(variable, own, self._master.steps_done)
+
+    def save(self) -> "State":
+        """The state of now, to which restore() goes back: what is recorded, and all that decides
+        how the run goes on.
+
+        It is kept until nothing refers to it, at most until the session is closed. InputError where
+        an FMU does not give its state, in real time, and where listeners record elsewhere; errors
+        of FMUs as of step().
+        """
+        with self._in_use():
+            if self.pacer:
+                raise InputError(f"{self.system.name}: a run in real time cannot go back")
+            if self._has_listeners:
+                raise InputError(
+                    f"{self.system.name}: what listeners have got cannot be taken back; must be a "
+                    "session without, to save its state"
+                )
+            records = [record.saved() for record in self._records]
+            return State(self, self.time, self._master.saved(), records)
+
+    def restore(self, state: "State") -> None:
+        """Go back to a state of this session that save() gave, as often as you like.
+
+        The run goes on from there with the same bits, as if what came after had not been. So it
+        does after a failure or an interruption, unless an FMU refuses any further call.
+        InputError for a state of another session; SimulationError where an FMU fails.
+        """
+        if not isinstance(state, State) or state.session is not self:
+            raise InputError(f"{self.system.name}: {state!r}: must be a state of this session")
+        if self._closed:
+            raise InputError(f"{self.system.name}: the session is closed; must be a new one")
+        self._failed, self._failure = True, None
+        with self._guard(), self._failures():
+            self._master.restore(state.master)
+        for record, saved in zip(self._records, state.records, strict=True):
+            record.restore(saved)
+        self._failed = False
 
     def result(self) -> Result:
         """Return the result recorded until now.
@@ -486,6 +542,19 @@ def _loaded(component: Component) -> str:
 def _check_count(name: str, count: object) -> None:
     if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= int(count) <= MOST:
         raise InputError(f"{name} = {count!r}: must be a whole number from 1 to {MOST}")
+
+
+def _leaves_the_process_alone(component: Component) -> bool:
+    """True for an FMU elsewhere, or of our own C: it takes no Ctrl-C, and goes to no folder."""
+    fmu = component.loaded
+    return component.isolation == "process" or (fmu.ours and not fmu.python)
+
+
+@contextmanager
+def _guarded() -> Iterator[None]:
+    """Ctrl-C is one, and the current folder the same, whatever FMUs in this process do."""
+    with interruptible(), _folder_kept():
+        yield
 
 
 @contextmanager

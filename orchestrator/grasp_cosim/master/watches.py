@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +80,16 @@ class Watches:
             f"{self._system.name}: limits[{watch.number}]: {watch.limit.when} at t = {time}, it is "
             f"{shown}: the run was aborted"
         )
+
+    def saved(self) -> tuple[Any, ...]:
+        """What came of them until now, for restore()."""
+        return self.table.copy(), len(self.log), dict(self._first)
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what was saved."""
+        self.table[:], lines, first = saved
+        del self.log[lines:]
+        self._first = dict(first)
 
     def arm(self) -> None:
         """Look for peers that are back once more."""

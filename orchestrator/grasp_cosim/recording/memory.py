@@ -64,7 +64,7 @@ class MemoryListener:
 
     def __init__(self, every: int = 1, paced: bool = False) -> None:
         self._every, self._paced = every, paced
-        self._rows = 0
+        self._rows = self._shown = 0
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Make room; InputError where the run does not fit into memory."""
@@ -92,6 +92,18 @@ class MemoryListener:
     def end(self, complete: bool) -> None:
         """Nothing is left to do."""
 
+    def saved(self) -> int:
+        """What was recorded until now, for restore()."""
+        return self._rows
+
+    def restore(self, saved: int) -> None:
+        """Take back what was recorded since; columns that were given out keep it."""
+        self._rows = saved
+        if saved < self._shown:
+            before, self._table = self._table, np.empty_like(self._table)
+            self._table[:, :saved] = before[:, :saved]
+            self._shown = saved
+
     def columns(self, next_row: Rows | None = None) -> Columns:
         """The recorded communication points in s and the columns by name, so far.
 
@@ -100,6 +112,7 @@ class MemoryListener:
         of a row that is not recorded, it is their last.
         """
         steps, table = self._steps[: self._rows], self._table[:, : self._rows]
+        self._shown = max(self._shown, self._rows)
         if next_row:
             steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
         found = zip(self._signals, table, strict=True)
@@ -136,6 +149,16 @@ class EveryRow:
 
     def end(self, complete: bool) -> None:
         """The file goes with the last name of it."""
+
+    def saved(self) -> int:
+        """What was kept until now, for restore()."""
+        return self._rows
+
+    def restore(self, saved: int) -> None:
+        """Take back what was kept since."""
+        if not self.lost:
+            self._file.seek(8 * saved * len(self._places))
+        self._rows = saved
 
     def columns(self) -> Columns:
         """All communication points in s so far, and the columns, mapped from the file."""

@@ -14,8 +14,10 @@ is found where it is recorded.
 
 import hashlib
 import math
+from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -71,53 +73,74 @@ Start = Callable[[Parameters, Draws, Time], Act]
 """Makes a fault from its parameters, its random numbers and the base step in ns."""
 
 
-def _stuck(given: Parameters, *_: object) -> Act:
-    """The given value, or the one of the first step in which it is asked."""
-    held = float(given.get("value", math.nan))
-    since = -math.inf if "value" in given else math.inf
+class Remembering(ABC):
+    """An Act that goes by what it has passed: memory is all of that."""
 
-    def act(value: float, step: int, acts: bool) -> float:
-        nonlocal held, since
+    memory: Sequence[Any] = ()
+
+    def saved(self) -> Sequence[Any]:
+        """The memory of now, for restore()."""
+        return copy(self.memory)
+
+    def restore(self, saved: Sequence[Any]) -> None:
+        """Go back to what was saved."""
+        self.memory = copy(saved)
+
+    @abstractmethod
+    def __call__(self, value: float, step: int, acts: bool) -> float:
+        """As an Act."""
+
+
+class _Stuck(Remembering):
+    """The given value, or the one of the first step in which it is asked."""
+
+    def __init__(self, given: Parameters, *_: object) -> None:
+        since = -math.inf if "value" in given else math.inf
+        self.memory = since, float(given.get("value", math.nan))
+
+    def __call__(self, value: float, step: int, acts: bool) -> float:
         if not acts:
             return value
-        if step <= since:
-            since, held = step, value
+        if step <= self.memory[0]:
+            self.memory = step, value
+        held: float = self.memory[1]
         return held
 
-    return act
 
-
-def _dropout(given: Parameters, draws: Draws, _: Time) -> Act:
+class _Dropout(Remembering):
     """Hold what got through in an earlier step where a value is lost; at first there is none."""
-    probability: float = given["probability"]
-    last, held, passed = INITIAL - 1, None, None
 
-    def act(value: float, step: int, acts: bool) -> float:
-        nonlocal last, held, passed
+    def __init__(self, given: Parameters, draws: Draws, _: Time) -> None:
+        self._probability, self._draws = given["probability"], draws
+        self.memory = INITIAL - 1, None, None
+
+    def __call__(self, value: float, step: int, acts: bool) -> float:
+        last, held, passed = self.memory
         if step != last:
-            last, held = step, passed
-        if held is not None and acts and draws.uniforms(step)[1] < probability:
-            return held
-        passed = value
+            held = passed
+        if held is not None and acts and self._draws.uniforms(step)[1] < self._probability:
+            value, kept = held, passed
+        else:
+            kept = value
+        self.memory = step, held, kept
         return value
 
-    return act
 
-
-def _delay(given: Parameters, _: Draws, step_ns: Time) -> Act:
+class _Delay(Remembering):
     """The last value passed at least so many base steps ago; the first one where there is none."""
-    steps = round(given["time"] * NANOSECONDS / step_ns)
-    history: deque[tuple[int, float]] = deque()
 
-    def act(value: float, step: int, acts: bool) -> float:
+    def __init__(self, given: Parameters, _: Draws, step_ns: Time) -> None:
+        self._steps = round(given["time"] * NANOSECONDS / step_ns)
+        self.memory: deque[tuple[int, float]] = deque()
+
+    def __call__(self, value: float, step: int, acts: bool) -> float:
+        history = self.memory
         if history and history[-1][0] == step:
             history.pop()
         history.append((step, value))
-        while len(history) > 1 and history[1][0] <= step - steps:
+        while len(history) > 1 and history[1][0] <= step - self._steps:
             history.popleft()
         return history[0][1] if acts else value
-
-    return act
 
 
 def _check_delay(place: str, given: Parameters, step_ns: Time) -> None:
@@ -168,9 +191,9 @@ class FaultKind:
 FINITE = Range("a finite number")
 
 FAULTS: Mapping[str, FaultKind] = {
-    "stuck": FaultKind(_stuck, {"value": None}, discrete=True),
+    "stuck": FaultKind(_Stuck, {"value": None}, discrete=True),
     "dropout": FaultKind(
-        _dropout,
+        _Dropout,
         {"probability": Range("a number from 0 to 1", 0.0, 1.0)},
         discrete=True,
         random=True,
@@ -182,7 +205,7 @@ FAULTS: Mapping[str, FaultKind] = {
         random=True,
     ),
     "delay": FaultKind(
-        _delay,
+        _Delay,
         {"time": Range(f"a number from 0 to {LONGEST:g}", 0.0, LONGEST)},
         discrete=True,
         check=_check_delay,

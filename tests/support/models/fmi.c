@@ -439,6 +439,31 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
 }
 #endif
 
+/* A state is a copy of the whole model, which has no memory beside. */
+#if FMI == 2
+#define STATES_OF_HOST(action) fmi2##action##FMUstate
+#else
+#define STATES_OF_HOST(action) fmi3##action##FMUState
+#endif
+
+Status STATES_OF_HOST(Get)(void *c, void **state) {
+    if (!*state) *state = malloc(sizeof(Model));
+    memcpy(*state, c, sizeof(Model));
+    return F(OK);
+}
+
+Status STATES_OF_HOST(Set)(void *c, void *state) {
+    memcpy(c, state, sizeof(Model));
+    return F(OK);
+}
+
+Status STATES_OF_HOST(Free)(void *c, void **state) {
+    (void)c;
+    free(*state);
+    *state = NULL;
+    return F(OK);
+}
+
 Status F(CompletedIntegratorStep)(void *c, Truth no_set, Truth *enter, Truth *terminate) {
     Model *m = c;
     (void)no_set;
