@@ -9,7 +9,7 @@ import math
 import random
 import sys
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from grasp_cosim import System, hand_system, simulate
 from grasp_cosim.hand.system import fmus_of
@@ -109,7 +109,9 @@ def main(count: int = 60) -> None:
     print(f"{'':28}" + "".join(f"{u:>14}" for u in ("s", "s", "N", "N", "mm/s", "mm", "mm/s")))
     for hand in HANDS:
         system, draw = system_of(hand), random.Random(5)  # noqa: S311 - no secret
-        found = [simulate(system.with_values(v)).metrics for v in cases(hand, count, draw)]
+        found: list[Mapping[str, Any]] = [
+            simulate(system.with_values(v)).metrics for v in cases(hand, count, draw)
+        ]
         spreads = [m["time_difference"] for m in found]
         numbers = [
             math.inf if None in spreads else max(spreads),

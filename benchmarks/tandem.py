@@ -101,7 +101,9 @@ def main(count: int = 100) -> None:
     with TemporaryDirectory() as folder:
         for row in ROWS:
             system = _system(row, Path(folder)).with_experiment(stop=5.0)
-            found = [simulate(system.with_values(v)).metrics for v in cases(row, count)]
+            found: list[Mapping[str, Any]] = [
+                simulate(system.with_values(v)).metrics for v in cases(row, count)
+            ]
             _print(row, found)
 
 

@@ -7,7 +7,8 @@ any size, moves where a page shows it as an image, and stands still, at the end 
 those who want no motion.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -100,7 +101,7 @@ def _plane(k: int, title: str, run: Result) -> Iterator[Part]:
         )
         yield _moved(f"p{k}{j}", finger, time, middle + c * way, wrist + s * way)
         out = way[-1] + 68.0
-        touch = run.metrics["time_to_contact"][j - 1]
+        touch = _touches(run)[j - 1]
         when = "never touches" if touch is None else f"{touch:.2f} s"
         text = _text(middle + c * out, wrist + s * out + 5, when, "middle")
         yield _shown(f"w{k}{j}", text, time, float(time[-1]) - 1e-2 if touch is None else touch)
@@ -149,7 +150,7 @@ def _gripper(k: int, title: str, run: Result) -> Iterator[Part]:
     beam = f'<rect x="0" y="{BEAM}" width="1" height="9" fill="var(--muted)"/>'
     spread = place[1] - place[2] + 2 * NARROW
     yield _moved(f"c{k}", beam, time, place[2] - NARROW, stretch=spread)
-    for j, touch in zip(FINGERS, run.metrics["time_to_contact"], strict=True):
+    for j, touch in zip(FINGERS, _touches(run), strict=True):
         x = 0 if j == 1 else -NARROW
         number = _text(x + NARROW / 2, BEAM + 62, str(j), "on middle")
         finger = _rect(x, BEAM + 9, NARROW, 102, j) + number
@@ -161,9 +162,14 @@ def _gripper(k: int, title: str, run: Result) -> Iterator[Part]:
     yield _shown(f"q{k}", outcome, time, float(time[-1]) - 0.5)
 
 
+def _touches(run: Result) -> Any:
+    """When the fingers touch, s; None for one that does not."""
+    return run.metrics["time_to_contact"]
+
+
 def _carried(run: Result) -> str:
-    shift = 1e3 * run.metrics["object_shift"]
-    apart = run.metrics["time_difference"]
+    metrics: Mapping[str, Any] = run.metrics
+    shift, apart = 1e3 * metrics["object_shift"], metrics["time_difference"]
     touched = "one never touches" if apart is None else f"{apart:.2f} s apart"
     return f"{touched}, box carried {shift:.1f} mm"
 
@@ -180,7 +186,7 @@ def _row(k: int, title: str, run: Result) -> Iterator[Part]:
         'rx="4" fill="var(--object)"/>',
         "",
     )
-    for j, touch in zip(FINGERS, run.metrics["time_to_contact"], strict=True):
+    for j, touch in zip(FINGERS, _touches(run), strict=True):
         at, side, anchor = ends[j], SIDE[j], "" if j == 1 else "end"
         lit = f'<rect x="{at - 3:.1f}" y="{top + 34}" width="6" height="88" fill="var(--lit)"/>'
         when = _text(at + 4 * side, top + 140, f"touches at {touch:.2f} s", anchor)
@@ -195,7 +201,7 @@ def _row(k: int, title: str, run: Result) -> Iterator[Part]:
     target += _text(0, top + 34, "target", "muted middle")
     yield _moved(f"t{k}", target, time, MIDDLE + SCALE * signals["controller.target_position"])
     text = _text(WIDTH - 14, top + 18, _outcome(run), "name end")
-    yield _shown(f"o{k}", text, time, max(run.metrics["time_to_contact"]))
+    yield _shown(f"o{k}", text, time, max(_touches(run)))
 
 
 def _clock(time: npt.NDArray[np.float64], height: int) -> Iterator[Part]:

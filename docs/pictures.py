@@ -13,9 +13,9 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import tutorials
 from grasp_cosim import hand_system, simulate, tandem_system
@@ -26,9 +26,10 @@ from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.view import draw_hand as draw_three_fingers
 from grasp_cosim.recording.folder import load_run
-from grasp_cosim.report.diagram import Link, diagram_svg
 from grasp_cosim.report.plot import headed, save
+from grasp_cosim.report.system import connections_svg, stand_alone
 from grasp_cosim.report.tables import Caption, about
+from grasp_cosim.system.settings import settings
 from hand import hand_svg, tandem_svg, three_svg
 
 HERE = Path(__file__).parent
@@ -72,26 +73,8 @@ def draw_tandem(folder: Path) -> None:
 def draw_loop(folder: Path) -> None:
     """loop.svg: the FMUs of the built-in system and their connections, as `report` draws them."""
     system = grasp_system(native=False)
-    links = [
-        Link((c.source.component, c.source.variable), (c.target.component, c.target.variable))
-        for c in system.connections
-    ]
-    boxes = {c.name: c.fmu.name for c in system.components}
-    svg = diagram_svg(boxes, links, simulate(system, stop=0.01).units)
-    head, tag, rest = svg.partition("<defs>")
-    backing = '<rect width="100%" height="100%" rx="8" fill="var(--paper)"/>'
-    head = head.replace("<svg ", '<svg class="diagram" ', 1)
-    write_text(
-        folder / "loop.svg", f"{head}<style>\n{_diagram_style()}</style>{backing}{tag}{rest}\n"
-    )
-
-
-def _diagram_style() -> str:
-    """The part of the page's style that is of its colours and of a diagram."""
-    css = (files("grasp_cosim.report") / "page/page.css").read_text("utf-8")
-    colors, _, _ = css.partition("* {")
-    rules = re.findall(r"^(?:\.diagram [.t]|#tip)[^{]*\{[^}]*\}\n", css, re.MULTILINE)
-    return colors + "".join(rules)
+    units = simulate(system, stop=0.01).units
+    write_text(folder / "loop.svg", f"{stand_alone(connections_svg(settings(system), units))}\n")
 
 
 def draw_report(folder: Path) -> None:
@@ -104,7 +87,8 @@ def draw_report(folder: Path) -> None:
         tutorials.done("run", "--native", "--out", str(page.parent))
         tutorials.done("report", str(page.parent))
         run = load_run(page.parent)
-        touches = run.time.searchsorted(max(run.metrics["time_to_contact"]))
+        times: Any = run.metrics["time_to_contact"]
+        touches = run.time.searchsorted(max(times))
         subprocess.run(  # noqa: S603 - the browser of this machine, our own page
             [
                 browser, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",

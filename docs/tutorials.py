@@ -136,7 +136,7 @@ def value(run: Result, name: str, otherwise: float) -> float:
 
 def gap_behind(run: Result) -> float:
     """The gap of the second finger at the moment of the first contact, m."""
-    times = run.metrics["time_to_contact"]
+    times: Any = run.metrics["time_to_contact"]
     later = 1 + times.index(max(times))
     return float(np.interp(min(times), run.time, run.signals[f"plant.gap[{later}]"]))
 

@@ -1,10 +1,11 @@
 """Public names, names nearest to one that is not known, those of packages; numbers in texts."""
 
+import pydoc
 import re
 import shlex
 import subprocess
 import sys
-from importlib.metadata import metadata
+from importlib.metadata import metadata, version
 from pathlib import Path
 
 import grasp_cosim
@@ -90,9 +91,26 @@ def test_a_public_name_is_one_that_its_home_has(name):
     assert getattr(sys.modules[f"grasp_cosim.{home}"], name) is value
 
 
+def test_dir_and_help_have_the_public_names_alone():
+    assert [n for n in dir(grasp_cosim) if not n.startswith("_")] == grasp_cosim.__all__
+    page = pydoc.render_doc(grasp_cosim, renderer=pydoc.plaintext)
+    assert "class System(" in page
+    assert "Run the system once for each row" in page
+    names: dict[str, object] = {}
+    exec("from grasp_cosim import *", names)
+    assert {*names} == {*grasp_cosim.__all__, "__builtins__"}
+
+
+def test_the_version_is_that_of_the_distribution():
+    assert grasp_cosim.__version__ == version("grasp-cosim")
+    with pytest.raises(AttributeError, match="no attribute 'versoin'"):
+        grasp_cosim.versoin  # noqa: B018
+
+
 def test_importing_the_package_imports_no_numbers():
-    program = "import sys, grasp_cosim; print('numpy' in sys.modules, 'fmpy' in sys.modules)"
-    assert subprocess.check_output([sys.executable, "-c", program], text=True) == "False False\n"
+    names = "numpy", "fmpy", "importlib.metadata"
+    program = f"import sys, grasp_cosim; print([n for n in {names} if n in sys.modules])"
+    assert subprocess.check_output([sys.executable, "-c", program], text=True) == "[]\n"
 
 
 @given(st.floats(allow_nan=False), st.integers())

@@ -16,11 +16,12 @@ when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.swe
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .base.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
+    __version__: str
     from .comparison.compare import compare
     from .comparison.qualify import qualify
     from .grasp.identification.identification import identify
@@ -88,9 +89,20 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
-    globals()[name] = value
-    return value
+def __dir__() -> list[str]:
+    return [*__all__, *(name for name in globals() if name.startswith("__")), "__version__"]
+
+
+if not TYPE_CHECKING:  # who checks types knows the names above, and none besides
+
+    def __getattr__(name):
+        if name == "__version__":
+            from importlib.metadata import version
+
+            value = version("grasp-cosim")
+        elif name in _HOMES:
+            value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+        else:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = value
+        return value

@@ -9,7 +9,7 @@ from grasp_cosim import InputError, metric, simulate
 from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.side import differences, read_side
-from grasp_cosim.comparison.words import as_json, as_text
+from grasp_cosim.comparison.words import as_json, as_text, verdict
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.units import Conversion
 from report.runs import component, grasp_run, rounded, write_run
@@ -253,3 +253,26 @@ def test_settings_that_differ(snapshot):
         ),
     }
     assert {n: [" | ".join(d) for d in differences(run, b)] for n, b in others.items()} == snapshot
+
+
+def test_a_comparison_is_true_where_the_runs_are_alike():
+    run = grasp_run()
+    same, other = compare(run, run), compare(run, changed(run, **{"gap[1]": run[GAP] + 1.0}))
+    assert same
+    assert not other
+    assert {same: 1}[same] == 1
+    assert same != other
+
+
+def test_a_comparison_shows_its_verdict_and_the_worst(tmp_path):
+    run = grasp_run()
+    write_run(tmp_path / "<b>", run)
+    found = compare(tmp_path / "<b>", changed(run, **{"gap[1]": run[GAP] + 1.0}))
+    first, *lines = repr(found).splitlines()
+    assert first == verdict(found)
+    assert len(lines) < 24
+    assert any(GAP in line for line in lines)
+    page = found._repr_html_()
+    assert verdict(found) in page
+    assert "&lt;b&gt;" in page
+    assert "<b>/" not in page

@@ -12,6 +12,7 @@ from grasp_cosim.comparison.bands import Bands, Given, read_bands
 from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.comparison.words import qualification_json as as_json
 from grasp_cosim.comparison.words import qualification_text as as_text
+from grasp_cosim.comparison.words import reason
 from support.marks import slow
 from support.native_fmus import build, needs_gcc
 
@@ -267,3 +268,24 @@ def test_a_new_direct_dependence_is_judged_by_the_candidates_own_run(loops, said
     found = qualify(system, "plant", tmp_path / "plant.fmu", rename={"x": "y_Real", "y_Real": "x"})
     assert not found.qualified
     assert said in as_json(found)["reason"]
+
+
+def test_a_qualification_is_true_where_the_candidate_may_take_the_place(copied, heavier):
+    assert copied
+    assert not heavier
+    assert copied != heavier
+
+
+def test_a_qualification_shows_its_verdict_and_its_reason(heavier):
+    first, why, *lines = repr(heavier).splitlines()
+    assert first.startswith("NOT QUALIFIED: GripperPlant.fmu as plant (now GripperPlant.fmu)")
+    assert why.startswith("  7 of 23 signals and ")
+    assert len(lines) < 22
+    assert reason(heavier) in heavier._repr_html_()
+
+
+def test_a_candidate_that_did_not_run_shows_why(short, fmus):
+    blocked = qualify(short, "plant", fmus / "GraspController.fmu")
+    assert not blocked
+    assert "the interface does not fit" in repr(blocked)
+    assert "the interface does not fit" in blocked._repr_html_()

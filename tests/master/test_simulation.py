@@ -236,3 +236,13 @@ def test_a_temporary_folder_that_crashes_pythonfmu_is_refused(grasp, unpack_in):
 def test_a_temporary_folder_with_a_space_is_fine(grasp, unpack_in):
     unpack_in("a b")
     assert simulate(grasp, stop=1e-3).complete
+
+
+def test_a_session_says_how_far_it_is_and_which_names_it_has(grasp):
+    with simulate.session(grasp, step=1e-3, stop=0.01) as session:
+        session.step(3)
+        assert repr(session) == "Session of grasp.toml at 0.003 of 0.01 s"
+        names = session._ipython_key_completions_()
+        assert {"plant.gap[1]", "sensor_1.gap"} <= {*names}
+        assert [session[name] for name in names]
+    assert repr(session).endswith(", closed")

@@ -74,9 +74,9 @@ def test_native_fmus_and_what_is_read_back(tmp_path, version, isolation, scheme)
 @needs_gcc
 def test_a_session_has_the_text_of_now(tmp_path):
     with simulate.session(changing(tmp_path, "3.0", "none")) as session:
-        assert session["b.y_String"] == "at rest"
+        assert session.text("b.y_String") == "at rest"
         assert session.step()
-        assert session["b.y_String"] == TEXTS[0]
+        assert session.text("b.y_String") == TEXTS[0]
 
 
 @needs_gcc

@@ -4,6 +4,7 @@ import itertools
 import random
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import pytest
 from grasp_cosim.report.diagram import Link, diagram_svg
@@ -112,3 +113,12 @@ def test_every_connection_leads_to_its_port_past_all_boxes_and_feedback_below(ca
             assert way.attrib["class"] == "connection back"
             assert way.find(f"{SVG}text").text == w.name
     assert len(set(lanes)) == len(lanes)
+
+
+def test_a_system_in_a_notebook_is_its_diagram(grasp):
+    page = replace(grasp, name="<b>.toml")._repr_html_()
+    assert "<b>&lt;b&gt;.toml</b>: 3 s in steps of 0.1 ms, sequential; 10 connections" in page
+    assert page.count('<g class="box">') == 4
+    assert "plant.gap[1] → sensor_1.gap" in page
+    assert ":root" not in page
+    assert ".diagram .box rect" in page

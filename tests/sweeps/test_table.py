@@ -350,3 +350,29 @@ def test_runs_come_back_under_the_index_of_the_frame(index, in_a_file):
 def test_a_cell_of_pandas_that_is_not_there_leaves_the_system_its_value():
     frame = pd.DataFrame({"a": pd.array([1, None], "Int64"), "b": [pd.NaT, 2.0]})
     assert as_rows(frame) == [{"a": 1}, {"b": 2.0}]
+
+
+def test_a_table_shows_a_line_for_each_metric():
+    text = repr(small())
+    assert text.splitlines()[:2] == ["Table of 2 runs, 1 failed", "  varied: a.p"]
+    assert "reach" in text
+    many = made([{"a.p": i} for i in range(1000)], [Outcome(i, {"m": 1.0}) for i in range(1000)],
+                {}, [])  # fmt: skip
+    assert len(repr(many)) < 500
+
+
+def test_a_table_in_a_notebook_has_its_first_rows_as_texts():
+    table = made([{"a.p": i} for i in range(30)], [Outcome(i, {}, f"<i>{i}") for i in range(30)],
+                 {"a.p": "<N>"}, [])  # fmt: skip
+    page = table._repr_html_()
+    assert "a.p [&lt;N&gt;]" in page
+    assert "&lt;i&gt;9" in page
+    assert "&lt;i&gt;10" not in page
+    assert "<i>" not in page
+    assert table._ipython_key_completions_() == ["index", "a.p", "error"]
+
+
+def test_equal_tables_have_one_hash():
+    one, other = small(), small()
+    assert one == other
+    assert hash(one) == hash(other)

@@ -255,3 +255,22 @@ def test_a_name_of_several_variables_is_left_alone_and_refused_where_it_is_wante
     assert "dp: several variables of dp.fmu are called b: they are left alone" in remarks(system)
     with pytest.raises(InputError, match=r"dp\.fmu, where several are called b, has no "):
         system.with_values({"dp.b": 2.0})
+
+
+def test_equal_systems_are_one_key_and_others_another(grasp):
+    again = System.load(SYSTEM, grasp.components[0].fmu.parent)
+    same = System.load(SYSTEM, grasp.components[0].fmu.parent)
+    wide = same.with_values({"plant.object_width": 0.05})
+    assert again == same
+    assert hash(again) == hash(same)
+    assert hash(wide) != hash(same)
+    assert {same: 1, wide: 2}[again] == 1
+
+
+def test_a_system_shows_itself_in_five_lines(grasp):
+    lines = repr(grasp).splitlines()
+    assert lines[0] == "System grasp.toml"
+    assert len(lines) == 5
+    assert max(map(len, lines)) <= 120
+    assert "3 s in steps of 0.1 ms, sequential" in lines[1]
+    assert len(repr(grasp.components[0].interface)) < 120

@@ -57,6 +57,18 @@ def grouped(value: float, decimals: int = 0) -> str:
     return f"{value:,.{decimals}f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
+WIDEST, LONGEST = 120, 24
+"""Characters and lines of a repr() at most, which is less than a screen."""
+
+
+def on_a_screen(lines: Sequence[str]) -> str:
+    """The lines as a repr() has them: of many the first, each of them cut where it is long."""
+    left = len(lines) - LONGEST
+    more = [f"... ({counted(left, 'line')} more)"] if left > 0 else []
+    harmless = [on_one_line(line) for line in [*lines[:LONGEST], *more]]
+    return "\n".join(x if len(x) <= WIDEST else f"{x[: WIDEST - 3]}..." for x in harmless)
+
+
 def columns(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
     """Return a line for each row, two spaces between its cells.
 

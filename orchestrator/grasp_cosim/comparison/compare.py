@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, choices
+from ..base.higher import higher
 from ..interface.units import Conversion
 from ..master.simulation import simulate
 from ..metrics.metric import Metric, metrics_of
@@ -29,9 +30,11 @@ Curves = Mapping[str, Curve]
 Values = Mapping[str, float | None]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Comparison:
     """Two runs from `begin` to `end` in s; signals and metrics that both have, the worst first.
+
+    It is true where the two are alike: `if compare(a, b):`.
 
     Both are in the units of a. `curves` are the signals of a and of b that were compared, `asked`
     the metrics that were, `absent` those that neither has a value of, `only` the signals that only
@@ -66,6 +69,17 @@ class Comparison:
     def alike(self) -> bool:
         """True if both came to their ends, and all that was compared is inside its band."""
         return not self.unfinished and all(c.inside for c in (*self.signals, *self.metrics))
+
+    def __bool__(self) -> bool:
+        return self.alike
+
+    def __repr__(self) -> str:
+        """The verdict, what the runs are, and the worst signals and metrics."""
+        return str(higher("comparison.words").short_text(self))
+
+    def _repr_html_(self) -> str:
+        """The same, as notebooks show it."""
+        return str(higher("comparison.page").short_html(self))
 
 
 def compare(

@@ -27,6 +27,7 @@ from ..report.tables import (
     scaled,
     summary,
     table,
+    text_table,
 )
 from .bands import Compared, plain
 from .compare import Comparison
@@ -34,8 +35,11 @@ from .qualify import Qualification
 from .side import Side
 from .tube import deviation, tube
 from .words import (
+    ROWS,
     absent_lines,
+    cells,
     difference_lines,
+    kinds,
     notes,
     qualification_verdict,
     reason,
@@ -74,6 +78,25 @@ def write_qualification(q: Qualification, path: Path) -> bool:
 def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
     """Return the page as text; of more than `limit` values the signals are thinned."""
     return _html(c, limit, verdict(c), c.alike, [*absent_lines(c), *notes(c)])
+
+
+def short_html(c: Comparison) -> str:
+    """The verdict on two runs, what they are, and the worst signals and metrics, for a notebook."""
+    sides = zip(c.names, (c.a, c.b), strict=True)
+    runs = "<br>".join(escape(f"{name}: {side.name}") for name, side in sides)
+    return f"<p><b>{escape(verdict(c))}</b><br>{runs}</p>{_worst(c)}"
+
+
+def short_qualification_html(q: Qualification) -> str:
+    """The verdict on a candidate and its reason, its interface, and the worst, for a notebook."""
+    head = f"<p><b>{escape(qualification_verdict(q))}</b><br>{escape(reason(q))}</p>"
+    interface = "<br>".join(map(escape, difference_lines(q.swap.differences)))
+    return f"{head}<p>{interface}</p>{'' if q.comparison is None else _worst(q.comparison)}"
+
+
+def _worst(c: Comparison) -> str:
+    """Tables of the signals and the metrics that are furthest out of their bands."""
+    return "".join(text_table(cells(kind, found[:ROWS], c.names)) for kind, found in kinds(c))
 
 
 def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[str]) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..base.checks import choice, known
 from ..base.errors import InputError, SimulationError
+from ..base.higher import higher
 from ..interface.expansion import values_of
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
@@ -43,7 +44,7 @@ END = Metric(
 """Compared where one of the runs ends before the stop time."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Swap:
     """The system with the original, and with the candidate unless a difference blocks that.
 
@@ -65,9 +66,9 @@ class Swap:
         return self.system.component(self.component, "swap").fmu
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Qualification:
-    """The verdict and all that led to it.
+    """The verdict and all that led to it; true where the candidate is qualified.
 
     failure is why the candidate did not run to the end, None where it did or was not run.
     comparison is that of the two runs, in which notes are what the candidate's run tells and the
@@ -81,12 +82,12 @@ class Qualification:
     @property
     def signals(self) -> tuple[Compared, ...]:
         """The signals that were compared, the worst first."""
-        return self.comparison.signals if self.comparison else ()
+        return () if self.comparison is None else self.comparison.signals
 
     @property
     def metrics(self) -> tuple[Compared, ...]:
         """The metrics that were compared, the worst first."""
-        return self.comparison.metrics if self.comparison else ()
+        return () if self.comparison is None else self.comparison.metrics
 
     @property
     def blocks(self) -> tuple[Difference, ...]:
@@ -98,6 +99,17 @@ class Qualification:
         """True if the candidate may take the original's place: all that there was to compare."""
         c = self.comparison
         return c is not None and not self.failure and c.alike and bool(c.signals or c.metrics)
+
+    def __bool__(self) -> bool:
+        return self.qualified
+
+    def __repr__(self) -> str:
+        """The verdict and its reason, the worst signals and metrics, and the interface."""
+        return str(higher("comparison.words").short_qualification(self))
+
+    def _repr_html_(self) -> str:
+        """The same, as notebooks show it."""
+        return str(higher("comparison.page").short_qualification_html(self))
 
 
 def qualify(

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ..base.errors import InputError, choices
 from ..base.files import check_nature
 from ..base.si_units import known_unit
+from ..base.text import counted
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals, measure
 from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run
@@ -26,7 +27,7 @@ AS_IT_STARTS, NONE = "as the FMU starts", "none"
 """In place of a value that was not given, and of what one run has not."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Side:
     """The numbers that were recorded, by name, on `time` in s, which does not fall.
 
@@ -50,6 +51,11 @@ class Side:
     groups: Sequence[str] = ()
     silent: tuple[str, ...] = ()
     """The signals of a log that told no unit, and got that of the other run."""
+
+    def __repr__(self) -> str:
+        """What it is called, and how much of it there is."""
+        size = f"{counted(len(self.time), 'row')}, {counted(len(self.signals), 'signal')}"
+        return f"Side {self.name}: {size}"
 
     @property
     def interval(self) -> float:

@@ -8,7 +8,7 @@ from math import inf, isfinite
 from typing import Any
 
 from ..base.errors import choices
-from ..base.text import columns, significant
+from ..base.text import columns, on_a_screen, significant
 from ..system.times import in_seconds
 from .bands import Compared, plain
 from .compare import Comparison
@@ -45,6 +45,30 @@ def as_text(c: Comparison) -> str:
     elif c.a.result and c.b.result:
         parts.append(["the settings of the runs are the same"])
     return _joined([*parts, *_tables(c), [*absent_lines(c), *notes(c)]])
+
+
+def short_text(c: Comparison) -> str:
+    """The verdict, what the runs are, and a few of the worst: the repr() of a comparison."""
+    sides = zip(c.names, (c.a, c.b), strict=True)
+    head = [verdict(c), *(f"  {name}: {side.name}" for name, side in sides)]
+    return on_a_screen([*head, *short_lines(c)])
+
+
+def short_qualification(q: Qualification) -> str:
+    """The verdict and its reason, a few of the worst, and the interface, as its repr()."""
+    interface, *_ = difference_lines(q.swap.differences)
+    worst = [] if q.comparison is None else short_lines(q.comparison)
+    return on_a_screen([qualification_verdict(q), f"  {reason(q)}", f"  {interface}", *worst])
+
+
+def short_lines(c: Comparison) -> list[str]:
+    """A few of the signals and metrics, the worst first."""
+    return [f"  {line}" for kind, found in kinds(c) for line in _table(kind, found, c.names, FEW)]
+
+
+def kinds(c: Comparison) -> list[tuple[str, Sequence[Compared]]]:
+    """The signals and the metrics that were compared, as far as there are any."""
+    return [(k, found) for k, found in (("signal", c.signals), ("metric", c.metrics)) if found]
 
 
 def notes(c: Comparison) -> list[str]:
@@ -88,8 +112,10 @@ def qualification_text(q: Qualification) -> str:
     """The verdict, then what is out of band, the worst first, then the interface."""
     c, parts = q.comparison, [[qualification_verdict(q), reason(q)]]
     last = [f"whether this machine loads it: grasp-cosim inspect --load {q.swap.candidate}"]
-    parts += [*(_tables(c) if c else []), difference_lines(q.swap.differences)]
-    return _joined([*parts, _cut(notes(c), MOST) if c else last if q.failure else []])
+    parts += [*([] if c is None else _tables(c)), difference_lines(q.swap.differences)]
+    if c is not None:
+        last = _cut(notes(c), MOST)
+    return _joined([*parts, last if c is not None or q.failure else []])
 
 
 def qualification_verdict(q: Qualification) -> str:
@@ -123,10 +149,10 @@ def qualification_json(q: Qualification) -> dict[str, Any]:
         "differences": [asdict(d) for d in q.swap.differences],
         "signals": [_json(s, "original", "candidate") for s in q.signals],
         "metrics": [_json(m, "original", "candidate") for m in q.metrics],
-        "no_value": list(c.absent) if c else [],
-        "uncompared": list(c.only[0]) if c else [],
-        "numerics": list(c.numerics) if c else [],
-        "log": list(c.notes) if c else [],
+        "no_value": [] if c is None else list(c.absent),
+        "uncompared": [] if c is None else list(c.only[0]),
+        "numerics": [] if c is None else list(c.numerics),
+        "log": [] if c is None else list(c.notes),
         "bands": {
             "signals": {s.name: _band(s) | {"time": s.band.time} for s in q.signals},
             "metrics": {m.name: _band(m) for m in q.metrics},
@@ -191,23 +217,28 @@ def _cut(lines: Sequence[str], most: int, indent: str = "") -> list[str]:
 
 
 def _tables(c: Comparison) -> list[list[str]]:
-    both = (("signal", c.signals), ("metric", c.metrics))
-    return [_table(name, compared, c.names) for name, compared in both if compared]
+    return [_table(kind, compared, c.names, ROWS) for kind, compared in kinds(c)]
 
 
-def _table(name: str, compared: Sequence[Compared], runs: tuple[str, str]) -> list[str]:
-    """The lines of a table of signals or metrics: what is out of band, the worst first, else some
-    that are inside; `runs` are the heads of their values.
-    """
-    outside = [c for c in compared if not c.inside]
-    shown, time = outside[:ROWS] or compared[:FEW], ["at t in s"] if name == "signal" else []
+def cells(name: str, compared: Sequence[Compared], runs: tuple[str, str]) -> list[list[str]]:
+    """The head and a row for each signal or metric; `runs` are the heads of their values."""
+    time = ["at t in s"] if name == "signal" else []
     rows = [["x band", name, "deviation", "band", "unit", *time, *runs]]
-    for c in shown:
+    for c in compared:
         at = [] if c.time is None else [f"{c.time:.9g}"]
         values = [significant(v, 6) for v in (c.original, c.candidate)]
         widths = [significant(v, 3) for v in (c.deviation, c.band.width)]
         rows.append([significant(c.ratio, 3), c.name, *widths, c.unit or "", *at, *values])
-    lines = columns(rows, {1, 4})
+    return rows
+
+
+def _table(name: str, compared: Sequence[Compared], runs: tuple[str, str], most: int) -> list[str]:
+    """The lines of a table of signals or metrics: what is out of band, the worst first and at
+    `most` so many, else some that are inside; `runs` are the heads of their values.
+    """
+    outside = [c for c in compared if not c.inside]
+    shown = outside[:most] or compared[:FEW]
+    lines = columns(cells(name, shown, runs), {1, 4})
     if left := len(compared) - len(shown):
         beyond = len(outside) - len(shown)
         more = f"{beyond} more out of band, " if beyond > 0 else ""

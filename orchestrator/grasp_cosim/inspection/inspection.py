@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import choices
+from ..base.text import WIDEST as SCREEN
+from ..base.text import on_a_screen
 from ..interface.interface import Variable
 from ..interface.obstacles import KINDS, this_platform
 from ..interface.read import describe
@@ -17,30 +19,37 @@ WIDEST = 32
 """Between name and description, the width of a column where the width of the table is limited."""
 
 
-def inspect_fmu(path: Path) -> dict[str, Any]:
+class Report(dict[str, Any]):
+    """The declarations of an FMU, ready for JSON; it shows itself as `inspect` does."""
+
+    def __repr__(self) -> str:
+        return on_a_screen(as_text(self, SCREEN).splitlines())
+
+
+def inspect_fmu(path: Path) -> Report:
     """Return the declarations of the FMU at path, ready for JSON; InputError where there is no FMU.
 
     `dependencies` is null where an output declares none, which means all inputs in FMI. `sizes`
     name by dimension the variable that holds the length, null where that is fixed.
     """
     found = describe(path)
-    return {
-        "fmu": str(path),
-        "model_name": found.model_name,
-        "fmi_version": found.version,
-        "kinds": [KINDS[key] for key in found.kinds],
-        "generation_tool": found.tool,
-        "guid": found.guid or None,
-        "default_experiment": dict(found.experiment),
-        "platforms": list(found.platforms),
-        "this_machine": this_platform(found.version),
-        "sources": found.sources,
-        "python": found.python,
-        "capabilities": dict(found.capabilities),
-        "log_categories": list(found.log_categories),
-        "ambiguous": list(found.ambiguous),
-        "variables": [_variable(v) for v in found.variables],
-    }
+    return Report(
+        fmu=str(path),
+        model_name=found.model_name,
+        fmi_version=found.version,
+        kinds=[KINDS[key] for key in found.kinds],
+        generation_tool=found.tool,
+        guid=found.guid or None,
+        default_experiment=dict(found.experiment),
+        platforms=list(found.platforms),
+        this_machine=this_platform(found.version),
+        sources=found.sources,
+        python=found.python,
+        capabilities=dict(found.capabilities),
+        log_categories=list(found.log_categories),
+        ambiguous=list(found.ambiguous),
+        variables=[_variable(v) for v in found.variables],
+    )
 
 
 def as_text(report: Mapping[str, Any], width: int | None = None) -> str:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -273,7 +274,7 @@ class ModelExchange:
     told: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Interface:
     """The interface of an FMU; guid is the instantiation token, tool what it was made with.
 
@@ -364,6 +365,12 @@ class Interface:
         """The value of a capability, under the name that FMI 2.0 or 3.0 has for it."""
         wanted = _plain(flag)
         return next((v for name, v in self.capabilities.items() if _plain(name) == wanted), None)
+
+    def __repr__(self) -> str:
+        """What FMU it is of, and how many variables that has of which causality."""
+        found = Counter(v.causality for v in self.variables)
+        counts = ", ".join(f"{count} {causality}" for causality, count in found.items())
+        return f"Interface of {self.path.name}, FMI {self.version}: {counts or 'no variables'}"
 
     @property
     def can_vary_step(self) -> bool:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from numbers import Integral
-from typing import Any
 
 from ..base.errors import InputError, SimulationError, nearest
 from ..base.interruption import interruptible, interrupts
@@ -19,7 +18,7 @@ from ..exchange.listener import Listener
 from ..fmi.instance import Instance
 from ..fmi.process import load
 from ..interface.interface import Given
-from ..interface.units import IDENTITY
+from ..interface.units import IDENTITY, Conversion
 from ..metrics.in_si import in_si
 from ..metrics.metric import (
     Function,
@@ -39,7 +38,7 @@ from ..system.connectors import given_by_connectors, read_at
 from ..system.declared_steps import check_declared_steps
 from ..system.description import System
 from ..system.native import needed_twins
-from ..system.parts import Component, Realtime, as_signal
+from ..system.parts import Component, Port, Realtime, as_signal
 from ..system.settings import start_values
 from ..system.times import TimeInput, in_seconds
 from ..system.validity import remarks
@@ -308,22 +307,47 @@ class Session:
         self._master.meanwhile = show
         return self._master.total_steps if self._master.runs_alone else 1
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> float:
         """The value now of an output, of a connected input or of what is recorded, by a name like
         'plant.gap[1]'.
 
-        A float, of a Boolean 0.0 or 1.0; of a String its text. InputError where there is no such
-        signal; connected inputs that are Strings are none.
+        Of a Boolean it is 0.0 or 1.0; the text of a String is that of text(). InputError where
+        there is no such signal.
         """
-        slots, texts = self._master.slots, self._master.texts
-        port, change = read_at(self.system, as_signal(f"signal {name!r}", name))
-        if port not in slots:
-            valid = nearest(name, [*self.system.outputs, *slots])
-            raise InputError(f"{name!r}: no such signal; {valid}")
-        value = float(self._master.values[slots[port]])
-        if port in texts:
-            return texts[port].listed[int(value)]
+        port, change = self._read_at(name)
+        if port in self._master.texts:
+            raise InputError(f"{name!r}: is a String; must be read by session.text({name!r})")
+        value = float(self._master.values[self._master.slots[port]])
         return value if change == IDENTITY else change(value)
+
+    def text(self, name: str) -> str:
+        """The text now of a String, by its name; InputError where there is no such signal.
+
+        Connected inputs that are Strings are none.
+        """
+        port, _ = self._read_at(name)
+        if port not in self._master.texts:
+            raise InputError(f"{name!r}: is a number; must be read by session[{name!r}]")
+        texts = self._master.texts[port].listed
+        return texts[int(self._master.values[self._master.slots[port]])]
+
+    def _read_at(self, name: str) -> tuple[Port, Conversion]:
+        """The signal of a component behind a name, and what is made of its value."""
+        port, change = read_at(self.system, as_signal(f"signal {name!r}", name))
+        if port not in self._master.slots:
+            valid = nearest(name, self._ipython_key_completions_())
+            raise InputError(f"{name!r}: no such signal; {valid}")
+        return port, change
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """The names of signals, for Tab behind a bracket in a notebook."""
+        return [*self.system.outputs, *map(str, self._master.slots)]
+
+    def __repr__(self) -> str:
+        """How far it is."""
+        state = ", closed" if self._closed else ", broken off" if self._failed else ""
+        stop = in_seconds(self.system.stop_ns)
+        return f"Session of {self.system.name} at {self.time:.6g} of {stop:.6g} s{state}"
 
     def set(self, name: str, value: Given) -> None:
         """Set a tunable parameter or an input without a connection, or a whole array of such.

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..base.by_name import ByName
 from ..base.checks import known
 from ..base.errors import InputError, choices, nearest
 from ..base.errors import reason as reason_of
@@ -65,8 +66,8 @@ class MissingSignalError(KeyError):
         return str(self.args[0])
 
 
-@dataclass(frozen=True, eq=False)
-class Signals(Mapping[str, npt.NDArray[Any]]):
+@dataclass(frozen=True, eq=False, repr=False)
+class Signals(ByName[npt.NDArray[Any]]):
     """Recorded signals by names like plant.gap[1], where plant is a role or a component.
 
     `time` in s and every signal have the shape (rows,). They come in SI base units, by_name has

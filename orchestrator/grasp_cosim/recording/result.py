@@ -7,20 +7,21 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, overload
 
 import numpy as np
 import numpy.typing as npt
 
+from ..base.by_name import ByName
 from ..base.checks import extra_module, is_number
 from ..base.errors import UnknownNameError, choices
 from ..base.files import write_json
 from ..base.higher import higher
 from ..base.one_piece import in_one_piece
-from ..base.text import on_one_line
+from ..base.text import on_a_screen
 from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
-from ..metrics.metric import Measured, Metric, Signals, measure, metrics_of
+from ..metrics.metric import Measured, Metric, Signals, Value, measure, metrics_of
 from ..realtime.timing import Timing
 from ..system.settings import given_values
 from ..system.times import NANOSECONDS, nearest_time
@@ -38,8 +39,8 @@ if TYPE_CHECKING:
 KINDS = {"f": "Real", "i": "Integer", "b": "Boolean", "O": "String"}
 """The kind of a signal by the kind of its column's element type."""
 
-FEW, WIDTH = 3, 100
-"""So many names, and characters, are in a line of a result's repr()."""
+FEW = 3
+"""So many names are in a line of a result's repr()."""
 
 PIECE = 8192
 """Rows written at once."""
@@ -95,10 +96,35 @@ OF_ANY = View(
 
 
 class Figures(dict[str, Any]):
-    """Metrics and other figures by name; KeyError, with the nearest names, where there is none."""
+    """Metrics and other figures by name; KeyError, with the nearest names, where there is none.
 
-    def __missing__(self, name: str) -> Any:
+    A metric is a number, True or False, None where it has no value, or a list of these.
+    """
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __getitem__(self, name: Literal["wall_time", "real_time_factor"]) -> float | None: ...
+        @overload
+        def __getitem__(self, name: Literal["step", "stop", "ended_at"]) -> float: ...
+        @overload
+        def __getitem__(self, name: Literal["steps"]) -> int: ...  # type: ignore[overload-overlap]
+        @overload
+        def __getitem__(self, name: Literal["complete"]) -> bool: ...
+        @overload
+        def __getitem__(self, name: Literal["scheme"]) -> str: ...  # type: ignore[overload-overlap]
+        @overload
+        def __getitem__(self, name: Literal["proxies"]) -> Mapping[str, Any]: ...  # type: ignore[overload-overlap]
+        @overload
+        def __getitem__(self, name: str) -> Value | list[Value]: ...
+        def __getitem__(self, name: str) -> Any: ...
+
+    def __missing__(self, name: str) -> NoReturn:
         raise UnknownNameError(name, tuple(self), "metric")
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """The names, for Tab behind a bracket in a notebook."""
+        return [*self]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,13 +135,13 @@ class Known:
     proxies: Mapping[str, Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Result(Mapping[str, npt.NDArray[Any]]):
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(ByName[npt.NDArray[Any]]):
     """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
 
     It is the same whether it was just run or read back from a folder. Every signal has the shape
     of `time`, (rows,), and is in its unit in `units`, that of its FMU. `settings` are those of
-    system.settings, as in run.json.
+    system.settings, as in run.json. A result is equal to itself alone: see compare().
     """
 
     settings: Mapping[str, Any]
@@ -160,8 +186,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
 
     def __repr__(self) -> str:
         """The system, its settings, metrics and signals in five lines."""
-        lines = map(on_one_line, self._in_words())
-        return "\n".join(x if len(x) <= WIDTH else f"{x[: WIDTH - 3]}..." for x in lines)
+        return on_a_screen([*self._in_words()])
 
     def _repr_html_(self) -> str:
         """The run and its metrics, as notebooks show them."""
@@ -220,7 +245,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return {name: column for name, column in self.items() if column.dtype != object}
 
     @property
-    def metrics(self) -> Mapping[str, Any]:
+    def metrics(self) -> Figures:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
         InputError where the function of one fails; KeyError, with the nearest names, if not there.
@@ -229,7 +254,7 @@ class Result(Mapping[str, npt.NDArray[Any]]):
         return self._figures
 
     @cached_property
-    def _figures(self) -> Mapping[str, Any]:
+    def _figures(self) -> Figures:
         """The metrics without those that fail."""
         known, took, settings = self.known, self.wall_time, self.settings
         simulated = float(self.time[-1]) - settings.get("start", 0.0)

@@ -1,12 +1,13 @@
 """The signals that a run of ours has recorded, and logs of others, read from their files."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from ..base.by_name import ByName
 from ..base.errors import InputError, nearest
 from ..base.text import from_cell
 from ..system.times import LONGEST
@@ -52,7 +53,7 @@ def read_signals(path: Path, texts: Collection[str]) -> Columns:
     return time, signals
 
 
-class Log(Mapping[str, npt.NDArray[np.float64] | npt.NDArray[np.bool_]]):
+class Log(ByName[npt.NDArray[np.float64] | npt.NDArray[np.bool_]]):
     """Signals that any tool has recorded, numbers or Booleans by name, on `time` in s.
 
     A column is read when it is asked for, so that one that nobody uses may hold whatever it likes;

@@ -32,14 +32,13 @@ from ..exchange.listener import Texts
 from ..recording.csv import quoted
 from ..recording.folder import load_run, run_folder
 from ..recording.result import Result
-from .diagram import Link, diagram_svg
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter
+from .system import connections_svg
 from .tables import (
     Caption,
     caption,
     metrics_table,
-    number,
     protocol_html,
     settings_html,
     summary,
@@ -318,19 +317,9 @@ def moments(log: Sequence[str]) -> list[float]:
 
 
 def _connections(result: Result) -> str:
-    faults: dict[str, list[str]] = {}
-    for fault in result.settings["faults"]:
-        faults.setdefault(fault["connection"], []).append(fault["kind"])
-    links = []
-    for c in result.settings["connections"]:
-        label = [] if c["factor"] is None else [f"× {number(c['factor'])}"]
-        label += [f"+ {number(c['offset'])}"] if c["offset"] else []
-        label += faults.get(c["to"], [])
-        source, target = (tuple(c[end].split(".", 1)) for end in ("from", "to"))
-        links.append(Link(source, target, ", ".join(label), fault=c["to"] in faults))
-    boxes = {name: c["fmu"] for name, c in result.settings["components"].items()}
+    svg = connections_svg(result.settings, result.units)
     return (
-        f'<div class="diagram">{diagram_svg(boxes, links, result.units)}</div>'
+        f'<div class="diagram">{svg}</div>'
         f"{svg_button('.diagram svg', 'connections')}"
         '<p class="hint">From left to right in the order of execution. Above: connections past '
         "others. Dashed, below: connections back to a component that steps earlier. Hold the "

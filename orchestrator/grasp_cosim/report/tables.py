@@ -148,7 +148,7 @@ def scaled(value: Any, factor: float) -> str:
 
 def settings_html(result: Result) -> str:
     """Components, experiment, events, faults, log and discarded steps."""
-    run = {**result.metrics, **result.settings}
+    run: dict[str, Any] = {**result.metrics, **result.settings}
     components = [
         (
             f'<td>{escape(name)}</td><td data-head="FMU">{escape(c["fmu"])}</td>'
@@ -240,6 +240,13 @@ def table(heads: str, rows: Iterable[str], kind: str = "") -> str:
     body = "".join(f"<tr>{row}</tr>" for row in rows)
     of_kind = f' class="{kind}"' if kind else ""
     return f'<div class="scroll"><table{of_kind}>{head}<tbody>{body}</tbody></table></div>'
+
+
+def text_table(rows: Sequence[Sequence[str]]) -> str:
+    """A table of texts, the first row its heads."""
+    heads, *others = rows
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
+    return table(head, ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in others])
 
 
 def svg_button(which: str, name: str) -> str:

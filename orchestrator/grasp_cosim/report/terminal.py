@@ -1,5 +1,6 @@
 """A result as the command line prints it."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from ..base.text import counted, fixed, significant
@@ -24,7 +25,7 @@ def as_json(result: Result) -> dict[str, Any]:
 
 def as_text(result: Result) -> str:
     """What a run came to, for people: a line for each metric."""
-    m = result.metrics
+    m: Mapping[str, Any] = result.metrics
     lines = [
         f"{counted(m['steps'], 'step')} of {1e3 * m['step']:g} ms, {m['scheme']}, "
         f"{fixed(m['real_time_factor'], 2)} times as fast as real time"

@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,11 +19,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.checks import extra_module
-from ..base.errors import InputError, nearest
+from ..base.errors import InputError, choices, nearest
 from ..base.one_piece import in_one_piece
-from ..base.text import columns, counted, significant
+from ..base.text import columns, counted, on_a_screen, significant
 from ..interface.interface import Value
 from ..metrics.metric import Metric
+from ..report.tables import text_table
 from .rows import Row
 
 if TYPE_CHECKING:
@@ -30,6 +32,9 @@ if TYPE_CHECKING:
 
 STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
 """The statistics of a metric, besides how many runs have one."""
+
+FEW, ROWS = 4, 10
+"""So many places that vary are named in the repr() of a table, and rows are in its HTML."""
 
 SUFFIXES = (".csv", ".parquet")
 
@@ -54,7 +59,7 @@ class Outcome:
     ended_at: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Table:
     """Columns of equal length by name, None where there is no value; a row per run, in order.
 
@@ -63,10 +68,10 @@ class Table:
     `units` are those of SI in which the columns are, None where they have none.
     """
 
-    columns: Mapping[str, Sequence[Any]]
+    columns: Mapping[str, Sequence[Any]] = field(hash=False)
     varied: tuple[str, ...]
     metrics: tuple[str, ...]
-    units: Mapping[str, str | None]
+    units: Mapping[str, str | None] = field(hash=False)
     measured: tuple[Metric, ...] = ()
     """The metrics whose columns there are."""
     labels: Any = field(default=None, compare=False, repr=False)
@@ -82,6 +87,20 @@ class Table:
             raise InputError(f"{name!r}: no such column of the sweep; {found}")
         values = self.columns[name]
         return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
+
+    def __repr__(self) -> str:
+        """How many runs there are, what varied, what failed, and a line for each metric."""
+        first, *lines = as_text(self).splitlines()
+        varied = f"  varied: {choices(self.varied, FEW)}"
+        return on_a_screen([f"Table of {first}", varied, *(f"  {line}" for line in lines)])
+
+    def _repr_html_(self) -> str:
+        """The same and the first rows, as notebooks show them."""
+        return as_html(self)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """The names of columns, for Tab behind a bracket in a notebook."""
+        return [*self.columns]
 
     @property
     def ended_early(self) -> dict[int, float]:
@@ -287,21 +306,51 @@ def as_json(table: Table) -> dict[str, Any]:
 
 def as_text(table: Table) -> str:
     """How many runs there are, what failed, and a line for each metric."""
+    rows = _study_rows(table) if is_study(table) else _statistics(table)
+    return "\n".join([*_heads(table), *columns(rows, (0, 1))])
+
+
+def as_html(table: Table) -> str:
+    """The same for a notebook, and the first rows of the table."""
+    first, *more = (f"{escape(line)}<br>" for line in _heads(table))
+    rows = _study_rows(table) if is_study(table) else _statistics(table)
+    shown = [name for name in table.columns if name != "error" or table.errors]
+    heads = [f"{n} [{table.units[n]}]" if table.units.get(n) else n for n in shown]
+    cells = [[_shown(table.columns[n][i]) for n in shown] for i in range(min(ROWS, len(table)))]
+    return (
+        f"<p><b>{first}</b>{''.join(more)}</p>{text_table(rows)}"
+        f"<details><summary>the first {counted(len(cells), 'row')}</summary>"
+        f"{text_table([heads, *cells])}</details>"
+    )
+
+
+def _shown(value: Any) -> str:
+    """A value of the table for the eye."""
+    if isinstance(value, float):
+        return significant(value)
+    return "" if value is None else str(_cell(value))
+
+
+def _heads(table: Table) -> list[str]:
+    """How many runs there are, and the first that failed."""
     early = f", {len(table.ended_early)} ended early by an FMU" if table.ended_early else ""
     lines = [f"{counted(len(table), 'run')}, {len(table.errors)} failed{early}"]
     for index, error in list(table.errors.items())[:1]:
         lines.append(f"the first that failed, {index}: {error}")
-    if is_study(table):
-        return "\n".join([*lines, *_study_lines(table)])
+    return lines
+
+
+def _statistics(table: Table) -> list[list[str]]:
+    """A head and a row for each metric: its title, unit, count and STATISTICS."""
     rows = [["", "", "runs", *STATISTICS]]
     for name, row in table.summary().items():
         title, factor, unit = table.shown(name)
         numbers = [_scaled(row[head], factor) for head in STATISTICS]
         rows.append([title, unit, str(row["runs"]), *numbers])
-    return "\n".join([*lines, *columns(rows, (0, 1))])
+    return rows
 
 
-def _study_lines(table: Table) -> list[str]:
+def _study_rows(table: Table) -> list[list[str]]:
     """The errors of each metric against the finest step, by step, and the observed order."""
     found = convergence(table)
     first = next(iter(found.values()))
@@ -312,7 +361,7 @@ def _study_lines(table: Table) -> list[str]:
         title, factor, unit = table.shown(name)
         numbers = [_scaled(x, factor) for x in (c.finest, *c.errors)]
         rows.append([title, unit, *numbers, significant(c.order, 3, "-")])
-    return columns(rows, (0, 1))
+    return rows
 
 
 def _scaled(value: float | None, factor: float) -> str:

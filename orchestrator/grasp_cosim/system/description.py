@@ -38,7 +38,7 @@ FILES = (".toml", ARCHIVE)
 """The suffixes of files that have a system."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class System(Structure):
     """A checked system: every name exists, every input has one source or keeps a value."""
 

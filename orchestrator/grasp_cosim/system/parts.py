@@ -150,6 +150,9 @@ class Component:
         """What the files of its FMUs declare now."""
         return [read_interface(fmu) for fmu in (self.fmu, self.native) if fmu]
 
+    def __hash__(self) -> int:
+        return hash((self.name, self.fmu, self.native, frozenset(self.values.items())))
+
     def __getstate__(self) -> dict[str, Any]:
         """What it was made of alone: other processes read the FMUs themselves."""
         return {f.name: getattr(self, f.name) for f in fields(self)}

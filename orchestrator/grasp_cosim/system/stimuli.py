@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from ..base.checks import choice
-from ..base.errors import InputError
+from ..base.errors import InputError, choices
 from .parts import Connection, Port, as_port, as_signal
 from .times import LONGEST, NANOSECONDS
 
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 Interpolation = Literal["linear", "held"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
+
+FEW = 3
+"""So many columns are named in the repr() of stimuli."""
 
 
 RECORDED, SETTINGS = "signals", "run.json"
@@ -68,7 +71,7 @@ class Stimulus:
         return tuple(first.values())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stimuli:
     """Samples that drive inputs and tunable parameters: columns, and the times of the rows in ns,
     which do not fall.
@@ -92,6 +95,9 @@ class Stimuli:
     recorded: tuple[Connection, ...] | None = field(default=None, compare=False)
     """Of a file that a run has recorded, the connections of that: see replay.py."""
     recorded_columns: Mapping[Port, Stimulus] = field(default_factory=dict, compare=False)
+
+    def __repr__(self) -> str:
+        return f"Stimuli of {self.file}, {len(self.times)} rows: {choices(self.columns, FEW)}"
 
     def __post_init__(self) -> None:
         """ValueError where the columns could not be read from a file."""

@@ -9,8 +9,10 @@ from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
 
 from ..base.checks import choice
-from ..base.errors import InputError, nearest
+from ..base.errors import InputError, choices, nearest
+from ..base.higher import higher
 from ..base.si_units import Unit
+from ..base.text import on_a_screen
 from ..interface.interface import Given, Interface, Variable
 from ..interface.units import IDENTITY, Conversion
 from .parts import (
@@ -28,7 +30,7 @@ from .parts import (
 )
 from .record import Record
 from .stimuli import Stimuli
-from .times import LONGEST, Time, TimeGrid, in_nanoseconds
+from .times import LONGEST, Time, TimeGrid, in_nanoseconds, in_seconds
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -37,8 +39,11 @@ DIVERGING: tuple[str, ...] = get_args(Diverging)
 
 Made = TypeVar("Made")
 
+NAMED, FEW = 4, 2
+"""So many components, and connections or values, are named in the repr() of a system."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Structure:
     """Components, their connections, and the experiment.
 
@@ -59,23 +64,41 @@ class Structure:
     step_ns: Time
     stop_ns: Time
     scheme: Scheme
-    events: tuple[Event, ...] = ()
-    faults: tuple[Fault, ...] = ()
+    events: tuple[Event, ...] = field(default=(), hash=False)
+    faults: tuple[Fault, ...] = field(default=(), hash=False)
     initialisation: Initialisation = Initialisation()
     notes: tuple[str, ...] = field(default=(), compare=False)
-    roles: Mapping[str, str] = field(default_factory=dict)
-    presets: Mapping[str, Mapping[str, Given]] = field(default_factory=dict)
+    roles: Mapping[str, str] = field(default_factory=dict, hash=False)
+    presets: Mapping[str, Mapping[str, Given]] = field(default_factory=dict, hash=False)
     diverging: Diverging = "stop"
-    input: Stimuli | None = None
+    input: Stimuli | None = field(default=None, hash=False)
     realtime: Realtime = Realtime()
     metrics: tuple[str, ...] = ()
     start_ns: Time = 0
     record: Record = Record()
-    inputs: Mapping[str, SystemInput] = field(default_factory=dict)
-    outputs: Mapping[str, SystemOutput] = field(default_factory=dict)
+    inputs: Mapping[str, SystemInput] = field(default_factory=dict, hash=False)
+    outputs: Mapping[str, SystemOutput] = field(default_factory=dict, hash=False)
     limits: tuple[Limit, ...] = ()
     verdict: Acceptance = Acceptance()
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        """Its experiment, its components with their FMUs, and how many connections there are."""
+        step, stop = in_seconds(self.step_ns), in_seconds(self.stop_ns)
+        names = [f"{c.name} ({c.fmu.stem})" for c in self.components]
+        given = [f"{c.name}.{n} = {v}" for c in self.components for n, v in c.values.items()]
+        lines = [
+            f"System {self.name}",
+            f"  experiment   {stop:.6g} s in steps of {1e3 * step:.6g} ms, {self.scheme}",
+            f"  components   {choices(names, NAMED)}",
+            f"  connections  {len(self.connections)}: {choices(self.connections, FEW)}",
+            f"  values       {choices(given, FEW)}",
+        ]
+        return on_a_screen(lines)
+
+    def _repr_html_(self) -> str:
+        """The diagram of its connections, and its experiment, as notebooks show them."""
+        return str(higher("report.system").system_html(self))
 
     @property
     def total_steps(self) -> int:

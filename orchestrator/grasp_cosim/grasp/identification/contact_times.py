@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -181,11 +181,11 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     values |= {"plant.initial_object_position": grasp.x_m, RATIO: own * grasp.ratio}
     try:
         chosen = with_si_values(with_case(system, grasp.case), values, "identify:")
-        result = close(chosen, after=0.0)
+        times: Any = close(chosen, after=0.0).metrics["time_to_contact"]
     except (InputError, SimulationError) as error:
         error.args = (f"x_m = {grasp.x_m:g} m, Case {grasp.case}: {error}",)
         raise
-    return [STOP if t is None else float(t) for t in result.metrics["time_to_contact"]]
+    return [STOP if t is None else float(t) for t in times]
 
 
 def _contact(place: str, numbers: Mapping[str, float]) -> Contact:

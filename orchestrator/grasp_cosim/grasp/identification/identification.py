@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.errors import InputError, nearest
-from ...base.text import counted
+from ...base.text import counted, on_a_screen
 from ...metrics.metric import Signals
 from ...recording.folder import load_log
 from ...recording.log_names import AS_THEY_ARE, LogNames
@@ -81,7 +81,7 @@ OF_TIMES = tuple(name for name in GROUPS if name not in ("mass", "gain", "delay"
 DEFAULT = ("coulomb", "viscous")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Identification:
     """A fit, what it was made from, and what its residuals belong to, in their unit."""
 
@@ -96,6 +96,9 @@ class Identification:
     def values(self) -> dict[str, float]:
         """The fitted values by name, as System.with_settings() takes them."""
         return {e.name: e.value for e in self.fit.estimates}
+
+    def __repr__(self) -> str:
+        return on_a_screen(self.text().splitlines())
 
     def as_json(self) -> dict[str, Any]:
         """All of it as JSON has it."""

@@ -11,6 +11,7 @@ import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 
@@ -182,14 +183,15 @@ Runs = dict[tuple[Setting, int], Run]
 def as_run(result: Result, setting: Setting, case: int) -> Run:
     """Part of a grasp that an evaluation keeps; InputError where a finger does not touch."""
     first, second = (_sensor_contact(result, j) for j in FINGERS)
-    if first is None or second is None or None in result.metrics["time_to_contact"]:
+    times: Any = result.metrics["time_to_contact"]
+    if first is None or second is None or None in times:
         raise InputError(
             f"evaluate: x_m = {setting.x_m} m, Case {case}: a finger does not reach the object"
         )
     target = result.by_role["controller.target_position"]
     beyond = float(np.max((target - setting.x_m) * math.copysign(1.0, setting.x_m)))
     shown = result if setting == Setting(REFLECTANCE_X_M) else None
-    right, left = (_touch_force(result, j) for j in FINGERS)
+    right, left = map(partial(_touch_force, result), FINGERS, times)
     return Run(setting, case, dict(result.metrics), (first, second), beyond, (right, left), shown)
 
 
@@ -204,8 +206,7 @@ def _sensor_contact(result: Result, finger: int) -> float | None:
     return float(time[k - 1] + fraction * (time[k] - time[k - 1]))
 
 
-def _touch_force(result: Result, finger: int) -> float:
-    touch = result.metrics["time_to_contact"][finger - 1]
+def _touch_force(result: Result, finger: int, touch: float) -> float:
     near = (result.time >= touch) & (result.time <= touch + IMPACT_WINDOW)
     return float(np.abs(result.by_role[f"plant.contact_force[{finger}]"][near]).max())
 

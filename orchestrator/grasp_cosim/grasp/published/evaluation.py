@@ -13,6 +13,7 @@ from typing import Any
 
 from ...base.files import check_folder, write_json, write_text
 from ...base.progress import Progress
+from ...base.text import on_a_screen
 from ...recording.result import UNITS
 from ...report.plot import new_figure
 from ..metrics import IMPACT_WINDOW, METRICS
@@ -41,6 +42,13 @@ BOOKKEEPING = ("wall_time", "real_time_factor")
 """What differs from one repetition of a grasp to the next."""
 
 
+class Evaluation(dict[str, Any]):
+    """What evaluate() returns; it shows itself as the claims and the deviations."""
+
+    def __repr__(self) -> str:
+        return on_a_screen(verdict(self).splitlines())
+
+
 def evaluate(
     *,
     bench: bool = False,
@@ -48,7 +56,7 @@ def evaluate(
     out: Path | None = None,
     native: bool | None = None,
     progress: bool = False,
-) -> dict[str, Any]:
+) -> Evaluation:
     """Run Cases 0, 1 and 2 in all settings of the paper's simulations, and compare the figures.
 
     With `bench` they are those of its experiments, on the bench preset. `controller` and `native`
@@ -84,13 +92,13 @@ def write(out: Path, evidence: Evidence, report: Mapping[str, Any], source: Sour
     write_text(out / "evaluation.html", evaluation_html(evidence, report["claims"], source))
 
 
-def as_report(evidence: Evidence, source: Source) -> dict[str, Any]:
+def as_report(evidence: Evidence, source: Source) -> Evaluation:
     """What evaluate() returns; a condition is a position in m, or names the colours."""
-    return {
-        "rows": evidence.rows,
-        "rms": evidence.rms,
-        "claims": check_claims(source, evidence),
-        "runs": [
+    return Evaluation(
+        rows=evidence.rows,
+        rms=evidence.rms,
+        claims=check_claims(source, evidence),
+        runs=[
             {
                 "condition": r.setting.x_m if source == "simulation" else r.setting.label,
                 "case": r.case,
@@ -98,14 +106,14 @@ def as_report(evidence: Evidence, source: Source) -> dict[str, Any]:
             }
             for r in evidence.runs.values()
         ],
-        "units": {
+        units={
             **{m.name: m.unit for m in METRICS},
             **{name: unit for name, unit in UNITS.items() if name not in BOOKKEEPING},
             **{name: "s" for name, value in evidence.rows[0].items() if isinstance(value, float)},
             "rms": "s",
             "condition": "m",
         },
-    }
+    )
 
 
 def verdict(report: Mapping[str, Any]) -> str:
