@@ -103,4 +103,4 @@ def test_few_import_by_name_what_no_contract_sees():
     rooms = {file.partition("/")[0] for file in files}
     assert rooms == {"__init__.py", "cli", "base", "fmu_export"}
     higher = {f.partition("/")[0] for f in files_with("orchestrator/grasp_cosim", "higher")}
-    assert higher == {"system", "metrics", "recording"}
+    assert higher == {"system", "metrics", "recording", "comparison"}

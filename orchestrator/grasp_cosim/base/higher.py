@@ -1,8 +1,8 @@
 """What a lower room takes from a higher one: by name, when it is called for.
 
-Those are the reader of archives, the pictures and tables of a result, and a group: a folder of this
-package with what is its own of any system that names it, `metrics.py` with METRICS and `view.py`
-with a VIEW. A system file names groups as `metrics = ["grasp"]`.
+Those are the reader of archives, the pictures, tables and words of what is shown, and a group: a
+folder of this package with what is its own of any system that names it, `metrics.py` with METRICS
+and `view.py` with a VIEW. A system file names groups as `metrics = ["grasp"]`.
 """
 
 from functools import cache
