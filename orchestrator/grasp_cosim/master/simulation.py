@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from numbers import Integral
+from typing import Any
 
 from ..base.errors import InputError, SimulationError, nearest
 from ..base.interruption import interruptible, interrupts
