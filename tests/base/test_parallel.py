@@ -110,18 +110,19 @@ from functools import partial
 from grasp_cosim.base.parallel import Crew
 from grasp_cosim.base.progress import Progress
 
-if __name__ == "__main__":
-    with Crew(1) as crew, Progress("runs", shown=False) as bar:
-        blocked = crew.map(partial(signal.pthread_sigmask, signal.SIG_BLOCK), [()], bar)
-    print(*(sorted(s.name for s in mask) for mask in blocked))
+with Crew(1) as crew, Progress("runs", shown=False) as bar:
+    blocked = crew.map(partial(signal.pthread_sigmask, signal.SIG_BLOCK), [()], bar)
+print(*(sorted(s.name for s in mask) for mask in blocked), __name__)
 """
 
 
 def test_also_the_first_process_starts_with_signals_held_back(tmp_path):
-    """Ctrl-C would end its start with a traceback; that multiprocessing is new takes a new one."""
+    """Ctrl-C would end its start with a traceback; that multiprocessing is new takes a new one.
+
+    A script without a guard, which none of them runs anew."""
     (tmp_path / "masks.py").write_text(MASKS)
     done = subprocess.run([sys.executable, tmp_path / "masks.py"], capture_output=True, text=True)
-    assert (done.stdout, done.stderr) == ("['SIGINT', 'SIGTERM']\n", "")
+    assert (done.stdout, done.stderr) == ("['SIGINT', 'SIGTERM'] __main__\n", "")
 
 
 def test_a_kill_ends_its_processes_whatever_they_are_at(tmp_path):

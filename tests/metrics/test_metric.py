@@ -2,6 +2,7 @@
 
 import pickle
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -371,9 +372,17 @@ def test_a_metric_of_every_result_comes_back_as_itself():
     assert pickle.loads(pickle.dumps(at_end)) is at_end
 
 
-def test_a_metric_that_cannot_go_to_another_process_is_refused():
-    with pytest.raises(InputError, match=r"^metric 'x': cannot go to another process \(.*\); must"):
-        check_portable([at_end, made("x", lambda _: 1.0)])
+def test_a_metric_that_cannot_go_to_another_process_is_refused(monkeypatch):
+    local = made("x", lambda _: 1.0)
+    check_portable([at_end, local])  # with cloudpickle
+    monkeypatch.setitem(sys.modules, "cloudpickle", None)
+    with pytest.raises(InputError) as caught:
+        check_portable([at_end, local])
+    assert re.fullmatch(
+        r"metric 'x': cannot go to another process \(.*\); must be a function in a module or in a "
+        r"file of metrics, or cloudpickle be there: .* pip install '?cloudpickle'?",
+        str(caught.value),
+    )
 
 
 # ------------------------------------------------------------------------- what is asked for

@@ -15,17 +15,11 @@ import pandas as pd
 import pytest
 from grasp_cosim import InputError, System, metric, sweep
 from grasp_cosim.metrics.metric import load_metrics
+from grasp_cosim.sweeps.kept import identity_of, keep, opened, write_line
+from grasp_cosim.sweeps.places import cluster
 from grasp_cosim.sweeps.rows import grid
-from grasp_cosim.sweeps.sweep import (
-    Task,
-    cluster,
-    identity_of,
-    opened,
-    packed,
-    run_packed,
-    run_row,
-    write_line,
-)
+from grasp_cosim.sweeps.run import Task, packed, run_packed, run_row
+from grasp_cosim.sweeps.table import Outcome
 from recording.rows import full_disk
 from support.native_fmus import needs_gcc, talker
 from support.native_systems import integrator, write_integrator
@@ -231,7 +225,7 @@ def test_kept_runs_are_bound_to_what_they_are_of(system, mine, tmp_path):
     rows = [{"a.gain": 1.0}, {"a.gain": 2.0}]
     sweep(system, rows, metrics=mine, out=out, workers=1)
     whole = out.read_bytes()
-    (tmp_path / "t.csv.rows").write_bytes(b'{"runs of": "others"}\n')
+    (tmp_path / "t.csv.rows").write_bytes(b'{"runs of": "others"}\n{"index": 0}\n')
     with pytest.raises(
         InputError, match="has runs that differ in all that is known of them; remove it"
     ):
@@ -274,10 +268,12 @@ def test_what_decides_a_row_is_what_kept_runs_are_of(
 
     given = {"system": system, "rows": [{"a.gain": 2.0}], "function": share}
     with opened(tmp_path / "t.csv", named(**given), {}) as file:
+        keep(file, Outcome(0, {"share": 0.2}))
         before = Path(file.name).read_bytes()
     (tmp_path / "t.csv.rows").write_bytes(before)  # as of runs that were interrupted
-    with opened(tmp_path / "t.csv", named(**given), {}):
-        pass
+    done = {}
+    with opened(tmp_path / "t.csv", named(**given), done):
+        assert set(done) == {0}
     (tmp_path / "t.csv.rows").write_bytes(before)
     monkeypatch.setitem(globals(), "SHARE", change.get("SHARE", SHARE))
     if "stop" in change:

@@ -2,10 +2,12 @@
 
 The processes are new ones: a fork of one that has loaded FMUs would share their state. One that
 dies takes its own job with it and no other, and a new one takes its place. Where we die, they die,
-whatever they are at. From the current folder they import nothing.
+whatever they are at. From the current folder they import nothing, and a user's script they do not
+run anew: it needs no `if __name__ == "__main__"`. What goes to them is as of `pickles.py`.
 """
 
 import os
+import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import partial
@@ -14,6 +16,7 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from tempfile import gettempdir
+from types import ModuleType
 from typing import Any, NamedTuple, Self, TypeVar
 
 from . import interruption
@@ -133,7 +136,8 @@ class _Worker:
         self._started = False
         self.process: BaseProcess = context.Process(target=_work, args=(theirs,))
         try:
-            with closing(theirs), _safe_path(), held_back(interruption.SIGNALS):  # they are for us
+            # signals are for us
+            with closing(theirs), _safe_path(), _no_script(), held_back(interruption.SIGNALS):
                 self.process.start()
         except BaseException:  # of a signal that came meanwhile
             _end([self])
@@ -178,6 +182,17 @@ def _safe_path() -> Iterator[None]:
     finally:
         del os.environ[_SAFE_PATH]
         os.environ.update(before)
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Have processes started meanwhile not import the script that runs here, as they would."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _end(workers: Iterable[_Worker]) -> None:

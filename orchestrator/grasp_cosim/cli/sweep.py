@@ -9,8 +9,8 @@ import click
 from ..base.errors import InputError
 from ..interface.interface import Value
 from ..sweeps.pictures import draw_sweep
+from ..sweeps.places import cluster
 from ..sweeps.rows import grid, varied
-from ..sweeps.sweep import cluster
 from ..sweeps.sweep import sweep as run_sweep
 from ..sweeps.table import as_json as in_json
 from ..sweeps.table import as_text, check_format
@@ -61,7 +61,7 @@ TABLE = Path("sweep.csv")
     help="Table to write, a .csv or .parquet file, or a folder for it.",
 )
 @click.option(
-    "--workers", type=click.IntRange(1), help="Run so many processes. Default: one for each core."
+    "--workers", type=click.IntRange(1), help="Do so many runs at a time. Default: one per core."
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, like tcp://host:8786.")
 @click.option("--plot", is_flag=True, help="Draw the metrics over what varies, beside the table.")

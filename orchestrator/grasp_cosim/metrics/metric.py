@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import pickle
 import sys
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -25,10 +24,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.by_name import ByName
-from ..base.checks import known
+from ..base.checks import install_command, known
 from ..base.errors import InputError, choices, nearest
 from ..base.errors import reason as reason_of
 from ..base.higher import groups, higher
+from ..base.pickles import as_bytes
 from ..base.si_units import refusal
 from ..interface.units import Conversion
 
@@ -217,7 +217,8 @@ class Metric:
         if any(self.function is m.function for m in of_group):
             return _of_group, (self.group, self.name, self.needs, self.uses, self.entries)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
-        if getattr(sys.modules.get(module), name, None) is self:  # it replaced its function there
+        there = module != "__main__" and getattr(sys.modules.get(module), name, None)
+        if there is self:  # it replaced its function there
             return resolve_name, (f"{module}:{name}",)
         return Metric, tuple(getattr(self, field) for field in self.__dataclass_fields__)
 
@@ -366,14 +367,15 @@ def chosen(
 
 
 def check_portable(metrics: Iterable[Metric]) -> None:
-    """InputError where a metric cannot go to other processes, as those of many runs have to."""
+    """InputError where a metric cannot go to other processes."""
     for m in metrics:
         try:
-            pickle.dumps(m)
+            as_bytes(m)
         except Exception as error:  # pickle has one of its own for each reason
             raise InputError(
                 f"metric {m.name!r}: cannot go to another process ({_said(error)}); must be a "
-                "function under @metric(name) in a module or a file"
+                "function in a module or in a file of metrics, or cloudpickle be there: "
+                f"{install_command('cloudpickle')}"
             ) from error
 
 

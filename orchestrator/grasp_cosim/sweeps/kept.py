@@ -1,0 +1,133 @@
+"""The runs of a sweep that are done, kept beside its table until all are: a line of JSON each."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict
+from importlib.metadata import version
+from io import FileIO
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import InputError, SimulationError, choices
+from ..base.files import make_folder
+from ..base.identity import parts_of
+from ..base.scratch import SUFFIX, Lock
+from ..metrics.metric import Metric
+from ..recording.memory import writing
+from ..system.settings import settings
+from .rows import Row
+from .run import Task
+from .table import Outcome, check_format
+
+FEW = 3
+"""Things in which runs differ that are named at most."""
+
+
+def keep(file: FileIO, outcome: Outcome) -> None:
+    """Keep the outcome of a run from now on; SimulationError where that fails."""
+    try:
+        write_line(file, as_line(asdict(outcome)))
+    except OSError as error:
+        said = f"{file.name!r}: {error.strerror}"
+        raise SimulationError(f"{said}; with room for it the same command goes on") from error
+
+
+def as_line(content: Any) -> bytes:
+    """A line of JSON."""
+    return json.dumps(content, sort_keys=True).encode() + b"\n"
+
+
+def write_line(file: FileIO, line: bytes) -> None:
+    """Write a line at the end of a file; OSError where there is no room for all of it."""
+    end = file.seek(0, os.SEEK_END)
+    if file.write(line) < len(line):  # which is no error to it
+        file.truncate(end)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@contextmanager
+def opened(table: Path, identity: Mapping[str, str], done: dict[int, Outcome]) -> Iterator[FileIO]:
+    """The file of the runs that are `done`, which these are read from, for one process at a time.
+
+    It is made where there is none, and removed without an error. The lock goes with the process,
+    however that ends. InputError where another process has it, or it is of other runs: `identity`
+    has a hash of each thing that decides them, by what it is called.
+    """
+    check_format(table)
+    path = table.with_name(f"{table.name}.rows")
+    make_folder(path.parent)
+    lock = Lock(path.with_name(path.name + SUFFIX))
+    if not lock.taken():
+        said = f"{path}: another process does runs of it"
+        raise InputError(f"{said}; wait for its end, or name another --out")
+    try:
+        with closing(FileIO(path, "a")) as file:
+            first, *lines = path.read_bytes().splitlines(keepends=True) or [b""]
+            head = as_line({"runs of": identity})
+            if not first.endswith(b"\n") or (first != head and not lines):  # which has no runs
+                with writing(path, InputError):
+                    file.truncate(0)
+                    write_line(file, head)
+            elif first != head:
+                raise InputError(
+                    f"{path}: has runs that differ in {_difference(first, identity)}; remove it, "
+                    "or name another --out"
+                )
+            if lines and not lines[-1].endswith(b"\n"):  # torn by a kill
+                file.truncate(path.stat().st_size - len(lines.pop()))
+            outcomes = [_outcome(path, number, line) for number, line in enumerate(lines, 2)]
+            done |= {outcome.index: outcome for outcome in outcomes}
+            yield file
+        path.unlink()  # closed, as Windows wants it
+    finally:
+        lock.release()
+
+
+def _outcome(path: Path, number: int, line: bytes) -> Outcome:
+    """The outcome that a line of the file of runs holds; InputError where it holds none."""
+    try:
+        outcome = Outcome(**json.loads(line))
+        whole = isinstance(outcome.index, int) and isinstance(outcome.metrics, dict)
+    except (ValueError, TypeError):
+        whole = False
+    if not whole:
+        raise InputError(
+            f"{path}: line {number} is damaged; remove the file, or name another --out"
+        )
+    return outcome
+
+
+def _difference(first: bytes, identity: Mapping[str, str]) -> str:
+    """What the runs that the first line of a file tells of differ in."""
+    try:
+        was = dict(json.loads(first)["runs of"])
+    except (ValueError, TypeError, KeyError):
+        was = {}
+    names = [n for n in {**identity, **was} if was.get(n) != identity.get(n)]
+    return choices(names, FEW) if was else "all that is known of them"
+
+
+def identity_of(task: Task, rows: Sequence[Row], metrics: Sequence[Metric]) -> dict[str, str]:
+    """A hash of each thing that decides the results, by what it is called in a message."""
+    decisive = {"the rows": rows, "the version of grasp-cosim": version("grasp-cosim")}
+    decisive |= {f"the system's {key}": value for key, value in settings(task.system).items()}
+    fmus = {f"the FMU of {c.name}": c.fmu.read_bytes() for c in task.system.components}
+    return {
+        **{name: _hash_of(as_line(v)) for name, v in decisive.items()},
+        **{name: _hash_of(content) for name, content in fmus.items()},
+        **{
+            f"metric {m.name!r}, its {part}": found
+            for m in metrics
+            for part, found in parts_of(m.function).items()
+        },
+    }
+
+
+def _hash_of(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

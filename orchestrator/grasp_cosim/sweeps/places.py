@@ -1,0 +1,174 @@
+"""Where the runs of a sweep are done: threads or processes here, or an executor of any kind.
+
+Threads take few runs of native FMUs made here, which cannot end the process: no process is started,
+and what a script or a notebook defines is there. All else goes to processes: a crash takes its own
+run only, and the part of a run that holds Python's lock, some 10 ms, is done side by side.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from functools import partial, wraps
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.checks import extra_module
+from ..base.errors import InputError, SimulationError
+from ..base.parallel import Crew, Lost
+from ..exchange.listener import Experiment, Signal
+from ..metrics.metric import Function, Signals, check_portable
+from .run import Job, Packed, Task, packed, run_packed, run_row
+from .table import Outcome
+
+FEW = 100
+"""Runs that threads do: about so many take as long as processes take to start."""
+
+AHEAD = 100
+"""Runs that an executor is given before others have ended."""
+
+KILLED = "KilledWorker"
+"""The name of Dask's error where a run ended its worker, several times; the others go on."""
+
+CONNECT = 10.0
+"""s, to find the scheduler and a worker of a cluster."""
+
+Outcomes = Generator[Outcome, None, None]
+
+
+def here(task: Task, jobs: Sequence[Job], workers: int | None) -> Outcomes:
+    """The outcomes of this machine, in the order in which they end.
+
+    InputError where processes are needed, and a metric cannot go to one.
+    """
+    count = min(workers or os.cpu_count() or 1, len(jobs))
+    if len(jobs) <= FEW and may_be_threads(task, jobs):
+        return in_threads(task, jobs, count)
+    check_portable(task.metrics)
+    return in_processes(task, jobs, count)
+
+
+def may_be_threads(task: Task, jobs: Sequence[Job]) -> bool:
+    """True where all FMUs are native and made here, in every row."""
+    swapped = any(place.endswith(".fmu") for _, row in jobs for place in row)
+    return not swapped and all(
+        c.loaded.ours and not c.loaded.python and c.isolation == "none"
+        for c in task.system.components
+    )
+
+
+def in_threads(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
+    """The outcomes of so many threads; closing it ends the runs that go on.
+
+    Functions of the user's are called one at a time, as they are in a process.
+    """
+    halting, lock = _Halting(), threading.Lock()
+    own = tuple(replace(m, function=_one_by_one(m.function, lock)) for m in task.metrics)
+    run = partial(run_row, replace(task, metrics=own), listeners=(halting,))
+    with ThreadPoolExecutor(max(count, 1), "sweep") as pool:
+        try:
+            yield from _outcomes(pool, lambda job: run(*job), jobs)
+        finally:
+            halting.halted.set()
+
+
+class _Halting:
+    """A listener that ends its run, between two blocks, once it is halted."""
+
+    def __init__(self) -> None:
+        self.halted = threading.Event()
+
+    def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
+        """Nothing is to be prepared."""
+
+    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """KeyboardInterrupt once it is halted."""
+        if self.halted.is_set():
+            raise KeyboardInterrupt
+
+    def end(self, complete: bool) -> None:
+        """Nothing is left to do."""
+
+
+def _one_by_one(function: Function, lock: threading.Lock) -> Function:
+    @wraps(function)
+    def locked(signals: Signals) -> Any:
+        with lock:
+            return function(signals)
+
+    return locked
+
+
+def in_processes(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
+    """The outcomes of so many processes of this machine, in the order in which they end."""
+    run = partial(run_packed, packed(task, with_fmus=False))
+    with Crew(count) as crew, closing(crew.results(run, jobs)) as results:
+        for (index, _), found in results:
+            if isinstance(found, Lost):
+                yield Outcome(index, {}, f"the process of the run {found.end}")
+            else:
+                yield found
+
+
+def elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
+    """The outcomes of an executor, to which the FMUs go; closing it cancels the rest."""
+    check_portable(task.metrics)
+    shared: Any = packed(task, with_fmus=True)
+    if client := getattr(executor, "_client", None):
+        # Dask: it goes to each worker once, and again if the one that has it dies
+        shared = client.submit(Packed._make, shared, pure=False)
+    yield from _outcomes(executor, run_packed, jobs, shared)
+
+
+def _outcomes(
+    executor: Executor, run: Callable[..., Outcome], jobs: Sequence[Job], *shared: Any
+) -> Outcomes:
+    """The outcomes of run(*shared, job), as they end; closing it cancels the rest."""
+    left = iter(jobs)
+    pending: dict[Future[Outcome], int] = {}
+    try:
+        while True:
+            for job in islice(left, AHEAD - len(pending)):
+                pending[executor.submit(run, *shared, job)] = job[0]
+            if not pending:
+                break
+            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                index, failure = pending.pop(future), future.exception()
+                if failure is None:
+                    yield future.result()
+                elif type(failure).__name__ == KILLED:
+                    yield Outcome(index, {}, "the worker of the run died, several times")
+                else:
+                    raise SimulationError(f"sweep: run {index}: {_said(failure)}") from failure
+    finally:
+        for future in pending:
+            future.cancel()
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """The executor of the Dask cluster whose scheduler is at an address like tcp://host:8786."""
+    dask = extra_module("distributed", "it talks to Dask clusters", "dask")
+    try:
+        client = dask.Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--scheduler {address}: {_said(error)}; must be one that runs") from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECT)
+        except TimeoutError as error:
+            raise InputError(f"--scheduler {address}: no worker; must have at least one") from error
+        executor: Executor = client.get_executor(pure=False)
+        yield executor
+
+
+def _said(error: BaseException) -> str:
+    """The first line of an error, or its name where it has none."""
+    return (str(error).splitlines() or [type(error).__name__])[0]

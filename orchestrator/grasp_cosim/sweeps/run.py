@@ -1,0 +1,102 @@
+"""A run of a sweep: in this process, or in another one, to which the task travels with its FMUs."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+from ..base.errors import InputError, SimulationError
+from ..base.parallel import deliver
+from ..base.pickles import as_bytes
+from ..base.scratch import ScratchFolder
+from ..exchange.listener import Listener
+from ..master.simulation import simulate
+from ..metrics.metric import Metric
+from ..recording.result import Result
+from ..system.description import System
+from .rows import Row
+from .table import Outcome
+
+Job = tuple[int, Row]
+"""The number of a row, and the row in the units of its FMUs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """All that runs share: the system and a user's metrics."""
+
+    system: System
+    metrics: tuple[Metric, ...] = ()
+
+
+def run_row(task: Task, index: int, row: Row, listeners: Sequence[Listener] = ()) -> Outcome:
+    """Run a row; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted.
+
+    The outcome is delivered before the FMUs are ended, which may take the process along.
+    """
+
+    def finish(result: Result, error: SimulationError | None) -> None:
+        if error is not None:
+            deliver(Outcome(index, {}, str(error)))
+        elif result.came_to_its_end:
+            deliver(Outcome(index, result.measured.flat(), ended_at=result.ended_at))
+
+    try:
+        system = task.system.with_settings(row, "sweep: {}".format)
+        result = simulate(system, metrics=task.metrics, listeners=listeners, finish=finish)
+        if not result.came_to_its_end:
+            raise KeyboardInterrupt
+        return Outcome(index, result.measured.flat(), ended_at=result.ended_at)
+    except (InputError, SimulationError) as error:
+        return Outcome(index, {}, str(error))
+
+
+class Packed(NamedTuple):
+    """A task as bytes, which a process unpacks once, with what its FMUs hold for other machines."""
+
+    key: str
+    task: bytes
+    fmus: tuple[bytes, ...] = ()
+
+
+def packed(task: Task, with_fmus: bool) -> Packed:
+    """The task as bytes, with the contents of its FMUs for another machine or without."""
+    components = task.system.components if with_fmus else ()
+    fmus = tuple((c.native or c.fmu).read_bytes() for c in components)
+    content = as_bytes(task)
+    return Packed(hashlib.sha256(b"".join((content, *fmus))).hexdigest(), content, fmus)
+
+
+_unpacked: dict[str, tuple[Task, ScratchFolder | None]] = {}
+"""What this process has unpacked, by key; the folders of FMUs go with it."""
+
+_one_at_a_time = threading.Lock()
+"""All Python FMUs of a process share its modules, and a compiled loop keeps the others waiting."""
+
+
+def run_packed(shared: Packed, job: Job) -> Outcome:
+    """Do a run in this process."""
+    with _one_at_a_time:
+        if shared.key not in _unpacked:
+            _unpacked[shared.key] = _unpack(shared)
+        return run_row(_unpacked[shared.key][0], *job)
+
+
+def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
+    """The task, whose FMUs are in a folder of this process where their contents came along."""
+    task: Task = pickle.loads(shared.task)  # noqa: S301 - by packed(), through a pipe or a scheduler
+    if not shared.fmus:
+        return task, None
+    folder = ScratchFolder()
+    components = []
+    for i, (component, content) in enumerate(zip(task.system.components, shared.fmus, strict=True)):
+        path = Path(folder.name, str(i), component.fmu.name)
+        path.parent.mkdir()
+        path.write_bytes(content)
+        components.append(replace(component, fmu=path, native=None))
+    return replace(task, system=replace(task.system, components=tuple(components))), folder

@@ -1,0 +1,107 @@
+"""Where runs are done: in threads as in processes, from any script, and ended by Ctrl-C."""
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from grasp_cosim import grasp_system, sweep
+from grasp_cosim.metrics.metric import metric
+from grasp_cosim.sweeps.places import in_processes, in_threads, may_be_threads
+from grasp_cosim.sweeps.run import Task
+from support.marks import needs_compiler
+from support.native_systems import integrator
+
+pytestmark = needs_compiler
+
+POSITION = "plant.initial_object_position"
+JOBS = [(i, {POSITION: 0.005 * i}) for i in range(8)]
+
+
+@pytest.fixture(scope="module")
+def native():
+    return grasp_system().with_experiment(step=1e-3, stop=0.3).natively(True)
+
+
+def closed(run):
+    """By how much the first finger closed, in m."""
+    return float(run["plant.gap[1]"][0] - run["plant.gap[1]"].min())
+
+
+@pytest.mark.slow
+def test_threads_and_processes_find_the_same_bits(native):
+    task = Task(native, (metric("closed")(closed),))
+    threads, processes = (
+        sorted(of(task, JOBS, 2), key=lambda o: o.index) for of in (in_threads, in_processes)
+    )
+    assert threads == processes
+    assert len({o.metrics["closed"] for o in threads}) > 1
+    assert all(o.error is None for o in threads)
+
+
+def test_only_native_fmus_made_here_run_in_threads(native, tmp_path):
+    assert may_be_threads(Task(native), JOBS)
+    assert not may_be_threads(Task(native), [(0, {"components.plant.fmu": "x.fmu"})])
+    assert not may_be_threads(Task(native.natively(False)), JOBS)
+    assert not may_be_threads(Task(integrator(tmp_path)), JOBS)
+
+
+def test_functions_of_the_user_are_called_one_at_a_time(native):
+    inside, most = [], []
+
+    def watched(run):
+        inside.append(run)
+        time.sleep(0.01)
+        most.append(len(inside))
+        inside.pop()
+        return 1.0
+
+    assert len([*in_threads(Task(native, (metric("watched")(watched),)), JOBS, 2)]) == len(JOBS)
+    assert set(most) == {1}
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_ends_the_runs_of_threads(native):
+    ended = []
+
+    def interrupting(run):
+        ended.append(run.time[-1])
+        signal.raise_signal(signal.SIGINT)
+        return 1.0
+
+    rows = [{"experiment.stop": stop} for stop in (0.01, 300.0, 300.0)]
+    with pytest.raises(KeyboardInterrupt):
+        sweep(native, rows, metrics=[interrupting], workers=2)
+    assert ended == [0.01]
+    assert not [t for t in threading.enumerate() if t.name.startswith("sweep")]
+
+
+SCRIPT = """
+from grasp_cosim import grasp_system, sweep
+
+SCALE = 1e3
+
+def closed(run):
+    return SCALE * float(run["plant.gap[1]"].min())
+
+print("once")
+system = grasp_system().with_experiment(step=1e-2, stop=0.1)
+rows = {"plant.initial_object_position": [0.0, 0.01]}
+for native in (True, False):
+    table = sweep(system, rows, metrics=[closed], native=native)
+    print(table["closed"].tolist(), table.errors)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_needs_no_guard_and_its_functions_are_metrics(tmp_path):
+    """Neither in threads nor in processes."""
+    (tmp_path / "script.py").write_text(SCRIPT)
+    program = [sys.executable, "script.py"]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
+    once, threads, processes = done.stdout.splitlines()
+    assert (done.stderr, once) == ("", "once")
+    assert threads == processes
+    assert threads.endswith("] {}")
