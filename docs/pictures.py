@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 import tutorials
 from grasp_cosim import hand_system, simulate, tandem_system
 from grasp_cosim.base.files import write_text
@@ -26,7 +27,7 @@ from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.view import draw_hand as draw_three_fingers
 from grasp_cosim.recording.folder import load_run
-from grasp_cosim.report.plot import headed, save
+from grasp_cosim.report.plot import headed, new_figure, save
 from grasp_cosim.report.system import connections_svg, stand_alone
 from grasp_cosim.report.tables import Caption, about
 from grasp_cosim.system.settings import settings
@@ -123,6 +124,30 @@ def draw_map(folder: Path) -> None:
     exec(example.replace('"map.png"', repr(str(folder / "reflectance_map.png"))), {})  # noqa: S102
 
 
+def draw_layer_2(folder: Path) -> None:
+    """layer_2_loop.png: the models of the example of docs/linear_analysis.md as a Bode plot."""
+    page = (HERE / "linear_analysis.md").read_text("utf-8")
+    names: dict[str, Any] = {}
+    exec(re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0], names)  # noqa: S102
+    omega = np.geomspace(1.0, 3e3, 600)
+    figure = new_figure(7.0, 4.6)
+    gain, phase = figure.subplots(2, 1, sharex=True)
+    for at, model in names["models"].items():
+        loop, gap = -model.frequency_response(omega)[:, 0, 0], model.margins()
+        (line,) = gain.loglog(omega, abs(loop), label=f"{at:g} s")
+        phase.semilogx(omega, np.degrees(np.unwrap(np.angle(loop))), color=line.get_color())
+        lag = gap.phase_margin - 180.0
+        phase.plot([gap.crossover] * 2, [-180.0, lag], color=line.get_color(), lw=2.5, alpha=0.5)
+    gain.axhline(1.0, color="0.6", lw=0.8)
+    phase.axhline(-180.0, color="0.6", lw=0.8)
+    gain.set(ylabel="|L|", ylim=(1e-3, 50.0))
+    gain.legend(title="at", fontsize=8)
+    phase.set(ylabel="phase of -L, \N{DEGREE SIGN}", xlabel="frequency, rad/s")
+    phase.set(ylim=(-250.0, 160.0), yticks=[-180, -90, 0, 90])
+    headed(figure, Caption("Layer 2 on the way to the surface", about({})), "bars: phase margins")
+    save(figure, folder / "layer_2_loop.png")
+
+
 PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "hand": (draw_hand, ["hand.svg"]),
     "three": (draw_three, ["three_fingers.svg", "three_fingers.png"]),
@@ -132,6 +157,7 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "report": (draw_report, ["report.png"]),
     "timing": (draw_timing, ["timing.png"]),
     "maps": (draw_map, ["reflectance_map.png"]),
+    "layer_2": (draw_layer_2, ["layer_2_loop.png"]),
     "limits": (
         partial(tutorials.update, "limits"),
         ["layers.png", "objects.png", "limits.png", "colour.png"],

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from .grasp.system import grasp_system
     from .hand.system import hand_system
     from .inspection.inspection import inspect_fmu
+    from .linearisation.linearise import linearise
+    from .linearisation.state_space import StateSpace
     from .master.simulation import Session, simulate
     from .metrics.metric import AnyOf, Metric, metric
     from .recording.folder import load_run
@@ -48,6 +50,7 @@ __all__ = [
     "Result",
     "Session",
     "SimulationError",
+    "StateSpace",
     "System",
     "compare",
     "evaluate",
@@ -55,6 +58,7 @@ __all__ = [
     "hand_system",
     "identify",
     "inspect_fmu",
+    "linearise",
     "load_run",
     "metric",
     "qualify",
@@ -71,6 +75,7 @@ _HOMES = {
     "Realtime": "system.parts",
     "Result": "recording.result",
     "Session": "master.simulation",
+    "StateSpace": "linearisation.state_space",
     "System": "system.description",
     "compare": "comparison.compare",
     "evaluate": "grasp.published.evaluation",
@@ -78,6 +83,7 @@ _HOMES = {
     "hand_system": "hand.system",
     "identify": "grasp.identification.identification",
     "inspect_fmu": "inspection.inspection",
+    "linearise": "linearisation.linearise",
     "load_run": "recording.folder",
     "metric": "metrics.metric",
     "qualify": "comparison.qualify",

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from grasp_cosim import System, cli, simulate
+from grasp_cosim import System, cli, grasp_system, linearise, simulate
 from grasp_cosim.base.higher import groups
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.relay import Relay
@@ -104,6 +104,28 @@ def as_script(text, folder):
 @pytest.mark.parametrize("page", ["docs/hand.md", "docs/tandem.md"])
 def test_the_examples_of_another_gripper_hold(page, tmp_path):
     assert as_script("".join(blocks(page, "python")), tmp_path)
+
+
+@needs_compiler
+def test_the_loops_of_linear_analysis_are_as_shown(capsys):
+    (example,) = blocks("docs/linear_analysis.md", "python")
+    exec(example, names := {})
+    printed = capsys.readouterr().out
+    assert f"```\n{printed}```\n" in PAGES["docs/linear_analysis.md"]
+    assert len(names["models"]) == printed.count("\n")
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "row", re.findall(r"^\| ([\d.]+) \| (\w+) \| (.*) \|$", PAGES["docs/linear_analysis.md"], re.M)
+)
+def test_the_margins_at_the_surface_are_as_shown(row):
+    milliseconds, scheme, shown = row
+    step, name = 1e-3 * float(milliseconds), "controller.intensity[1]"
+    system = grasp_system().with_values({"plant.initial_object_position": 0.07499})
+    found = linearise(system, 2 * step, [name], [name], step=step, scheme=scheme).margins()
+    margins = f"{found.crossover:.1f} | {found.phase_margin:.1f} | {1e3 * found.delay_margin:.2f}"
+    assert margins == shown
 
 
 @pytest.mark.slow

@@ -120,6 +120,15 @@ class Instance(Protocol):
         SimulationError where the FMU fails, or did so in a way that nothing may follow.
         """
 
+    def numbers(self) -> npt.NDArray[np.float64]:
+        """The numbers that make up its state; InputError where they are not known one by one."""
+
+    def take_numbers(self, numbers: npt.NDArray[np.float64]) -> bool:
+        """Go on from a state of other numbers; False where the FMU refuses these.
+
+        Errors as of numbers().
+        """
+
     def last_successful_time(self) -> float | None:
         """Return the end of a discarded or shortened step in s, None if the FMU does not say."""
 

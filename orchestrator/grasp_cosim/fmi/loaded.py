@@ -33,6 +33,7 @@ from ..interface.obstacles import of_binary, of_loading, this_machine
 from ..system.parts import Logging
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, WARNING, Inputs
 from .messages import SEVERE, Messages
+from .numbers import state_numbers, take_numbers
 from .states import States
 
 _PYTHON_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int)
@@ -435,6 +436,24 @@ class LoadedInstance(ABC):
         self._arrays = {reference: [*elements] for reference, elements in arrays.items()}
         self._inputs.restore(inputs)
         self._messages.restore(messages)
+
+    def numbers(self) -> npt.NDArray[np.float64]:
+        self._check_numbers()
+        with self._failures():
+            return state_numbers(self._slave, self.interface)
+
+    def take_numbers(self, numbers: npt.NDArray[np.float64]) -> bool:
+        self._check_numbers()
+        with self._failures():
+            return take_numbers(self._slave, self.interface, numbers)
+
+    def _check_numbers(self) -> None:
+        """InputError where the numbers of the state are not known."""
+        if not (self.interface.ours and self.interface.has_states):
+            raise InputError(
+                f"{self.name}: the states of {self.interface.path.name} are not known one by one; "
+                "must be an FMU that grasp-cosim build made of a block"
+            )
 
     def _bind_states(self) -> States:
         """The functions for states; InputError where the FMU has none."""

@@ -277,6 +277,13 @@ class ProcessInstance:
         self._inputs.restore(inputs)
         self._messages.restore(messages)
 
+    def numbers(self) -> npt.NDArray[np.float64]:
+        found: npt.NDArray[np.float64] = self._ask("numbers")
+        return found
+
+    def take_numbers(self, numbers: npt.NDArray[np.float64]) -> bool:
+        return bool(self._ask("take_numbers", numbers))
+
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """As Instance.transfer: inputs arrive with the next step, and outputs come with it."""
         pending, shared = self._shared.add(self.interface, variables)

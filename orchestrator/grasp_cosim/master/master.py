@@ -8,7 +8,7 @@ The schemes, components with a longer step and time are in docs/system_files.md.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -32,7 +32,7 @@ from .engine import Aside, CompiledLoop, Engine, make_loop
 from .exchanged import exchanged, used
 from .initialisation import Propagation
 from .plan import Planner
-from .scenario import Scenario, driven_at, drives_of
+from .scenario import NO_CUTS, Cut, Scenario, driven_at, drives_of
 from .watches import Watches
 
 CHUNK = 4096
@@ -74,8 +74,11 @@ class Master:
         engine: Engine = "auto",
         pacer: Pacer | None = None,
         renew: Callable[[], Sequence[Instance]] | None = None,
+        cuts: Mapping[Port, Cut] = NO_CUTS,
     ) -> None:
-        """Renew closes the instances and loads others, for a loop that is initialised anew."""
+        """Renew closes the instances and loads others, for a loop that is initialised anew; cuts
+        are by the input at which each is.
+        """
         self.system = system
         self._engine, self._renew_instances = engine, renew
         self.instances = tuple(instances)
@@ -92,7 +95,7 @@ class Master:
         self.values = np.zeros(len(self.slots) + (pacer.width if pacer else 0))
         if pacer:
             pacer.bind(self.values[len(self.slots) :], self._hand_on_until)
-        self.scenario = Scenario(system, instances, self.slots, self.values)
+        self.scenario = Scenario(system, instances, self.slots, self.values, cuts)
         interfaces = {instance.name: instance.interface for instance in instances}
         self.watches = Watches(system, interfaces, self.slots)
         self._receive = receive

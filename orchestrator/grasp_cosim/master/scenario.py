@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,12 @@ class _Once:
         return found if found < self.end else math.inf
 
 
+Cut = Callable[[float], float]
+"""What becomes of a value that is passed where a connection is cut, for an analysis."""
+
+NO_CUTS: Mapping[Port, Cut] = MappingProxyType({})
+
+
 class Scenario:
     """The events and faults of one run.
 
@@ -78,6 +85,7 @@ class Scenario:
         instances: Sequence[Instance],
         slots: Mapping[Port, int],
         values: npt.NDArray[np.float64],
+        cuts: Mapping[Port, Cut] = NO_CUTS,
     ) -> None:
         """Values holds the signals of now whenever a method is called, at the places in slots."""
         self.log: list[str] = []
@@ -94,7 +102,7 @@ class Scenario:
             numbers = replace(fault, parameters=given)
             windows.append(Window(numbers, system.step_ns, system.start_ns))
             self._pending += windows[-1].ends(f"faults[{i}]")
-        self.fault_functions = fault_functions(windows, system.step_ns)
+        self.fault_functions = fault_functions(windows, system.step_ns, cuts)
         self.tunings = tunings_of(system)
         self._due = self._next_step(0)
         self._settable: set[Port] = set()
@@ -279,9 +287,13 @@ class Window:
 
 
 class FaultFunction:
-    """Changes a value passed at a step number: the faults of a connection, one after the other."""
+    """Changes a value passed at a step number: the faults of a connection, one after the other.
 
-    def __init__(self) -> None:
+    A cut of that connection comes after them.
+    """
+
+    def __init__(self, cut: Cut | None) -> None:
+        self._cut = cut
         self._chain: list[tuple[Act, Window]] = []
 
     def add(self, act: Act, window: Window) -> None:
@@ -292,7 +304,7 @@ class FaultFunction:
         """What becomes of the value."""
         for act, window in self._chain:
             value = act(value, step, window.acts(step))
-        return value
+        return self._cut(value) if self._cut else value
 
     def saved(self) -> list[tuple[Any, ...]]:
         """When the faults began, and what they remember, for restore()."""
@@ -309,14 +321,17 @@ class FaultFunction:
                 act.restore(memory)
 
 
-def fault_functions(windows: Sequence[Window], step_ns: Time) -> Mapping[Port, FaultFunction]:
-    """Return for each connection that has faults, by target, all of them one after the other."""
-    functions: dict[Port, FaultFunction] = {}
+def fault_functions(
+    windows: Sequence[Window], step_ns: Time, cuts: Mapping[Port, Cut] = NO_CUTS
+) -> Mapping[Port, FaultFunction]:
+    """Return for each connection that has faults or a cut, by target, all of them in turn."""
+    targets = dict.fromkeys([*(window.fault.target for window in windows), *cuts])
+    functions = {target: FaultFunction(cuts.get(target)) for target in targets}
     kinds: Counter[tuple[Port, str]] = Counter()
     for window in windows:
         fault, key = window.fault, (window.fault.target, window.fault.kind)
         act = FAULTS[fault.kind].start(fault.parameters, Draws(fault, kinds[key]), step_ns)
-        functions.setdefault(fault.target, FaultFunction()).add(act, window)
+        functions[fault.target].add(act, window)
         kinds[key] += 1
     return functions
 

@@ -4,7 +4,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from numbers import Integral
@@ -45,6 +45,7 @@ from ..system.times import TimeInput, in_seconds
 from ..system.validity import remarks
 from .engine import Engine
 from .master import Master
+from .scenario import NO_CUTS, Cut
 
 LOGGER = logging.getLogger(__name__)
 """Gets what the operating system does not permit, and at the level INFO what a run does."""
@@ -93,8 +94,13 @@ class Session:
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
         finish: Finish | None = None,
+        cuts: Mapping[Port, Cut] = NO_CUTS,
     ) -> None:
-        """Load and initialise; see simulate() for the arguments and errors."""
+        """Load and initialise; see simulate() for the arguments and errors.
+
+        A cut of a connection, by its input, gets each value that is passed there, and says what is
+        passed in its place.
+        """
         system = system.with_experiment(step, stop, scheme, diverging)
         if not all(c.is_current for c in system.components):
             system = replace(system, components=tuple(replace(c) for c in system.components))
@@ -132,7 +138,7 @@ class Session:
         self._tell(self._remarks)
         try:
             with _guarded():
-                self._begin(listeners, every, engine)
+                self._begin(listeners, every, engine, cuts)
             self._tell(self._early())
             if paced:
                 self._ask_for_privileges(paced)
@@ -140,21 +146,28 @@ class Session:
             self._stack.close()
             raise
 
-    def _begin(self, listeners: Sequence[Listener], every: int, engine: Engine) -> None:
+    def _begin(
+        self,
+        listeners: Sequence[Listener],
+        every: int,
+        engine: Engine,
+        cuts: Mapping[Port, Cut],
+    ) -> None:
         """Load the FMUs, initialise them and hand on the row of t = 0; the stack undoes it all."""
         self._instances: list[Instance] = []
         self._stack.callback(self._close_instances)
         with phase(f"loading {len(self.system.components)} FMUs"):
             self._load_instances()
-        self._master = Master(
+        self.master = Master(
             self.system,
             self._instances,
             lambda *rows: self._dispatch(*rows),
             engine,
             self.pacer,
             self._renew_instances,
+            cuts,
         )
-        slots, texts = self._master.slots, self._master.texts
+        slots, texts = self.master.slots, self.master.texts
         receivers = (self._memory, *listeners)
         self._dispatch = Dispatcher(self.system, slots, receivers, every, texts, self._whole)
         self._records: list[Dispatcher | MemoryListener | EveryRow] = [
@@ -167,7 +180,7 @@ class Session:
         self._stack.callback(self._hand_over)  # before the FMUs are ended, and after:
         self._stack.callback(self._end)
         with phase("initialising"), self._failures():  # where the row of t = 0 is not finite
-            self._master.initialise()
+            self.master.initialise()
         self._initialised = True
         if all(map(_leaves_the_process_alone, self.system.components)):
             self._guard = nullcontext
@@ -210,7 +223,7 @@ class Session:
         """Hand on what is left, and end the listeners, even where that fails."""
         with self._failures():
             try:
-                self._master.hand_on()
+                self.master.hand_on()
             except BaseException:
                 self._failed = True
                 raise
@@ -249,12 +262,12 @@ class Session:
     @property
     def time(self) -> float:
         """The communication point reached, in s."""
-        return in_seconds(self.system.time_ns(self._master.steps_done))
+        return in_seconds(self.system.time_ns(self.master.steps_done))
 
     @property
     def complete(self) -> bool:
         """True if the stop time is reached without a failure."""
-        return self._master.steps_done == self.system.total_steps and not self._failed
+        return self.master.steps_done == self.system.total_steps and not self._failed
 
     @property
     def ended_at(self) -> float | None:
@@ -262,8 +275,8 @@ class Session:
 
         None also after a failure.
         """
-        end = self._master.total_steps
-        early = self._master.steps_done == end < self.system.total_steps
+        end = self.master.total_steps
+        early = self.master.steps_done == end < self.system.total_steps
         return self.time if early and not self._failed else None
 
     def step(self, steps: int = 1) -> bool:
@@ -279,7 +292,7 @@ class Session:
         start, took = time.perf_counter(), self._dispatch.took
         try:
             with self._in_use():
-                return self._master.advance(int(steps)) > 0
+                return self.master.advance(int(steps)) > 0
         finally:
             self._wall_time += time.perf_counter() - start
             if not self.pacer:  # which has time for the listeners
@@ -305,8 +318,8 @@ class Session:
 
         These are all of them where a run in real time needs no look in between.
         """
-        self._master.meanwhile = show
-        return self._master.total_steps if self._master.runs_alone else 1
+        self.master.meanwhile = show
+        return self.master.total_steps if self.master.runs_alone else 1
 
     def __getitem__(self, name: str) -> float:
         """The value now of an output, of a connected input or of what is recorded, by a name like
@@ -316,9 +329,9 @@ class Session:
         there is no such signal.
         """
         port, change = self._read_at(name)
-        if port in self._master.texts:
+        if port in self.master.texts:
             raise InputError(f"{name!r}: is a String; must be read by session.text({name!r})")
-        value = float(self._master.values[self._master.slots[port]])
+        value = float(self.master.values[self.master.slots[port]])
         return value if change == IDENTITY else change(value)
 
     def text(self, name: str) -> str:
@@ -327,22 +340,22 @@ class Session:
         Connected inputs that are Strings are none.
         """
         port, _ = self._read_at(name)
-        if port not in self._master.texts:
+        if port not in self.master.texts:
             raise InputError(f"{name!r}: is a number; must be read by session[{name!r}]")
-        texts = self._master.texts[port].listed
-        return texts[int(self._master.values[self._master.slots[port]])]
+        texts = self.master.texts[port].listed
+        return texts[int(self.master.values[self.master.slots[port]])]
 
     def _read_at(self, name: str) -> tuple[Port, Conversion]:
         """The signal of a component behind a name, and what is made of its value."""
         port, change = read_at(self.system, as_signal(f"signal {name!r}", name))
-        if port not in self._master.slots:
+        if port not in self.master.slots:
             valid = nearest(name, self._ipython_key_completions_())
             raise InputError(f"{name!r}: no such signal; {valid}")
         return port, change
 
     def _ipython_key_completions_(self) -> list[str]:
         """The names of signals, for Tab behind a bracket in a notebook."""
-        return [*self.system.outputs, *map(str, self._master.slots)]
+        return [*self.system.outputs, *map(str, self.master.slots)]
 
     def __repr__(self) -> str:
         """How far it is."""
@@ -360,7 +373,7 @@ class Session:
         values, _ = given_by_connectors(self.system, {name: value}, "set: ".__add__)
         with self._in_use():
             for variable, own in values.items():
-                self._master.scenario.set(variable, own, self._master.steps_done)
+                self.master.scenario.set(variable, own, self.master.steps_done)
 
     def save(self) -> "State":
         """The state of now, to which restore() goes back: what is recorded, and all that decides
@@ -379,7 +392,7 @@ class Session:
                     "session without, to save its state"
                 )
             records = [record.saved() for record in self._records]
-            return State(self, self.time, self._master.saved(), records)
+            return State(self, self.time, self.master.saved(), records)
 
     def restore(self, state: "State") -> None:
         """Go back to a state of this session that save() gave, as often as you like.
@@ -394,7 +407,7 @@ class Session:
             raise InputError(f"{self.system.name}: the session is closed; must be a new one")
         self._failed, self._failure = True, None
         with self._guard(), self._failures():
-            self._master.restore(state.master)
+            self.master.restore(state.master)
         for record, saved in zip(self._records, state.records, strict=True):
             record.restore(saved)
         self._failed = False
@@ -405,8 +418,8 @@ class Session:
         SimulationError, with the result, where a listener does not take it.
         """
         with self._failures():
-            self._master.hand_on()
-        master, signals, asked = self._master, self._dispatch.signals, self._privileges
+            self.master.hand_on()
+        master, signals, asked = self.master, self._dispatch.signals, self._privileges
         pacer = self.pacer
         time, columns = self._memory.columns(self._dispatch.pending)
         return Result(
@@ -455,10 +468,10 @@ class Session:
 
     def _early(self) -> tuple[str, ...]:
         """The lines of the log that are known before the first step."""
-        return (*self._remarks, *self._in_si.notes, *self._master.log)
+        return (*self._remarks, *self._in_si.notes, *self.master.log)
 
     def _log(self) -> tuple[str, ...]:
-        master = self._master
+        master = self.master
         rejected = (
             f"{name}: {counted(r.count, 'step')} discarded or ended early, taken in parts, "
             f"the first at t = {r.first:.9g} s"

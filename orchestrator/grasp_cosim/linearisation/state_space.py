@@ -1,0 +1,181 @@
+"""A sampled linear model, its frequency response, and the margins of a loop that was opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import degrees, inf, nan, pi
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.checks import extra_module
+from ..base.errors import InputError, choices
+
+if TYPE_CHECKING:
+    import control
+
+Matrix = npt.NDArray[np.float64]
+Response = npt.NDArray[np.complex128]
+
+POINTS = 4000
+"""Frequencies at which a loop is looked at for its crossovers, besides those of its poles."""
+
+FEW = 4
+"""So many names of each kind are in the repr() of a model."""
+
+LOWEST = 1e-7
+"""The lowest of them, as a share of the Nyquist frequency."""
+
+
+class Margins(NamedTuple):
+    """How far a loop is from instability, by the factor -L that it has where it was opened.
+
+    Of several crossovers each figure is that of the nearest to instability. Where there is none
+    the frequency is NaN and the margin infinite. The margins of a loop that is not stable as it is
+    mean nothing.
+    """
+
+    crossover: float
+    """rad/s, where |L| is 1 and the delay margin the smallest."""
+    phase_margin: float
+    """Degrees of lag that the loop bears there."""
+    delay_margin: float
+    """s of delay that it bears."""
+    phase_crossover: float
+    """rad/s, where -L is real and negative."""
+    gain_margin: float
+    """The factor above 1 that the loop bears."""
+    stable: bool
+    """True if the closed loop is stable as it is: on the way of a run a slow mode may grow."""
+
+    def __str__(self) -> str:
+        """In a line."""
+        return (
+            f"crossover {self.crossover:.4g} rad/s, phase margin {self.phase_margin:.4g} degrees, "
+            f"delay margin {1e3 * self.delay_margin:.4g} ms, gain margin {self.gain_margin:.4g}, "
+            f"{'stable' if self.stable else 'not stable'}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """The linear model of deviations from a run, at points `step` apart, in s.
+
+        x[k+1] = A x[k] + B u[k],    y[k] = C x[k] + D u[k]
+
+    A has the shape (states, states), B (states, inputs), C (outputs,
+    states), D (outputs, inputs). The names are in these orders; those of states are the component
+    and a number, or the signal that is held from a step to the next. Values are in the units of
+    the signals.
+    """
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    step: float
+    at: float
+    """The time of the run in s."""
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Its size, and what goes in and comes out."""
+        return (
+            f"StateSpace at {self.at:g} s, in steps of {self.step:g} s: "
+            f"{len(self.states)} states, from {choices(self.inputs, FEW)} to "
+            f"{choices(self.outputs, FEW)}"
+        )
+
+    @property
+    def poles(self) -> Response:
+        """The eigenvalues of A; the model is stable where all are within the unit circle."""
+        return np.linalg.eigvals(self.A).astype(np.complex128)
+
+    def frequency_response(self, omega: npt.ArrayLike) -> Response:
+        """D + C (z - A)^-1 B at z = exp(j omega step), for frequencies in rad/s.
+
+        Of shape (frequencies, outputs, inputs).
+        """
+        z = np.exp(1j * self.step * np.atleast_1d(np.asarray(omega, np.float64)))
+        resolvent = z[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
+        found = self.C @ np.linalg.solve(resolvent, self.B.astype(np.complex128)) + self.D
+        return np.asarray(found, np.complex128)
+
+    def margins(self) -> Margins:
+        """Those of the loop that was opened between the one input and the one output.
+
+        InputError where there are several.
+        """
+        if self.D.shape != (1, 1):
+            raise InputError(
+                f"margins: {len(self.inputs)} inputs and {len(self.outputs)} outputs; must be one "
+                "input, at which a loop is opened, and one output"
+            )
+
+        def loop(omega: npt.ArrayLike) -> Response:
+            return -self.frequency_response(omega)[:, 0, 0]  # 1 - L of u = y is 1 + (-L)
+
+        omega = self._frequencies()
+        values = loop(omega)
+        crossovers = zeros(lambda w: abs(loop(w)[0]) - 1.0, omega, np.abs(values) - 1.0)
+        lags = [(float(np.angle(-loop(w)[0]) % (2.0 * pi)), w) for w in crossovers]
+        lag, crossover = min(lags, key=lambda found: found[0] / found[1], default=(inf, nan))
+        turns = [*zeros(lambda w: loop(w)[0].imag, omega, values.imag), float(omega[-1])]
+        shares = [(-loop(w)[0].real, w) for w in turns]  # at the end, Nyquist's, it is real
+        gains = [(1.0 / share, w) for share, w in shares if 0.0 < share < 1.0]
+        gain, turn = min(gains, default=(inf, nan))
+        return Margins(
+            crossover,
+            degrees((lag + pi) % (2.0 * pi) - pi) if lag < inf else inf,
+            lag / crossover if lag < inf else inf,
+            turn,
+            gain,
+            self._stable_when_closed(),
+        )
+
+    def _stable_when_closed(self) -> bool:
+        """True if u = y is stable, by the states that the input reaches."""
+        reached = (self.B != 0.0).any(axis=1)
+        while (more := reached | (self.A[:, reached] != 0.0).any(axis=1)).sum() > reached.sum():
+            reached = more
+        closed = self.A + self.B @ self.C / (1.0 - self.D[0, 0])
+        poles = np.linalg.eigvals(closed[np.ix_(reached, reached)])
+        return bool(np.abs(poles).max(initial=0.0) < 1.0)
+
+    def ss(self) -> control.StateSpace:
+        """The same for python-control, which must be installed."""
+        made: Any = extra_module("control", "which has this class", "control").ss(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            self.step,
+            states=[*self.states],
+            inputs=[*self.inputs],
+            outputs=[*self.outputs],
+        )
+        return made
+
+    def _frequencies(self) -> npt.NDArray[np.float64]:
+        """From low ones to the Nyquist frequency, in rad/s, those of the poles among them."""
+        nyquist = pi / self.step
+        poles = self.poles
+        of_poles = np.abs(np.log(poles[poles != 0.0])) / self.step
+        within = of_poles[(of_poles > LOWEST * nyquist) & (of_poles < nyquist)]
+        return np.unique([*np.geomspace(LOWEST * nyquist, nyquist, POINTS), *within])
+
+
+def zeros(
+    function: Callable[[float], float],
+    omega: npt.NDArray[np.float64],
+    values: npt.NDArray[np.float64],
+) -> list[float]:
+    """Where a function of the frequency is zero; values are those at omega."""
+    from scipy.optimize import brentq  # only here: it takes time to load
+
+    changes = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0.0)
+    return [float(brentq(function, omega[i], omega[i + 1])) for i in changes]
