@@ -2,6 +2,7 @@
 
 import math
 import os
+import signal
 import sys
 import tempfile
 from dataclasses import replace
@@ -10,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmi.test_instances import KINDS, alone
-from grasp_cosim import InputError, SimulationError, simulate
+from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi.instance import ERROR
+from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.master import master
 from grasp_cosim.system.parts import Connection, Event, Port
 from support.marks import engines, needs_pythonfmu
@@ -75,6 +77,20 @@ def test_steps_are_counted_in_whole_numbers(grasp, steps):
             session.step(steps)
         assert session.step(np.int64(3))
         assert session.time == 3e-4
+
+
+def test_a_step_of_our_own_c_asks_the_system_for_nothing(natives, monkeypatch):
+    """No signal handler is set, no folder looked up: FMUs that may do what they like need that."""
+
+    def asked(*_):
+        raise AssertionError("asked")
+
+    with simulate.session(System.load(SYSTEM, natives)) as session:
+        monkeypatch.setattr(signal, "signal", asked)
+        monkeypatch.setattr(os, "getcwd", asked)
+        assert session.step()
+        session.restore(session.save())
+        monkeypatch.undo()
 
 
 def test_an_engine_that_does_not_exist_is_refused(grasp):

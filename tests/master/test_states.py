@@ -51,6 +51,7 @@ def way(system, at, away=0, changes=(), then=(), **options):
             for name, value in dict(changes).items():
                 session.set(name, value)
             session.step(away)
+            session.step(3)
             session.restore(state)
             assert session.time == state.time
         for name, value in dict(then).items():
@@ -87,7 +88,7 @@ FAULTS = (
     Fault(GAPS[0], "noise", {"standard_deviation": 1e-3}, seed=3),
     Fault(GAPS[1], "dropout", {"probability": 0.6}, 10 * MS),
     Fault(GAPS[1], "delay", {"time": 0.02}, 40 * MS),
-    Fault(GAPS[1], "bias", {"value": 1e-3}, when=Condition(GAPS[1], "<", 0.035)),
+    Fault(GAPS[1], "bias", {"value": 1e-3}, when=Condition(GAPS[1], "<", 0.06)),
 )
 EVENTS = (
     Event({Port("sensor_1", "reflectance"): 0.7}, at_ns=65 * MS),
@@ -98,12 +99,12 @@ LIMITS = (Limit(Condition(GAPS[0], "<", 0.03), "warn"),)
 
 @engines
 @pytest.mark.parametrize("every", [1, 3])
-@pytest.mark.parametrize(("at", "away"), [(50, 45), (33, 367)])
+@pytest.mark.parametrize(("at", "away"), [(50, 45), (33, 200), (33, 367)])
 def test_all_that_acts_on_a_run_goes_back(natives, engine, every, at, away):
     """Faults that remember, what happens once, limits, energies; after the last step, too."""
     system = replace(native_grasp(natives), faults=FAULTS, events=EVENTS, limits=LIMITS)
     assert len(simulate(system).log) > 6
-    changes = {"sensor_1.reflectance": 0.5, "plant.friction.coulomb[1]": 0.1}
+    changes = {"sensor_2.reflectance": 0.2, "plant.finger_mass[2]": 0.2}
     check(system, at, away, changes, engine=engine, every=every)
 
 
@@ -199,7 +200,7 @@ def test_what_ran_away_on_the_other_way_is_not_told(tmp_path):
 
 
 def test_a_failure_names_the_inputs_that_are_there_again(tmp_path):
-    system = able(alone(tmp_path, "2.0", "none", error_at=0.55), "2.0")
+    system = able(alone(tmp_path, "2.0", "none", error_at=0.85), "2.0")
     for away in (0, 2):
         with pytest.raises(SimulationError, match="u_Integer = 0, "):
             way(system, 3, away, {"part.u_Integer": 5})

@@ -466,7 +466,7 @@ class LoadedInstance(ABC):
             partial(self._symbol(f"{action}{form}", kind), instance)
             for action in ("Get", "Set", "Free")
         )
-        return States(get, set_, free)
+        return States(get, set_, free, overwrites=not self._python)
 
     def _has_no_state(self, why: str) -> InputError:
         """The error where the state is asked for."""

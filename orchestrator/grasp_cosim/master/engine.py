@@ -108,6 +108,7 @@ class CompiledLoop:
         self._kept = plan, callbacks, tables, words
         self.shared = _Shared()
         self._drives = tables[4]
+        self._rows, self._place = None, 0
         self.alone = all(call.native and not call.keeps_lock for call in plan.calls)
         self._places = words.ctypes.data, ctypes.addressof(self.shared)
         self._run = library(any(call.keeps_lock for call in plan.calls)).run
@@ -129,21 +130,27 @@ class CompiledLoop:
         grid_start: int,
         grid_step: int,
         per_second: int,
-        row: int | None = None,
+        row: int = 0,
+        ring: bool = False,
     ) -> tuple[int, int, int]:
-        """As loop.run(). Given the row of the first step, rows are filled round and round."""
+        """As loop.run(), from a row on. In a ring, rows are filled round and round."""
         tables, shared = self._places
+        if rows is not self._rows:
+            self._rows, self._place = rows, rows.ctypes.data
         self.shared.done = start
-        if row is None:
-            self.shared.taken, row = start, 0
-        place, room = rows.ctypes.data, len(rows)
-        grid = grid_start, grid_step, per_second
-        step = self._run(tables, place, room, row, operation, start, stop, *grid, shared)
+        if not ring:
+            self.shared.taken = start - row
+        step = self._run(
+            tables, self._place, len(rows), row, operation, start, stop,
+            grid_start, grid_step, per_second, shared,
+        )  # fmt: skip
         return step, self.shared.operation, self.shared.status
 
 
-Loop = Callable[[Any, int, int, int, int, int, int], tuple[int, int, int]] | CompiledLoop
-"""loop.run() over a plan: takes rows, operation, start, stop, and the grid of its times."""
+Loop = Callable[..., tuple[int, int, int]]
+"""loop.run() over a plan: takes rows, operation, start, stop, the grid of its times, and row: which
+of the rows is the first.
+"""
 
 
 def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
@@ -176,7 +183,11 @@ def _interpreted(plan: Plan) -> Loop:
     tables = plan.operations, plan.connections, plan.casts, plan.drives, watches
     calls = [call.python for call in plan.calls]
     over = partial(loop.run, *tables, calls, buffers, values, clock, warned)
-    return lambda rows, *where: over(memoryview(rows.reshape(-1)), *where)
+
+    def run(rows: Any, *where: int, row: int = 0) -> tuple[int, int, int]:
+        return over(memoryview(rows[row:].reshape(-1)), *where)
+
+    return run
 
 
 @lru_cache(maxsize=1)

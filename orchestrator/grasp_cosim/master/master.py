@@ -44,8 +44,8 @@ ROOM = 1 << 15
 MOST_BYTES = 1 << 26
 """Of memory for these rows; of a wide row there are fewer."""
 
-ENOUGH = 32
-"""The rows that advance() collects before it hands them on: one alone costs more than a step."""
+ENOUGH = 128
+"""The rows that advance() collects before it hands them on: one alone costs 100 steps."""
 
 LONG = 0.1
 """s of wall time after which it hands on any."""
@@ -263,9 +263,10 @@ class Master:
             raise SimulationError(self._pacer.meter.verdict()) from None
         for instance in self.instances:
             instance.quieten()
-        fresh = self._waiting()[max(first - self._handed_on, 0) :]
-        wraps = len(self._waiting()) < self.steps_done - self._handed_on
-        if self._enough() or wraps or not np.isfinite(fresh).all():
+        waiting = self._waiting()
+        wraps = len(waiting) < self.steps_done - self._handed_on
+        fresh = waiting[max(first - self._handed_on, 0) :]
+        if wraps or self._enough(len(waiting)) or not np.isfinite(fresh).all():
             self.hand_on()
         return self.steps_done - first
 
@@ -330,11 +331,11 @@ class Master:
         first = (self._handed_on - self._base) % len(self._rows)
         return self._rows[first : first + self.steps_done - self._handed_on]
 
-    def _enough(self) -> bool:
-        """Return True if the rows are many, have waited long or include the last one."""
+    def _enough(self, rows: int) -> bool:
+        """True if so many rows that wait are many, have waited long or include the last one."""
         return (
             self.steps_done == self.total_steps
-            or (self._pacer is None and len(self._waiting()) >= ENOUGH)  # a pacer has its occasions
+            or (self._pacer is None and rows >= ENOUGH)  # a pacer has its occasions
             or time.monotonic() - self._handed_on_at > LONG
         )
 
@@ -358,8 +359,9 @@ class Master:
         step, operation = self.steps_done, 0
         try:
             while step < (until := min(stop, self.total_steps, self._pause)):
-                rows = self._rows[step - self._base :]
-                step, operation, status = self._loop(rows, operation, step, until, *self._grid)
+                step, operation, status = self._loop(
+                    self._rows, operation, step, until, *self._grid, row=step - self._base
+                )
                 if status:
                     self.steps_done = step
                     self._resolve(step, operation, status)
@@ -389,7 +391,7 @@ class Master:
                 while step < (until := min(stop, self.total_steps, self._pause)):
                     row = (step - self._base) % len(self._rows)
                     step, operation, status = compiled(
-                        self._rows, operation, step, until, *self._grid, row
+                        self._rows, operation, step, until, *self._grid, row=row, ring=True
                     )
                     if status == loop.OVERRUN:
                         raise pacer.overrun()

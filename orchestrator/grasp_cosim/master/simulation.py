@@ -5,10 +5,11 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from numbers import Integral
-from typing import Any
+from typing import Any, TypeVar
 
 from ..base.errors import InputError, SimulationError, nearest
 from ..base.interruption import interruptible, interrupts
@@ -58,6 +59,8 @@ Finish = Callable[[Result, SimulationError | None], object]
 
 LOOK = 0.1
 """s of wall time between two looks at the progress bar and at Ctrl-C."""
+
+T = TypeVar("T")
 
 GROWTH = 8
 """Times as many steps as before one look that there are at most before the next."""
@@ -130,7 +133,7 @@ class Session:
         paced = system.realtime if realtime is True else realtime
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
-        self._guard: Callable[[], AbstractContextManager[object]] = _guarded
+        self._fmus_behave = False
         self._stack = ExitStack()
         check_declared_steps(system)
         waits = long_waits(system, self.pacer.realtime) if self.pacer else []
@@ -182,8 +185,7 @@ class Session:
         with phase("initialising"), self._failures():  # where the row of t = 0 is not finite
             self.master.initialise()
         self._initialised = True
-        if all(map(_leaves_the_process_alone, self.system.components)):
-            self._guard = nullcontext
+        self._fmus_behave = all(map(_leaves_the_process_alone, self.system.components))
 
     def _load_instances(self) -> None:
         for component in self.system.components:
@@ -215,8 +217,7 @@ class Session:
         try:
             yield
         except SimulationError as error:
-            self._failed, self._failure = True, error
-            error.result = error.result or self.result()
+            self._break(error)
             raise
 
     def _end(self) -> None:
@@ -291,27 +292,37 @@ class Session:
         _check_count("steps", steps)
         start, took = time.perf_counter(), self._dispatch.took
         try:
-            with self._in_use():
-                return self.master.advance(int(steps)) > 0
+            return self._called(partial(self.master.advance, int(steps))) > 0
         finally:
             self._wall_time += time.perf_counter() - start
             if not self.pacer:  # which has time for the listeners
                 self._wall_time -= self._dispatch.took - took
 
-    @contextmanager
-    def _in_use(self) -> Iterator[None]:
-        """Refuses a session whose FMUs must not be called; whatever is raised inside breaks it."""
+    def _called(self, act: Callable[[], T]) -> T:
+        """What `act` returns, which calls FMUs; whatever is raised in it breaks the session.
+
+        Refuses a session whose FMUs must not be called.
+        """
         if self._closed or self._failed:
             state = "closed" if self._closed else "broken off by a failure or an interruption"
             raise InputError(f"{self.system.name}: the session is {state}; must be a new one")
         try:
-            with self._guard(), self._failures():
-                yield
+            if self._fmus_behave:
+                return act()
+            with _guarded(), self._failures():
+                return act()
         except InputError:  # which was found before any FMU was called
             raise
-        except BaseException:
-            self._failed = True
+        except BaseException as error:
+            self._break(error)
             raise
+
+    def _break(self, error: BaseException) -> None:
+        """An error broke the session; a SimulationError gets what was recorded as its result."""
+        self._failed = True
+        if isinstance(error, SimulationError):
+            self._failure = error
+            error.result = error.result or self.result()
 
     def shown_by(self, show: Callable[[], None]) -> int:
         """Have `show` called while a long step goes on; returns the steps that are best at first.
@@ -371,9 +382,12 @@ class Session:
         FMUs as of step().
         """
         values, _ = given_by_connectors(self.system, {name: value}, "set: ".__add__)
-        with self._in_use():
+
+        def set_all() -> None:
             for variable, own in values.items():
                 self.master.scenario.set(variable, own, self.master.steps_done)
+
+        self._called(set_all)
 
     def save(self) -> "State":
         """The state of now, to which restore() goes back: what is recorded, and all that decides
@@ -383,16 +397,15 @@ class Session:
         an FMU does not give its state, in real time, and where listeners record elsewhere; errors
         of FMUs as of step().
         """
-        with self._in_use():
-            if self.pacer:
-                raise InputError(f"{self.system.name}: a run in real time cannot go back")
-            if self._has_listeners:
-                raise InputError(
-                    f"{self.system.name}: what listeners have got cannot be taken back; must be a "
-                    "session without, to save its state"
-                )
-            records = [record.saved() for record in self._records]
-            return State(self, self.time, self.master.saved(), records)
+        if self.pacer:
+            raise InputError(f"{self.system.name}: a run in real time cannot go back")
+        if self._has_listeners:
+            raise InputError(
+                f"{self.system.name}: what listeners have got cannot be taken back; must be a "
+                "session without, to save its state"
+            )
+        master = self._called(self.master.saved)
+        return State(self, self.time, master, [record.saved() for record in self._records])
 
     def restore(self, state: "State") -> None:
         """Go back to a state of this session that save() gave, as often as you like.
@@ -403,14 +416,11 @@ class Session:
         """
         if not isinstance(state, State) or state.session is not self:
             raise InputError(f"{self.system.name}: {state!r}: must be a state of this session")
-        if self._closed:
-            raise InputError(f"{self.system.name}: the session is closed; must be a new one")
-        self._failed, self._failure = True, None
-        with self._guard(), self._failures():
-            self.master.restore(state.master)
+        if not self._closed:
+            self._failed, self._failure = False, None
+        self._called(partial(self.master.restore, state.master))
         for record, saved in zip(self._records, state.records, strict=True):
             record.restore(saved)
-        self._failed = False
 
     def result(self) -> Result:
         """Return the result recorded until now.
@@ -578,6 +588,8 @@ def _loaded(component: Component) -> str:
 
 
 def _check_count(name: str, count: object) -> None:
+    if type(count) is int and 1 <= count <= MOST:  # as a rule, and fast
+        return
     if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= int(count) <= MOST:
         raise InputError(f"{name} = {count!r}: must be a whole number from 1 to {MOST}")
 
