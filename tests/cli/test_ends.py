@@ -162,7 +162,7 @@ def test_an_interruption_inside_an_fmu_is_one(grasp, monkeypatch):
                 raise SimulationError("plant: returned fatal: KeyboardInterrupt") from None
             return 1
 
-        monkeypatch.setattr(session._master, "advance", advance)
+        monkeypatch.setattr(session.master, "advance", advance)
         with pytest.raises(KeyboardInterrupt):
             session.step()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

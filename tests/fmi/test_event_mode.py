@@ -184,7 +184,7 @@ def test_an_input_of_a_clock_arrives_with_its_ticks(tmp_path):
     system = System("bound", (part,), (), *nanoseconds, "sequential", events=events)
     taken = []
     with simulate.session(system) as session:
-        (instance,) = session._master.instances
+        (instance,) = session.master.instances
         variable = instance.interface.by_name["taken"]
         while session.step():
             taken += instance.get([variable])

@@ -147,8 +147,8 @@ def interrupts():
 def test_it_has_the_bits_of_a_free_run_in_its_folder_too(two, tmp_path, version, scheme):
     system = two(version, scheme)
     with simulate.session(system, realtime=FAST) as session:
-        assert session._master.runs_alone
-        shapes = [c.native and c.native.shape for c in session._master.plan.calls]
+        assert session.master.runs_alone
+        shapes = [c.native and c.native.shape for c in session.master.plan.calls]
         assert shapes.count(PACE) == 1
     with RunFolder(tmp_path / "out", system, paced=True) as folder:
         result = simulate(system, realtime=FAST, listeners=[folder])
@@ -230,5 +230,5 @@ def test_a_python_call_in_the_plan_keeps_the_pacer_in_python(two):
     """An event, say: nobody would hand the rows on in its wait otherwise."""
     system = two(more="[[events]]\nat = 0.5\nset = { 'a.gain' = 2.0 }\n")
     with simulate.session(system, realtime=FAST) as session:
-        assert not session._master.runs_alone
+        assert not session.master.runs_alone
     assert same_bits(simulate(system), simulate(system, realtime=FAST))
