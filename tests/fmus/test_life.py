@@ -5,8 +5,11 @@ from math import inf, nan
 from types import SimpleNamespace
 
 import pytest
+from grasp_cosim import SimulationError, System, simulate
 from grasp_cosim.fmu_export.contract import longest_step
 from grasp_cosim.fmu_export.shipped import blocks
+from grasp_cosim.system.parts import Component
+from grasp_cosim.system.times import NANOSECONDS
 from hypothesis import given
 from hypothesis import strategies as st
 from support.fmi2 import OK, H, Instance, drive
@@ -58,6 +61,15 @@ def test_a_step_that_is_too_long_is_discarded(load, name):
         assert instance.call("GetBooleanStatus", TERMINATED, byref(ends)) == OK
         assert not ends.value  # it is the step that is wrong, not the time to end
         assert instance.step(1e-3, longest) == OK
+
+
+def test_a_step_that_is_too_long_ends_a_run(kind, folder_of):
+    """On each kind: ours are not gone on with in parts, as what else discards a step is."""
+    sensor = Component("sensor", folder_of(kind) / "ProximitySensor.fmu", {"gap": 0.01})
+    system = System("long", (sensor,), (), 4 * NANOSECONDS, 8 * NANOSECONDS, "sequential")
+    refusal = r"^sensor: .* at t = 0 s: .*step of 4\.0 s: must be at most 2 s"
+    with pytest.raises(SimulationError, match=refusal):
+        simulate(system)
 
 
 @pytest.mark.parametrize("name", ["GraspController", "GraspControllerAdaptive"])

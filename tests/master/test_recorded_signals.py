@@ -136,6 +136,53 @@ def test_a_connected_input_is_what_was_passed(tmp_path, engine):
 
 
 @engines
+def test_by_default_a_faulted_input_is_recorded_behind_its_fault(tmp_path, engine):
+    faults = (Fault(Port("b", "u"), "bias", {"value": 7.0}, start_ns=2 * STEP),)
+    clean = simulate(loop(tmp_path), engine=engine)
+    result = simulate(loop(tmp_path, faults=faults), engine=engine)
+    assert [name for name in result if name not in clean] == ["b.u"]
+    expected = 3.0 * result["a.y"] + np.array([0.0, 0.0, 0.0, 7.0, 7.0, 7.0])
+    assert result["b.u"].tolist() == expected.tolist()
+    assert "b.u" not in simulate(loop(tmp_path, "!b.u", faults=faults), engine=engine)
+
+
+@engines
+@VERSIONS
+def test_by_default_inputs_are_recorded_that_events_and_stimuli_set(tmp_path, version, engine):
+    fmu = inner(tmp_path, version, outputs=True)
+    set_ = Event({Port("a", "u"): 3.0, Port("a", "k"): 4.0}, at_ns=2 * STEP)
+    result = simulate(replace(alone(fmu), events=(set_,)), engine=engine)
+    assert list(result) == ["a.u", "a.y"]
+    assert result["a.u"].tolist() == [1.0, 1.0, 1.0, 3.0, 3.0, 3.0]
+    (tmp_path / "drive.csv").write_text("time,a.u\n0,0\n0.5,5\n", "utf-8")
+    driven = simulate(alone(fmu).with_input(tmp_path / "drive.csv"), engine=engine)
+    assert driven["a.u"] == pytest.approx([0.0, 0.0, 1.0, 2.0, 3.0, 4.0], abs=1e-12)
+
+
+@engines
+@pytest.mark.parametrize("record", [(), ("a.y",)])
+def test_a_session_reads_and_records_what_it_sets(tmp_path, record, engine):
+    """In one line of the log, whatever it sets how often; without a record by asking the FMU."""
+    system = alone(inner(tmp_path, outputs=True), *record)
+    inputs, read = [1.0], []
+    with simulate.session(system, engine=engine) as session:
+        read.append(session["a.u"])
+        for k in range(STEPS):
+            session.set("a.u", 0.5 * k)
+            read.append(session["a.u"])
+            session.step()
+            inputs.append(0.5 * k)
+        assert session["a.k"] == 2.0
+        with pytest.raises(InputError, match=r"^'a\.w': no such signal; valid: .*a\.u"):
+            session["a.w"]
+        result = session.result()
+    assert read == inputs
+    assert [result[name].tolist() for name in result if name == "a.u"] == [inputs] * (not record)
+    assert result.log == ("t = 0 s: a.u = 0.0; set 5 times, the last at t = 0.4 s: a.u = 2.0",)
+    assert "a.u" not in simulate(system, engine=engine)
+
+
+@engines
 @pytest.mark.parametrize("record", [(), ("b.x",)])
 def test_conditions_go_by_any_number(tmp_path, record, engine):
     """Recorded or not; x of a is above 0.5 from 0.4 s on, b.tau was 0.5 all the time."""

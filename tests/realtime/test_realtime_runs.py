@@ -175,7 +175,7 @@ def test_steps_in_pieces_and_looks_in_between_come_to_the_same(two):
             assert session.step(steps)
             assert len(session.result().time) == round(session.time * 1e3) + 1
         assert session.complete
-        assert same_bits(session.result(), simulate(system))
+        assert same_bits(session.result(), simulate(system.as_steered()))
 
 
 def test_what_fails_is_late_or_discarded_does_what_it_does_in_a_free_run(two):

@@ -451,6 +451,11 @@ class Interface:
         """The main name of a variable or array."""
         return self.main_names.get(name, name)
 
+    @property
+    def inputs(self) -> list[Variable]:
+        """The inputs, each by its main name alone."""
+        return [v for v in self.of("input") if self.main_name(v.name) == v.name]
+
     def by_main_names(
         self, values: Mapping[str, Value], place: Callable[[str], str]
     ) -> dict[str, Value]:

@@ -14,16 +14,17 @@ from ..system.validity import driven_inputs
 class Exchanged:
     """The numbers that a run moves, of each component in groups of one FMI type; Strings beside.
 
-    passed are inputs that have a source; fetched is all else that the run must know, and texts are
-    the Strings of that.
+    passed are inputs that have a source, held those without, which keep what they were set to;
+    fetched is all else that the run must know, and texts are the Strings of that.
     """
 
     fetched: Mapping[str, list[list[Variable]]]
     passed: Mapping[str, list[list[Variable]]]
+    held: tuple[Port, ...]
     texts: tuple[Port, ...]
 
     def slots(self) -> dict[Port, int]:
-        """The place of each value in the vector: fetched, then passed; Strings last."""
+        """The place of each value in the vector: fetched, then passed, then held; Strings last."""
         numbers = [
             Port(name, v.name)
             for moved in (self.fetched, self.passed)
@@ -31,7 +32,7 @@ class Exchanged:
             for variables in groups
             for v in variables
         ]
-        return {port: slot for slot, port in enumerate((*numbers, *self.texts))}
+        return {port: slot for slot, port in enumerate((*numbers, *self.held, *self.texts))}
 
 
 def exchanged(system: System) -> Exchanged:
@@ -42,20 +43,24 @@ def exchanged(system: System) -> Exchanged:
     needed = _with_whole_arrays(system, {*system.observed, *sources, *in_conditions(system)})
     fetched: dict[str, list[list[Variable]]] = {}
     passed: dict[str, list[list[Variable]]] = {}
+    held: list[Port] = []
     texts: list[Port] = []
     for component in system.components:
         to_fetch: list[Variable] = []
         to_pass: list[Variable] = []
+        inputs = {Port(component.name, v.name) for v in component.loaded.inputs}
         for v in component.loaded.variables:
             port = Port(component.name, v.name)
             if v.kind == "String" and port in needed:
                 texts.append(port)
             elif v.is_number and port in passed_on:
                 to_pass.append(v)
+            elif v.is_number and port in needed and port in inputs:
+                held.append(port)
             elif v.is_number and port in needed:
                 to_fetch.append(v)
         fetched[component.name], passed[component.name] = _by_type(to_fetch), _by_type(to_pass)
-    return Exchanged(fetched, passed, tuple(texts))
+    return Exchanged(fetched, passed, tuple(held), tuple(texts))
 
 
 def sourced(system: System) -> frozenset[Port]:

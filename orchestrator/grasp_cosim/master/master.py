@@ -32,7 +32,7 @@ from .engine import Aside, CompiledLoop, Engine, make_loop
 from .exchanged import exchanged, used
 from .initialisation import Propagation
 from .plan import Planner
-from .scenario import NO_CUTS, Cut, Scenario, driven_at, drives_of
+from .scenario import NO_CUTS, Cut, Scenario, driven_at, drives_of, stored
 from .watches import Watches
 
 CHUNK = 4096
@@ -138,6 +138,12 @@ class Master:
         self._loop = made = make_loop(self.plan, self._engine, None if pacer else self.total_steps)
         self._alone = made if pacer and isinstance(made, CompiledLoop) and made.alone else None
 
+    def read(self, port: Port) -> Value:
+        """The value now of any variable, from its FMU."""
+        instance = next(i for i in self.instances if i.name == port.component)
+        (value,) = instance.get([instance.interface.by_name[port.variable]])
+        return value
+
     def initialise(self) -> None:
         """Start values in, then outputs at the start that agree with its inputs.
 
@@ -177,6 +183,7 @@ class Master:
         except SimulationError as error:
             raise InputError(str(error)) from error
         values = propagation.values
+        values |= self._held_at_start()
         self._fetch_others(values)
         for component, instance in pairs:
             has_had_event = instance in in_event_mode or component.integrated
@@ -194,6 +201,18 @@ class Master:
         for instance in self.instances:
             instance.quieten()
         self.peers = {c.name: _peer_of(c, i) for c, i in pairs if c.is_proxy}
+
+    def _held_at_start(self) -> dict[Port, Value]:
+        """What inputs without a source start with, where that is given or declared."""
+        found: dict[Port, Value] = {}
+        for port in self.system.once(exchanged).held:
+            component = self.system.component(port.component, port)
+            interface = component.loaded
+            start = interface.by_name[port.variable].start_value
+            value = component.values.get(port.variable, start)
+            if isinstance(value, float | int):
+                found[port] = stored(interface, port.variable, value)
+        return found
 
     def _fetch_others(self, values: dict[Port, Value]) -> None:
         """What was not passed on: locals, say, or elements of connected arrays without a source."""
@@ -520,7 +539,8 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
 
     Goes on from where the step got to. Where it got nowhere, the rest is halved, at most down to
     1/1024 of the step; a rest below half of that is none. The time in s where the FMU asked for the
-    end of the simulation, else None. SimulationError where that does not help.
+    end of the simulation, else None. SimulationError where that does not help, and where an FMU of
+    ours refuses a step.
     """
     clock, length = clock_of(begin, end), end - begin
     smallest = length / SMALLEST
@@ -529,6 +549,8 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
             stop = float(clock[0]) + length
             stop = end if stop >= end - smallest / 2 else stop
             status, clock[0] = instance.through_events(status, float(clock[0]), stop)
+        if status == DISCARD and instance.interface.ours:
+            break  # in Python it could not go on: pythonfmu has no word for it but fatal
         if status in (DISCARD, EARLY):
             if (ended := instance.the_end()) is not None:
                 return ended

@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.checks import exact
-from ..fmi.instance import Instance
+from ..fmi.instance import Instance, dtype
 from ..interface.expansion import values_of
-from ..interface.interface import Given, Value, Variable
+from ..interface.interface import Given, Interface, Value, Variable
 from ..interface.units import IDENTITY
 from ..system.connectors import read_at
 from ..system.description import System
@@ -32,7 +32,7 @@ from ..system.parts import Condition, Event, Fault, Port, literal
 from ..system.scenario import check_setting
 from ..system.times import Time, first_step, seconds
 from ..system.validity import driven_inputs, driven_parameters, is_linear, samples_of
-from .exchanged import sourced
+from .exchanged import exchanged, sourced
 
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -72,11 +72,33 @@ Cut = Callable[[float], float]
 NO_CUTS: Mapping[Port, Cut] = MappingProxyType({})
 
 
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A line of the log: what happened at a step, or how often something was set, and last."""
+
+    step: int
+    text: str
+    count: int = 1
+    last_step: int = 0
+    last_text: str = ""
+
+    def said(self, system: System) -> str:
+        """The line, with its times."""
+        first = seconds(system.time_ns(self.step))
+        if self.count == 1:
+            return f"t = {first}: {self.text}"
+        last = seconds(system.time_ns(self.last_step))
+        return (
+            f"t = {first}: {self.text}; set {self.count} times, the last at t = {last}: "
+            f"{self.last_text}"
+        )
+
+
 class Scenario:
     """The events and faults of one run.
 
-    log says what happened, a line each, in order. fault_functions are those of the connections that
-    have faults, by target.
+    log says what happened, a line each, in order; what a session sets many times has one line.
+    fault_functions are those of the connections that have faults, by target.
     """
 
     def __init__(
@@ -88,11 +110,13 @@ class Scenario:
         cuts: Mapping[Port, Cut] = NO_CUTS,
     ) -> None:
         """Values holds the signals of now whenever a method is called, at the places in slots."""
-        self.log: list[str] = []
-        self._applied: list[Callable[[int], Sequence[str]]] = []
+        self._lines: list[_Line] = []
+        self._line_of: dict[Port, int] = {}
+        self._applied: dict[object, Callable[[int], Sequence[str]]] = {}
         self._system, self._slots, self._values = system, slots, values
         self._instances = {instance.name: instance for instance in instances}
         self._passed = system.once(sourced)
+        self._held = {port: slots[port] for port in system.once(exchanged).held if port in slots}
         self._pending: list[_Once] = []
         for i, event in enumerate(system.events):
             self._add_event(f"events[{i}]", event)
@@ -117,6 +141,11 @@ class Scenario:
         happen, said = self._setter(place, event), f"{place} did not happen: {otherwise}"
         self._pending.append(_Once(first, math.inf, period, event.when, happen, said, sets=True))
 
+    @property
+    def log(self) -> list[str]:
+        """What happened, a line each."""
+        return [line.said(self._system) for line in self._lines]
+
     def renew(self, instances: Sequence[Instance]) -> None:
         """Act on other instances of the same components from now on."""
         self._instances.clear()
@@ -124,14 +153,15 @@ class Scenario:
 
     def saved(self) -> tuple[Any, ...]:
         """What has happened, for restore(); what was set is in the FMUs."""
-        happened = len(self.log), len(self._applied), [*self._pending], self._due
+        said = [*self._lines], dict(self._line_of), dict(self._applied)
+        happened = said, [*self._pending], self._due
         faults = [function.saved() for function in self.fault_functions.values()]
         return happened, faults, [tuning.taken for tuning in self.tunings]
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved."""
-        (lines, applied, pending, self._due), faults, taken = saved
-        del self.log[lines:], self._applied[applied:]
+        ((lines, line_of, applied), pending, self._due), faults, taken = saved
+        self._lines, self._line_of, self._applied = [*lines], dict(line_of), dict(applied)
         self._pending = [*pending]
         for function, fault in zip(self.fault_functions.values(), faults, strict=True):
             function.restore(fault)
@@ -140,7 +170,7 @@ class Scenario:
 
     def apply_again(self, step: int) -> None:
         """Set once more what events, and set(), have set before."""
-        for happen in self._applied:
+        for happen in self._applied.values():
             happen(step)
 
     def before_step(self, step: int) -> None:
@@ -154,8 +184,9 @@ class Scenario:
         for once in self._pending[:]:
             if once.due(step) == step and self._holds(once.when):
                 self._pending.remove(once)
-                self._note(step, once.happen(step))
-                self._applied += [once.happen] if once.sets else []
+                self._lines += [_Line(step, line) for line in once.happen(step)]
+                if once.sets:
+                    self._applied[once] = once.happen
         self._due = self._next_step(step + 1)
 
     def _next_step(self, step: int) -> float:
@@ -196,15 +227,21 @@ class Scenario:
             check_setting(self._system, port, value, place)
             self._settable.add(port)
         happen = self._setter(place, Event({port: value}))
-        self._note(step, happen(step))
-        self._applied.append(happen)
+        (text,) = happen(step)
+        self._applied.pop(port, None)  # what is set last is set last again
+        self._applied[port] = happen
+        number = self._line_of.setdefault(port, len(self._lines))
+        if number == len(self._lines):
+            self._lines.append(_Line(step, text))
+        else:
+            before = self._lines[number]
+            self._lines[number] = replace(
+                before, count=before.count + 1, last_step=step, last_text=text
+            )
 
     def pending(self) -> list[str]:
         """A line for each event that has not happened and each fault that has not begun."""
         return [once.otherwise for once in self._pending if once.otherwise]
-
-    def _note(self, step: int, lines: Sequence[str]) -> None:
-        self.log += [f"t = {seconds(self._system.time_ns(step))}: {line}" for line in lines]
 
     def _holds(self, condition: Condition | None) -> bool:
         if condition is None:
@@ -224,7 +261,8 @@ class Scenario:
     def _setter(self, place: str, event: Event) -> Callable[[int], Sequence[str]]:
         """What an event does.
 
-        An element of an array that is connected in part is passed on from its slot.
+        An element of an array that is connected in part is passed on from its slot; an input that
+        is held there has in it what its FMU got.
         """
         calls: dict[str, tuple[list[Variable], list[Value]]] = {}
         placed: dict[int, float] = {}
@@ -239,6 +277,8 @@ class Scenario:
                     variables, given = calls.setdefault(port.component, ([], []))
                     variables.append(interface.by_name[name])
                     given.append(parsed)
+                    if element in self._held:
+                        placed[self._held[element]] = stored(interface, name, parsed)
         reason = f" ({event.when})" if event.when else ""
         lines = [f"{port} = {literal(value)}{reason}" for port, value in event.set.items()]
 
@@ -456,6 +496,12 @@ def driven_at(system: System, drives: dict[Port, Drive], name: str, step: int) -
         for port, drive in drives.items()
         if port.component == name
     }
+
+
+def stored(interface: Interface, name: str, value: Value) -> float:
+    """A number as an FMU of that interface has it, which may have fewer digits."""
+    element = dtype(interface.version, interface.by_name[name].type)
+    return float(element.type(value))
 
 
 def of_kind(kind: str, number: float) -> Value:

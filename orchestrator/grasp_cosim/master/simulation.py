@@ -20,7 +20,7 @@ from ..exchange.listener import Listener
 from ..fmi.instance import Instance
 from ..fmi.process import load
 from ..interface.interface import Given
-from ..interface.units import IDENTITY, Conversion
+from ..interface.units import IDENTITY
 from ..metrics.in_si import in_si
 from ..metrics.metric import (
     Function,
@@ -98,13 +98,16 @@ class Session:
         note: Callable[[str], None] | None = None,
         finish: Finish | None = None,
         cuts: Mapping[Port, Cut] = NO_CUTS,
+        steered: bool = True,
     ) -> None:
         """Load and initialise; see simulate() for the arguments and errors.
 
         A cut of a connection, by its input, gets each value that is passed there, and says what is
-        passed in its place.
+        passed in its place. steered says that set() may be called, so inputs without a source are
+        recorded by default.
         """
         system = system.with_experiment(step, stop, scheme, diverging)
+        system = system.as_steered() if steered else system
         if not all(c.is_current for c in system.components):
             system = replace(system, components=tuple(replace(c) for c in system.components))
         system = system.with_natives(needed_twins(system))
@@ -333,40 +336,51 @@ class Session:
         return self.master.total_steps if self.master.runs_alone else 1
 
     def __getitem__(self, name: str) -> float:
-        """The value now of an output, of a connected input or of what is recorded, by a name like
-        'plant.gap[1]'.
+        """The value now of any variable, by a name like 'plant.gap[1]' or 'plant.force[1]'.
 
-        Of a Boolean it is 0.0 or 1.0; the text of a String is that of text(). InputError where
-        there is no such signal.
+        A connected input has what was passed to its FMU last, behind its faults; what is neither
+        recorded nor connected is asked of the FMU. Of a Boolean it is 0.0 or 1.0; the text of a
+        String is that of text(). InputError where there is no such variable.
         """
-        port, change = self._read_at(name)
-        if port in self.master.texts:
+        value = self._now(name)
+        if isinstance(value, str):
             raise InputError(f"{name!r}: is a String; must be read by session.text({name!r})")
-        value = float(self.master.values[self.master.slots[port]])
-        return value if change == IDENTITY else change(value)
+        return value
 
     def text(self, name: str) -> str:
-        """The text now of a String, by its name; InputError where there is no such signal.
-
-        Connected inputs that are Strings are none.
-        """
-        port, _ = self._read_at(name)
-        if port not in self.master.texts:
+        """The text now of a String, by its name; InputError where there is no such variable."""
+        value = self._now(name)
+        if not isinstance(value, str):
             raise InputError(f"{name!r}: is a number; must be read by session[{name!r}]")
-        texts = self.master.texts[port].listed
-        return texts[int(self.master.values[self.master.slots[port]])]
+        return value
 
-    def _read_at(self, name: str) -> tuple[Port, Conversion]:
-        """The signal of a component behind a name, and what is made of its value."""
+    def _now(self, name: str) -> float | str:
+        """The value now of a variable, from the last row, or else from its FMU."""
+        master = self.master
         port, change = read_at(self.system, as_signal(f"signal {name!r}", name))
-        if port not in self.master.slots:
-            valid = nearest(name, self._ipython_key_completions_())
-            raise InputError(f"{name!r}: no such signal; {valid}")
-        return port, change
+        if port not in master.slots:
+            component = self.system.by_name.get(port.component)
+            variable = component and component.interface.by_name.get(port.variable)
+            if not variable or not variable.supported:
+                valid = nearest(name, self._ipython_key_completions_())
+                raise InputError(f"{name!r}: no such signal; {valid}")
+            with self._in_use():
+                asked = master.read(port)
+            return asked if isinstance(asked, str) else float(asked)
+        value = float(master.values[master.slots[port]])
+        if port in master.texts:
+            return master.texts[port].listed[int(value)]
+        return value if change == IDENTITY else change(value)
 
     def _ipython_key_completions_(self) -> list[str]:
-        """The names of signals, for Tab behind a bracket in a notebook."""
-        return [*self.system.outputs, *map(str, self.master.slots)]
+        """The names of what can be read, for Tab behind a bracket in a notebook."""
+        readable = [
+            f"{component.name}.{v.name}"
+            for component in self.system.components
+            for v in component.interface.variables
+            if v.supported
+        ]
+        return list(dict.fromkeys([*self.system.outputs, *map(str, self.master.slots), *readable]))
 
     def __repr__(self) -> str:
         """How far it is."""
@@ -567,6 +581,7 @@ class Simulate:
                 diverging=diverging,
                 note=note,
                 finish=keep,
+                steered=False,
             ) as session,
             phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"),
         ):

@@ -204,6 +204,11 @@ class System(Structure):
         record.check("record:", self.components, self.outputs)
         return replace(self, record=record)
 
+    def as_steered(self) -> "System":
+        """The system as a session has it, which by default records all that it may set."""
+        made = replace(self, steered=True)
+        return self if made.recorded == self.recorded else made
+
     def natively(self, native: bool | None = None) -> "System":
         """A copy that runs native twins of its FMUs, with the same bits; False: as they are named.
 

@@ -3,7 +3,7 @@
 A pattern is a name like plant.gap[1], in which * stands for any text and ? for one character; all
 else is meant as it stands, brackets too. The name of an array stands for its elements. A pattern
 behind a ! leaves out what it matches. Without one that takes signals in, each component has what it
-has by default: its outputs, or its locals where it has no output.
+has by default: its outputs, or its locals where it has no output, and the inputs that are acted on.
 """
 
 from __future__ import annotations
@@ -67,15 +67,23 @@ class Record:
         """True if it names what is recorded, in the place of what is recorded by default."""
         return bool(self._patterns()[0])
 
-    def chosen(self, components: Sequence[Component]) -> dict[Port, Variable]:
-        """The signals that are recorded, in the order of the system; no arrays, no binaries."""
+    def chosen(
+        self, components: Sequence[Component], acted_on: Collection[Port] = ()
+    ) -> dict[Port, Variable]:
+        """The signals that are recorded, in the order of the system; no arrays, no binaries.
+
+        acted_on are the inputs that are recorded by default.
+        """
         taken_in, left_out = self._patterns()
         chosen: dict[Port, Variable] = {}
         for component in components:
-            variables = by_default(component.interface)
+            supported = [v for v in component.interface.variables if v.supported]
             if taken_in:
-                variables = [v for v in component.interface.variables if v.supported]
-                variables = _taken(component, variables, taken_in)
+                variables = _taken(component, supported, taken_in)
+            else:
+                names = {v.name for v in by_default(component.interface)}
+                names |= {p.variable for p in acted_on if p.component == component.name}
+                variables = [v for v in supported if v.name in names]
             unwanted = {v.name for v in _taken(component, variables, left_out)}
             for v in variables:
                 if v.name not in unwanted:

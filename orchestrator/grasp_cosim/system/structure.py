@@ -55,7 +55,7 @@ class Structure:
     ours. record says what is recorded. inputs and outputs are those of the system itself, which an
     archive may have, by name. limits are conditions that must not hold, and verdict is what such a
     run, or one with a bench or in real time, may come to. as_read is settings.made_of() when it was
-    read.
+    read. steered says that a session has it, which may set any input without a source.
     """
 
     name: str
@@ -81,6 +81,7 @@ class Structure:
     limits: tuple[Limit, ...] = ()
     verdict: Acceptance = Acceptance()
     as_read: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    steered: bool = False
 
     def __repr__(self) -> str:
         """Its experiment, its components with their FMUs, and how many connections there are."""
@@ -117,7 +118,27 @@ class Structure:
     @cached_property
     def recorded(self) -> dict[Port, Variable]:
         """The signals that a run records, in the order of the system: no arrays, no binaries."""
-        return self.record.chosen(self.components)
+        return self.record.chosen(self.components, self.acted_on)
+
+    @cached_property
+    def acted_on(self) -> frozenset[Port]:
+        """The inputs that a fault, an event or a column of stimuli gives values that no output has.
+
+        Of a session also those without a source, which it may set.
+        """
+        ports = {fault.target for fault in self.faults}
+        ports |= {*(self.input.columns if self.input else ())}
+        for event in self.events:
+            ports |= {element for port in event.set for element in self.elements(port)}
+        inputs = {
+            Port(component.name, v.name): v
+            for component in self.components
+            for v in component.interface.inputs
+        }
+        if self.steered:
+            connected = {connection.target for connection in self.connections}
+            ports |= {p for p, v in inputs.items() if v.is_number and p not in connected}
+        return frozenset(ports & inputs.keys())
 
     @cached_property
     def watched(self) -> dict[Port, Variable]:
