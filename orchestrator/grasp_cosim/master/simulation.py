@@ -364,8 +364,7 @@ class Session:
             if not variable or not variable.supported:
                 valid = nearest(name, self._ipython_key_completions_())
                 raise InputError(f"{name!r}: no such signal; {valid}")
-            with self._in_use():
-                asked = master.read(port)
+            asked = self._called(lambda: master.read(port))
             return asked if isinstance(asked, str) else float(asked)
         value = float(master.values[master.slots[port]])
         if port in master.texts:
