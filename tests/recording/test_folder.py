@@ -65,6 +65,27 @@ def test_it_ends_as_a_result_writes_it_and_is_read_back_as_it_was(grasp, tmp_pat
         assert (back.metrics, back.timing) == (result.metrics, result.timing)
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_a_result_is_saved_as_a_run_is_recorded(grasp, tmp_path, form, monkeypatch):
+    """In the place of an older one, also where some rows, or some signals, were recorded."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    system, saved = grasp.with_experiment(step=1e-3, stop=0.1), tmp_path / "saved"
+    for chosen, every in ((system, 1), (system.with_record("plant.gap*"), 7)):
+        with RunFolder(tmp_path / "on", chosen, form=form) as folder:
+            result = simulate(chosen, listeners=[folder], every=every)
+            folder.finish(result)
+        result.save(str(saved), form)
+        assert sorted(p.name for p in saved.iterdir()) == ["run.json", f"signals.{form}"]
+        for name in {"run.json", f"signals.{form}"} - {"signals.arrow"}:  # its batches take a time
+            assert (saved / name).read_bytes() == (tmp_path / "on" / name).read_bytes()
+        back = load_run(saved)
+        assert (back.metrics, back.units, back.log) == (result.metrics, result.units, result.log)
+        assert all(np.array_equal(back[name], column) for name, column in result.items())
+        back.save(tmp_path / "again", form)
+        texts = ((folder / "run.json").read_text() for folder in (saved, tmp_path / "again"))
+        assert len({json.dumps(json.loads(text), sort_keys=True) for text in texts}) == 1
+
+
 def test_what_waits_is_written_in_spare_time(grasp, tmp_path):
     table = rows(100)
     with RunFolder(tmp_path, grasp, paced=True) as folder:

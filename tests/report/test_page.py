@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.page import comparison_html
 from grasp_cosim.metrics.metric import Metric
 from grasp_cosim.recording.folder import load_run
-from grasp_cosim.report.page import Scene, Zoom, page_html
+from grasp_cosim.report.page import Scene, Zoom, page_html, write_report
 from grasp_cosim.report.tables import about, caption, changes
 from report.runs import grasp_run, paced, ring_run, write_run
 from report.test_embed import unpacked
@@ -77,6 +78,21 @@ def test_the_page_is_whole_and_needs_nothing_from_outside(run):
     targets = {str(a["href"])[1:] for _, a in page.found if str(a.get("href")).startswith("#")}
     assert targets <= set(page.ids())
     assert not re.search(r"\$\w", Elements(html).visible)
+
+
+def test_the_report_of_a_result_is_that_of_its_folder(tmp_path, monkeypatch):
+    """Saved or not; a folder may be given as a text."""
+    monkeypatch.chdir(tmp_path)
+    run = grasp_run()
+    run.save("saved")
+    page = write_report("saved")[0]
+    assert (page, page.exists()) == (Path("saved/report.html"), True)
+    assert write_report(load_run("saved"))[0] == page
+    other = write_report(replace(run, origin=load_run("saved").origin))[0]
+    assert other == Path("report.html")
+    assert other.read_text("utf-8") == page.read_text("utf-8")
+    assert write_report(run, "own.html", "Ours")[0] == Path("own.html")
+    assert "<title>Ours" in Path("own.html").read_text("utf-8")
 
 
 def test_the_data_in_the_page_are_those_of_the_run_to_the_bit():

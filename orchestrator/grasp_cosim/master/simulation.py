@@ -463,6 +463,7 @@ class Session:
             limits=master.watches.trips(),
             initialised_anew=tuple(master.renewed),
             peers=master.peers,
+            components=self.system.components,
         )
 
     def _of_proxies(self, step: float) -> list[str]:

@@ -29,6 +29,7 @@ from ..metrics.in_si import in_si
 from ..metrics.metric import Measured, Metric, Signals, metrics_of, resolved
 from ..realtime.timing import Timing
 from ..system.description import System
+from ..system.parts import Component
 from .arrow import ArrowListener
 from .csv import CsvListener
 from .log_names import AS_THEY_ARE, LogNames
@@ -67,21 +68,25 @@ class RunFolder:
     def __init__(
         self,
         folder: Path,
-        system: System,
+        of: System | Result,
         command: Sequence[str] = (),
         paced: bool = False,
         form: Form = "csv",
     ) -> None:
-        """`command` led to the run; if it is `paced`, rows are written in spare() time only.
+        """`of` is the system that runs, or the result that did; `command` led to the run.
 
-        `form` is that of the rows, signals.csv or signals.arrow. InputError without pyarrow, where
-        that needs it.
+        If it is `paced`, rows are written in spare() time only. `form` is that of the rows,
+        signals.csv or signals.arrow. InputError without pyarrow, where that needs it.
         """
         self._folder, self._paced = folder, paced
         self._place = folder.absolute()  # an FMU may go elsewhere
-        self._origin = origin(system, command)
-        conversions = in_si(system, ()).conversions
-        self._to_si = {name: c for name, c in conversions.items() if name in system.kept}
+        self._origin = origin(of.components, command)
+        if isinstance(of, Result):
+            self._origin |= of.origin
+            self._to_si = dict(of.to_si)
+        else:
+            conversions = in_si(of, ()).conversions
+            self._to_si = {name: c for name, c in conversions.items() if name in of.kept}
         name = ARROW if form == "arrow" else SIGNALS
         kind = ArrowListener if form == "arrow" else CsvListener
         self._file: Listener = kind(folder / name, self._place / name)
@@ -196,6 +201,13 @@ class RunFolder:
             raise InputError(unwritable(path, error)) from error
 
 
+def save_run(result: Result, folder: Path, form: Form) -> None:
+    """Write a result into a folder, as Result.save()."""
+    with RunFolder(folder, result, form=form) as into:
+        result.replay(into)
+        into.finish(result)
+
+
 def now() -> datetime:
     """Return the time, or that of SOURCE_DATE_EPOCH, where the environment has it.
 
@@ -210,15 +222,15 @@ def now() -> datetime:
         raise InputError(f"SOURCE_DATE_EPOCH={epoch}: must be the seconds since 1970") from error
 
 
-def origin(system: System, command: Sequence[str]) -> dict[str, Any]:
+def origin(components: Sequence[Component], command: Sequence[str]) -> dict[str, Any]:
     """The date now, the versions of what makes the run, which FMUs those are, and the command."""
     from importlib.metadata import version
 
     fmus = {
         c.name: {"guid": c.loaded.guid, "tool": c.loaded.tool, "sha256": _hash(c.loaded.path)}
-        for c in system.components
+        for c in components
     }
-    for c in system.components:
+    for c in components:
         if c.native:  # the FMU whose place it takes
             fmus[c.name]["native_twin_of"] = c.interface.guid
     return {

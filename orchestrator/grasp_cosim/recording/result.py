@@ -23,6 +23,7 @@ from ..exchange.listener import Experiment, Listener, Signal
 from ..interface.units import Conversion
 from ..metrics.metric import Measured, Metric, Signals, Value, measure, metrics_of
 from ..realtime.timing import Timing
+from ..system.parts import Component
 from ..system.settings import given_values
 from ..system.times import NANOSECONDS, nearest_time
 from .arrow import ArrowListener
@@ -169,6 +170,8 @@ class Result(ByName[npt.NDArray[Any]]):
     """What was worked out of every step, where fewer rows were recorded."""
     folder: Path | None = None
     """Where it was read from; None of a run that was just done."""
+    components: tuple[Component, ...] = ()
+    """What ran; none of a run that was read."""
     ended_at: float | None = None
     """The time of the last row in s where an FMU asked for the end before the stop time."""
     limits: tuple[Trip, ...] = ()
@@ -299,6 +302,14 @@ class Result(ByName[npt.NDArray[Any]]):
         early = {} if self.ended_at is None else {"ended_at": "s"}
         return {**self.measured.units, **UNITS, **early}
 
+    def save(self, folder: str | Path, form: Literal["csv", "arrow"] = "csv") -> None:
+        """Write what `run --out` does: the signals in a form and run.json; load_run() reads it.
+
+        An older run there is replaced. InputError where the folder is not for us, or without
+        pyarrow, where that is needed; SimulationError where the writing fails.
+        """
+        higher("recording.folder").save_run(self, Path(folder), form)
+
     def to_csv(self, path: str | Path) -> None:
         """Write time and signals with full precision, a line per communication point."""
         self._play(path, CsvListener)
@@ -411,15 +422,14 @@ class Result(ByName[npt.NDArray[Any]]):
         per_s = float(NANOSECONDS / nearest_time(self.settings["step"]))
         return np.asarray(np.rint(since * per_s), np.int64)
 
-    def _play(self, path: str | Path, make: Callable[[Path, Path], Listener]) -> None:
-        """Have a listener hear the recorded run again, which writes a file in a place."""
+    def replay(self, listener: Listener) -> None:
+        """Have a listener hear the recorded run again."""
         said = self.descriptions
         signals = [
             Signal(name, self.units[name], KINDS[column.dtype.kind], said.get(name, ""))
             for name, column in self.items()
         ]
-        with in_one_piece(Path(path)) as part, ExitStack() as stack:
-            listener = make(Path(path), part)
+        with ExitStack() as stack:
             listener.begin(Experiment.of(self.settings), signals)
             stack.callback(listener.end, self.complete)
             for first in range(0, len(self.time), PIECE):
@@ -430,6 +440,11 @@ class Result(ByName[npt.NDArray[Any]]):
                     text = signal.kind == "String"
                     rows[:, i] = [*map(signal.texts.number, values)] if text else values
                 listener.block(steps, rows)
+
+    def _play(self, path: str | Path, make: Callable[[Path, Path], Listener]) -> None:
+        """Have a listener hear the recorded run again, which writes a file in a place."""
+        with in_one_piece(Path(path)) as part:
+            self.replay(make(Path(path), part))
 
 
 def _in_words(metric: Metric, value: Any) -> str:

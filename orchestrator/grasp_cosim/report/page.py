@@ -30,7 +30,7 @@ from ..base.one_piece import is_stream
 from ..base.text import grouped
 from ..exchange.listener import Texts
 from ..recording.csv import quoted
-from ..recording.folder import load_run, run_folder
+from ..recording.folder import load_run
 from ..recording.result import Result
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter
@@ -90,17 +90,21 @@ class Scene:
     zooms: Sequence[Zoom] = ()
 
 
-def write_report(run: str | Path, out: str | Path | None = None, title: str = "") -> list[Path]:
-    """Write the page of a run, by its folder, and the pictures that there are; where they are.
+def write_report(
+    run: Result | str | Path, out: str | Path | None = None, title: str = ""
+) -> list[Path]:
+    """Write the page of a run, and the pictures that there are; where they are.
 
-    The page is `out`, by default report.html in the folder, under the title that the run has or
+    The run is a result, or what load_run() takes. The page is `out`, by default report.html in the
+    run's folder, of a result that has none in the current one, under the title that the run has or
     another one. With matplotlib a picture is beside it, and one of the timing of a run in real
     time. InputError where the folder has no run, or the page cannot be written.
     """
-    folder = run_folder(Path(run))
+    read = run if isinstance(run, Result) else load_run(run)
+    folder = read.folder or Path()
     page = Path(out) if out else folder / "report.html"
-    recorded = load_run(folder).titled(title)
-    if recorded.wall_time is None:
+    recorded = read.titled(title)
+    if recorded.folder and recorded.wall_time is None:
         LOGGER.warning("%s: unfinished, to t = %.6g s", folder, recorded.time[-1])
     check_file(page)
     remove_parts(page.parent, page.name, *of_any_format(recorded.view.stem, TIMING))
