@@ -194,6 +194,8 @@ sqrt(a) / b if a > 0.0 else log(b) / a if b > 0.0 else c
 (a if p.flag else b) * c
 p.weights[0] + p.weights[-1] * p.weights[1] + (a, b, c)[1]
 NESTED[1][0] + NESTED[0][1] + NESTED[1][1] + (*p.weights[1:], a)[2]
+p.weights[::-1][0] * a + p.weights[2:0:-1][1] * b + p.weights[::2][1]
+(a if abs(a) < inf else 0.0) * (180.0 / pi) + (1.0 if b != b else b)
 ((a, b) * 3)[5] + ((0.5,) * 4)[3] + float(len(p.weights))
 1.0 if any(w > a for w in p.weights) and not all(1.0 / w > a for w in (b, c)) else 0.0
 1.0 if any(g.gain > a for g in (p.inner, p.other)) else 0.0
@@ -290,6 +292,11 @@ for x, (y, _) in zip(p.weights, ((a, b), (b, c), (c, a))):
     total = total * x + y
 for x in p.weights:
     total -= x
+return total
+---
+total = a
+for k, x in zip((0, 1, 2), p.weights):
+    total += k * x
 return total
 ---
 def_, int_, I, y1, unix, near, far, div, gamma, register, fault, free, exp_1 = (a,) * 13

@@ -18,6 +18,7 @@ from types import FunctionType, GenericAlias, ModuleType
 from typing import Any, NoReturn
 
 from . import types
+from .advice import ADVICE
 from .text import Source, UntranslatableError, identifier, number
 from .types import BOOLEAN, REAL, SCALARS, WHOLE, Function, Program, Type, Value, said
 
@@ -37,27 +38,8 @@ FUNCTIONS = {getattr(math, name): name for name in _FUNCTIONS.split()} | {math.l
 OF_TWO = (math.atan2, math.copysign, math.fmod, math.pow, math.ldexp)
 TO_WHOLE = {math.floor: "floored", math.ceil: "ceiled", math.trunc: "truncated", int: "truncated"}
 
-ADVICE: dict[Any, str] = {
-    "Lambda": "lambda is not in the subset; use a function of the module",
-    "List": "a list is not in the subset; use a tuple",
-    "ListComp": "a list is not in the subset; use tuple(... for ...)",
-    "Dict": "a dict is not in the subset; use a MappingProxyType of the module",
-    "NamedExpr": ":= is not in the subset; assign before",
-    "GeneratorExp": "a generator is only for any, all and tuple",
-    "FloorDiv": "// is not in the subset; write floor(a / b)",
-    "Mod": "% is not in the subset; write fmod(a, b)",
-    "While": "while is not in the subset, as a step must end; use for ... in range(n) with break",
-    "FunctionDef": "a function in a function is not in the subset; put it into the module",
-    "Try": "try is not in the subset; ask before",
-    "Global": "global is not in the subset; what is to be kept belongs into State",
-    "Match": "match is not in the subset; use if and elif",
-    "Raise": "raise is only for __post_init__; a step whose outputs are not finite is refused",
-    "ImportFrom": "import in a function is not in the subset; put it at the top of the module",
-    sum: "sum: its rounding depends on the version of Python; write a + b, or a loop",
-    math.fsum: "math.fsum is not in the subset; write a + b, or a loop",
-    math.hypot: "math.hypot is CPython's own; write sqrt(x * x + y * y)",
-    round: "round is not in the subset; write floor(x + 0.5)",
-}
+VALID = "valid are numbers, tuples, if, for, functions of this module, and of math: "
+VALID += ", ".join(sorted(f.__name__ for f in (*FUNCTIONS, *TO_WHOLE) if f is not int))
 
 _UNKNOWN = object()
 _PATH = re.compile(r"-?([*&]?[A-Za-z_]\w*(->|\.\w|\[\d+\]|\w)*|[\d.]+(e[-+]?\d+)?)")
@@ -160,7 +142,8 @@ class Expressions:
 
     def _other(self, node: ast.AST, kind: Any = None) -> NoReturn:
         text = ast.unparse(node).partition("\n")[0]
-        self.refuse(node, ADVICE.get(kind or type(node).__name__, f"{text}: is not in the subset"))
+        otherwise = f"{text}: is not in the subset; {VALID}"
+        self.refuse(node, ADVICE.get(kind or type(node).__name__, otherwise))
 
     def _number(self, node: ast.expr) -> Value:
         return self._as_number(self._value(node), node)
@@ -179,8 +162,12 @@ class Expressions:
         return value
 
     def _on_constant(self, node: ast.Constant) -> Value:
+        if node.value is None:
+            self.refuse(
+                node, "None: must be a number; math.nan is one that says that there is none"
+            )
         if not isinstance(node.value, int | float):
-            self.refuse(node, f"{ast.unparse(node)}: must be a number")
+            self.refuse(node, f"{ast.unparse(node)}: must be a number, or of an IntEnum of Params")
         if isinstance(node.value, int) and abs(node.value) > 2**53:
             self.refuse(node, f"{node.value}: an int must be at most 2**53; write {node.value}.0")
         return self._number_of(node.value)
@@ -231,12 +218,13 @@ class Expressions:
         return Value(f" {symbol} ".join(self._at(v, EQUAL) for v in values), BOOLEAN, level)
 
     def _on_compare(self, node: ast.Compare) -> Value:
+        for op in node.ops:
+            if type(op) not in COMPARISONS:
+                self._other(node, type(op).__name__)
         values = [self._number(item) for item in (node.left, *node.comparators)]
         values[1:-1] = [self.simple(v) for v in values[1:-1]]
         found = []
         for a, op, b in zip(values, node.ops, values[1:], strict=False):
-            if type(op) not in COMPARISONS:
-                self.refuse(node, f"{ast.unparse(node)}: is not in the subset; compare numbers")
             symbol, level = COMPARISONS[type(op)]
             found.append(Value(f"{self._at(a, SUM)} {symbol} {self._at(b, SUM)}", BOOLEAN, level))
         return self._all(found, "&&", AND)
@@ -286,9 +274,9 @@ class Expressions:
     def _on_subscript(self, node: ast.Subscript) -> Value:
         items = self._items(self._value(node.value), node.value)
         if isinstance(node.slice, ast.Slice):
-            first = self._index(node.slice.lower) if node.slice.lower else 0
-            last = self._index(node.slice.upper) if node.slice.upper else len(items)
-            return self._display(items[first:last])
+            ends = (node.slice.lower, node.slice.upper, node.slice.step)
+            chosen = slice(*(None if end is None else self._index(end) for end in ends))
+            return self._display(items[chosen])
         place = self._index(node.slice)
         if not -len(items) <= place < len(items):
             self.refuse(node, f"{ast.unparse(node)}: there are {len(items)} items")
@@ -300,7 +288,8 @@ class Expressions:
         except ValueError:
             place = self.known(node)
         if not isinstance(place, int):
-            self.refuse(node, f"[{ast.unparse(node)}]: an index must be a constant")
+            loop = "to go through a tuple write for x in items, or for x, y in zip(a, b)"
+            self.refuse(node, f"[{ast.unparse(node)}]: an index must be a constant; {loop}")
         return place
 
     def _on_attribute(self, node: ast.Attribute) -> Value:

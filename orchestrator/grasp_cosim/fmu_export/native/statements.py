@@ -90,6 +90,7 @@ class Body(Expressions):
 
     def _on_expr(self, node: ast.Expr) -> None:
         if not isinstance(node.value, ast.Constant):
+            self._value(node.value)  # what is not in the subset at all says so
             self.refuse(node, f"{ast.unparse(node)}: has no effect; leave it out")
 
     def _on_pass(self, node: ast.Pass) -> None:
@@ -187,7 +188,8 @@ class Body(Expressions):
             self._on_each(node, changed)
             return
         if not isinstance(node.target, ast.Name) or not 1 <= len(call.args) <= 2:
-            self.refuse(node, f"{ast.unparse(call)}: must be range(n) or range(first, n)")
+            must = "must be range(n) or range(first, n); for a step of 2 write 2 * k in the loop"
+            self.refuse(node, f"{ast.unparse(call)}: {must}")
         if name in self.bound and name != "_":
             self.refuse(node, f"{name}: is a variable already; use another name")
         first, last = (["0"] + [self._number(a).text for a in call.args])[-2:]
