@@ -43,6 +43,9 @@ build --native --target linux65 :: build: --target 'linux65': must be of linux64
 build --native --fmi 1 :: Invalid value for '--fmi': '1' is not one of '2', '3'.
 build --target linux64 :: --target linux64: needs --native
 build --native --c-only c --fmi 3 :: build: --c-only cannot be used with --target
+build file.toml :: file.toml: is a .toml file; must be a block, a Python file; `grasp-cosim
+build plant.fmu :: plant.fmu: is an FMU; must be a block, a Python file; `grasp-cosim inspect
+build GripperPlant :: GripperPlant is one of ours: --native builds it alone
 build --fingers 3 block.py :: build: --fingers 3 cannot be used with block.py
 inspect folder.toml :: folder.toml: is a folder; must be an FMU, a file
 init file.toml :: file.toml: is there already; give another name, or --force
@@ -51,8 +54,9 @@ init folder.toml :: folder.toml: is a folder; must be the name of a file
 init a.toml --as hand=vendor.fmu :: --as hand: no component 'hand'; valid: plant, sens
 init a.toml --as plant=none.fmu :: none.fmu: no such FMU file
 init a.toml --fmu a=vendor.fmu --fmu a=vendor.fmu :: must be a name of its own
-init a.toml --fmu a=vendor.fmu --as plant=vendor.fmu :: --fmu cannot be used with --as
-init a.toml --fingers 3 --as plant=vendor.fmu :: --fingers and --angles cannot be used with
+init a.toml --fmu a=vendor.fmu --as plant=vendor.fmu :: --as puts one into the grasp
+init a.toml --fingers 3 --as plant=vendor.fmu :: `grasp-cosim run a.toml --swap plant=vendor.fmu`
+init a.toml --fmu a=vendor.fmu --tandem :: each makes a system of its own; must be one of them
 init a.toml --angles 0,x :: --angles '0,x': must be numbers in degrees, as 0,90,225
 identify a.csv :: a.csv: no such log; must be a .csv, .tsv, .mf4, .arrow, .feather, .parquet file
 identify --fit mass :: the published experiments: 'mass' cannot be fitted; valid: coulomb

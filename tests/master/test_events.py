@@ -185,8 +185,8 @@ def test_what_did_not_happen_is_said():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("a.u", 1.0, r"^set: a\.u: is a continuous input; must be .* a fault of kind"),
-        ("a.w", 1.0, r"^set: a\.w: not there; must be a tunable parameter, or an input without"),
+        ("a.u", 1.0, r"^set: a\.u: is an input with a connection: a fault on 'a\.y -> a\.u' of"),
+        ("a.w", 1.0, r"^set: a\.w: .* has no variable 'w'; what can be set in a run is an input "),
         ("c.p", 1.0, r"^set: c\.p: no component 'c'; valid: a, b, slow$"),
         ("p", 1.0, r"^set: p: no component 'p'"),
         ("a.p", "1", r"^set: a\.p: p = '1': must be a finite number"),

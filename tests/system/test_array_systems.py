@@ -85,11 +85,14 @@ def test_a_mistake_is_one_line(load, connections, a, message):
 
 
 EVENTS = [
-    ("'a.n' = 2", "a.n: is a structural parameter: it decides on sizes, and is set before the run"),
+    (
+        "'a.n' = 2",
+        "a.n: is a structural parameter, which decides on sizes: must be set before the run",
+    ),
     ("'a.u' = [1, 2]", r"set\.a\.u: u = \[1, 2\]: is \[2\]; must be \[3\], or a list"),
-    ("'b.u' = 1", "set.b.u: is a continuous input; must be a tunable parameter, or an input"),
-    ("'a.y' = 1", "set.a.y: is a continuous output; must be"),
-    ("'a.v' = 1", "set.a.v: not there; must be"),
+    ("'b.u' = 1", r"set.b.u: is an input with a connection: a fault on 'a.y\[2\] -> b.u\[2\]' of"),
+    ("'a.y' = 1", "set.a.y: is an output that the FMU calculates"),
+    ("'a.v' = 1", "has no variable 'v'; what can be set"),
 ]
 
 

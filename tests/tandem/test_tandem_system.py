@@ -154,7 +154,7 @@ def test_the_command_writes_a_system_that_runs(command, tmp_path, monkeypatch):
     assert System.load("tandem.toml").with_experiment(stop=0.1) is not None
     code, _, said = command("init", "other.toml", "--tandem", "--fingers", "3")
     assert code == 2
-    assert "--tandem cannot be used with --fmu, --fingers or --angles" in said
+    assert "--fingers and --angles cannot be used with --tandem; each makes" in said
 
 
 VENDOR = '''"""A gripper on an arm in other words."""

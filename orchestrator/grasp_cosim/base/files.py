@@ -65,10 +65,14 @@ WANTED = {
     "fmu": "an FMU, a file",
     "system": "a system, a .toml or .ssp file",
     "run": "a folder that `grasp-cosim run --out` wrote",
+    "block": "a block, a Python file",
 }
 """The natures of files that a command may want, in words."""
 
-_TAKEN = {"fmu": ("an FMU",), "system": ("a .toml file",), "run": (WANTED["run"], "a folder")}
+_TAKEN = {
+    "fmu": ("an FMU",), "system": ("a .toml file",), "run": (WANTED["run"], "a folder"),
+    "block": ("a .py file",),
+}  # fmt: skip
 """In the place of a run, what is missing in a folder is to be said."""
 
 _OF_A_RUN = {"run.json", "signals.csv", "signals.arrow"}

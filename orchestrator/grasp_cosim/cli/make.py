@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from ..base.errors import InputError, SimulationError
-from ..base.files import FMU_FOLDER, NATIVE_FOLDER, check_folder
+from ..base.files import FMU_FOLDER, NATIVE_FOLDER, check_folder, check_nature
 from ..fmu_export.proxy import DEFAULTS, Settings
 from ..interface.obstacles import of_binary
 from ..interface.read import describe
@@ -76,6 +76,8 @@ def build(
     for option, value in only_native.items():
         if value is not None and not native:
             raise InputError(f"{option} {value}: needs --native")
+    if block:
+        check_nature(block, "block")
     folder = out or (NATIVE_FOLDER if native else FMU_FOLDER)
     check_folder(c_only or folder)
     notes: list[str] = []

@@ -71,13 +71,8 @@ def init(
     check_file(file)
     foreign = _paired("--as", candidates)
     own = _paired("--fmu", fmus)
-    if own and foreign:
-        raise InputError("--fmu cannot be used with --as")
     hand = fingers is not None or angles is not None
-    if hand and (own or foreign):
-        raise InputError("--fingers and --angles cannot be used with --fmu or --as")
-    if tandem and (own or hand):
-        raise InputError("--tandem cannot be used with --fmu, --fingers or --angles")
+    _check_together(file, foreign, alone=bool(own), hand=hand, tandem=tandem)
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
     if own:
@@ -103,6 +98,31 @@ def init(
     for note in notes if not as_json else ():
         say(note)
     return 0
+
+
+def _check_together(
+    file: Path, foreign: Mapping[str, Path], alone: bool, hand: bool, tandem: bool
+) -> None:
+    """InputError where options name two systems: one of FMUs alone, of a hand, a tandem, a grasp.
+
+    Foreign FMUs may be in the place of components of the last two.
+    """
+    if hand and foreign:
+        fmus = " ".join(f"--swap {name}={quote(str(fmu))}" for name, fmu in foreign.items())
+        raise InputError(
+            "--fingers and --angles cannot be used with --as; write the hand alone, then "
+            f"`grasp-cosim run {quote(str(file))} {fmus}`"
+        )
+    if alone and foreign:
+        raise InputError(
+            "--fmu cannot be used with --as; --fmu makes a system of FMUs alone, "
+            "--as puts one into the grasp"
+        )
+    of = {"--fmu": alone, "--fingers and --angles": hand, "--tandem": tandem}
+    given = [option for option, is_given in of.items() if is_given]
+    if len(given) > 1:
+        systems = "each makes a system of its own; must be one of them"
+        raise InputError(f"{given[0]} cannot be used with {given[1]}; {systems}")
 
 
 def shown(fmu: Path, folder: Path) -> str:

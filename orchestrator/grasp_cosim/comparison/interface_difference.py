@@ -137,7 +137,7 @@ def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
         alike = nearest(name, [v.name for v in candidate.of(causality)], candidate.listing)
         text = (
             f"{causality} is {how} in the system, but missing; if it has another name: "
-            f"--set components.COMPONENT.rename.{name}=NAME; {alike}"
+            f"--set components.{use.component}.rename.{name}=NAME; {alike}"
         )
     return Difference(severity, "missing", name, text)
 

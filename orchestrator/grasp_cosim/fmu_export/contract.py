@@ -254,11 +254,19 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
     raise TypeError(f"{name} is {got}: must be float, bool{whole}, a tuple of one of them{besides}")
 
 
+DECLARED = {
+    "parameter": 'Parameter("meaning", unit="N")',
+    "input": 'Input("meaning", unit="N", nominal=1.0)',
+    "output": 'Output("meaning", unit="N", nominal=1.0, depends_on=set())',
+}
+"""How a variable is declared, by its causality: an example."""
+
+
 def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
     valid: type[Any] = {"parameter": Parameter, "input": Input, "output": Output}[causality]
     declared = getattr(hint, "__metadata__", (None,))[0]
     if not isinstance(declared, valid):
-        raise TypeError(f'{name}: must be Annotated[type, {valid.__name__}("meaning", unit=...)]')
+        raise TypeError(f"{name}: must be like Annotated[float, {DECLARED[causality]}]")
     base = get_args(hint)[0]
     size = len(get_args(base)) if get_origin(base) is tuple else None
     kind = _kind(name, causality, base)
@@ -271,7 +279,10 @@ def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
         if (declared.low, declared.high) != (-inf, inf):
             limits = (declared.low, declared.high)
         if kind is float:
-            nominal = abs(start[0] if size else start) or None
+            first = start[0] if size else start
+            if not isinstance(first, float):
+                raise TypeError(f"{name} = {start!r}: must be of type float")
+            nominal = abs(first) or None
     elif kind is float:
         if declared.nominal is None:
             raise TypeError(f"{name}: must have a nominal value, nominal=...")

@@ -4,26 +4,43 @@ Its documentation is its docstring and the table of its variables.
 """
 
 import ast
+import ctypes
 import inspect
+import re
 import sys
+import threading
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
+from dataclasses import fields
+from functools import partial
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.util import module_from_spec
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
+from shlex import quote
 from typing import Any
+
+import block_variables
 
 from ..base.si_units import refusal
 from .contract import Variable, declared, longest_step, unpacker, variables
 from .description import Description
 from .package import HASH, IMPORT, Model, script
 from .page import BEGIN, variable_tables
-from .shipped import FEWEST, MOST, PACKAGES, SHIPPED, of_fingers
+from .shipped import FEWEST, MOST, PACKAGES, SHIPPED, of_fingers, together
 
 PARTS = ("Params", "Inputs", "State", "Outputs", "initial_state", "step", "outputs")
 """What a block has."""
+
+ARGUMENTS = {"initial_state": "p, u", "step": "p, x, u, h", "outputs": "p, x, u"}
+"""What its functions take."""
+
+SLAVES = {"Fmi2Slave": "pythonfmu", "Fmi3Slave": "pythonfmu3"}
+"""What makes FMUs of the classes that have these bases, and how these are called."""
+
+LONGEST_TRIAL = 30.0
+"""s that a function of a block may take as it is tried, and its file to be imported."""
 
 
 @contextmanager
@@ -34,14 +51,13 @@ def own_model(file: Path) -> Iterator[Model]:
     is not packed: it must be installed where the FMU runs.
     ValueError, one line, where the file is no such block.
     """
-    is_identifier = file.stem.isascii() and file.stem.isidentifier()
-    if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
-        raise ValueError(f"{file}: must be NAME.py, NAME of letters, digits and _, a letter first")
+    _check_name(file)
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
     for ours in (*SHIPPED, *(hand for n in range(FEWEST, MOST + 1) for hand in of_fingers(n))):
         if ours.lower() == name.lower():  # the same file on Windows
             raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
     text, tree = _parsed(file)
+    _check_slaves(file, tree)
     _check_imports(file, text, tree)
     with _run(file, tree) as block:
         summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
@@ -58,6 +74,29 @@ def own_model(file: Path) -> Iterator[Model]:
             file,
             requires=_required(file, tree),
         )
+
+
+def _check_name(file: Path) -> None:
+    """ValueError where the name of a file is not that of a Python module, as an FMU's must be."""
+    is_identifier = file.stem.isascii() and file.stem.isidentifier()
+    if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
+        ours = together(file.name) if file.name == str(file) else None
+        native = f"; {file} is one of ours: --native builds it alone" if ours else ""
+        must = "must be NAME.py, NAME of letters, digits and _, a letter first"
+        raise ValueError(f"{file}: {must}{native}")
+
+
+def _check_slaves(file: Path, tree: ast.Module) -> None:
+    """ValueError where there is a class of which another tool makes an FMU."""
+    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    for node in classes:
+        for base in node.bases:
+            if tool := SLAVES.get(ast.unparse(base).rpartition(".")[2]):
+                raise ValueError(
+                    f"{file}: line {node.lineno}: is a class of {tool}, and no block; "
+                    f"`{tool} build -f {quote(str(file))}` makes its FMU; "
+                    f"a block has {', '.join(PARTS)}"
+                )
 
 
 def _parsed(file: Path) -> tuple[str, ast.Module]:
@@ -86,10 +125,19 @@ def _check_imports(file: Path, text: str, tree: ast.Module) -> None:
         for module in modules:
             package = module.partition(".")[0]
             if package not in installed and not (packable and package in PACKAGES):
-                form = "at the top level, with single spaces: from PACKAGE import ..."
-                ours = f"or of {', '.join(PACKAGES)}, {form}"
-                must = f"must be of the standard library, in REQUIRES, {ours}"
+                must = _importable(file, package)
                 raise ValueError(f"{file}: line {node.lineno}: imports {module}; {must}")
+
+
+def _importable(file: Path, package: str) -> str:
+    """What must be done about a package that a block imports, and which could not be packed."""
+    if package in PACKAGES:
+        return "must be at the top level, with single spaces: from PACKAGE import ..."
+    if not package or file.with_name(package).is_dir() or file.with_name(f"{package}.py").exists():
+        return "must be in the file itself, as a block is one file"
+    libraries = f"must be of the standard library, or of {', '.join(PACKAGES)}"
+    required = f'REQUIRES = ("{package}",) names what is to be installed where the FMU runs'
+    return f"{libraries}; {required}"
 
 
 def _required(file: Path, tree: ast.Module) -> tuple[str, ...]:
@@ -118,11 +166,29 @@ def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
             missing = ", ".join(part for part in PARTS if not hasattr(module, part))
             if missing:
                 raise ValueError(f"{file}: has no {missing}; a block has {', '.join(PARTS)}")
+            _check_parts(file, module)
             yield module
     finally:
         del sys.modules[name]
         if before:
             sys.modules[name] = before
+
+
+def _check_parts(file: Path, block: Any) -> None:
+    """ValueError where a class of a block is not of its kind, or a function takes other things."""
+    made = getattr(block.Params, "__dataclass_params__", None)
+    if made is None or not made.frozen:
+        raise ValueError(f"{file}: Params: must be a frozen dataclass: @dataclass(frozen=True)")
+    for name in ("Inputs", "Outputs"):
+        if not hasattr(getattr(block, name), "_fields"):
+            raise ValueError(f"{file}: {name}: must be a NamedTuple: class {name}(NamedTuple)")
+    for name, arguments in ARGUMENTS.items():
+        signature = inspect.signature(getattr(block, name))
+        try:
+            signature.bind(*arguments.split())
+        except TypeError as error:
+            must = f"must be {name}({arguments})"
+            raise ValueError(f"{file}: {name}{signature}: {must}") from error
 
 
 def _variables(file: Path, block: Any) -> list[Variable]:
@@ -132,8 +198,8 @@ def _variables(file: Path, block: Any) -> list[Variable]:
     with _tried(file, "Inputs()"):
         u = block.Inputs()
     with _tried(file, "declaration"):
-        fields = declared(block)
-        found = variables(fields)
+        declaration = declared(block)
+        found = variables(declaration)
         _check_declaration(found)
         longest_step(block)
     with _tried(file, "initial_state()"):
@@ -145,11 +211,17 @@ def _variables(file: Path, block: Any) -> list[Variable]:
         for name in {**before, **kinds}:  # or a saved state would come back as another: 0.5 as 0
             kind, like = (k[name].__name__ if name in k else "not there" for k in (kinds, before))
             if kind != like:
-                raise ValueError(f"{name} is {kind}: must be as initial_state() makes it, {like}")
+                zero = "; write 0.0 for 0 there" if (kind, like) == ("float", "int") else ""
+                must = f"must be as initial_state() makes it, {like}{zero}"
+                raise ValueError(f"{name} is {kind}: {must}")
     outputs = [v for v in found if v.causality == "output"]
     with _tried(file, "outputs()"):
         for x in (first, second):
-            values = unpacker(fields)(block.outputs(p, x, u))
+            y = block.outputs(p, x, u)
+            if not isinstance(y, tuple) or len(y) != len(block.Outputs._fields):
+                must = f"must return Outputs({', '.join(block.Outputs._fields)})"
+                raise ValueError(f"returns {y!r}: {must}")
+            values = unpacker(declaration)(y)
             for v, value in zip(outputs, values, strict=True):
                 _check_type(v, value, *([int] if v.kind is float else []))
                 if not isfinite(value):
@@ -174,6 +246,9 @@ def _check_declaration(found: list[Variable]) -> None:
             raise ValueError(f"{v.name}: must be of ASCII letters, digits and _")
         if v.causality != "output":
             _check_type(v, v.start)
+            low, high = v.limits or (-inf, inf)
+            if low > high:
+                raise ValueError(f"{v.name}: low = {low!r}: must not be above high = {high!r}")
             v.check(v.start)
 
 
@@ -186,6 +261,8 @@ def _kinds(state: Any, name: str = "State") -> dict[str, type[Any]]:
         for label, item in zip(labels, state, strict=True):
             kinds |= _kinds(item, name + label)
         return kinds
+    if state is None and name == "State":
+        raise ValueError("returns None: must return State(...)")
     if not isinstance(state, (float, int)):
         raise ValueError(f"{name} = {state!r}: must be float, bool, int, or a tuple of those")
     return {name: type(state)}
@@ -193,12 +270,51 @@ def _kinds(state: Any, name: str = "State") -> dict[str, type[Any]]:
 
 @contextmanager
 def _tried(file: Path, what: str) -> Iterator[None]:
-    """Raise what goes wrong in the user's code as a ValueError that says what and where."""
+    """Raise what goes wrong in the user's code as a ValueError that says what and where.
+
+    So it is if that takes longer than LONGEST_TRIAL.
+    """
     try:
-        yield
-    except (Exception, SystemExit) as error:
+        with _ended_after(LONGEST_TRIAL):
+            yield
+    except (Exception, SystemExit, _EndlessError) as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(file)]
         place = f" line {lines[-1]}:" if lines else ""
-        said = " ".join(str(error).splitlines())
-        raise ValueError(f"{file}:{place} {what}: {type(error).__name__}: {said}") from error
+        raise ValueError(f"{file}:{place} {what}: {_reason(error)}") from error
+
+
+def _reason(error: BaseException) -> str:
+    """What a user's code raised, and what helps, in one line."""
+    if isinstance(error, _EndlessError):
+        way = "must end; for a loop with a bound write for ... in range(n), with break"
+        return f"was not done after {LONGEST_TRIAL:g} s; {way}"
+    said = f"{type(error).__name__}: {' '.join(str(error).splitlines())}"
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        return f"{said}; it may be had by: python -m pip install {error.name.partition('.')[0]}"
+    made = re.match(r"(Input|Output|Parameter)\.__init__\(\)", str(error))
+    if made and isinstance(error, TypeError):
+        valid = [f"{f.name}=..." for f in fields(getattr(block_variables, made[1])) if f.kw_only]
+        return f"{said}; valid: {made[1]}(meaning, {', '.join(valid)})"
+    return said
+
+
+class _EndlessError(BaseException):
+    """Raised in a user's code that takes too long, which may catch an Exception in its loop."""
+
+
+@contextmanager
+def _ended_after(seconds: float) -> Iterator[None]:
+    """Raise _EndlessError in the Python code that runs here for longer than that."""
+    thread = ctypes.c_ulong(threading.get_ident())
+    raise_there = partial(
+        ctypes.pythonapi.PyThreadState_SetAsyncExc, thread, ctypes.py_object(_EndlessError)
+    )
+    timer = threading.Timer(seconds, raise_there)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()  # so that nothing is raised once this is over

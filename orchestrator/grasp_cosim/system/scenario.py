@@ -22,7 +22,7 @@ from ..base.checks import (
 )
 from ..base.errors import InputError, choices, nearest
 from ..interface.expansion import values_of
-from ..interface.interface import SETTABLE, Given, Interface, Value, Variable
+from ..interface.interface import PARAMETERS, Given, Interface, Value, Variable
 from .connectors import read_at, taps
 from .faults import FAULTS, RANDOM
 from .parts import (
@@ -40,7 +40,7 @@ from .parts import (
 )
 from .structure import Structure
 from .times import Time, first_step, in_nanoseconds, in_seconds, seconds, written
-from .validity import driven
+from .validity import FEW, driven
 
 _CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s'"]+)""")
 
@@ -208,27 +208,35 @@ def check_setting(system: Structure, port: Port, value: Given, place: str) -> di
     interface = system.component(port.component, place).interface
     settable = _settable(system)
     if not settable.keys() >= {*system.elements(port)}:
-        own = [p for p in settable if p.component == port.component]
-        raise InputError(
-            f"{place}: {_why_not(interface, port)}; must be a tunable parameter, or an input "
-            "without a column or a connection, on which a fault of kind 'stuck' puts a value; "
-            f"{nearest(port, own or settable, interface.listing)}"
-        )
+        own = [str(p) for p in settable if p.component == port.component]
+        near = nearest(port, own, interface.listing) if own else "the component has none"
+        what = "what can be set in a run is an input without a source, or a tunable parameter"
+        raise InputError(f"{place}: {_why_not(system, interface, port)}; {what}; {near}")
     values = values_of(interface, place, port.variable, value)
     return {Port(port.component, name): v for name, v in values.items()}
 
 
-def _why_not(interface: Interface, port: Port) -> str:
-    """Why a variable, or a whole array, cannot be set in the run."""
+def _why_not(system: Structure, interface: Interface, port: Port) -> str:
+    """Why a variable, or a whole array, cannot be set in the run, and what else does that."""
     v = interface.sample(port.variable)
     if v is None:
-        return "not there"
+        return f"{interface.short} has no variable {port.variable!r}"
+    if port.variable not in (v.name, *interface.arrays):
+        several = choices(interface.elements(port.variable), FEW)
+        return f"there are {several} of it, which must be set one by one"
+    before = f"must be set before the run, --set {port}=VALUE"
     if v.causality == "structuralParameter":
-        return "is a structural parameter: it decides on sizes, and is set before the run alone"
-    nature = f"is a {v.variability} {v.causality}"
-    if v.causality not in SETTABLE and v.settable:
-        return f"{nature}: its initial value is set before the run alone"
-    return nature
+        return f"is a structural parameter, which decides on sizes: {before}"
+    if v.causality in PARAMETERS:
+        return f"is a {v.variability} parameter: {before}"
+    if v.causality != "input":
+        return f"is the start of what the FMU calculates: {before}" if v.settable else v.unsettable
+    elements = system.elements(port)
+    connection = next((c for c in system.connections if c.target in elements), None)
+    if connection:
+        stuck = f"a fault on '{connection}' of kind 'stuck' puts a value in its place"
+        return f"is an input with a connection: {stuck}"
+    return "is an input that a column drives: must have its values there, or no column"
 
 
 def _check_condition(system: Structure, condition: Condition | None, place: str) -> None:

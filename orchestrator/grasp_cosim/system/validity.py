@@ -27,6 +27,9 @@ from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of
 from .times import NANOSECONDS, seconds, written
 
+FEW = 6
+"""Variables that a message names at most."""
+
 LARGEST_COUNT = 2**62
 """Ticks that the times of stimuli may be away from 0, so that their distances fit into 64 bits."""
 
@@ -133,9 +136,9 @@ def check_connections(system: Structure) -> None:
             Port(c.name, v.name) for c in system.components for v in c.interface.of("output")
         ]
         raise InputError(
-            f"{system.name}: no source for {choices(missing)}; must have a connection from one of "
-            f"{choices(outputs)}, or a value in the system file, or --set {missing[0]}=VALUE where "
-            "another FMU brings it; or drive it with --input"
+            f"{system.name}: no source for {choices(missing, FEW)}; must have a connection from "
+            f"one of {choices(outputs, FEW)}, or a value in the system file, "
+            f"or --set {missing[0]}=VALUE where another FMU brings it; or drive it with --input"
         )
 
 
@@ -317,7 +320,7 @@ def _of_components(system: Structure) -> Iterator[str]:
             if without and c.interface.by_name[without[0]].causality == "input":
                 free += [name] if len(without) == len(whole.names) else without
         if free:
-            yield f"{c.name}: no source for {choices(free, 6)}: kept as the FMU starts with"
+            yield f"{c.name}: no source for {choices(free, FEW)}: kept as the FMU starts with"
     if not system.recorded:
         yield (
             f"{system.name}: nothing is recorded; must have an output or a local that is a Real, "
