@@ -90,7 +90,7 @@ TWICE = [
         '"source.y -> plant.u"',
         "[[events]]\nat = 0.2\nset = { 'plant.drive' = 1.0 }\n",
         "k = 1.0",
-        "is a continuous input; must be a tunable parameter, or an input without a column",
+        "is an input with a connection: a fault on 'source.y -> plant.u' of kind",
     ),
     (
         "",

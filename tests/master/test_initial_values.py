@@ -85,5 +85,5 @@ def test_what_cannot_be_set_is_refused(tmp_path, values, message):
 
 def test_an_event_does_not_set_it(tmp_path):
     event = "[[events]]\nat = 0.2\nset = { 'ball.h' = 1.0 }\n"
-    with pytest.raises(InputError, match=r"ball\.h: is a continuous output: its initial value is"):
+    with pytest.raises(InputError, match=r"ball\.h: is the start of what the FMU calculates: must"):
         load(tmp_path, event)

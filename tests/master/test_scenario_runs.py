@@ -183,7 +183,7 @@ def test_a_session_goes_along_and_does_not_set_what_is_driven(tmp_path):
     with simulate.session(system) as session:
         session.step(6)
         assert session["a.u_Real"] == pytest.approx(0.5)
-        with pytest.raises(InputError, match=r"a.u_Real: is a continuous input; must be"):
+        with pytest.raises(InputError, match=r"a.u_Real: is driven by a column: must have"):
             session.set("a.u_Real", 1.0)
 
 

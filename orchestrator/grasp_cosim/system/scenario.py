@@ -224,6 +224,9 @@ def _why_not(system: Structure, interface: Interface, port: Port) -> str:
     if port.variable not in (v.name, *interface.arrays):
         several = choices(interface.elements(port.variable), FEW)
         return f"there are {several} of it, which must be set one by one"
+    elements = system.elements(port)
+    if {*elements} & {*driven(system)}:
+        return "is driven by a column: must have its values there, or no column"
     before = f"must be set before the run, --set {port}=VALUE"
     if v.causality == "structuralParameter":
         return f"is a structural parameter, which decides on sizes: {before}"
@@ -231,12 +234,11 @@ def _why_not(system: Structure, interface: Interface, port: Port) -> str:
         return f"is a {v.variability} parameter: {before}"
     if v.causality != "input":
         return f"is the start of what the FMU calculates: {before}" if v.settable else v.unsettable
-    elements = system.elements(port)
     connection = next((c for c in system.connections if c.target in elements), None)
-    if connection:
-        stuck = f"a fault on '{connection}' of kind 'stuck' puts a value in its place"
-        return f"is an input with a connection: {stuck}"
-    return "is an input that a column drives: must have its values there, or no column"
+    if connection is None:
+        return f"is an input of type {v.nature}, which cannot be set"
+    stuck = f"a fault on '{connection}' of kind 'stuck' puts a value in its place"
+    return f"is an input with a connection: {stuck}"
 
 
 def _check_condition(system: Structure, condition: Condition | None, place: str) -> None:
