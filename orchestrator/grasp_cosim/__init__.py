@@ -18,7 +18,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .base.errors import InputError, SimulationError
+from .base.errors import InputError, RunInterruptedError, SimulationError
 
 if TYPE_CHECKING:
     __version__: str
@@ -48,6 +48,7 @@ __all__ = [
     "Metric",
     "Realtime",
     "Result",
+    "RunInterruptedError",
     "Session",
     "SimulationError",
     "StateSpace",

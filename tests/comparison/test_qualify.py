@@ -152,17 +152,6 @@ def test_an_original_that_fails_is_no_verdict(short, altered):
         qualify(short.swap("plant", fmu), "plant", own_plant(short), isolation="none")
 
 
-def test_ctrl_c_is_no_verdict(short, monkeypatch):
-    import grasp_cosim.comparison.qualify as module
-
-    class Interrupted:
-        came_to_its_end = False
-
-    monkeypatch.setattr(module, "simulate", lambda *_, **__: Interrupted())
-    with pytest.raises(KeyboardInterrupt):
-        qualify(short, "plant", own_plant(short), isolation="none")
-
-
 # ------------------------------------------------------------------------- FMUs in C
 
 UNITS = {"x": "m", "gain": "m"}

@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Realtime, SimulationError, simulate
+from grasp_cosim import InputError, Realtime, RunInterruptedError, SimulationError, simulate
 from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.master.master import CHUNK, Master
 from grasp_cosim.master.plan import Planner
@@ -372,7 +372,9 @@ def test_ctrl_c_does_not_wait_for_the_next_step(tmp_path, monkeypatch, engine):
     fake.on_sleep = lambda: os.kill(os.getpid(), signal.SIGINT)
     monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
     monkeypatch.setattr("grasp_cosim.realtime.pacer.CLOCK_OF_THE_SYSTEM", fake.clock)
-    result = simulate(make_system([mock], [], 10), engine=engine, realtime=Realtime(factor=1e-4))
+    with pytest.raises(RunInterruptedError) as interrupted:
+        simulate(make_system([mock], [], 10), engine=engine, realtime=Realtime(factor=1e-4))
+    result = interrupted.value.result
     assert len(fake.sleeps) == 1
     assert not result.complete
     assert result.time.tolist() == [0.0, 0.1]

@@ -11,7 +11,7 @@ import signal
 import threading
 
 import pytest
-from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
+from grasp_cosim import InputError, Realtime, RunInterruptedError, SimulationError, System, simulate
 from grasp_cosim.base.calls import PACE
 from grasp_cosim.master import engine, master
 from grasp_cosim.master.engine import has_compiler
@@ -196,7 +196,9 @@ def test_what_fails_is_late_or_discarded_does_what_it_does_in_a_free_run(two):
 def test_ctrl_c_ends_it_soon_and_keeps_what_was_recorded(two, factor):
     """While it sleeps between steps, and where it never does."""
     long, realtime = two().with_experiment(stop=1e5), Realtime(factor=factor)
-    result = simulate(long, realtime=realtime, every=10, listeners=[interrupts()])
+    with pytest.raises(RunInterruptedError) as interrupted:
+        simulate(long, realtime=realtime, every=10, listeners=[interrupts()])
+    result = interrupted.value.result
     assert not result.complete
     assert 0 < result.time[-1] < 1e5
     with simulate.session(long, realtime=realtime, listeners=[interrupts()]) as session:

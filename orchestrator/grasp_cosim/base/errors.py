@@ -16,6 +16,14 @@ class SimulationError(Exception):
     """What was recorded until then, a recording.result.Result; None where there is nothing."""
 
 
+class RunInterruptedError(KeyboardInterrupt):
+    """Ctrl-C ended a run in good order: result is what was recorded, a recording.result.Result."""
+
+    def __init__(self, result: Any) -> None:
+        super().__init__("the run was interrupted; what was recorded is the result of this error")
+        self.result = result
+
+
 class UnknownNameError(KeyError):
     """A mapping has no such name among its names of a kind; the message has the nearest ones."""
 

@@ -118,18 +118,25 @@ class _RaisedAgainError(KeyboardInterrupt):
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
-    """Ctrl-C is a KeyboardInterrupt here, even where a Python FMU makes an error of it."""
-
-    def end() -> NoReturn:
-        raise _RaisedAgainError
-
+def raised(end: Callable[[], object]) -> Iterator[None]:
+    """Here the first signal calls `end`; at the end it is a KeyboardInterrupt, whatever came."""
     with interrupts(end) as came:
         try:
             yield
         finally:
             if came.is_set():
                 raise KeyboardInterrupt
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Ctrl-C is a KeyboardInterrupt here, even where a Python FMU makes an error of it."""
+
+    def end() -> NoReturn:
+        raise _RaisedAgainError
+
+    with raised(end):
+        yield
 
 
 def _raise(number: int, _: FrameType | None) -> None:

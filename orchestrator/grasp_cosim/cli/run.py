@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ..base.errors import InputError, SimulationError
+from ..base.errors import InputError, RunInterruptedError, SimulationError
 from ..master.simulation import simulate
 from ..recording.folder import FORMS, Form, RunFolder
 from ..recording.mdf import check_mdf
@@ -117,16 +117,19 @@ def run(
             elif out:
                 say(f"kept what was recorded, in {out}")
 
-        result = simulate(
-            chosen,
-            progress=not is_quiet(),
-            every=every,
-            listeners=[folder] if folder else (),
-            realtime=realtime,
-            metrics=metrics,
-            note=say,
-            finish=finish,
-        )
+        try:
+            result = simulate(
+                chosen,
+                progress=not is_quiet(),
+                every=every,
+                listeners=[folder] if folder else (),
+                realtime=realtime,
+                metrics=metrics,
+                note=say,
+                finish=finish,
+            )
+        except RunInterruptedError as interrupted:
+            result = interrupted.result
     if not result.came_to_its_end:
         message = f"interrupted at t = {result.time[-1]:.6g} s; kept what was recorded"
         return fail(message, INTERRUPTED)

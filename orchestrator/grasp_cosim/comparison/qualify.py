@@ -148,7 +148,7 @@ def qualify(
     except InputError as error:
         how = "of the candidate: --set components.NAME.units.VARIABLE=UNIT"
         raise InputError(f"{error}; {how}") from error
-    run = _run(swap.system, progress and "original")
+    run = simulate(swap.system, progress=progress and "original")
     ours = side_of(run, swap.original.name)
     ours = replace(ours, to_si={n: c for n, c in more.items() if n not in run} | dict(run.to_si))
     given = bands or Bands()
@@ -184,18 +184,11 @@ def qualify(
 def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
     """The candidate's run as far as it got, and why it did not get to the end."""
     try:
-        return _run(swapped, progress and "candidate"), None
+        return simulate(swapped, progress=progress and "candidate"), None
     except SimulationError as error:
         return error.result, str(error)
     except InputError as error:  # does not load, or refuses its initialisation
         return None, str(error)
-
-
-def _run(system: System, progress: str | bool) -> Result:
-    result = simulate(system, progress=progress)
-    if not result.came_to_its_end:
-        raise KeyboardInterrupt
-    return result
 
 
 def _other_numerics(system: System, original: Side, progress: bool) -> tuple[list[Side], list[str]]:
@@ -204,7 +197,7 @@ def _other_numerics(system: System, original: Side, progress: bool) -> tuple[lis
     said = ["every second sample"]
     for name, other in _variants(system):
         try:
-            run = _run(other, progress and f"original, {name}")
+            run = simulate(other, progress=progress and f"original, {name}")
             runs.append(side_of(run, name))
             said.append(name)
         except (InputError, SimulationError) as error:

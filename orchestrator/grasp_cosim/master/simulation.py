@@ -11,8 +11,8 @@ from functools import partial
 from numbers import Integral
 from typing import Any, TypeVar
 
-from ..base.errors import InputError, SimulationError, nearest
-from ..base.interruption import interruptible, interrupts
+from ..base.errors import InputError, RunInterruptedError, SimulationError, nearest
+from ..base.interruption import interruptible, raised
 from ..base.progress import DELAY, Progress, phase
 from ..base.text import counted
 from ..exchange.dispatch import Dispatcher
@@ -556,7 +556,8 @@ class Simulate:
         the end, also after a failure. finish gets the result, and the error that ended the run if
         there is one, before the FMUs are terminated and freed, in which they may crash.
 
-        Ctrl-C ends the run early: the result is what was recorded, with complete = False.
+        Ctrl-C ends the run in good order, then is a KeyboardInterrupt: once FMUs are loaded a
+        RunInterruptedError, with what was recorded as its result.
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way, or a signal runs away.
         """
@@ -567,25 +568,30 @@ class Simulate:
             if finish is not None:
                 finish(result, error)
 
-        with (
-            Session(
-                system,
-                step=step,
-                stop=stop,
-                scheme=scheme,
-                every=every,
-                listeners=listeners,
-                engine=engine,
-                realtime=realtime,
-                metrics=metrics,
-                diverging=diverging,
-                note=note,
-                finish=keep,
-                steered=False,
-            ) as session,
-            phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"),
-        ):
-            _drive(session, progress)
+        try:
+            with (
+                Session(
+                    system,
+                    step=step,
+                    stop=stop,
+                    scheme=scheme,
+                    every=every,
+                    listeners=listeners,
+                    engine=engine,
+                    realtime=realtime,
+                    metrics=metrics,
+                    diverging=diverging,
+                    note=note,
+                    finish=keep,
+                    steered=False,
+                ) as session,
+                phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"),
+            ):
+                _drive(session, progress)
+        except KeyboardInterrupt as interrupt:
+            if not results:
+                raise
+            raise RunInterruptedError(results[0]) from interrupt
         return results[0]
 
     session = Session
@@ -634,9 +640,10 @@ def _folder_kept() -> Iterator[None]:
 
 
 def _drive(session: Session, progress: bool | str) -> None:
+    """Have it step to its end; KeyboardInterrupt, between two steps, at Ctrl-C."""
     begin, end = map(in_seconds, (session.system.start_ns, session.system.stop_ns))
     with (
-        interrupts(session.halt.set),
+        raised(session.halt.set),
         Progress(
             progress if isinstance(progress, str) else session.system.name,
             end - begin,

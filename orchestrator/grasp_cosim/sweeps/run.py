@@ -49,8 +49,6 @@ def run_row(task: Task, index: int, row: Row, listeners: Sequence[Listener] = ()
     try:
         system = task.system.with_settings(row, "sweep: {}".format)
         result = simulate(system, metrics=task.metrics, listeners=listeners, finish=finish)
-        if not result.came_to_its_end:
-            raise KeyboardInterrupt
         return Outcome(index, result.measured.flat(), ended_at=result.ended_at)
     except (InputError, SimulationError) as error:
         return Outcome(index, {}, str(error))

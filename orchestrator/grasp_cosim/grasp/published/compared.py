@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.interruption import interrupts
+from ...base.interruption import raised
 from ...base.parallel import Crew
 from ...base.progress import Progress, phase
 from ...base.text import to_cell
@@ -124,13 +124,11 @@ def close(system: System, after: float | None = None) -> Result:
     The end is known to LOOK; a result that ends early is not complete. KeyboardInterrupt on Ctrl-C.
     """
     steps = max(1, round(LOOK / in_seconds(system.step_ns)))
-    with simulate.session(system) as session, interrupts(session.halt.set):
+    with simulate.session(system) as session, raised(session.halt.set):
         end = in_seconds(system.stop_ns)
         touching = False
         contacts = [resolved(f"plant.contact[{j}]", system.roles) for j in FINGERS]
-        while session.time < end and session.step(steps):
-            if session.halt.is_set():
-                raise KeyboardInterrupt
+        while not session.halt.is_set() and session.time < end and session.step(steps):
             if after is not None and not touching and all(session[name] for name in contacts):
                 touching, end = True, session.time + after
         return session.result()
