@@ -40,8 +40,8 @@ def test_a_run_that_is_broken_off_keeps_what_was_recorded(grasp, tmp_path):
 def test_where_a_listener_fails_the_others_keep_their_rows(grasp, tmp_path):
     full, memory = CsvListener(tmp_path / "s.csv"), MemoryListener()
     with simulate.session(grasp, stop=0.1, listeners=[memory, full]) as session:
-        session.step(35)
-        with full_disk(20_000), pytest.raises(SimulationError, match=r"s\.csv: cannot b") as caught:
+        session.step(150)
+        with full_disk(90_000), pytest.raises(SimulationError, match=r"s\.csv: cannot b") as caught:
             session.step(900)
     result = caught.value.result
     assert not result.complete

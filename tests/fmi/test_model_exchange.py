@@ -151,7 +151,7 @@ def test_arrays_are_states_inputs_and_outputs(tmp_path, sizes):
         times = 100_000_000, 1_000_000_000
         system = System("s", parts, connection, *times, "sequential", event)
         found.append(simulate(system).signals)
-    assert len(found[0]) == 2 * r
+    assert len(found[0]) == 2 * r + 1  # the outputs, and a.u[1], which an event sets
     for name, exact in found[0].items():
         assert found[1][name] == pytest.approx(exact, rel=WITHIN)
 
