@@ -38,7 +38,7 @@ def blocks(page, kind):
 
 
 (METRIC,) = blocks("docs/guide.md", "python")
-MAP, SOBOL = blocks("docs/studies.md", "python")
+MAP, SOBOL, NOISE = blocks("docs/studies.md", "python")
 
 
 @pytest.fixture(scope="session")
@@ -134,8 +134,9 @@ def test_the_margins_at_the_surface_are_as_shown(row):
     [
         (MAP, {", 25)": ", 3)", ", 17)": ", 2)", "stop=6.0": "stop=0.5"}, ""),
         (SOBOL, {"n=64": "n=2"}, "alone"),
+        (NOISE, {"* 20": "* 3"}, "] "),
     ],
-    ids=["map", "sobol"],
+    ids=["map", "sobol", "noise"],
 )
 def test_the_scripts_of_studies(script, fewer, printed, tmp_path):
     for text, less in fewer.items():

@@ -25,6 +25,8 @@ from .rows import Row
 from .run import Task
 from .table import Outcome, check_format
 
+PACKAGE = "grasp-cosim"
+
 FEW = 3
 """Things in which runs differ that are named at most."""
 
@@ -115,7 +117,9 @@ def _difference(first: bytes, identity: Mapping[str, str]) -> str:
 
 def identity_of(task: Task, rows: Sequence[Row], metrics: Sequence[Metric]) -> dict[str, str]:
     """A hash of each thing that decides the results, by what it is called in a message."""
-    decisive = {"the rows": rows, "the version of grasp-cosim": version("grasp-cosim")}
+    decisive: dict[str, Any] = {"the rows": rows, "the version of grasp-cosim": version(PACKAGE)}
+    if signals := task.signals:
+        decisive["the signals"] = [signals.every, {n: a.signals for n, a in signals.arrays.items()}]
     decisive |= {f"the system's {key}": value for key, value in settings(task.system).items()}
     fmus = {f"the FMU of {c.name}": c.fmu.read_bytes() for c in task.system.components}
     return {

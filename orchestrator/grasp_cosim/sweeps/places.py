@@ -15,7 +15,7 @@ from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial, wraps
 from itertools import islice
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,8 @@ from ..base.errors import InputError, SimulationError
 from ..base.parallel import Crew, Lost
 from ..exchange.listener import Experiment, Signal
 from ..metrics.metric import Function, Signals, check_portable
-from .run import Job, Packed, Task, packed, run_packed, run_row
+from ..recording.memory import writing
+from .run import Job, Packed, Task, packed, run_packed, run_row, run_there
 from .table import Outcome
 
 FEW = 100
@@ -41,6 +42,8 @@ CONNECT = 10.0
 """s, to find the scheduler and a worker of a cluster."""
 
 Outcomes = Generator[Outcome, None, None]
+
+Found = TypeVar("Found")
 
 
 def here(task: Task, jobs: Sequence[Job], workers: int | None) -> Outcomes:
@@ -74,7 +77,9 @@ def in_threads(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
     run = partial(run_row, replace(task, metrics=own), listeners=(halting,))
     with ThreadPoolExecutor(max(count, 1), "sweep") as pool:
         try:
-            yield from _outcomes(pool, lambda job: run(*job), jobs)
+            for _, outcome in _results(pool, lambda job: run(*job), jobs):
+                assert outcome is not None  # noqa: S101 - threads are not lost
+                yield outcome
         finally:
             halting.halted.set()
 
@@ -118,21 +123,36 @@ def in_processes(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
 
 
 def elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
-    """The outcomes of an executor, to which the FMUs go; closing it cancels the rest."""
+    """The outcomes of an executor, to which the FMUs go; closing it cancels the rest.
+
+    Signals come back with them. SimulationError where these cannot be written.
+    """
     check_portable(task.metrics)
     shared: Any = packed(task, with_fmus=True)
     if client := getattr(executor, "_client", None):
         # Dask: it goes to each worker once, and again if the one that has it dies
         shared = client.submit(Packed._make, shared, pure=False)
-    yield from _outcomes(executor, run_packed, jobs, shared)
+    with closing(_results(executor, run_there, jobs, shared)) as results:
+        for index, found in results:
+            if found is None:
+                yield Outcome(index, {}, "the worker of the run died, several times")
+                continue
+            outcome, blocks = found
+            if task.signals:
+                with writing(task.signals.folder):
+                    task.signals.write(index, blocks)
+            yield outcome
 
 
-def _outcomes(
-    executor: Executor, run: Callable[..., Outcome], jobs: Sequence[Job], *shared: Any
-) -> Outcomes:
-    """The outcomes of run(*shared, job), as they end; closing it cancels the rest."""
+def _results(
+    executor: Executor, run: Callable[..., Found], jobs: Sequence[Job], *shared: Any
+) -> Generator[tuple[int, Found | None], None, None]:
+    """What run(*shared, job) returns, by the number of the job, as they end; None of a lost one.
+
+    Closing it cancels the rest.
+    """
     left = iter(jobs)
-    pending: dict[Future[Outcome], int] = {}
+    pending: dict[Future[Found], int] = {}
     try:
         while True:
             for job in islice(left, AHEAD - len(pending)):
@@ -142,9 +162,9 @@ def _outcomes(
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 index, failure = pending.pop(future), future.exception()
                 if failure is None:
-                    yield future.result()
+                    yield index, future.result()
                 elif type(failure).__name__ == KILLED:
-                    yield Outcome(index, {}, "the worker of the run died, several times")
+                    yield index, None
                 else:
                     raise SimulationError(f"sweep: run {index}: {_said(failure)}") from failure
     finally:

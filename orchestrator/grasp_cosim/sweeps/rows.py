@@ -31,6 +31,8 @@ Row = Mapping[str, Value]
 TIMES = tuple(f"experiment.{key}" for key in ("start", "step", "stop"))
 """The places of times, which may be fractions like 1/30."""
 
+STOP = "experiment.stop"
+
 MOST = 100_000
 """Runs of a sweep at most."""
 
@@ -74,20 +76,20 @@ def varied(text: str) -> tuple[str, list[Value]]:
     return place, [float(value) for value in np.linspace(start, end, count)]
 
 
-def as_rows(given: Any) -> list[dict[str, Value]]:
+def as_rows(given: Any, alike: bool = False) -> list[dict[str, Value]]:
     """The rows of a table, read or in a file, of columns by place, of a data frame, or of rows.
 
     A data frame is one of pandas or polars, a table of pyarrow, a structured array of NumPy, or a
     Dataset of xarray. Beside columns a single value is that of each row. A cell that is None, NaN
     or empty leaves that place as the system has it. InputError where these are no rows, nothing
-    varies, or there are more than MOST.
+    varies, unless they may be `alike`, or there are more than MOST.
     """
     if isinstance(given, str | Path):
         given = read_rows(Path(given))
     rows = [*map(_row, count(), _listed(given))]
     if not 1 <= len(rows) <= MOST:
         raise InputError(f"sweep: {len(rows)} rows; must be 1 to {MOST}")
-    if not any(rows):
+    if not (alike or any(rows)):
         raise InputError("sweep: nothing varies; the rows must have at least one column")
     return rows
 

@@ -6,6 +6,7 @@ import hashlib
 import pickle
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +21,8 @@ from ..metrics.metric import Metric
 from ..recording.result import Result
 from ..system.description import System
 from .rows import Row
+from .seeds import with_row
+from .signals import Store
 from .table import Outcome
 
 Job = tuple[int, Row]
@@ -28,26 +31,31 @@ Job = tuple[int, Row]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """All that runs share: the system and a user's metrics."""
+    """All that runs share: the system, a user's metrics, and where their signals are kept."""
 
     system: System
     metrics: tuple[Metric, ...] = ()
+    signals: Store | None = None
 
 
 def run_row(task: Task, index: int, row: Row, listeners: Sequence[Listener] = ()) -> Outcome:
     """Run a row; one that fails is an outcome, too. KeyboardInterrupt where it was interrupted.
 
-    The outcome is delivered before the FMUs are ended, which may take the process along.
+    The outcome is delivered before the FMUs are ended, which may take the process along. Where its
+    signals cannot be written, they are not there.
     """
 
     def finish(result: Result, error: SimulationError | None) -> None:
         if error is not None:
             deliver(Outcome(index, {}, str(error)))
         elif result.came_to_its_end:
+            if task.signals:
+                with suppress(OSError):
+                    task.signals.write(index, task.signals.blocks(result))
             deliver(Outcome(index, result.measured.flat(), ended_at=result.ended_at))
 
     try:
-        system = task.system.with_settings(row, "sweep: {}".format)
+        system = with_row(task.system, row)
         result = simulate(system, metrics=task.metrics, listeners=listeners, finish=finish)
         return Outcome(index, result.measured.flat(), ended_at=result.ended_at)
     except (InputError, SimulationError) as error:
@@ -85,6 +93,13 @@ def run_packed(shared: Packed, job: Job) -> Outcome:
         return run_row(_unpacked[shared.key][0], *job)
 
 
+def run_there(shared: Packed, job: Job) -> tuple[Outcome, dict[str, bytes]]:
+    """Do a run in this process, on a machine of its own: its signals come along."""
+    outcome = run_packed(shared, job)
+    signals = _unpacked[shared.key][0].signals
+    return outcome, signals.taken(job[0]) if signals else {}
+
+
 def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
     """The task, whose FMUs are in a folder of this process where their contents came along."""
     task: Task = pickle.loads(shared.task)  # noqa: S301 - by packed(), through a pipe or a scheduler
@@ -97,4 +112,6 @@ def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
         path.parent.mkdir()
         path.write_bytes(content)
         components.append(replace(component, fmu=path, native=None))
-    return replace(task, system=replace(task.system, components=tuple(components))), folder
+    system = replace(task.system, components=tuple(components))
+    signals = replace(task.signals, folder=Path(folder.name, "signals")) if task.signals else None
+    return replace(task, system=system, signals=signals), folder

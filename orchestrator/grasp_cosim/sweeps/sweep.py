@@ -6,18 +6,22 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import closing, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from ..base.errors import InputError
+from ..base.checks import whole
+from ..base.errors import InputError, SimulationError
 from ..base.progress import Progress, phase
+from ..base.scratch import ScratchFolder
 from ..base.text import counted
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, chosen, metrics_of
 from ..system.description import System
 from .kept import identity_of, keep, opened
 from .places import elsewhere, here
-from .rows import as_rows, check_units, labels_of, read_rows, settings_of, unit_of
+from .rows import Row, as_rows, check_units, labels_of, read_rows, settings_of, unit_of
 from .run import Task
+from .seeds import seeds_of_runs
+from .signals import Recorded, Store, arrays, begin, recording, times
 from .table import Outcome, Table, made
 
 
@@ -26,6 +30,9 @@ def sweep(
     rows: Any,
     *,
     metrics: Sequence[Metric | Function | str] = (),
+    signals: Sequence[str] | str = (),
+    every: int = 1,
+    seed: Literal["run"] | None = None,
     out: str | Path | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
@@ -38,7 +45,13 @@ def sweep(
     place, where a single value is that of each row; or a data frame, as of as_rows(); or the path
     of a table. The index of a pandas DataFrame is that of the table's to_pandas().
 
-    metrics are worked out beside those of the system. The table is written to `out`, a .csv or
+    metrics are worked out beside those of the system. signals, named as for with_record(), are kept
+    of each run, at each n-th communication point where `every` says so: table.to_xarray() has them
+    over run, time and finger. Each run writes its own to disk, into the Zarr store beside `out`,
+    which ends in .zarr, else into a temporary folder. With the seed "run" all that is random has
+    another seed in each run, see seeds.py, and rows may be alike: [{}] * 100.
+
+    The table is written to `out`, a .csv or
     .parquet file; until all are done, finished runs are kept beside it, and the same call goes on.
     workers are so many runs at a time, by default one for each processor: in threads where the FMUs
     are native and made here and the runs few, else in processes. A script needs no guard for these,
@@ -53,7 +66,8 @@ def sweep(
     if isinstance(rows, str | Path):
         rows = read_rows(Path(rows))
         check_units(system, rows)
-    rows_in_si = as_rows(rows)
+    rows_in_si = as_rows(rows, alike=seed is not None)
+    whole("every", every, 1, must="a whole number, at least 1")
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
     observed = system.shown
@@ -61,29 +75,67 @@ def sweep(
     all_metrics = metrics_of(system.metrics, own_metrics)
     in_si(system, all_metrics)
     measured, missing = available(all_metrics, observed, system.roles)
-    if not measured:
+    if not (measured or signals):
         because = f" ({'; '.join(missing)})" if missing else ""
         raise InputError(
             f"{system.name}: has no metric{because}; name a file of yours by --metrics"
         )
     units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in rows_in_si for p in row)}
-    task = Task(system.natively(native), own_metrics)
-    settings_of_runs = settings_of(task.system, rows_in_si)
+    seeds = seeds_of_runs(system, rows_in_si, seed)
     file = Path(out) if out is not None else None
+    recorded = _recorded(system, signals, every, rows_in_si, measured, file) if signals else None
+    if signals:
+        system, _ = recording(system, signals)
+    task = Task(system.natively(native), own_metrics, recorded.store if recorded else None)
+    own_rows = zip(settings_of(task.system, rows_in_si), seeds, strict=True)
+    jobs = [*enumerate({**row, **own} for row, own in own_rows)]
     done: dict[int, Outcome] = {}
-    identity = identity_of(task, settings_of_runs, all_metrics) if file else {}
-    with opened(file, identity, done) if file else nullcontext() as store:
-        to_do = [(i, row) for i, row in enumerate(settings_of_runs) if i not in done]
+    identity = identity_of(task, [row for _, row in jobs], all_metrics) if file else {}
+    with opened(file, identity, done) if file else nullcontext() as lines:
+        if recorded and file:
+            beside = [{**row, **own} for row, own in zip(rows_in_si, seeds, strict=True)]
+            begin(recorded, beside, identity, goes_on=bool(done))
+            done = {i: o for i, o in done.items() if o.error or recorded.store.has(i)}
+        to_do = [job for job in jobs if job[0] not in done]
         results = elsewhere(executor, task, to_do) if executor else here(task, to_do, workers)
-        bar = Progress("sweep", len(rows_in_si), shown=progress, initial=len(done))
+        bar = Progress("sweep", len(jobs), shown=progress, initial=len(done))
         with phase(f"sweep, {counted(len(to_do), 'run')}"), bar, closing(results):
             for outcome in results:
-                if store:
-                    keep(store, outcome)
+                _check_written(task.signals, outcome)
+                if lines:
+                    keep(lines, outcome)
                 done[outcome.index] = outcome
                 bar.update()
-        outcomes = [done[i] for i in range(len(rows_in_si))]
-        table = made(rows_in_si, outcomes, units, measured, labels_of(rows))
+        outcomes = [done[i] for i, _ in jobs]
+        table = made(rows_in_si, outcomes, units, measured, labels_of(rows), seeds, recorded)
         if file:
             table.write(file)
     return table
+
+
+def _check_written(signals: Store | None, outcome: Outcome) -> None:
+    """SimulationError where the signals of a run that came to its end are not there."""
+    if signals and outcome.error is None and not signals.has(outcome.index):
+        raise SimulationError(
+            f"{signals.folder}: the signals of run {outcome.index} were not written; with room for "
+            "them the same call goes on"
+        )
+
+
+def _recorded(
+    system: System,
+    signals: Sequence[str] | str,
+    every: int,
+    rows: Sequence[Row],
+    metrics: Sequence[Metric],
+    out: Path | None,
+) -> Recorded:
+    """What is kept of the signals, and where: beside the table, else in a temporary folder."""
+    time = times(system, rows, every)
+    observing, found = recording(system, signals)
+    names = [name for name in found if not any(name in row for row in rows)]  # a coordinate
+    scratch = None if out else ScratchFolder()
+    folder = Path(scratch.name) if scratch else out.with_suffix(".zarr") if out else Path()
+    return Recorded(
+        Store(folder, arrays(observing, names, metrics), len(time), every), time, scratch
+    )

@@ -26,9 +26,11 @@ from ..interface.interface import Value
 from ..metrics.metric import Metric
 from ..report.tables import text_table
 from .rows import Row
+from .signals import RUN, TIME, Recorded, dimension
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
 """The statistics of a metric, besides how many runs have one."""
@@ -76,6 +78,8 @@ class Table:
     """The metrics whose columns there are."""
     labels: Any = field(default=None, compare=False, repr=False)
     """The index of the pandas DataFrame whose rows these are; None of other rows."""
+    signals: Recorded | None = field(default=None, compare=False, repr=False)
+    """Whole signals of the runs, which to_xarray() has, where they were asked for."""
 
     def __len__(self) -> int:
         return len(self.columns["index"])
@@ -145,6 +149,32 @@ class Table:
         numbered: pd.DataFrame = frame.set_index("index")
         return numbered if self.labels is None else numbered.set_axis(self.labels)
 
+    def to_xarray(self) -> xr.Dataset:
+        """The table and the signals of the runs as a Dataset over run, time and finger.
+
+        What varied are coordinates of the runs. Entries of a metric, and elements of an array of
+        signals, are along a dimension; what there is none of is NaN. With `units` and `long_name`.
+        InputError without xarray.
+        """
+        xarray = extra_module("xarray", "it makes the data set", "xarray")
+        data: xr.Dataset = xarray.Dataset(coords={RUN: self.columns["index"]})
+        beside = {*self.metrics, "index", "error"}
+        for name in (n for n in self.columns if n not in beside):
+            data.coords[name] = RUN, _numbers_or_texts(self.columns[name]), self._about(name)
+        for m in self.measured:
+            _add_metric(data, self, m)
+        for name in (n for n in self.metrics if n.partition("[")[0] not in data):
+            data[name] = RUN, self[name], self._about(name)
+        data["error"] = RUN, [error or "" for error in self.columns["error"]]
+        if self.signals:
+            _add_signals(data, self.signals)
+        return data
+
+    def _about(self, name: str) -> dict[str, str]:
+        """The unit of a column, if it has one, as xarray has it."""
+        unit = self.units.get(name)
+        return {"units": unit} if unit else {}
+
     def write(self, path: str | Path) -> None:
         """Write CSV, or Parquet by its suffix, in one piece; equal tables make equal bytes.
 
@@ -175,21 +205,62 @@ class Table:
             parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields)), file)
 
 
+def _numbers_or_texts(column: Sequence[Any]) -> npt.NDArray[Any]:
+    """A column as numbers, NaN where there is none, or as texts, "" where there is none."""
+    if any(isinstance(value, str) for value in column):
+        return np.array(["" if value is None else str(value) for value in column])
+    if all(isinstance(value, int) for value in column):  # and Booleans
+        return np.array(column)
+    return np.array([np.nan if value is None else float(value) for value in column])
+
+
+def _add_metric(data: xr.Dataset, table: Table, metric: Metric) -> None:
+    """Add what there is of a metric, of several entries along a dimension."""
+    there = [name for name in metric.columns if name in table.columns]
+    if not there:
+        return
+    about = {"long_name": metric.title, **({"units": metric.unit} if metric.unit else {})}
+    if metric.entries:
+        along, places = dimension(metric)
+        nothing = np.full(len(table), np.nan)
+        columns = [table[name] if name in there else nothing for name in metric.columns]
+        data.coords[along] = along, list(places)
+        data[metric.name] = (RUN, along), np.stack(columns, axis=1), about
+    else:
+        data[metric.name] = RUN, table[metric.name], about
+
+
+def _add_signals(data: xr.Dataset, recorded: Recorded) -> None:
+    """Add the signals of all runs, which are read here."""
+    data.coords[TIME] = TIME, recorded.time, {"units": "s", "long_name": TIME}
+    for name, array in recorded.store.arrays.items():
+        if array.dimension and array.dimension not in data.coords:
+            data.coords[array.dimension] = [*range(1, len(array.signals) + 1)]
+        about = {"units": array.unit, "long_name": array.description}
+        whole = recorded.store.column(name, len(data[RUN]))
+        data[name] = array.dimensions, whole, {key: text for key, text in about.items() if text}
+
+
 def made(
     rows: Sequence[Row],
     outcomes: Sequence[Outcome],
     units: Mapping[str, str | None],
     metrics: Sequence[Metric],
     labels: Any = None,
+    seeds: Sequence[Mapping[str, int]] = (),
+    signals: Recorded | None = None,
 ) -> Table:
     """The table of rows and what came of each; `units` are those of the places that vary.
 
     `labels` are as those of a Table; where they are whole numbers or texts, `index` has them.
+    `seeds` of the runs are columns, and vary nothing.
     """
     varied = tuple(dict.fromkeys(place for row in rows for place in row))
     measured = tuple(dict.fromkeys(name for o in outcomes for name in o.metrics))
     columns: dict[str, Sequence[Any]] = {"index": _index(labels, len(rows))}
     columns |= {place: [row.get(place) for row in rows] for place in varied}
+    seeded = dict.fromkeys(place for of_run in seeds for place in of_run)
+    columns |= {p: [{**r, **s}.get(p) for r, s in zip(rows, seeds, strict=True)] for p in seeded}
     columns |= {name: [o.metrics.get(name) for o in outcomes] for name in measured}
     if any(o.ended_at is not None for o in outcomes):
         columns[ENDED_AT] = [o.ended_at for o in outcomes]
@@ -197,7 +268,7 @@ def made(
     columns["error"] = [o.error for o in outcomes]
     of_metrics = {m.name: m.unit for m in metrics}
     found = {name: of_metrics.get(name.partition("[")[0]) for name in measured}
-    return Table(columns, varied, measured, {**units, **found}, tuple(metrics), labels)
+    return Table(columns, varied, measured, {**units, **found}, tuple(metrics), labels, signals)
 
 
 def _index(labels: Any, count: int) -> Sequence[Any]:

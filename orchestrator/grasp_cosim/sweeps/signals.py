@@ -1,0 +1,308 @@
+"""Whole signals of all runs of a sweep, on disk: a store of Zarr, which xarray opens.
+
+A run writes its own as it ends, a file for each signal, in one piece; what is not there is NaN. So
+nothing goes through memory or between processes, and a sweep that goes on has what was written. It
+is format 3 of Zarr (zarr-specs.readthedocs.io) without compression, which takes no package.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.errors import InputError
+from ..base.files import make_folder, write_json
+from ..base.one_piece import in_one_piece
+from ..base.scratch import ScratchFolder
+from ..exchange.listener import Experiment
+from ..metrics.metric import Metric
+from ..recording.memory import writing
+from ..recording.result import Result
+from ..system.description import System
+from ..system.settings import settings
+from .rows import STOP, TIMES, Row
+
+HEAD = "zarr.json"
+"""The file of what a group or an array is."""
+
+OURS = "signals of the sweep"
+"""The attribute of our stores, a hash of what decides the runs."""
+
+RUN, TIME = "run", "time"
+
+_ZARR = {"zarr_format": 3}
+
+_ELEMENT = re.compile(r"(.+)\[(\d+)\]")
+
+
+@dataclass(frozen=True)
+class Array:
+    """The signals that are the elements of an array, or a single one, and how it is shown."""
+
+    signals: tuple[str, ...]
+    dimension: str | None
+    unit: str | None
+    description: str
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Their names, in order."""
+        return (RUN, TIME, self.dimension) if self.dimension else (RUN, TIME)
+
+    @property
+    def size(self) -> tuple[int, ...]:
+        """How many elements there are, along the dimension of these."""
+        return (len(self.signals),) if self.dimension else ()
+
+
+@dataclass(frozen=True)
+class Store:
+    """What is kept of each run, and where: arrays by name, at each n-th communication point."""
+
+    folder: Path
+    arrays: Mapping[str, Array]
+    rows: int
+    every: int = 1
+
+    def blocks(self, result: Result) -> dict[str, bytes]:
+        """What is written of a run, by array: its rows, then NaN where it ended early."""
+        found = {}
+        for name, array in self.arrays.items():
+            block = np.full((self.rows, len(array.signals)), np.nan, "<f8")
+            for i, signal in enumerate(array.signals):
+                column = result[signal][:: self.every]
+                block[: len(column), i] = column
+            found[name] = block.tobytes()
+        return found
+
+    def write(self, run: int, blocks: Mapping[str, bytes]) -> None:
+        """Write what there is of a run; OSError where that fails."""
+        for name, block in blocks.items():
+            with in_one_piece(self._file(name, run)) as part:
+                part.write_bytes(block)
+
+    def has(self, run: int) -> bool:
+        """True if all of a run is there."""
+        return all(self._file(name, run).is_file() for name in self.arrays)
+
+    def taken(self, run: int) -> dict[str, bytes]:
+        """What there is of a run, which is removed."""
+        files = {name: self._file(name, run) for name in self.arrays}
+        blocks = {name: file.read_bytes() for name, file in files.items() if file.is_file()}
+        for name in blocks:
+            files[name].unlink()
+        return blocks
+
+    def column(self, name: str, runs: int) -> npt.NDArray[np.float64]:
+        """All runs of an array, of the shape (runs, rows) or with its elements behind."""
+        array = self.arrays[name]
+        whole = np.full((runs, self.rows, *array.size), np.nan)
+        for run in range(runs):
+            if (file := self._file(name, run)).is_file():
+                whole[run] = np.fromfile(file, "<f8").reshape(whole.shape[1:])
+        return whole
+
+    def _file(self, name: str, run: int) -> Path:
+        places = "".join(".0" for _ in self.arrays[name].dimensions[1:])
+        return self.folder / name / f"{run}{places}"
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The signals of the runs of a table; the folder of those without `out` goes with them."""
+
+    store: Store
+    time: npt.NDArray[np.float64]
+    scratch: ScratchFolder | None = None
+
+
+def recording(system: System, signals: Sequence[str] | str) -> tuple[System, list[str]]:
+    """The system that records these signals, too, and their names; InputError as of with_record().
+
+    Also where one is a String.
+    """
+    wanted = system.with_record(*([signals] if isinstance(signals, str) else signals))
+    for port, variable in wanted.recorded.items():
+        if variable.kind == "String":
+            raise InputError(f"signals: {port} is a String; must be numbers or Booleans")
+    names = sorted(wanted.kept, key=_in_order)
+    if wanted.kept <= system.kept:
+        return system, names
+    return system.with_record(*sorted(system.kept | wanted.kept, key=_in_order)), names
+
+
+def times(system: System, rows: Iterable[Row], every: int) -> npt.NDArray[np.float64]:
+    """Each n-th communication point of the longest run in s; InputError where steps differ."""
+    for place in (place for row in rows for place in row if place in TIMES and place != STOP):
+        raise InputError(f"signals: the rows vary {place}; must be one for all, as the time is")
+    ends = {row.get(STOP) for row in rows}
+    longest = max(_until(system, end).total_steps for end in ends)
+    steps = np.arange(0, longest + 1, every)
+    return Experiment.of(settings(system)).times(steps)
+
+
+def _until(system: System, stop: Any) -> System:
+    return system if stop is None else system.with_settings({STOP: stop})
+
+
+def arrays(system: System, names: Sequence[str], metrics: Iterable[Metric]) -> dict[str, Array]:
+    """The arrays of which signals are all elements, plant.gap[1] and so on, and the other signals.
+
+    The elements are along the dimension of metrics of as many, like finger.
+    """
+    words = {len(m.entries): dimension(m)[0] for m in metrics if m.entries}
+    known = {str(port): variable for port, variable in system.observed.items()}
+    found = {}
+    for name, signals in _grouped(names).items():
+        variable = known.get(signals[0])
+        several = len(signals)
+        found[name.replace("/", "_")] = Array(
+            signals,
+            words.get(several, f"element_{several}") if signals != (name,) else None,
+            variable.unit if variable else None,
+            (variable.description if variable else None) or "",
+        )
+    return found
+
+
+def dimension(metric: Metric) -> tuple[str, Sequence[Any]]:
+    """The name of the dimension of a metric of several entries, and what is along it.
+
+    Of "finger 1", "finger 2" these are finger, and 1, 2.
+    """
+    word = metric.entries[0].rpartition(" ")[0]
+    numbers = range(1, len(metric.entries) + 1)
+    if word and metric.entries == tuple(f"{word} {i}" for i in numbers):
+        return word.replace(" ", "_"), list(numbers)
+    return f"{metric.name}_entry", metric.entries
+
+
+def _grouped(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Signals by the array that they are all elements of, else by their own names."""
+    members: dict[str, list[str]] = {}
+    for name in names:
+        element = _ELEMENT.fullmatch(name)
+        members.setdefault(element[1] if element else name, []).append(name)
+    found: dict[str, tuple[str, ...]] = {}
+    for array, several in members.items():
+        whole = [f"{array}[{i}]" for i in range(1, len(several) + 1)]
+        if len(several) > 1 and several == whole:
+            found[array] = tuple(several)
+        else:
+            found |= {name: (name,) for name in several}
+    return found
+
+
+def _in_order(name: str) -> list[Any]:
+    """A key by which x[2] comes before x[10]."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+
+
+# ------------------------------------------------------------------------- what Zarr says of it
+
+
+def begin(
+    recorded: Recorded, rows: Sequence[Row], identity: Mapping[str, str], goes_on: bool
+) -> None:
+    """Make the store of the runs of these rows, unless it is there and the sweep `goes_on`.
+
+    Columns of numbers are coordinates of the runs. InputError where the folder is of something
+    else, or the store cannot be made.
+    """
+    store, key = recorded.store, _joined(identity)
+    if store.folder.exists():
+        if _key(store.folder) == key and goes_on:
+            return
+        shutil.rmtree(store.folder)
+    with writing(store.folder, InputError):
+        beside = {RUN: [*range(len(rows))], **_numbers(rows)}
+        heads = _written(recorded, beside)
+        others = " ".join(name for name in beside if name != RUN)
+        head = {
+            **_ZARR,
+            "node_type": "group",
+            "attributes": {OURS: key, **({"coordinates": others} if others else {})},
+            "consolidated_metadata": {
+                "kind": "inline",
+                "must_understand": False,
+                "metadata": heads,
+            },
+        }
+        write_json(store.folder / HEAD, head)
+
+
+def _key(folder: Path) -> str:
+    """The hash of what the runs of a store are of; InputError where it is none of ours."""
+    try:
+        return str(json.loads((folder / HEAD).read_text("utf-8"))["attributes"][OURS])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{folder}: is there, and has no signals of a sweep; remove it, or name another out"
+        ) from error
+
+
+def _joined(identity: Mapping[str, str]) -> str:
+    return sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+
+
+def _numbers(rows: Sequence[Row]) -> dict[str, list[float]]:
+    """The columns of rows that are numbers, NaN where a row leaves its place."""
+    places = dict.fromkeys(place for row in rows for place in row)
+    columns = {place: [row.get(place, np.nan) for row in rows] for place in places}
+    return {p: list(map(float, c)) for p, c in columns.items() if not any(map(_is_text, c))}
+
+
+def _is_text(value: object) -> bool:
+    return not isinstance(value, int | float)
+
+
+def _written(recorded: Recorded, beside: Mapping[str, Sequence[float]]) -> dict[str, Any]:
+    """Write what there is of the arrays before any run; their heads by name."""
+    store, found = recorded.store, {}
+    for name, array in store.arrays.items():
+        shape = len(beside[RUN]), store.rows, *array.size
+        about = {"units": array.unit, "long_name": array.description}
+        found[name] = _head(shape, (1, *shape[1:]), array.dimensions, about)
+    along = {a.dimension: [*range(1, len(a.signals) + 1)] for a in store.arrays.values() if a.size}
+    for column, name, values in (
+        (TIME, TIME, recorded.time),
+        *((name, name, values) for name, values in along.items() if name),
+        *((name, RUN, values) for name, values in beside.items()),
+    ):
+        whole = np.asarray(values, "<f8")
+        found[column] = _head(whole.shape, whole.shape, (name,), {})
+        make_folder(store.folder / column)
+        (store.folder / column / "0").write_bytes(whole.tobytes())
+    for name, head in found.items():
+        write_json(store.folder / name / HEAD, head)
+    return found
+
+
+def _head(
+    shape: Sequence[int],
+    chunk: Sequence[int],
+    dimensions: Sequence[str],
+    about: Mapping[str, Any],
+) -> dict[str, Any]:
+    """What the file HEAD of an array says."""
+    return {
+        **_ZARR,
+        "node_type": "array",
+        "shape": list(shape),
+        "data_type": "float64",
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": list(chunk)}},
+        "chunk_key_encoding": {"name": "v2", "configuration": {"separator": "."}},
+        "fill_value": "NaN",
+        "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
+        "attributes": {key: text for key, text in about.items() if text},
+        "dimension_names": list(dimensions),
+    }
