@@ -4,10 +4,12 @@ import gc
 import io
 import sys
 import threading
+from types import SimpleNamespace
 
 import pytest
 from grasp_cosim.base import progress
 from grasp_cosim.base.progress import Progress, write
+from tqdm import notebook
 
 
 class Terminal(io.StringIO):
@@ -95,3 +97,41 @@ def test_one_that_an_interruption_kept_from_beginning_ends_without_a_word(monkey
     del bar
     gc.collect()
     assert told == []
+
+
+@pytest.fixture
+def kernel(monkeypatch):
+    """A kernel of Jupyter without ipywidgets."""
+    shell = SimpleNamespace(kernel=object())
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    monkeypatch.setattr(progress, "find_spec", lambda _: None)
+
+
+@pytest.mark.usefixtures("kernel")
+def test_a_notebook_without_widgets_has_a_bar_that_moves(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with Progress("map", 2, delay=0.0, ticking=False) as bar:
+        bar.update()
+        bar.refresh()
+        write("a line")
+    drawn = sys.stderr.getvalue()
+    assert "\rmap: 1 of 2 runs ############ " in drawn
+    assert "\ra line\n\rmap: 1 of 2 runs" in drawn
+
+
+@pytest.mark.usefixtures("kernel")
+def test_a_notebook_with_widgets_has_one(monkeypatch):
+    monkeypatch.setattr(progress, "find_spec", lambda name: name == "ipywidgets")
+    children = [
+        SimpleNamespace(value=None, style=SimpleNamespace(), bar_style="") for _ in range(3)
+    ]
+    box = SimpleNamespace(children=children, close=list)
+    shown = []
+    monkeypatch.setattr(notebook.tqdm_notebook, "status_printer", lambda *_: box)
+    monkeypatch.setattr(notebook, "display", shown.append, raising=False)
+    with Progress("map", 2, delay=0.0, ticking=False) as bar:
+        bar.update()
+        bar.refresh()
+        left, middle, _ = (child.value for child in children)
+    assert shown == [box]
+    assert (left.split(), middle) == (["map:", "1", "of", "2", "runs"], 1)

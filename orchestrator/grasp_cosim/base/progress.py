@@ -1,6 +1,7 @@
 """How far something is, on standard error: tqdm's bar; a line every 10 s where is no terminal.
 
-What is over sooner than can be read shows nothing.
+In a notebook it is tqdm's widget, or its bar as text where there is no ipywidgets. What is over
+sooner than can be read shows nothing.
 """
 
 import io
@@ -10,6 +11,9 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
+from importlib.util import find_spec
+from typing import Any
 
 from tqdm import tqdm
 
@@ -32,6 +36,12 @@ class _Lines(io.StringIO):
         return len(text)
 
 
+def in_notebook() -> bool:
+    """True in a kernel of Jupyter, whose output is no terminal, and yet shows what moves."""
+    shell: Any = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel")
+
+
 class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
     """A context manager; update() says how much more is done, of `total` or of nobody knows what.
 
@@ -40,6 +50,13 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
     """
 
     _begun = False
+    _bar = "{bar:24}"
+
+    def __new__(cls, *arguments: Any, **named: Any) -> "Progress":
+        """A widget in a notebook that can show one."""
+        shown = _widget() if in_notebook() and find_spec("ipywidgets") else cls
+        made: Progress = super().__new__(shown, *arguments, **named)
+        return made
 
     def __init__(
         self,
@@ -56,12 +73,12 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
 
         `ticking` shows that time goes by, from a thread, also where update() is not called.
         """
-        lines = not sys.stderr.isatty()
+        lines = not (sys.stderr.isatty() or in_notebook())
         every, delay = (EVERY, EVERY) if lines else (0.1, delay)
         form = "{n:.2f} of {total:.2f} s" if unit == "s" else "{n} of {total} {unit}s"
         counted = f": {form if total else '{n} {unit}s'}" if unit else ""
         left = ", about {remaining} left" if total else ""
-        bar = " {bar:24}" if total and not lines else ","
+        bar = f" {self._bar}" if total and not lines else ","
         self._over = threading.Event()
         super().__init__(
             desc=what,
@@ -105,9 +122,17 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
 Progress.set_lock(threading.RLock())  # tqdm's own is of multiprocessing, which may start a process
 
 
+@cache
+def _widget() -> type[Progress]:
+    """Progress as the widget that tqdm has for notebooks."""
+    from tqdm.notebook import tqdm_notebook  # only here: it looks for IPython
+
+    return type("Widget", (Progress, tqdm_notebook), {"_bar": "{bar}"})
+
+
 def write(line: str) -> None:
     """Write a line on standard error, now, above a bar that is there."""
-    if sys.stderr.isatty():
+    if sys.stderr.isatty() or in_notebook():
         Progress.write(line, file=sys.stderr)
     else:
         sys.stderr.write(line + "\n")
