@@ -23,6 +23,13 @@ with simulate.session(system) as session:
     reveal_type(session.text("plant.state"))  # str
     reveal_type(session.step())  # bool
     reveal_type(session.result())  # Result
+own = System(
+    components={"plant": "Plant.fmu", "push": lambda t, inputs: 1.0},
+    connections=["push.force -> plant.force", ("plant.gap", "push.gap")],
+    experiment={"step": 1e-3, "stop": 1.0},
+)
+reveal_type(own)  # System
+reveal_type(own.parameters["plant.mass"].unit)  # str | None
 table = sweep(system, {"plant.object_width": [0.05, 0.06]})
 reveal_type(table["plant.object_width"])  # ndarray
 reveal_type(compare(result, "other/").alike)  # bool

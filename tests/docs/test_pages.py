@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from grasp_cosim import System, cli, grasp_system, linearise, simulate
 from grasp_cosim.base.higher import groups
@@ -37,7 +38,7 @@ def blocks(page, kind):
     return re.findall(rf"```{kind}\n(.*?)```", PAGES[page], re.DOTALL)
 
 
-(METRIC,) = blocks("docs/guide.md", "python")
+METRIC, FROM_PYTHON = blocks("docs/guide.md", "python")
 MAP, SOBOL, NOISE = blocks("docs/studies.md", "python")
 
 
@@ -259,3 +260,24 @@ def test_the_map_has_all_rooms():
     rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
     assert sorted(rows) == ROOMS
     assert groups() == ("grasp", "hand", "tandem")
+
+
+def test_the_system_from_python_is_that_of_its_page():
+    """Up to the object each finger obeys v' = force / mass, its force held from point to point."""
+    names = {}
+    exec(FROM_PYTHON, names)
+    result, mass, step = names["result"], 0.5, 1e-3
+    gain, share, speed = 20.0, step / 0.05, 0.05
+    # velocity, integral and force of finger 2 at one point from those at the point before, and 1
+    after = np.zeros((4, 4))
+    after[0] = [1.0, 0.0, step / mass, 0.0]
+    after[1] = [0.0, 1.0, 0.0, share * speed] - share * after[0]
+    after[2] = gain * ([0.0, 0.0, 0.0, speed] - after[0] + after[1])
+    after[3, 3] = 1.0
+    start = np.array([0.0, 0.0, gain * speed, 1.0])
+    for k in (1, 10, 200, 800):
+        velocity, _, force, _ = np.linalg.matrix_power(after, k) @ start
+        assert result["plant.velocity[2]"][k] == pytest.approx(velocity, rel=1e-9)
+        assert result["controller.force[2]"][k] == pytest.approx(force, rel=1e-9, abs=1e-12)
+    assert result["plant.velocity[1]"][800] == pytest.approx(-speed, rel=0.01)
+    assert result.settings["changed"] == {"controller.gain": 20.0}

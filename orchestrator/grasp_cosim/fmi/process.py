@@ -43,6 +43,7 @@ from ..system.parts import Component, Logging, Solver
 from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
 from .instance import CLOCK, EARLY, OK, WARNING, Inputs, Instance, dtype
 from .messages import Message, Messages
+from .python_code import CodeInstance
 
 LOGGER = logging.getLogger(__name__)
 """Gets what is logged in the process of a component, but for the messages of its FMU."""
@@ -81,6 +82,8 @@ def load(component: Component) -> Instance:
     InputError where the FMU does not load. The caller closes it.
     """
     name, interface = component.name, component.loaded
+    if component.code:
+        return CodeInstance(name, component.code)
     if component.isolation == "process":
         return ProcessInstance(name, interface, component.solver, component.logging)
     if component.native and interface.version == "2.0":

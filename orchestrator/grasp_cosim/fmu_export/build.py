@@ -128,6 +128,21 @@ def build_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
         return build_model(model, out, plan)
 
 
+def kept_block(file: Path) -> Path:
+    """The FMU of the block in a file, from the cache where it was built of the same file.
+
+    ValueError, one line, where the file is no block, see own_model(); OSError where it is none.
+    """
+    name = f"fmus/{cache.key((sources_key(), 'block', file.name, file.read_bytes()))}"
+
+    def make(folder: Path) -> None:
+        build_block(file, folder)
+
+    with _building:
+        folder = cache.kept(name) or _until_the_end.get(name) or _made(make, name)
+    return next(folder.glob("*.fmu"))
+
+
 def build_chosen(
     block: Path | None, out: Path, plan: Plan | None = None, fingers: int | None = None
 ) -> list[Built]:

@@ -45,6 +45,11 @@ def write_ssp(system: System, path: Path) -> Written:
     """Write the archive; InputError where path is not that of an .ssp file."""
     if path.suffix.lower() != ".ssp" or path.is_dir():
         raise InputError(f"{path}: must be a file named like system.ssp")
+    if code := next((c for c in system.components if c.code), None):
+        raise InputError(
+            f"{path}: {code.name} is Python code, {code.fmu}; must be an FMU to be in an archive, "
+            "like that of a block: grasp-cosim build NAME.py"
+        )
     entries: dict[str, bytes] = {}
     sources = {c.name: _fmu_entry(c.fmu, entries) for c in system.components}
     bindings = {c.name: _values_entry(c, entries) for c in system.components if c.values}

@@ -121,7 +121,7 @@ def identity_of(task: Task, rows: Sequence[Row], metrics: Sequence[Metric]) -> d
     if signals := task.signals:
         decisive["the signals"] = [signals.every, {n: a.signals for n, a in signals.arrays.items()}]
     decisive |= {f"the system's {key}": value for key, value in settings(task.system).items()}
-    fmus = {f"the FMU of {c.name}": c.fmu.read_bytes() for c in task.system.components}
+    fmus = {f"the FMU of {c.name}": c.content for c in task.system.components}
     return {
         **{name: _hash_of(as_line(v)) for name, v in decisive.items()},
         **{name: _hash_of(content) for name, content in fmus.items()},

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from ..base.checks import install_command
 from ..base.errors import InputError, SimulationError
 from ..base.parallel import deliver
 from ..base.pickles import as_bytes
@@ -73,8 +74,14 @@ class Packed(NamedTuple):
 def packed(task: Task, with_fmus: bool) -> Packed:
     """The task as bytes, with the contents of its FMUs for another machine or without."""
     components = task.system.components if with_fmus else ()
-    fmus = tuple((c.native or c.fmu).read_bytes() for c in components)
-    content = as_bytes(task)
+    fmus = tuple(c.native.read_bytes() if c.native else c.content for c in components)
+    try:
+        content = as_bytes(task)
+    except Exception as error:  # pickle has one of its own for each reason
+        raise InputError(
+            f"{task.system.name}: cannot go to another process: {error}; must have Python code of "
+            f"a module, or cloudpickle installed: {install_command('cloudpickle')}"
+        ) from error
     return Packed(hashlib.sha256(b"".join((content, *fmus))).hexdigest(), content, fmus)
 
 
@@ -108,6 +115,9 @@ def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
     folder = ScratchFolder()
     components = []
     for i, (component, content) in enumerate(zip(task.system.components, shared.fmus, strict=True)):
+        if component.code:
+            components.append(component)
+            continue
         path = Path(folder.name, str(i), component.fmu.name)
         path.parent.mkdir()
         path.write_bytes(content)

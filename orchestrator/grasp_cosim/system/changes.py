@@ -68,7 +68,8 @@ def replaced(
     FMU's name that the new one has, too; a unit where the FMUs declare the same one, or the new FMU
     none.
     """
-    ours, theirs = was.sized(describe(was.fmu)).renamed(was.rename), was.sized(describe(fmu))
+    before = was.code.interface if was.code else describe(was.fmu)
+    ours, theirs = was.sized(before).renamed(was.rename), was.sized(describe(fmu))
     names = {
         name: own
         for name, own in was.rename.items()
@@ -87,6 +88,7 @@ def replaced(
         was,
         fmu=fmu,
         native=None,
+        code=None,
         rename=names,
         units={**kept, **units},
         solver=was.solver if alike else None,

@@ -1,9 +1,9 @@
 """The system description: components, connections and the experiment, checked once."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from ..base.checks import known
 from ..base.errors import InputError, nearest
@@ -11,9 +11,11 @@ from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
 from .connectors import check_connectors, driven_by_connectors, given_by_connectors
+from .from_python import from_sections
 from .names import in_main_names
 from .native import natives
-from .parts import Component
+from .parameters import Parameters, parameters_of
+from .parts import Component, Connection
 from .record import Record
 from .replay import replayed
 from .scenario import check_scenario
@@ -38,11 +40,64 @@ FILES = (".toml", ARCHIVE)
 """The suffixes of files that have a system."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, init=False, repr=False)
 class System(Structure):
     """A checked system: every name exists, every input has one source or keeps a value."""
 
-    def __post_init__(self) -> None:
+    @overload
+    def __init__(
+        self,
+        name: str = ...,
+        *,
+        components: Mapping[str, Any],
+        connections: Iterable[str | tuple[str, str] | Mapping[str, Any] | Connection] = ...,
+        experiment: Mapping[str, Any],
+        **sections: Any,
+    ) -> None: ...
+    @overload
+    def __init__(
+        self,
+        name: str,
+        components: tuple[Component, ...],
+        connections: tuple[Connection, ...],
+        *positional: Any,
+        **attributes: Any,
+    ) -> None: ...
+    def __init__(
+        self,
+        name: str = "system",
+        components: Any = (),
+        connections: Any = (),
+        *positional: Any,
+        **attributes: Any,
+    ) -> None:
+        """Make a system of `components` by name, `connections` and the `experiment`.
+
+        A component is the path of an FMU, the file of a block of ours, NAME.py, which is built, a
+        Component, or for trials Python code: a function (t, inputs), or a class with step(t,
+        inputs), see system.python_code. Or it is a mapping with that as "fmu" and the other entries
+        of a component in a file, such as "values" and "step". Components step in their order. A
+        connection is "a.y -> b.u" or ("a.y", "b.u"). The experiment has "step" and "stop" in s.
+        What else a system file has are arguments of the same names, like roles and metrics.
+        InputError where something is wrong.
+
+            System(
+                components={"plant": "Plant.fmu", "controller": PI},
+                connections=["plant.gap -> controller.gap", "controller.force -> plant.force"],
+                experiment={"step": 1e-3, "stop": 2.0},
+            )
+
+        Readers of files give the attributes of a Structure, the components as a tuple.
+        """
+        if isinstance(components, Mapping):
+            attributes = from_sections(name, components, connections, attributes)
+            super().__init__(**attributes)
+        else:
+            super().__init__(name, components, connections, *positional, **attributes)
+        self._check()
+
+    def _check(self) -> None:
+        """Complete it, and check all that it has."""
         check_steps(self)
         if self.input and self.input.recorded is not None:
             stimuli, note = replayed(self, self.input)
@@ -101,6 +156,11 @@ class System(Structure):
         times = {key: time for key, time in given.items() if time is not None}
         system = read_system(path, times, fmus, _stimuli(input), variant)
         return system.with_experiment(step, stop, start=start)
+
+    @property
+    def parameters(self) -> Parameters:
+        """The parameters that can be set: value, unit, range and description by name."""
+        return parameters_of(self)
 
     def start(self, key: str) -> float:
         """The number that 'component.variable' starts with, given by the system or by its FMU."""

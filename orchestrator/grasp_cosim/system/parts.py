@@ -18,6 +18,7 @@ from ..interface.expansion import expanded
 from ..interface.interface import Given, Interface, Nested, Value
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
+from .python_code import PythonCode
 from .times import LONGEST, NANOSECONDS, Time, in_seconds
 
 Isolation = Literal["none", "process"]
@@ -85,7 +86,8 @@ class Component:
     goes by the system's. step_ns is its own communication step, None for the system's. units are of
     variables that the FMU declares without one, or wrongly. native is the FMU that runs in the
     place of fmu, its twin with the same bits. With a solver the equations of an FMU that is for
-    model exchange, too, are integrated here, though it may have a co-simulation of its own.
+    model exchange, too, are integrated here, though it may have a co-simulation of its own. With
+    code there is no FMU: fmu is what that is called.
     """
 
     name: str
@@ -98,6 +100,7 @@ class Component:
     native: Path | None = None
     solver: Solver | None = None
     logging: Logging = False
+    code: PythonCode | None = None
 
     @property
     def integrated(self) -> Solver | None:
@@ -147,7 +150,9 @@ class Component:
         return self._now()
 
     def _now(self) -> list[Interface]:
-        """What the files of its FMUs declare now."""
+        """What the files of its FMUs declare now, or its code does."""
+        if self.code:
+            return [self.code.interface]
         return [read_interface(fmu) for fmu in (self.fmu, self.native) if fmu]
 
     def __hash__(self) -> int:
@@ -156,6 +161,11 @@ class Component:
     def __getstate__(self) -> dict[str, Any]:
         """What it was made of alone: other processes read the FMUs themselves."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @property
+    def content(self) -> bytes:
+        """What its results depend on: the bytes of its FMU, or its code."""
+        return self.code.content if self.code else self.fmu.read_bytes()
 
     @property
     def needs_native(self) -> bool:

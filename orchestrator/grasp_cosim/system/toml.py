@@ -87,12 +87,7 @@ def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[st
     """
     file, place = toml_table(path, "system file"), f"{path.name}: ".__add__
     check_filled_in(path)
-    check_keys(path.name, file, (*SECTIONS, RECORD))
-    for section in (*PLACES, "presets", RECORD):
-        table = file.get(section, None if section in ("experiment", "components") else {})
-        file[section] = as_table(place(f"[{section}]"), table)
-        if PLACES.get(section):
-            check_keys(place(f"[{section}]"), file[section], PLACES[section])
+    checked(file, path.name, place)
     components = []
     for name, entry in file["components"].items():
         own = place(f"components.{name}")
@@ -100,29 +95,51 @@ def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[st
         fmu = text(f"{own}.fmu", entry.get("fmu"), "the path of an FMU, as a string")
         new = Component(name, (fmus or path.parent) / fmu, {})
         components.append(with_entries(new, entry, place)[0])
-    for name, values in file["presets"].items():
-        own = place(f"presets.{name}")
+    return described(file, path.name, components, path.parent, stimuli)
+
+
+def checked(file: dict[str, Any], name: str, place: Place) -> None:
+    """Check which tables there are in a file of that name, and fill in those that are left out."""
+    check_keys(name, file, (*SECTIONS, RECORD))
+    for section in (*PLACES, "presets", RECORD):
+        table = file.get(section, None if section in ("experiment", "components") else {})
+        file[section] = as_table(place(f"[{section}]"), table)
+        if PLACES.get(section):
+            check_keys(place(f"[{section}]"), file[section], PLACES[section])
+
+
+def described(
+    file: dict[str, Any],
+    name: str,
+    components: Sequence[Component],
+    folder: Path = Path(),
+    stimuli: Stimuli | None = None,
+) -> dict[str, Any]:
+    """The attributes of a system of that name that the tables of a file in a folder describe."""
+    place = f"{name}: ".__add__
+    for preset, values in file["presets"].items():
+        own = place(f"presets.{preset}")
         check_values(own, as_table(own, values))
-    for name in _list(place, file, "metrics", '["grasp"]'):
-        text(place("metrics"), name, "the name of a group of metrics")
+    for group in _list(place, file, "metrics", '["grasp"]'):
+        text(place("metrics"), group, "the name of a group of metrics")
     links = _list(place, file, "connections", "['component.output -> component.input']")
     connections = by_element(
-        path.name,
+        name,
         components,
-        [_connection(place(f"connections[{i}]"), link) for i, link in enumerate(links)],
+        [read_connection(place(f"connections[{i}]"), link) for i, link in enumerate(links)],
     )
     if stimuli:
         file["input"] = {}
     file["experiment"] = {"step": None, "stop": None, "scheme": "sequential"} | file["experiment"]
-    found = sections(None, file, place, path.parent)
+    found = sections(None, file, place, folder)
     return {
         **found,
-        "name": path.name,
+        "name": name,
         "components": tuple(components),
         "connections": connections,
-        "events": read_events(path.name, file.get("events", [])),
-        "faults": read_faults(path.name, file.get("faults", []), connections),
-        "limits": read_limits(path.name, file.get("limits", [])),
+        "events": read_events(name, file.get("events", [])),
+        "faults": read_faults(name, file.get("faults", []), connections),
+        "limits": read_limits(name, file.get("limits", [])),
         "presets": file["presets"],
         "metrics": tuple(file.get("metrics", ())),
         "input": stimuli or found["input"],
@@ -261,7 +278,8 @@ def to_do(text: str) -> dict[int, str]:
     return {number: line.strip(" \t\r,") for number, line in lines if TODO.match(line)}
 
 
-def _connection(place: str, entry: Any) -> Connection:
+def read_connection(place: str, entry: Any) -> Connection:
+    """The connection of an entry of a file."""
     if not isinstance(entry, dict):
         parts = [part.strip() for part in entry.split("->")] if isinstance(entry, str) else []
         if len(parts) != 2:

@@ -77,6 +77,11 @@ def check_components(system: Structure) -> None:
     first: dict[Path, str] = {}
     for component in system.components:
         interface, fmu, name = component.interface, component.loaded, component.name
+        if component.code and (component.isolation != "none" or component.rename):
+            raise InputError(
+                f"{system.name}: {name}: is Python code of this process; must be without isolation "
+                "and rename"
+            )
         once = interface.capability("canBeInstantiatedOnlyOncePerProcess") is True
         if once and component.isolation == "none":
             other = first.setdefault(interface.path, name)

@@ -1,0 +1,129 @@
+"""A system from Python: what a system file has, with Python objects in the place of texts.
+
+Its sections are those of a file, docs/system_files.md, under the same names. A component is more
+than the path of an FMU: see component_from().
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..base.checks import check_keys
+from ..base.errors import InputError
+from .parts import Component, Connection, Port
+from .python_code import End, PythonCode, is_code, with_interface
+from .structure import unit_of
+from .toml import ENTRIES, checked, described, read_connection, with_entries
+
+Place = Callable[[str], str]
+
+KINDS = (
+    "the path of an FMU, the file of a block, NAME.py, a Component, or Python code with "
+    "step(t, inputs)"
+)
+
+
+def from_sections(
+    name: str, components: Mapping[str, Any], connections: Iterable[Any], sections: dict[str, Any]
+) -> dict[str, Any]:
+    """The attributes of a system of that name; InputError where something is wrong.
+
+    `components` are by name what component_from() takes, or mappings with that as "fmu" and the
+    other entries of a component in a file; connections as _link() takes them; sections as a file
+    has them.
+    """
+    place = f"{name}: ".__add__
+    links = [_link(entry) for entry in connections]
+    file = {**sections, "components": {**components}, "connections": links}
+    checked(file, name, place)
+    read = [read_connection(place(f"connections[{i}]"), link) for i, link in enumerate(links)]
+    entries = {n: e if isinstance(e, Mapping) else {"fmu": e} for n, e in components.items()}
+    made: dict[str, Component] = {}
+    for with_code in (False, True):  # which is as its other ends are
+        for n, entry in entries.items():
+            if is_code(entry.get("fmu")) is with_code:
+                own = place(f"components.{n}")
+                check_keys(own, entry, ENTRIES)
+                new = component_from(own, n, entry.get("fmu"), made, read)
+                more = {key: value for key, value in entry.items() if key != "fmu"}
+                made[n] = with_entries(new, more, place)[0]
+    return described(file, name, [made[n] for n in entries])
+
+
+def component_from(
+    place: str,
+    name: str,
+    entry: Any,
+    others: Mapping[str, Component],
+    connections: Iterable[Connection],
+) -> Component:
+    """The component of that name: a path is that of an FMU, or of the file of a block, NAME.py.
+
+    The FMU of a block is built and kept. A Component gets the name. Python code is as
+    python_code.py has it. InputError for anything else.
+    """
+    if isinstance(entry, Component):
+        return replace(entry, name=name)
+    if isinstance(entry, ModuleType) and entry.__file__:
+        entry = entry.__file__
+    if isinstance(entry, str | Path):
+        path = Path(entry)
+        return Component(name, _built(place, path) if path.suffix == ".py" else path, {})
+    if not is_code(entry):
+        raise InputError(f"{place} = {entry!r}: must be {KINDS}")
+    return _of_code(place, name, entry, others, [*connections])
+
+
+def _of_code(
+    place: str,
+    name: str,
+    code: Any,
+    others: Mapping[str, Component],
+    connections: Iterable[Connection],
+) -> Component:
+    """A component that is Python code; inputs without a connection keep their start values."""
+    connected: dict[str, dict[str, End]] = {"input": {}, "output": {}}
+    for c in connections:
+        ends = ("input", c.target, c.source), ("output", c.source, c.target)
+        for causality, own, other in ends:
+            if own.component == name:
+                known = connected[causality].get(own.variable, End())
+                connected[causality][own.variable] = known.or_as(_end(others, other))
+    made: PythonCode = with_interface(place, code, connected)
+    free = [v for v in made.interface.of("input") if v.name not in connected["input"]]
+    values = {v.name: x for v in free if (x := v.start_value) is not None}
+    return Component(name, made.interface.path, values, code=made)  # type: ignore[arg-type]
+
+
+def _end(others: Mapping[str, Component], port: Port) -> End:
+    """What is known of a variable of a component with an FMU; nothing where there is none."""
+    component = others.get(port.component)
+    variable = component.interface.by_name.get(port.variable) if component else None
+    if component is None or variable is None or not variable.is_number:
+        return End()
+    return End(variable.kind, unit_of(component.interface, variable))
+
+
+def _built(place: str, file: Path) -> Path:
+    """The FMU of the block in a file, which is kept for as long as the file stays as it is."""
+    from ..fmu_export.build import kept_block  # only here: few systems have such a component
+
+    try:
+        return kept_block(file)
+    except (ValueError, OSError) as error:
+        raise InputError(f"{place}: {error}") from error
+
+
+def _link(entry: Any) -> Any:
+    """A connection as a file has it, "a.y -> b.u" or a table; a pair of ports is one, too."""
+    if isinstance(entry, Connection):
+        scaled = {"factor": entry.factor, "offset": entry.offset}
+        given = {key: value for key, value in scaled.items() if value is not None}
+        return {"from": str(entry.source), "to": str(entry.target), **given}
+    if isinstance(entry, tuple | list) and len(entry) == 2:
+        return {"from": str(entry[0]), "to": str(entry[1])}
+    return entry

@@ -1,0 +1,165 @@
+"""A component that is Python code of this process, for trials: a function, or a class with step().
+
+    class PI:
+        inputs = {"gap": (0.1, "m")}        # a start value, a unit, or both
+        outputs = {"force": "N"}
+        parameters = {"gain": (40.0, "N/m")}
+
+        def step(self, t, inputs):
+            return {"force": self.gain * inputs["gap"]}
+
+step() is called once at each communication point of the component, that of the start included: `t`
+is its time in s, and inputs are the values there, by name. What it returns are the outputs from
+then on, by name; of a single one the value alone will do. A function (t, inputs) is the same
+without a state. What is not declared is as the connections have it: their variables, in the types
+and units of their other ends. A class is made anew for each run, and an object is copied;
+parameters are its attributes, which go before what is declared.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from ..base.errors import InputError
+from ..base.si_units import Unit, known_unit
+from ..interface.interface import Interface, Kind, Value, Variable
+
+CAUSALITIES = {"inputs": "input", "outputs": "output", "parameters": "parameter"}
+"""The causality of what a class declares under a name."""
+
+KINDS: Mapping[type, Kind] = {bool: "Boolean", int: "Integer", float: "Real"}
+
+DECLARED = "a start value, a unit, or both, as in (0.1, 'm')"
+
+
+class End(NamedTuple):
+    """What is known of a variable of such a component; None is what is not."""
+
+    kind: Kind | None = None
+    unit: Unit | None = None
+    start: Value | None = None
+
+    def or_as(self, other: End) -> End:
+        """The same, with what another knows where it does not."""
+        found = {key: value for key, value in self._asdict().items() if value is not None}
+        return other._replace(**found)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PythonCode:
+    """A function or a class with step(), or an object of one, and the interface it has."""
+
+    code: Any
+    interface: Interface
+
+    def new(self) -> Callable[[float, Mapping[str, Value]], Any]:
+        """The function that is called at each communication point, as at the start of a run."""
+        made = self.code() if isinstance(self.code, type) else deepcopy(self.code)
+        step: Callable[[float, Mapping[str, Value]], Any] = getattr(made, "step", made)
+        return step
+
+    @property
+    def content(self) -> bytes:
+        """What its results depend on: its source, and the attributes of an object."""
+        try:
+            source = inspect.getsource(type_of(self.code))
+        except (OSError, TypeError):  # typed into a console
+            source = type_of(self.code).__qualname__
+        attributes = "" if self.code is type_of(self.code) else vars(self.code)
+        return f"{source}{attributes}".encode()
+
+
+def is_code(entry: object) -> bool:
+    """True for a function, or a class or an object with step()."""
+    if isinstance(entry, ModuleType):  # a block
+        return False
+    return inspect.isroutine(entry) or callable(getattr(entry, "step", None))
+
+
+def type_of(code: Any) -> Any:
+    """The class of a class or of an object; a function itself."""
+    return code if inspect.isroutine(code) or isinstance(code, type) else type(code)
+
+
+def with_interface(place: str, code: Any, connected: Mapping[str, Mapping[str, End]]) -> PythonCode:
+    """The code with the interface that it declares, or that is `connected` to it, by causality.
+
+    InputError, which begins with the place, where it declares what makes no sense.
+    """
+    called = f"{type_of(code).__name__} (Python)"
+    variables: list[Variable] = []
+    units: dict[str, Unit] = {}
+    for what, causality in CAUSALITIES.items():
+        known = connected.get(causality, {})
+        declared = _declared(f"{place}: {what}", getattr(code, what, None))
+        for name, end in (known if declared is None else declared).items():
+            full = end.or_as(known.get(name, End()))
+            if causality == "parameter":
+                full = _of_attribute(full, getattr(code, name, None))
+            variables.append(_variable(name, causality, full, len(variables)))
+            units |= {full.unit.name: full.unit} if full.unit else {}
+    interface = Interface(
+        path=Path(called),
+        guid="",
+        identifier=type_of(code).__name__,
+        variables=tuple(variables),
+        units=units,
+        capabilities={"canHandleVariableCommunicationStepSize": True},
+        model_name=called,
+        tool="grasp-cosim",
+    )
+    return PythonCode(code, interface)
+
+
+def _variable(name: str, causality: str, end: End, reference: int) -> Variable:
+    kind = end.kind or "Real"
+    usual = "continuous" if kind == "Real" else "discrete"
+    start = None if end.start is None else str(end.start).lower()
+    return Variable(
+        name,
+        kind,
+        causality,
+        reference,
+        end.unit.name if end.unit else None,
+        None if causality == "output" else start,
+        None,
+        None,
+        type=kind,
+        variability="tunable" if causality == "parameter" else usual,
+    )
+
+
+def _of_attribute(end: End, value: Any) -> End:
+    """A parameter that starts as its attribute, if there is one; whole numbers have no unit."""
+    start = value if type(value) in KINDS else 0.0 if end.start is None else end.start
+    return End("Real" if end.unit else KINDS[type(start)], end.unit, start)
+
+
+def _declared(place: str, entries: Any) -> dict[str, End] | None:
+    """What a class declares; None where it declares nothing."""
+    if entries is None:
+        return None
+    if isinstance(entries, Mapping):
+        return {name: _end(f"{place}: {name!r}", entry) for name, entry in entries.items()}
+    if isinstance(entries, str) or not isinstance(entries, Iterable):
+        raise InputError(f"{place} = {entries!r}: must be names, or names with {DECLARED}")
+    return {name: End() for name in entries}
+
+
+def _end(place: str, entry: Any) -> End:
+    """A variable by its start value, its unit, both of them or neither."""
+    start, unit = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, None)
+    if isinstance(start, str):
+        start, unit = None, start
+    if (start is not None and type(start) not in KINDS) or not isinstance(unit, str | None):
+        raise InputError(f"{place} = {entry!r}: must be {DECLARED}")
+    found = None if unit is None else known_unit(unit)
+    if unit is not None and found is None:
+        raise InputError(f"{place} = {entry!r}: no unit that is known; must be like 'mm', 'N.s/m'")
+    return End("Boolean" if isinstance(start, bool) else None, found, start)
