@@ -162,13 +162,13 @@ class Dispatcher:
 
     def saved(self) -> tuple[Any, ...]:
         """What the rows until now came to, for restore()."""
-        told = len(self._runaways), self._divergence.saved(), self._unwatched.saved()
+        told = [*self._runaways], self._divergence.saved(), self._unwatched.saved()
         return told, self._energy.saved(), self.pending
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved; what the listeners got is their own concern."""
-        (lines, divergence, unwatched), energy, self.pending = saved
-        del self._runaways[lines:]
+        (runaways, divergence, unwatched), energy, self.pending = saved
+        self._runaways = [*runaways]
         self._divergence.restore(divergence)
         self._unwatched.restore(unwatched)
         self._energy.restore(energy)

@@ -261,6 +261,10 @@ class Fmi3Instance(LoadedInstance):
         """A step that does not end before this time, in s, has an event that is known already."""
         super().__init__(name, interface, tolerance, logging)
 
+    def _forget(self) -> None:
+        """As LoadedInstance."""
+        self._flags[:], self._last[:], self._limit[:] = False, 0.0, np.inf
+
     def _instantiate(self, folder: Path) -> FMU3Slave:
         slave = self._opened(folder)
         events = self.interface.event_mode

@@ -42,7 +42,15 @@ class EventInstance(Fmi3Instance):
         logging: Logging = False,
     ) -> None:
         """As LoadedInstance."""
-        self._clocks = Clocks(interface, self._bound, self._refusal)
+        self._inputs_at_events: list[_PartOfInputs] = []
+        self._step = 0.0
+        """The communication step in s."""
+        super().__init__(name, interface, tolerance, logging)
+
+    def _forget(self) -> None:
+        """As Fmi3Instance."""
+        super()._forget()
+        self._clocks = Clocks(self.interface, self._bound, self._refusal)
         self._events = Events(self._clocks, self._error)
         self._point = 0.0
         """The time that the FMU has come to, in s, at its events."""
@@ -52,10 +60,8 @@ class EventInstance(Fmi3Instance):
         self._started = False
         self._pending: dict[Variable, Value] = {}
         """What was set one by one, and has not arrived."""
-        self._inputs_at_events: list[_PartOfInputs] = []
-        self._step = 0.0
-        """The communication step in s."""
-        super().__init__(name, interface, tolerance, logging)
+        for inputs in self._inputs_at_events:
+            inputs.passed = b""
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0

@@ -120,6 +120,12 @@ class Instance(Protocol):
         SimulationError where the FMU fails, or did so in a way that nothing may follow.
         """
 
+    def reset(self) -> None:
+        """Be as it was when it was loaded, with what was bound since; enter_initialization() next.
+
+        InputError where the FMU has no such function; SimulationError where it fails.
+        """
+
     def numbers(self) -> npt.NDArray[np.float64]:
         """The numbers that make up its state; InputError where they are not known one by one."""
 
@@ -179,6 +185,11 @@ class Inputs:
         """True once the buffers hold what the FMU gets."""
         self._given: dict[Variable, Value] = {}
         self._bound: list[tuple[Sequence[Variable], npt.NDArray[Any]]] = []
+
+    def forget(self) -> None:
+        """It has none of the values any more."""
+        self.running = False
+        self._given.clear()
 
     def saved(self) -> dict[Variable, Value]:
         """What was set one by one, for restore(); the buffers are their owner's."""

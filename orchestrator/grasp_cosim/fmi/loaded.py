@@ -130,6 +130,7 @@ class LoadedInstance(ABC):
         self._python = False
         self._slave: Any = None
         self._kept_states: States | None = None
+        self._forget()
         if obstacle := of_binary(interface):
             raise InputError(f"{name}: {interface.called} {obstacle}")
         try:
@@ -436,6 +437,22 @@ class LoadedInstance(ABC):
         self._arrays = {reference: [*elements] for reference, elements in arrays.items()}
         self._inputs.restore(inputs)
         self._messages.restore(messages)
+
+    def reset(self) -> None:
+        if not self._may_be_called:
+            raise self._error("cannot go back after what it returned", self._time())
+        with self._failures():
+            self._slave.reset()
+        self._worst = OK
+        self._inputs.forget()
+        self._messages.forget()
+        self._arrays.clear()
+        self._forget()
+        self._choose_categories()
+
+    def _forget(self) -> None:
+        """Be as a new instance, but for what it has loaded and bound."""
+        return
 
     def numbers(self) -> npt.NDArray[np.float64]:
         self._check_numbers()

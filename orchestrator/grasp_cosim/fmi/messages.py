@@ -111,6 +111,10 @@ class Messages:
         last, tallies, self.count, self.unasked = saved
         self._last, self._tallies = deque(last, KEPT), dict(tallies)
 
+    def forget(self) -> None:
+        """Nothing was logged yet."""
+        self.restore(((), {}, 0, 0))
+
     @contextmanager
     def ignored(self) -> Iterator[None]:
         """What is logged meanwhile says nothing about the run."""

@@ -50,9 +50,17 @@ class ModelInstance(LoadedInstance):
     ) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
         self._chosen = chosen
-        self._clocks = Clocks(interface, self._bound, self._refusal)
-        self._events = Events(self._clocks, self._error)
         self._solver: Cvode | None = None
+        self._connected: list[ConnectedInputs] = []
+        self._step = 0.0
+        super().__init__(name, interface, chosen.relative_tolerance, logging)
+
+    def _forget(self) -> None:
+        """As LoadedInstance."""
+        super()._forget()
+        self._end_solver()
+        self._clocks = Clocks(self.interface, self._bound, self._refusal)
+        self._events = Events(self._clocks, self._error)
         self._now = 0.0
         self._next = math.inf
         self._get_indicators: Any = None
@@ -60,12 +68,16 @@ class ModelInstance(LoadedInstance):
         self._failed = OK
         self._given: dict[Variable, Value] = {}
         self._waiting: dict[Variable, Value] = {}
-        self._connected: list[ConnectedInputs] = []
         self._started = False
-        self._step = 0.0
         self._zero: npt.NDArray[np.bool_] | None = None
         self._warnings_noted = 0
-        super().__init__(name, interface, chosen.relative_tolerance, logging)
+        for inputs in self._connected:
+            inputs.passed = b""
+
+    def _end_solver(self) -> None:
+        if self._solver:
+            self._solver.close()
+            self._solver = None
 
     @property
     def _identifier(self) -> str:
@@ -83,9 +95,7 @@ class ModelInstance(LoadedInstance):
 
     def close(self) -> None:
         """Free the solver, then the FMU as far as it permits."""
-        if self._solver:
-            self._solver.close()
-            self._solver = None
+        self._end_solver()
         super().close()
 
     def enter_initialization(

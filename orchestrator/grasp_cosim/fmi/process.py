@@ -146,6 +146,10 @@ class _SharedMemory:
         """What is in the room that was given out, for restore()."""
         return self._memory[: self._used]
 
+    def clear(self) -> None:
+        """Nothing is pending in it."""
+        self._memory[: self._used] = bytes(self._used)
+
     def restore(self, saved: bytes) -> None:
         """Go back to what was saved."""
         self._memory[: len(saved)] = saved
@@ -279,6 +283,13 @@ class ProcessInstance:
         self._shared.restore(shared)
         self._inputs.restore(inputs)
         self._messages.restore(messages)
+
+    def reset(self) -> None:
+        self._ask("reset", timeout=START_TIMEOUT)
+        self._fresh = False
+        self._shared.clear()
+        self._inputs.forget()
+        self._messages.forget()
 
     def numbers(self) -> npt.NDArray[np.float64]:
         found: npt.NDArray[np.float64] = self._ask("numbers")

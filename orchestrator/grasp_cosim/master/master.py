@@ -118,6 +118,7 @@ class Master:
         self._grid = system.time_grid
         self._base = self._handed_on = 0
         self._handed_on_at = time.monotonic()
+        self._blank = self._own_state()
 
     def _make_loop(self) -> None:
         """The loop over the instances of now."""
@@ -294,26 +295,45 @@ class Master:
 
         InputError where an FMU does not give its state; SimulationError where it fails.
         """
+        return self._own_state(), [instance.saved() for instance in self.instances]
+
+    def _own_state(self) -> tuple[Any, ...]:
+        """All but the states of the FMUs."""
         plan, made = self.plan, self._loop
-        told = len(self.ends), dict(self.rejections), self.watches.saved(), self.scenario.saved()
+        told = [*self.ends], dict(self.rejections), self.watches.saved(), self.scenario.saved()
         arrays = [array.copy() for array in (plan.values, plan.clock, plan.warned, *plan.buffers)]
         drives = [drive.row for drive in plan.drives]
         compiled = made.saved() if isinstance(made, CompiledLoop) else None
         at = self.steps_done, self.total_steps, self._base, self._pause
-        instances = [instance.saved() for instance in self.instances]
-        return at, told, arrays, drives, compiled, self._waiting().copy(), instances
+        return at, told, arrays, drives, compiled, self._waiting().copy()
 
     def restore(self, saved: Any) -> None:
         """Go back to what was saved; SimulationError where an FMU fails."""
-        at, told, arrays, drives, compiled, waiting, instances = saved
-        plan, made = self.plan, self._loop
+        own, instances = saved
         for instance, state in zip(self.instances, instances, strict=True):
             instance.restore(state)
+        self._restore_own(own)
+
+    def reset(self, system: System) -> None:
+        """Go back to before the initialisation, with the start values of a system of the same FMUs.
+
+        InputError, SimulationError as of Instance.reset().
+        """
+        self.system = system
+        for instance in self.instances:
+            instance.reset()
+        self._restore_own(self._blank)
+        self.log.clear()
+
+    def _restore_own(self, saved: tuple[Any, ...]) -> None:
+        at, told, arrays, drives, compiled, waiting = saved
+        plan, made = self.plan, self._loop
         self.steps_done, self.total_steps, self._base, self._pause = at
         self._handed_on, self._aborted = self._base, ""
         self._rows[: len(waiting)] = waiting
-        lines, rejections, watches, scenario = told
-        del self.ends[lines:], plan.raised[:]
+        ends, rejections, watches, scenario = told
+        self.ends = [*ends]
+        plan.raised.clear()
         self.rejections = dict(rejections)
         self.watches.restore(watches)
         self.scenario.restore(scenario)
@@ -324,6 +344,17 @@ class Master:
             drive.row = row
         if isinstance(made, CompiledLoop):
             made.restore(compiled)
+
+    def end_here(self, why: str) -> None:
+        """Have the run end at the communication point reached; `why` is for the log."""
+        self.total_steps = self.steps_done
+        self.ends.append(f"t = {seconds(self.system.time_ns(self.steps_done))}: {why}")
+        self._finish_pacing()
+
+    def _finish_pacing(self) -> None:
+        if self._pacer is not None and self.steps_done == self.total_steps:
+            ended = self._alone.shared.ended if self._alone else None
+            self._pacer.finish(self.total_steps, ended)
 
     def hand_on(self) -> None:
         """Hand on the rows that wait; SimulationError where a value is not finite."""
@@ -365,9 +396,7 @@ class Master:
                 self._run_alone(stop, self._alone, self._pacer)
             else:
                 self._run(stop)
-            if self._pacer is not None and self.steps_done == self.total_steps:
-                ended = self._alone.shared.ended if self._alone else None
-                self._pacer.finish(self.total_steps, ended)
+            self._finish_pacing()
         except BaseException:
             self.hand_on()
             raise

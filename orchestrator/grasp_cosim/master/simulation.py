@@ -5,8 +5,8 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from numbers import Integral
 from typing import Any, TypeVar
@@ -41,7 +41,7 @@ from ..system.declared_steps import check_declared_steps
 from ..system.description import System
 from ..system.native import needed_twins
 from ..system.parts import Component, Port, Realtime, as_signal
-from ..system.settings import start_values
+from ..system.settings import run_settings, start_values
 from ..system.times import TimeInput, in_seconds
 from ..system.validity import remarks
 from .engine import Engine
@@ -72,6 +72,7 @@ class State:
 
     session: "Session" = field(repr=False)
     time: float
+    system: System = field(repr=False)
     master: Any = field(repr=False)
     records: Sequence[Any] = field(repr=False)
 
@@ -115,7 +116,7 @@ class Session:
         observed = system.shown
         self._metrics = chosen(metrics, system.metrics, observed, system.roles)
         self._asked = metrics_of(system.metrics, self._metrics)
-        notes = check_groups(system)
+        self._notes = check_groups(system)
         self._in_si = in_si(system, self._asked)  # refuses before, not after
         self.system = system
         self._memory = MemoryListener(every, bool(realtime))
@@ -137,10 +138,12 @@ class Session:
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
         self._fmus_behave = False
+        self._start: tuple[Any, Sequence[Any]] | None = None
+        """What save() would give at the start, once it was reset to these start values."""
         self._stack = ExitStack()
         check_declared_steps(system)
         waits = long_waits(system, self.pacer.realtime) if self.pacer else []
-        self._remarks = (*system.notes, *notes, *system.once(remarks), *waits)
+        self._remarks = (*system.notes, *self._notes, *system.once(remarks), *waits)
         self._tell(self._remarks)
         try:
             with _guarded():
@@ -183,6 +186,7 @@ class Session:
         ]
         if self.pacer:
             self.pacer.spare = self._dispatch.spare
+        self._blank = [record.saved() for record in self._records]
         self._stack.callback(self._hand_over)  # before the FMUs are ended, and after:
         self._stack.callback(self._end)
         with phase("initialising"), self._failures():  # where the row of t = 0 is not finite
@@ -410,15 +414,19 @@ class Session:
         an FMU does not give its state, in real time, and where listeners record elsewhere; errors
         of FMUs as of step().
         """
+        self._check_that_it_can_go_back()
+        master = self._called(self.master.saved)
+        records = [record.saved() for record in self._records]
+        return State(self, self.time, self.system, master, records)
+
+    def _check_that_it_can_go_back(self) -> None:
         if self.pacer:
             raise InputError(f"{self.system.name}: a run in real time cannot go back")
         if self._has_listeners:
             raise InputError(
                 f"{self.system.name}: what listeners have got cannot be taken back; must be a "
-                "session without, to save its state"
+                "session without"
             )
-        master = self._called(self.master.saved)
-        return State(self, self.time, master, [record.saved() for record in self._records])
 
     def restore(self, state: "State") -> None:
         """Go back to a state of this session that save() gave, as often as you like.
@@ -429,11 +437,76 @@ class Session:
         """
         if not isinstance(state, State) or state.session is not self:
             raise InputError(f"{self.system.name}: {state!r}: must be a state of this session")
+        self._go_back(state.master, state.records)
+        if state.system is not self.system:
+            self._take_values_of(state.system)
+
+    def _go_back(self, master: Any, records: Sequence[Any]) -> None:
         if not self._closed:
             self._failed, self._failure = False, None
-        self._called(partial(self.master.restore, state.master))
-        for record, saved in zip(self._records, state.records, strict=True):
+        self._called(partial(self.master.restore, master))
+        self._restore_records(records)
+
+    def reset(self, values: Mapping[str, Given] | None = None) -> None:
+        """Go back to the start of the run, as a new session would begin, without loading anew.
+
+        With other start values, where some are given, which stay for the resets after it. So it
+        does after a failure or an interruption, unless an FMU refuses any further call. InputError
+        where save() refuses for other reasons than the FMUs, for values that do not fit, or where
+        an FMU refuses its initialisation, which breaks the session until it is reset.
+        """
+        self._check_that_it_can_go_back()
+        if values or self._start is None:
+            system = self._with_values(values or {})
+            if not self._closed:
+                self._failed, self._failure = False, None
+            self._called(partial(self._begin_anew, system))
+        else:
+            self._go_back(*self._start)
+        self._wall_time = 0.0
+
+    def _with_values(self, values: Mapping[str, Given]) -> System:
+        """The system with other start values; InputError for what is none, or changes its signals.
+
+        Then the FMUs that are loaded would not do.
+        """
+        system = self.system.with_values(values) if values else self.system
+        names = [f.name for f in fields(system) if f.name != "components"]
+        both = [(getattr(system, name), getattr(self.system, name)) for name in names]
+        same = all(new is old or new == old for new, old in both)
+        pairs = zip(system.components, self.system.components, strict=True)
+        if not same or any(new.loaded is not old.loaded for new, old in pairs):
+            raise InputError(
+                f"reset: {', '.join(values)}: must be start values that change no size of an array"
+            )
+        return system
+
+    def _begin_anew(self, system: System) -> None:
+        self._failed = True
+        self.master.reset(system)
+        self._restore_records(self._blank)
+        self._take_values_of(system)
+        self.master.initialise()
+        self._failed = False
+        with suppress(InputError):  # an FMU that does not give its state is reset each time
+            self._start = self.master.saved(), [record.saved() for record in self._records]
+
+    def _take_values_of(self, system: System) -> None:
+        """Be a session of the system with these start values, as far as these are told."""
+        self.system, self._start = system, None
+        self._dispatch.settings = run_settings(system)
+        self._remarks = (*system.notes, *self._notes, *system.once(remarks))
+
+    def _restore_records(self, records: Sequence[Any]) -> None:
+        for record, saved in zip(self._records, records, strict=True):
             record.restore(saved)
+
+    def end_here(self, why: str) -> None:
+        """End the run at the communication point reached, before its stop time.
+
+        It has come to its end then; `why` is for the log.
+        """
+        self.master.end_here(why)
 
     def result(self) -> Result:
         """Return the result recorded until now.
@@ -537,6 +610,7 @@ class Simulate:
         diverging: str | None = None,
         note: Callable[[str], None] | None = None,
         finish: Finish | None = None,
+        until: Callable[[Session], bool] | None = None,
     ) -> Result:
         """Run a system to its stop time and return what it records at every communication point.
 
@@ -555,6 +629,10 @@ class Simulate:
         system.notes: what is known of the system and of t = 0 before the first step, the others at
         the end, also after a failure. finish gets the result, and the error that ended the run if
         there is one, before the FMUs are terminated and freed, in which they may crash.
+
+        until is asked at each communication point, of the session, and ends the run there where it
+        is true: ended_at of the result is that time, and the log has a line. A limit does the same
+        for a condition that is known before, in the loop itself.
 
         Ctrl-C ends the run in good order, then is a KeyboardInterrupt: once FMUs are loaded a
         RunInterruptedError, with what was recorded as its result.
@@ -587,7 +665,7 @@ class Simulate:
                 ) as session,
                 phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"),
             ):
-                _drive(session, progress)
+                _drive(session, progress, until)
         except KeyboardInterrupt as interrupt:
             if not results:
                 raise
@@ -639,7 +717,7 @@ def _folder_kept() -> Iterator[None]:
             os.chdir(here)
 
 
-def _drive(session: Session, progress: bool | str) -> None:
+def _drive(session: Session, progress: bool | str, until: Callable[[Session], bool] | None) -> None:
     """Have it step to its end; KeyboardInterrupt, between two steps, at Ctrl-C."""
     begin, end = map(in_seconds, (session.system.start_ns, session.system.stop_ns))
     with (
@@ -659,11 +737,35 @@ def _drive(session: Session, progress: bool | str) -> None:
                 bar.set_postfix_str(session.pacer.meter.live(), refresh=False)
             bar.update(session.time - begin - bar.n)
 
-        steps, start = session.shown_by(show), time.perf_counter()
-        while not session.halt.is_set() and session.step(steps):
-            show()
-            now = time.perf_counter()
-            steps = max(1, min(GROWTH * steps, int(steps * LOOK / (now - start))))
-            start = now
+        if until is None:
+            _drive_on(session, show)
+        else:
+            _drive_until(session, until, show)
         if session.pacer:
             bar.set_postfix_str(session.pacer.meter.live(), refresh=False)
+
+
+def _drive_on(session: Session, show: Callable[[], None]) -> None:
+    """Have it step to its end, with a look now and then."""
+    steps, start = session.shown_by(show), time.perf_counter()
+    while not session.halt.is_set() and session.step(steps):
+        show()
+        now = time.perf_counter()
+        steps = max(1, min(GROWTH * steps, int(steps * LOOK / (now - start))))
+        start = now
+
+
+def _drive_until(
+    session: Session, until: Callable[[Session], bool], show: Callable[[], None]
+) -> None:
+    """Have it step, one at a time, to where `until` is true, or to its end."""
+    shown = time.perf_counter()
+    while not session.halt.is_set():
+        if until(session):
+            session.end_here(f"until {getattr(until, '__name__', 'it')} was true: the run ended")
+            return
+        if not session.step():
+            return
+        if (now := time.perf_counter()) - shown > LOOK:
+            show()
+            shown = now

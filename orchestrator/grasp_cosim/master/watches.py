@@ -83,13 +83,12 @@ class Watches:
 
     def saved(self) -> tuple[Any, ...]:
         """What came of them until now, for restore()."""
-        return self.table.copy(), len(self.log), dict(self._first)
+        return self.table.copy(), [*self.log], dict(self._first)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved."""
-        self.table[:], lines, first = saved
-        del self.log[lines:]
-        self._first = dict(first)
+        self.table[:], log, first = saved
+        self.log, self._first = [*log], dict(first)
 
     def arm(self) -> None:
         """Look for peers that are back once more."""

@@ -1,10 +1,12 @@
 """Keeps a run in memory, as NumPy columns."""
 
+import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile, gettempdir
-from typing import Any
+from typing import Any, Generic, TypeVar
 from weakref import finalize
 
 import numpy as np
@@ -56,6 +58,17 @@ class Batch:
         return steps, rows
 
 
+Place = TypeVar("Place")
+
+
+@dataclass(slots=True, weakref_slot=True, eq=False)
+class _Kept(Generic[Place]):
+    """Where rows are, and how many of them are referred to elsewhere, and stay as they are."""
+
+    of: Place
+    rows: int = 0
+
+
 class MemoryListener:
     """Copies the rows, each n-th of a run, into a table with room for the whole run from the start.
 
@@ -64,7 +77,7 @@ class MemoryListener:
 
     def __init__(self, every: int = 1, paced: bool = False) -> None:
         self._every, self._paced = every, paced
-        self._rows = self._shown = 0
+        self._rows = 0
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Make room; InputError where the run does not fit into memory."""
@@ -75,7 +88,7 @@ class MemoryListener:
             self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
             own = self._paced and signals
             buffer = memory(8 * len(signals) * rows) if own else None
-            self._table = np.ndarray(shape, np.float64, buffer)
+            self._kept = _Kept(np.ndarray(shape, np.float64, buffer))
         except (MemoryError, ValueError, OverflowError, OSError):  # more bytes than there can be
             raise InputError(
                 f"{experiment.name}: {total} steps do not fit into memory; "
@@ -86,23 +99,24 @@ class MemoryListener:
         """Copy the rows."""
         end = self._rows + len(steps)
         self._steps[self._rows : end] = steps
-        self._table[:, self._rows : end] = rows.T
+        self._kept.of[:, self._rows : end] = rows.T
         self._rows = end
 
     def end(self, complete: bool) -> None:
         """Nothing is left to do."""
 
-    def saved(self) -> int:
+    def saved(self) -> "tuple[_Kept[npt.NDArray[np.float64]], int]":
         """What was recorded until now, for restore()."""
-        return self._rows
+        self._kept.rows = max(self._kept.rows, self._rows)
+        return self._kept, self._rows
 
-    def restore(self, saved: int) -> None:
-        """Take back what was recorded since; columns that were given out keep it."""
-        self._rows = saved
-        if saved < self._shown:
-            before, self._table = self._table, np.empty_like(self._table)
-            self._table[:, :saved] = before[:, :saved]
-            self._shown = saved
+    def restore(self, saved: "tuple[_Kept[npt.NDArray[np.float64]], int]") -> None:
+        """Go back to what was saved; other states, and columns that were given out, stay."""
+        self._kept, self._rows = saved
+        if self._rows < self._kept.rows:
+            table = np.empty_like(self._kept.of)
+            table[:, : self._rows] = self._kept.of[:, : self._rows]
+            self._kept = _Kept(table, self._rows)
 
     def columns(self, next_row: Rows | None = None) -> Columns:
         """The recorded communication points in s and the columns by name, so far.
@@ -111,8 +125,8 @@ class MemoryListener:
         objects. An Integer is exact up to 2**53, as the rows are float64. With the step and values
         of a row that is not recorded, it is their last.
         """
-        steps, table = self._steps[: self._rows], self._table[:, : self._rows]
-        self._shown = max(self._shown, self._rows)
+        steps, table = self._steps[: self._rows], self._kept.of[:, : self._rows]
+        self._kept.rows = max(self._kept.rows, self._rows)
         if next_row:
             steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
         found = zip(self._signals, table, strict=True)
@@ -133,38 +147,51 @@ class EveryRow:
         self._experiment = experiment
         self._places = [i for i, s in enumerate(signals) if s.name in self._names]
         self._signals = [signals[i] for i in self._places]
-        self._file = TemporaryFile(prefix="grasp_rows_", buffering=0)  # noqa: SIM115 - open as long as this
-        finalize(self, self._file.close)
+        self._open()
+
+    def _open(self, rows: int = 0) -> None:
+        file = TemporaryFile(prefix="grasp_rows_", buffering=0)  # noqa: SIM115 - open as long as this
+        self._kept = _Kept(file, rows)
+        finalize(self._kept, file.close)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Write what these rows have of the signals."""
         left = memoryview(b"" if self.lost else rows[:, self._places].tobytes())
         try:
             while left:
-                left = left[self._file.write(left) :]
+                left = left[self._kept.of.write(left) :]
         except OSError as error:
             self.lost = unwritable(Path(gettempdir()), error)
-            self._file.truncate(0)
+            self._kept.of.truncate(0)
         self._rows += len(steps)
 
     def end(self, complete: bool) -> None:
         """The file goes with the last name of it."""
 
-    def saved(self) -> int:
+    def saved(self) -> "tuple[_Kept[Any], int]":
         """What was kept until now, for restore()."""
-        return self._rows
+        self._kept.rows = max(self._kept.rows, self._rows)
+        return self._kept, self._rows
 
-    def restore(self, saved: int) -> None:
-        """Take back what was kept since."""
-        if not self.lost:
-            self._file.seek(8 * saved * len(self._places))
-        self._rows = saved
+    def restore(self, saved: "tuple[_Kept[Any], int]") -> None:
+        """Go back to what was saved; other states stay."""
+        self._kept, self._rows = saved
+        size = 8 * self._rows * len(self._places)
+        if self.lost:
+            return
+        if self._rows < self._kept.rows:
+            before = os.pread(self._kept.of.fileno(), size, 0)
+            self._open(self._rows)
+            self._kept.of.write(before)
+        self._kept.of.seek(size)
 
     def columns(self) -> Columns:
         """All communication points in s so far, and the columns, mapped from the file."""
         shape = self._rows, len(self._places)
         table = (
-            np.memmap(self._file, np.float64, "r", shape=shape) if all(shape) else np.empty(shape)
+            np.memmap(self._kept.of, np.float64, "r", shape=shape)
+            if all(shape)
+            else np.empty(shape)
         )
         found = zip(self._signals, table.T, strict=True)
         times = self._experiment.times(np.arange(self._rows))

@@ -439,6 +439,24 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
 }
 #endif
 
+Status F(Reset)(void *c) {
+    Model *m = c, old = *m;
+
+    memset(m, 0, sizeof(Model));
+    m->logging = old.logging;
+    m->exchange = old.exchange;
+    m->early = old.early;
+    m->events = old.events;
+    m->host = old.host;
+    m->log = old.log;
+    memcpy(m->name, old.name, sizeof m->name);
+    m->next = INFINITY;
+    m->reason = "";
+    for (int i = 0; i < ROOM; i++) m->nominal[i] = 1.0;
+    start(m);
+    return F(OK);
+}
+
 /* A state is a copy of the whole model, which has no memory beside. */
 #if FMI == 2
 #define STATES_OF_HOST(action) fmi2##action##FMUstate
