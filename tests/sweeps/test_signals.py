@@ -67,6 +67,7 @@ def test_zarr_reads_the_store(native, tmp_path, recwarn):
         "m",
     )
     assert data.coords[POSITION].values.tolist() == ROWS[POSITION]
+    assert data["time"].attrs["units"] == "s"
 
 
 def test_a_run_that_ends_early_or_fails_is_nan_from_there(native, tmp_path):

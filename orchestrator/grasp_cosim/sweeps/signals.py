@@ -279,7 +279,8 @@ def _written(recorded: Recorded, beside: Mapping[str, Sequence[float]]) -> dict[
         *((name, RUN, values) for name, values in beside.items()),
     ):
         whole = np.asarray(values, "<f8")
-        found[column] = _head(whole.shape, whole.shape, (name,), {})
+        about = {"units": "s"} if column == TIME else {}
+        found[column] = _head(whole.shape, whole.shape, (name,), about)
         make_folder(store.folder / column)
         (store.folder / column / "0").write_bytes(whole.tobytes())
     for name, head in found.items():
