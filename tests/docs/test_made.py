@@ -56,7 +56,7 @@ def test_without_jupyter_it_gives_what_it_shows(checkout):
     assert [texts(cell) for cell in ran] == [texts(cell) for cell in CODE]
     kinds = [sorted(o["data"]) for cell in ran for o in cell["outputs"] if "data" in o]
     assert ["image/png", "text/plain"] in kinds
-    assert kinds.count(["text/html", "text/plain"]) == 2
+    assert kinds.count(["text/html", "text/plain"]) == 3
 
 
 @pytest.mark.slow
