@@ -23,8 +23,11 @@ with simulate.session(system) as session:
     reveal_type(session.text("plant.state"))  # str
     reveal_type(session.step())  # bool
     reveal_type(session.result())  # Result
+class Push:
+    def step(self, t: float, inputs: dict[str, float]) -> dict[str, float]:
+        return {"force": 2.0 * inputs["gap"]}
 own = System(
-    components={"plant": "Plant.fmu", "push": lambda t, inputs: 1.0},
+    components={"plant": "Plant.fmu", "push": Push, "pull": lambda t, inputs: inputs["gap"]},
     connections=["push.force -> plant.force", ("plant.gap", "push.gap")],
     experiment={"step": 1e-3, "stop": 1.0},
 )

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, System, simulate, sweep
+from grasp_cosim import InputError, System, metric, simulate, sweep
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.ssp.to_archive import write_ssp
+from grasp_cosim.sweeps.run import Task, packed, run_packed
 from grasp_cosim.system.parts import Component, Connection, Port
 from grasp_cosim.system.toml import toml_table
 
@@ -178,3 +179,25 @@ def test_the_parameters_of_a_system_have_units_and_ranges(grasp):
     assert "<td>0 to 10</td>" in found._repr_html_()
     assert found._ipython_key_completions_() == list(found)
     assert sys.getsizeof(repr(grasp.parameters)) < 4000
+
+
+def test_a_run_elsewhere_takes_the_code_along(grasp):
+    task = Task(braked(grasp), (metric("first")(first_force),))
+    there = run_packed(packed(task, with_fmus=True), (0, {"brake.push": 0.5}))
+    assert (there.metrics, there.error) == ({"first": -0.5}, None)
+
+
+def test_code_that_cannot_go_to_another_process_is_refused_in_a_line(grasp, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cloudpickle", None)
+    local = type("Local", (Brake,), {})
+    with pytest.raises(InputError, match=r"^system: cannot go to another process: .*Local[^\n]*$"):
+        packed(Task(braked(grasp, local)), with_fmus=False)
+
+
+def test_other_attributes_and_other_code_are_other_runs(grasp):
+    objects = [Brake(), Brake(), Brake()]
+    objects[2].push = 0.5
+    one, same, other = (braked(grasp, brake).by_name["brake"].content for brake in objects)
+    assert one == same
+    assert len({one, other, braked(grasp).by_name["brake"].content}) == 3
+    assert b"-inputs" in one

@@ -11,7 +11,7 @@ from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
 from .connectors import check_connectors, driven_by_connectors, given_by_connectors
-from .from_python import from_sections
+from .from_python import Part, from_sections
 from .names import in_main_names
 from .native import natives
 from .parameters import Parameters, parameters_of
@@ -49,7 +49,7 @@ class System(Structure):
         self,
         name: str = ...,
         *,
-        components: Mapping[str, Any],
+        components: Mapping[str, Part],
         connections: Iterable[str | tuple[str, str] | Mapping[str, Any] | Connection] = ...,
         experiment: Mapping[str, Any],
         **sections: Any,

@@ -15,11 +15,16 @@ from typing import Any
 from ..base.checks import check_keys
 from ..base.errors import InputError
 from .parts import Component, Connection, Port
-from .python_code import End, PythonCode, is_code, with_interface
+from .python_code import End, Function, PythonCode, WithStep, is_code, with_interface
 from .structure import unit_of
 from .toml import ENTRIES, checked, described, read_connection, with_entries
 
 Place = Callable[[str], str]
+
+Part = (
+    str | Path | Component | ModuleType | type[WithStep] | WithStep | Function | Mapping[str, Any]
+)
+"""What component_from() takes, or a mapping with that as "fmu"."""
 
 KINDS = (
     "the path of an FMU, the file of a block, NAME.py, a Component, or Python code with "

@@ -24,7 +24,7 @@ from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from ..base.errors import InputError
 from ..base.si_units import Unit, known_unit
@@ -36,6 +36,17 @@ CAUSALITIES = {"inputs": "input", "outputs": "output", "parameters": "parameter"
 KINDS: Mapping[type, Kind] = {bool: "Boolean", int: "Integer", float: "Real"}
 
 DECLARED = "a start value, a unit, or both, as in (0.1, 'm')"
+
+
+class WithStep(Protocol):
+    """An object with step()."""
+
+    def step(self, t: float, inputs: dict[str, float], /) -> Any:
+        """The outputs from `t` on, in s, of the inputs there."""
+
+
+Function = Callable[[float, dict[str, float]], Any]
+"""The same without a state."""
 
 
 class End(NamedTuple):
@@ -58,10 +69,10 @@ class PythonCode:
     code: Any
     interface: Interface
 
-    def new(self) -> Callable[[float, Mapping[str, Value]], Any]:
+    def new(self) -> Function:
         """The function that is called at each communication point, as at the start of a run."""
         made = self.code() if isinstance(self.code, type) else deepcopy(self.code)
-        step: Callable[[float, Mapping[str, Value]], Any] = getattr(made, "step", made)
+        step: Function = getattr(made, "step", made)
         return step
 
     @property
