@@ -25,6 +25,13 @@ def clock(t, inputs):
     return t
 
 
+class Clock:
+    parameters = {"gain": 1.0}  # noqa: RUF012
+
+    def step(self, t, inputs):
+        return self.gain * t
+
+
 def counted(source=clock, count=Count, **more):
     return System(components={"source": source, "count": count},
                   connections=["source.y -> count.u"], experiment=EXPERIMENT, **more)  # fmt: skip
@@ -50,7 +57,7 @@ def test_a_loop_of_code_is_solved_at_the_start_and_counts_as_one_call():
 
 @pytest.mark.parametrize("count", [Count, Count()], ids=["class", "object"])
 def test_a_session_goes_back_to_its_state_and_to_its_start(count):
-    with simulate.session(counted(count=count)) as session:
+    with simulate.session(counted(Clock, count)) as session:
         session.step(2)
         state = session.save()
         for _ in range(2):
@@ -58,6 +65,14 @@ def test_a_session_goes_back_to_its_state_and_to_its_start(count):
             assert (session["count.calls"], session["count.sum"]) == (5, pytest.approx(1.0))
             session.restore(state)
             assert session["count.calls"] == 3
+        for _ in range(2):
+            session.reset()
+            assert (session["count.calls"], session["count.sum"]) == (1, 0.0)
+            session.step(5)
+            assert (session["count.calls"], session["count.sum"]) == (6, pytest.approx(1.5))
+        session.reset({"source.gain": 2.0})
+        session.step(5)
+        assert session["count.sum"] == pytest.approx(3.0)
     assert simulate(counted(count=count))["count.calls"][-1] == 6
 
 

@@ -33,6 +33,10 @@ class CodeInstance:
         self.interface = code.interface
         self._code = code
         self._given = Inputs()
+        self.reset()
+
+    def reset(self) -> None:
+        self._given.forget()
         self._parameters = {v.name: PLAIN[v.kind](v.start_value) for v in self._of("parameter")}
         self._inputs = {v.name: PLAIN[v.kind](v.start_value or 0) for v in self._of("input")}
         self._outputs: dict[str, Value] = {}
