@@ -73,7 +73,7 @@ def in_threads(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
     Functions of the user's are called one at a time, as they are in a process.
     """
     halting, lock = _Halting(), threading.Lock()
-    own = tuple(replace(m, function=_one_by_one(m.function, lock)) for m in task.metrics)
+    own = tuple(replace(m, function=one_by_one(m.function, lock)) for m in task.metrics)
     run = partial(run_row, replace(task, metrics=own), listeners=(halting,))
     with ThreadPoolExecutor(max(count, 1), "sweep") as pool:
         try:
@@ -102,7 +102,9 @@ class _Halting:
         """Nothing is left to do."""
 
 
-def _one_by_one(function: Function, lock: threading.Lock) -> Function:
+def one_by_one(function: Function, lock: threading.Lock) -> Function:
+    """The function, which is called while nobody else has the lock."""
+
     @wraps(function)
     def locked(signals: Signals) -> Any:
         with lock:
