@@ -30,6 +30,7 @@ API = (
     "grasp_cosim.recording.csv",
     "grasp_cosim.recording.mdf",
     "grasp_cosim.sweeps.sweep",
+    "grasp_cosim.gym.environment",
     "grasp_cosim.linearisation.state_space",
     "grasp_cosim.comparison.compare",
     "grasp_cosim.comparison.qualify",

@@ -138,6 +138,8 @@ class Session:
         self.pacer = Pacer(system, paced, self.halt.is_set) if paced else None
         self._privileges = Privileges()
         self._fmus_behave = False
+        self._places: dict[str, int] = {}
+        """Where in the values the numbers are that were read before, as they are."""
         self._start: tuple[Any, Sequence[Any]] | None = None
         """What save() would give at the start, once it was reset to these start values."""
         self._stack = ExitStack()
@@ -346,6 +348,9 @@ class Session:
         recorded nor connected is asked of the FMU. Of a Boolean it is 0.0 or 1.0; the text of a
         String is that of text(). InputError where there is no such variable.
         """
+        place = self._places.get(name)
+        if place is not None:  # as loops ask for the same again and again
+            return float(self.master.values[place])
         value = self._now(name)
         if isinstance(value, str):
             raise InputError(f"{name!r}: is a String; must be read by session.text({name!r})")
@@ -373,7 +378,10 @@ class Session:
         value = float(master.values[master.slots[port]])
         if port in master.texts:
             return master.texts[port].listed[int(value)]
-        return value if change == IDENTITY else change(value)
+        if change != IDENTITY:
+            return change(value)
+        self._places[name] = master.slots[port]
+        return value
 
     def _ipython_key_completions_(self) -> list[str]:
         """The names of what can be read, for Tab behind a bracket in a notebook."""

@@ -1,0 +1,121 @@
+"""An environment of gymnasium over a session: its episodes are runs, reset without loading anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.checks import extra_module
+from ..base.errors import InputError
+from ..interface.interface import Given
+from ..master.simulation import Session, simulate
+from ..system.connectors import read_at
+from ..system.description import System
+from ..system.parts import as_signal
+from ..system.times import nearest_time, seconds
+
+Floats = npt.NDArray[np.float64]
+Names = Sequence[str] | Mapping[str, tuple[float, float] | None]
+"""Names of variables; with a range of each, or None for that which its FMU declares."""
+
+if TYPE_CHECKING:
+    from gymnasium import Env
+    from gymnasium.spaces import Box
+else:
+    _PURPOSE = "which the environments of reinforcement learning are made with"
+    Env = extra_module("gymnasium", _PURPOSE, "gym").Env
+    Box = extra_module("gymnasium.spaces", _PURPOSE, "gym").Box
+
+
+class Environment(Env[Floats, Floats]):
+    """A system, observed and acted on by the names of its variables, in their units.
+
+    session is the run of the episode, for whatever else is to be known of it.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium has it
+
+    def __init__(
+        self,
+        system: System,
+        observations: Names,
+        actions: Names,
+        reward: Callable[[Session], float] | str,
+        *,
+        step: float,
+        ends: Callable[[Session], bool] = lambda _: False,
+        start: Callable[[np.random.Generator], Mapping[str, Given]] | None = None,
+        **options: Any,
+    ) -> None:
+        """Load the FMUs; they are freed by close().
+
+        actions are free inputs, or tunable parameters, which hold a value for a control `step`, in
+        s, a whole number of the system's own. reward is a signal, or what a function gives of the
+        session after each control step; an episode is terminated where `ends` is true, truncated
+        at the stop time of the system, or where an FMU ends the run. start draws start values from
+        the seeded generator of the environment at each reset; without, reset() may be given them
+        as `options`. Further options are those of simulate.session(). InputError where a name is
+        none; SimulationError, from step(), where an FMU fails.
+        """
+        self.session = simulate.session(system, **options)
+        try:
+            own, wanted = self.session.system.step_ns, nearest_time(step)
+            self._steps = int(wanted // own)
+            if self._steps < 1 or wanted % own:
+                raise InputError(f"step = {step!r}: must be a whole number of {seconds(own)}")
+            self.observation_space: Any = self._space(observations)
+            self.action_space: Any = self._space(actions)
+            self._observed, self._acting = tuple(observations), tuple(actions)
+            self._observe()  # where a name is none
+        except BaseException:
+            self.session.close()
+            raise
+        self._reward = (lambda s: s[reward]) if isinstance(reward, str) else reward
+        self._ends, self._draw_start = ends, start
+
+    def _space(self, names: Names) -> Box:
+        """The box of their ranges."""
+        given = names if isinstance(names, Mapping) else dict.fromkeys(names)
+        ranges = [self._declared(name) if x is None else x for name, x in given.items()]
+        low, high = np.array(ranges, np.float64).reshape(-1, 2).T
+        return Box(low, high, dtype=np.float64)
+
+    def _declared(self, name: str) -> tuple[float, float]:
+        """The least and the greatest value that an FMU declares; infinite where it does not."""
+        system = self.session.system
+        port, change = read_at(system, as_signal(f"signal {name!r}", name))
+        variable = system.component(port.component, name).interface.by_name.get(port.variable)
+        low, high = (-inf, inf) if variable is None else (variable.low, variable.high)
+        return min(change(low), change(high)), max(change(low), change(high))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """Begin an episode, with start values that are drawn, and those of the options."""
+        super().reset(seed=seed)
+        drawn = self._draw_start(self.np_random) if self._draw_start else {}
+        self.session.reset({**drawn, **(options or {})})
+        return self._observe(), {}
+
+    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        """Hold the action for a control step."""
+        session = self.session
+        for name, value in zip(self._acting, np.asarray(action).tolist(), strict=True):
+            session.set(name, value)
+        session.step(self._steps)
+        over = session.complete or session.ended_at is not None
+        terminated = bool(self._ends(session))
+        reward = float(self._reward(session))
+        return self._observe(), reward, terminated, over and not terminated, {}
+
+    def _observe(self) -> Floats:
+        session = self.session
+        return np.array([session[name] for name in self._observed], np.float64)
+
+    def close(self) -> None:
+        """Free the FMUs."""
+        self.session.close()
