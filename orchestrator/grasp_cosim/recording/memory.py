@@ -1,6 +1,5 @@
 """Keeps a run in memory, as NumPy columns."""
 
-import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -180,7 +179,8 @@ class EveryRow:
         if self.lost:
             return
         if self._rows < self._kept.rows:
-            before = os.pread(self._kept.of.fileno(), size, 0)
+            self._kept.of.seek(0)
+            before = self._kept.of.read(size)
             self._open(self._rows)
             self._kept.of.write(before)
         self._kept.of.seek(size)
