@@ -22,6 +22,7 @@ from grasp_cosim import cli
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import CLOSING, FINGERS
 from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
+from grasp_cosim.inspection.template import TEMPLATES
 from grasp_cosim.recording.folder import load_run
 from grasp_cosim.recording.result import Result
 from grasp_cosim.report.plot import (
@@ -366,14 +367,14 @@ PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
     "your_plant": draw_your_plant,
 }
 
-BLOCKS = ("spring_plant.py", "moving_object.py")
+BLOCKS = (TEMPLATES / "spring_plant.py", HERE / "moving_object.py")
 """What the pages build before they run it."""
 
 
 def update(name: str, pictures: Path) -> None:
     """Work out a page anew, and draw its pictures into a folder."""
     for block in BLOCKS:
-        done("build", str(HERE / block))
+        done("build", str(block))
     with TemporaryDirectory() as folder:
         page = HERE / f"{name}.md"
         text, tables = worked_out(page.read_text("utf-8"), recorder(Path(folder)))

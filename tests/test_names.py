@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import metadata, version
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from grasp_cosim.base.checks import EXACT, exact, install_command, integer, pack
 from grasp_cosim.base.errors import FEW, MANY, InputError, SimulationError, nearest
 from hypothesis import example, given
 from hypothesis import strategies as st
+
+PYPROJECT = Path(__file__).parents[1] / "pyproject.toml"
 
 PLANT = [
     *("force[1]", "force[2]", "gap[1]", "gap[2]", "finger_mass[1]", "finger_mass[2]"),
@@ -66,6 +69,14 @@ def test_every_extra_is_named_by_its_packages():
     assert [re.split("[>=]", what)[0] for what in named["parquet"]] == ["pyarrow"]
     assert all(named[extra] for extra in extras if extra != "fast")
     assert packages("no such extra") == []
+
+
+def test_all_has_every_extra_but_those_of_the_house():
+    extras = tomllib.loads(PYPROJECT.read_text("utf-8"))["project"]
+    extras = extras["optional-dependencies"]
+    (everything,) = extras.pop("all")
+    assert everything == f"grasp-cosim[{','.join(sorted(extras.keys() - {'dev'}))}]"
+    assert {"jupyter", "pandas", "plot", "xarray"} <= extras.keys()  # which the notebook asks for
 
 
 def test_the_command_is_for_the_python_that_runs(monkeypatch):

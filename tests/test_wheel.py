@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 import pytest
+from support.pages import BLOCKS, INDENTED, commands_of, fill_in
 
 ROOT = Path(__file__).parent.parent
 
@@ -62,10 +64,10 @@ def python(wheel, tmp_path_factory):
         offline = []
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
 
-    def run(*arguments, cwd):
+    def run(*arguments, cwd, code=0):
         command = [*offline, folder / "env/bin/python", *arguments]
         done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
+        assert done.returncode == code, done.stderr
         return done.stdout
 
     return run
@@ -77,6 +79,34 @@ def test_it_puts_no_general_name_into_site_packages(wheel):
     assert {name for name in names if not name.endswith(".dist-info")} == {
         "block_variables", "gripper_plant", "proximity_sensor", "grasp_controller", "grasp_cosim",
     }  # fmt: skip
+
+
+def test_the_page_on_a_plant_of_ones_own_runs_as_it_is_written(python, tmp_path):
+    """Both of its parts, from the top, in an empty folder; the page is in the wheel as well."""
+
+    def command(line, code=0):
+        return python("-m", "grasp_cosim", *shlex.split(line)[1:], cwd=tmp_path, code=code)
+
+    (folder,) = re.findall("Pages, examples and a notebook: (.*)", command("grasp-cosim --help"))
+    page = (Path(folder) / "your_plant.md").read_text("utf-8")
+    assert "/env/lib/" in folder
+    for line in INDENTED.findall(page):
+        command(line)
+    for kind, block in BLOCKS.findall(page):
+        if kind == "console":
+            for line, shown in commands_of(block):
+                if line.startswith("cp "):
+                    shutil.copy(*(tmp_path / name for name in line.split()[1:]))
+                elif "CASE" not in line:
+                    said = command(line, 1 if shown.startswith("NOT") else 0)
+                    assert said.startswith(shown), line
+        elif kind == "python" and block.startswith('"""'):
+            (tmp_path / "vendor.py").write_text(block, "utf-8")
+        elif block.startswith("[signals]"):
+            (tmp_path / "bands.toml").write_text(block, "utf-8")
+        elif kind == "toml":
+            fill_in(tmp_path / "my_system.toml", block)
+    assert (tmp_path / "vendor/report.html").is_file()
 
 
 def test_the_wheel_works_in_an_empty_folder(python, tmp_path):

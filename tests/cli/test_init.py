@@ -3,13 +3,16 @@
 import json
 import re
 import shutil
+import sys
 from pathlib import Path
+from subprocess import run
 
 import pytest
 from comparison.made import write_fmu
 from grasp_cosim import System
 from grasp_cosim.cli.systems import shown
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.inspection.template import KINDS
 from support.native_fmus import build_model, needs_gcc
 
 FOREIGN = {
@@ -117,6 +120,38 @@ def test_an_fmu_that_was_built_here_needs_no_process_of_its_own(fmus_here):
     assert fmus_here("init", "alone.toml", "--fmu", f"plant={fmu}")[0] == 0
     for file in ("a.toml", "alone.toml"):
         assert System.load(file).component("plant", "test").isolation == "none"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_block_to_start_from(command, tmp_path, kind):
+    """It builds as the command says, and is not written over."""
+    code, out, err = command("init", "mine.py", "--template", kind)
+    assert (code, err) == (0, "")
+    assert out.startswith(
+        "mine.py: written\ntest_mine.py: written\n    then: grasp-cosim build mine.py"
+    )
+    assert command("build", "mine.py")[1] == "fmus/build/Mine.fmu: new\n"
+    for left, there in (("mine.py", "test_mine.py"), ("test_mine.py", "mine.py")):
+        (tmp_path / left).unlink(missing_ok=True)
+        (tmp_path / there).write_text("own")
+        code, _, err = command("init", "mine.py", "--template", kind)
+        assert (code, err.startswith(f"grasp-cosim: {there}: is there already; ")) == (2, True)
+        assert not (tmp_path / left).exists()
+        assert (tmp_path / there).read_text() == "own"
+    assert command("init", "mine.py", "--template", kind, "--force")[0] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_its_test_passes_as_it_is_written(command, tmp_path, kind):
+    assert command("init", "mine.py", "--template", kind)[0] == 0
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py"]
+    done = run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    mutant = (tmp_path / "mine.py").read_text("utf-8").replace(" + p.", " - p.")
+    (tmp_path / "mine.py").write_text(mutant.replace("d * (u.force", "d * -(u.force"), "utf-8")
+    done = run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1, "it has to see that the equations are others"
 
 
 @pytest.mark.slow

@@ -50,6 +50,10 @@ build --fingers 3 block.py :: build: --fingers 3 cannot be used with block.py
 inspect folder.toml :: folder.toml: is a folder; must be an FMU, a file
 init file.toml :: file.toml: is there already; give another name, or --force
 init a.ssp :: a.ssp: must end in .toml, a system file
+init a.py :: a block in Python has --template plant, --template sensor, --template controller
+init my-plant.py --template plant :: my-plant.py: must be NAME.py, NAME of letters, digits and _
+init gripper_plant.py --template plant :: GripperPlant.fmu is one of the FMUs that come with th
+init a.py --template plant --tandem :: --tandem cannot be used with --template, which is no system
 init folder.toml :: folder.toml: is a folder; must be the name of a file
 init a.toml --as hand=vendor.fmu :: --as hand: no component 'hand'; valid: plant, sens
 init a.toml --as plant=none.fmu :: none.fmu: no such FMU file

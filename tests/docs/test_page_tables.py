@@ -11,13 +11,12 @@ import pytest
 from grasp_cosim import cli, simulate
 from grasp_cosim.fmu_export.contract import declared
 from grasp_cosim.fmu_export.shipped import blocks
+from grasp_cosim.inspection.template import TEMPLATES
 from grasp_cosim.recording.folder import load_run
-from support.native_fmus import needs_gcc, vendor_plant
+from support.pages import BLOCKS, INDENTED, commands_of, fill_in
 from support.pictures import assert_same_picture
 
 DOCS = Path(__file__).parents[2] / "docs"
-BLOCKS = re.compile(r"```(console|toml|python)\n(.*?)```", re.DOTALL)
-INDENTED = re.compile(r"^    (grasp-cosim .*?)(?:\s+#.*)?$", re.MULTILINE)
 
 
 def page(name):
@@ -49,7 +48,7 @@ def checked(name, checkout):
 @pytest.mark.slow
 def test_the_commands_at_the_beginnings_work(checkout):
     commands = INDENTED.findall(page("limits") + page("your_plant"))
-    assert {command.split()[1] for command in commands} == {"build", "run"}
+    assert {command.split()[1] for command in commands} == {"init", "build", "run"}
     for command in commands:
         short = ["--stop", "0.01"] if command.split()[1] == "run" else []
         assert cli.main([*shlex.split(command)[1:], *short]) == 0, command
@@ -81,7 +80,8 @@ def test_limits(checkout):
 
 @pytest.mark.slow
 def test_your_plant(checkout, capsys):
-    source = (DOCS / "spring_plant.py").read_text("utf-8")
+    assert cli.main(shlex.split(INDENTED.findall(page("your_plant"))[0])[1:]) == 0
+    source = (TEMPLATES / "spring_plant.py").read_text("utf-8")
     excerpts = 0
     for kind, block in BLOCKS.findall(page("your_plant").partition("## b.")[0]):
         if kind == "python":
@@ -104,14 +104,14 @@ def test_your_plant(checkout, capsys):
 
 
 @pytest.mark.slow
-@needs_gcc
 def test_an_fmu_from_elsewhere(checkout, grasp, capsys):
     """From the file of a vendor to QUALIFIED, by the page alone."""
-    vendor_plant(checkout / "vendor.fmu")
     page_b = page("your_plant").partition("## b.")[2]
     for kind, block in BLOCKS.findall(page_b):
         if kind == "console":
             try_commands(block, capsys)
+        elif kind == "python":
+            (checkout / "vendor.py").write_text(block, encoding="utf-8")
         else:
             fill_in(checkout / "my_system.toml", block)
     assert (checkout / "vendor/report.html").is_file()
@@ -120,25 +120,9 @@ def test_an_fmu_from_elsewhere(checkout, grasp, capsys):
         assert theirs[name] == pytest.approx(ours[name], rel=1e-9, abs=1e-12)
 
 
-def fill_in(system, block):
-    """Put each line of a table in the place of that with its key."""
-    chunks = system.read_text("utf-8").split("\n\n")
-    for table in block.strip().split("\n\n"):
-        heading, *new = table.splitlines()
-        (place,) = (i for i, chunk in enumerate(chunks) if chunk.startswith(heading))
-        lines = {line.partition(" = ")[0]: line for line in chunks[place].splitlines()}
-        for line in new:
-            assert line.partition(" = ")[0] in lines
-            lines[line.partition(" = ")[0]] = line
-        chunks[place] = "\n".join(lines.values())
-    system.write_text("\n\n".join(chunks), encoding="utf-8")
-
-
 def try_commands(block, capsys):
     """Do the commands of a block, which print first what the page shows below them."""
-    whole = block.replace("\\\n", " ")
-    for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", whole, re.MULTILINE | re.DOTALL):
-        command, _, shown = part.partition("\n")
+    for command, shown in commands_of(block):
         if "CASE" in command:
             continue  # the rows of a table
         if not command.startswith("grasp-cosim "):

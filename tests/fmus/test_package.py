@@ -14,7 +14,7 @@ from grasp_cosim.fmu_export.shipped import SHIPPED
 from support.fmi2 import Fmu, Instance, drive
 from support.kinds import all_kinds
 
-SPRING = Path(__file__).parents[2] / "docs" / "spring_plant.py"
+SPRING = Path(__file__).parents[2] / "orchestrator/grasp_cosim/inspection/templates/spring_plant.py"
 
 LOAD = """
 import sys, importlib

@@ -3,13 +3,13 @@
 A test that loads FMUs runs on each kind that it, or its module, is marked with.
 """
 
-from pathlib import Path
 from typing import Literal
 
 import pytest
 from grasp_cosim.fmu_export.build import build_block, build_model, planned
 from grasp_cosim.fmu_export.package import shipped_model
 from grasp_cosim.fmu_export.shipped import SHIPPED
+from grasp_cosim.inspection.template import TEMPLATES
 
 from .marks import platforms, slow
 
@@ -25,7 +25,7 @@ native_slowly = pytest.mark.parametrize(
 both_of_fmi_2 = pytest.mark.kinds("python", "native")
 python_only = pytest.mark.kinds("python")
 
-OWN = {"SpringPlant": Path(__file__).parents[2] / "docs/spring_plant.py"}
+OWN = {"SpringPlant": TEMPLATES / "spring_plant.py"}
 """Blocks that are a file of one's own, by the names of their FMUs."""
 
 

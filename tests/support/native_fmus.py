@@ -6,7 +6,6 @@ The value reference of a variable is its place in the lists here, where it names
 
 import json
 import shutil
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -320,35 +319,6 @@ def inner(
     return pack(folder / f"{name}.fmu", version, "inner", xml, library)
 
 
-BRAKE = "share of the force that is lost"
-_VENDOR = Model(
-    (
-        _TIME,
-        Variable("ForceRight", causality="input", start=0, unit="mN"),
-        Variable("ForceLeft", causality="input", start=0, unit="mN"),
-        Variable("Brake", causality="input", start=0, description=BRAKE),
-        *(
-            Variable(name, causality="output", depends=(), reference=place, sizes=sizes, unit=unit)
-            for name, place, unit, sizes in (
-                ("Gaps", 10, "mm", "=2"),
-                ("Fingers.Right.Position", 11, "mm", ""),
-                ("Fingers.Left.Position", 12, "mm", ""),
-                ("SpeedRight", 13, None, ""),
-                ("SpeedLeft", 14, None, ""),
-                ("LoadRight", 15, "mN", ""),
-                ("LoadLeft", 16, "mN", ""),
-                ("PartPosition", 17, "mm", ""),
-            )
-        ),
-        _parameter("PartStart", 30)._replace(reference=30, unit="mm"),
-        Variable("TouchRight", "Boolean", "output", "discrete", depends=(), reference=20),
-        Variable("TouchLeft", "Boolean", "output", "discrete", depends=(), reference=21),
-    ),
-    stop=3.0,
-    step=0.001,
-)
-
-
 def build(
     folder,
     name="native",
@@ -433,18 +403,6 @@ def state_space(
     library = library_of("state_space", "3.0", complete=complete) if binary else b""
     xml = description("state_space", "3.0", _state_space(types), [kind], capabilities, more=more)
     return pack(folder / f"{name}.fmu", "3.0", "state_space", xml, library)
-
-
-def vendor_plant(path):
-    """The gripper plant of another vendor, in mm and mN, with names of its own."""
-    from grasp_cosim import cli  # here, as what is below it is tested without
-
-    with tempfile.TemporaryDirectory() as folder:
-        assert cli.main(["build", "--native", "--c-only", folder, "GripperPlant"]) == 0
-        more = str(Path(folder, "GripperPlant.c")), f"-I{folder}", "-lm"
-        library = library_of("vendor", "3.0", more=more)
-    xml = description("vendor", "3.0", _VENDOR, ["CoSimulation"])
-    return pack(path, "3.0", "vendor", xml, library)
 
 
 def library_of(name, version, steps=True, complete=True, more=("-lm",), code=""):

@@ -4,6 +4,7 @@ import logging
 import os
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from tempfile import gettempdir
 
 import click
@@ -48,6 +49,12 @@ class Commands(click.Group):
             with formatter.section(title):
                 formatter.write_dl([(n, c.get_short_help_str(width)) for n, c in found])
 
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write where the pages are."""
+        super().format_epilog(ctx, formatter)
+        formatter.write_paragraph()
+        formatter.write(f"Pages, examples and a notebook: {pages()}\n")
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -64,6 +71,12 @@ class Commands(click.Group):
         command: click.Command = getattr(import_module(f"{__package__}.{HOMES[name]}"), name)
         command.params += [option for option in EVERYWHERE if option not in command.params]
         return command
+
+
+def pages() -> Path:
+    """The folder of the pages: in the package once it is installed, in the sources beside it."""
+    inside = Path(__file__).parents[1] / "docs"
+    return inside if inside.is_dir() else Path(__file__).parents[3] / "docs"
 
 
 SHOWN = {"help_option_names": ["-h", "--help"], "show_default": True}

@@ -56,7 +56,7 @@ def build(
     These are the plants, GripperPlant*, TandemPlant and HandPlant*, ProximitySensor,
     GraspController* and HandController*; the hand has three fingers, with --fingers as many as
     that, and the FMUs have the number in their names. With BLOCK, a Python file, the FMU of that
-    block alone is built: spring_plant.py becomes SpringPlant.fmu (docs/your_plant.md). With
+    block alone is built: my_plant.py becomes MyPlant.fmu; `init` writes one to start from. With
     --native, which translates the blocks to C and compiles them, BLOCK may also be the name of one
     of ours.
 
@@ -65,7 +65,7 @@ def build(
 
     \b
     Example: grasp-cosim build --out my_fmus
-    Your own: grasp-cosim build docs/spring_plant.py
+    Your own: grasp-cosim build my_plant.py
     Native: grasp-cosim build --native --target linux64,win64
     """
     from ..base.c_compilers import CompilerError  # only here: they take time to load

@@ -10,9 +10,10 @@ from typing import Any
 import click
 
 from ..base.checks import real
-from ..base.errors import InputError
+from ..base.errors import InputError, choices
 from ..base.files import FMU_FOLDER, check_file, write_text
 from ..inspection.draft import Draft, alone, replacing
+from ..inspection.template import KINDS, test_of, texts
 from ..interface.read import read_interface
 from ..system.description import System
 from ..system.toml import to_do
@@ -41,6 +42,11 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
 @click.option(
     "--tandem", is_flag=True, help="Make a system of a gripper in tandem, on the wrist of an arm."
 )
+@click.option(
+    "--template",
+    type=click.Choice([*KINDS]),
+    help="Write a block in Python, to build an FMU of, and its test.",
+)
 @click.option("--force", is_flag=True, help="Replace a file that is there already.")
 @json_option
 def init(
@@ -50,6 +56,7 @@ def init(
     fingers: int | None,
     angles: str | None,
     tandem: bool,
+    template: str | None,
     force: bool,
     as_json: bool,
 ) -> int:
@@ -57,15 +64,25 @@ def init(
 
     It describes the grasp, with its FMUs in fmus/build beside FILE. With --as, the entries of one
     component are filled in for an FMU of another vendor; what cannot be told is marked as TODO.
+    With --template, FILE is a block in Python instead, beside its test.
 
     \b
     Example: grasp-cosim init my_system.toml --as plant=vendor.fmu
     An FMU alone: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
     A hand: grasp-cosim init hand.toml --fingers 3 --angles 0,90,225
     A gripper on an arm: grasp-cosim init tandem.toml --tandem
+    A plant of your own: grasp-cosim init my_plant.py --template plant
     """
+    if template:
+        others = {"--as": candidates, "--fmu": fmus, "--fingers": fingers, "--angles": angles}
+        for option, value in {**others, "--tandem": tandem}.items():
+            if value:
+                raise InputError(f"{option} cannot be used with --template, which is no system")
+        return _block(file, template, force, as_json)
     if file.suffix.lower() != ".toml":
-        raise InputError(f"{file}: must end in .toml, a system file")
+        kinds = choices([f"--template {kind}" for kind in KINDS])
+        block = f"; a block in Python has {kinds}" if file.suffix == ".py" else ""
+        raise InputError(f"{file}: must end in .toml, a system file{block}")
     if file.is_file() and not force:
         raise InputError(f"{file}: is there already; give another name, or --force")
     check_file(file)
@@ -97,6 +114,33 @@ def init(
     show(as_json, report, "\n    ".join(_lines(file, drafts, left)))
     for note in notes if not as_json else ():
         say(note)
+    return 0
+
+
+def _block(file: Path, kind: str, force: bool, as_json: bool) -> int:
+    """Write a block in Python and its test; say how to go on."""
+    from ..fmu_export.own_block import fmu_name  # only here: it takes time to load
+
+    try:
+        name = fmu_name(file)
+    except ValueError as error:
+        raise InputError(f"--template {kind}: {error}") from error
+    written = texts(file, kind)
+    for path in written:
+        if path.is_file() and not force:
+            raise InputError(f"{path}: is there already; give another name, or --force")
+        check_file(path)
+    for path, text in written.items():
+        write_text(path, text)
+    fmu = FMU_FOLDER / f"{name}.fmu"
+    swaps = " ".join(f"--swap {component}={fmu}" for component in KINDS[kind].components)
+    then = [
+        f"grasp-cosim build {quote(str(file))}",
+        f"grasp-cosim run --step 1e-3 {swaps}",
+        f"python -m pytest {quote(str(test_of(file)))}",
+    ]
+    lines = [f"{path}: written" for path in written] + [f"    then: {line}" for line in then]
+    show(as_json, {"files": [str(path) for path in written], "then": then}, "\n".join(lines))
     return 0
 
 

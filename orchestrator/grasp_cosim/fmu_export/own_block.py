@@ -51,11 +51,7 @@ def own_model(file: Path) -> Iterator[Model]:
     is not packed: it must be installed where the FMU runs.
     ValueError, one line, where the file is no such block.
     """
-    _check_name(file)
-    name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
-    for ours in (*SHIPPED, *(hand for n in range(FEWEST, MOST + 1) for hand in of_fingers(n))):
-        if ours.lower() == name.lower():  # the same file on Windows
-            raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
+    name = fmu_name(file)
     text, tree = _parsed(file)
     _check_slaves(file, tree)
     _check_imports(file, text, tree)
@@ -76,14 +72,19 @@ def own_model(file: Path) -> Iterator[Model]:
         )
 
 
-def _check_name(file: Path) -> None:
-    """ValueError where the name of a file is not that of a Python module, as an FMU's must be."""
+def fmu_name(file: Path) -> str:
+    """The name of the FMU of the block in a file: MyPlant of my_plant.py; ValueError for none."""
     is_identifier = file.stem.isascii() and file.stem.isidentifier()
     if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
-        ours = together(file.name) if file.name == str(file) else None
-        native = f"; {file} is one of ours: --native builds it alone" if ours else ""
+        is_ours = file.name == str(file) and together(file.name) is not None
+        native = f"; {file} is one of ours: --native builds it alone" if is_ours else ""
         must = "must be NAME.py, NAME of letters, digits and _, a letter first"
         raise ValueError(f"{file}: {must}{native}")
+    name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
+    for ours in (*SHIPPED, *(hand for n in range(FEWEST, MOST + 1) for hand in of_fingers(n))):
+        if ours.lower() == name.lower():  # the same file on Windows
+            raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
+    return name
 
 
 def _check_slaves(file: Path, tree: ast.Module) -> None:

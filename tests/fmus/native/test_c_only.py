@@ -19,7 +19,7 @@ from support.marks import platforms, slow
 from support.native_fmus import needs_gcc
 
 ROOT = Path(__file__).parents[3]
-SPRING = ROOT / "docs/spring_plant.py"
+SPRING = ROOT / "orchestrator/grasp_cosim/inspection/templates/spring_plant.py"
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 OF_THE_COMPILER = {"memcpy", "memset", "memmove", "memcmp", "strlen", "strcpy"}
 OF_THE_COMPILER |= {"strcmp", "strcspn", "strchr"}

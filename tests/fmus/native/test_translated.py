@@ -10,6 +10,7 @@ from random import Random
 import pytest
 from fmus.native.c_block import Both, loaded
 from grasp_cosim.fmu_export.shipped import block_of as block_of_ours
+from grasp_cosim.inspection.template import TEMPLATES
 from support.kinds import TRANSLATED
 from support.marks import part, platforms, seeds, slow
 from support.native_fmus import needs_gcc
@@ -17,7 +18,8 @@ from support.native_fmus import needs_gcc
 pytestmark = needs_gcc
 
 DOCS = Path(__file__).parents[3] / "docs"
-OWN = {name: DOCS / f"{name}.py" for name in ("spring_plant", "moving_object")}
+BLOCKS = [*TEMPLATES.glob("*_*.py"), DOCS / "moving_object.py"]
+OWN = {block.stem: block for block in sorted(BLOCKS)}
 NAMES = [*TRANSLATED, *OWN]
 
 
