@@ -2,19 +2,19 @@
 
 import re
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from grasp_cosim import InputError, System, metric, simulate, sweep
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.inspection.template import TEMPLATES
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.sweeps.run import Task, packed, run_packed
 from grasp_cosim.system.parts import Component, Connection, Port
 from grasp_cosim.system.toml import toml_table
 
 EXPERIMENT = {"step": 1e-3, "stop": 0.5}
-SPRING = Path(__file__).parents[2] / "docs/spring_plant.py"
+SPRING = TEMPLATES / "spring_plant.py"
 
 
 class Brake:
