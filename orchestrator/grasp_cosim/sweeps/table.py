@@ -24,7 +24,6 @@ from ..base.one_piece import in_one_piece
 from ..base.text import columns, counted, on_a_screen, significant
 from ..interface.interface import Value
 from ..metrics.metric import Metric
-from ..report.tables import text_table
 from .rows import Row
 from .signals import RUN, TIME, Recorded, dimension
 
@@ -383,6 +382,8 @@ def as_text(table: Table) -> str:
 
 def as_html(table: Table) -> str:
     """The same for a notebook, and the first rows of the table."""
+    from ..report.tables import text_table  # only here: it takes time to load
+
     first, *more = (f"{escape(line)}<br>" for line in _heads(table))
     rows = _study_rows(table) if is_study(table) else _statistics(table)
     shown = [name for name in table.columns if name != "error" or table.errors]
