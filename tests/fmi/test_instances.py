@@ -7,10 +7,13 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
+import fmpy.fmi1
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
@@ -427,3 +430,24 @@ import grasp_cosim.fmi.co_simulation
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
     assert (done.stdout, done.stderr.split()) == (b"", [b"asked"] * 2)  # by FMPy: FMI 1.0 and 2.0
+
+
+@needs_gcc
+def test_threads_that_load_fmus_together_keep_the_current_folder(tmp_path, monkeypatch):
+    """FMPy goes to the folder of a library for the time of loading it, and all threads with it."""
+    load_library = fmpy.fmi1.cdll.LoadLibrary
+
+    def slowly(path):
+        time.sleep(0.01)
+        return load_library(path)
+
+    monkeypatch.setattr(fmpy.fmi1.cdll, "LoadLibrary", slowly)
+    monkeypatch.chdir(tmp_path)
+    fmu = build(tmp_path, version="2.0")
+
+    def life(_):
+        load(Component("part", fmu, {})).close()
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(life, range(12)))
+    assert Path.cwd() == tmp_path

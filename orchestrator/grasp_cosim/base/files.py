@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import tempfile
+import threading
 import zipfile
 from contextlib import suppress
 from glob import escape
@@ -13,6 +14,11 @@ from typing import Any
 
 from .errors import InputError
 from .one_piece import in_one_piece, is_stream
+
+CURRENT_FOLDER = threading.RLock()
+"""Held by who changes the current folder for a moment, as FMPy does to load a library, and by who
+asks for it to go back there: all threads have the same one.
+"""
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of a disk, not of the input."""

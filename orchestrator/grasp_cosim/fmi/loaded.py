@@ -26,7 +26,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..base.calls import TRANSFER_2, TRANSFER_3, Call, Native
 from ..base.errors import InputError, SimulationError
-from ..base.files import FULL, not_its_fault
+from ..base.files import CURRENT_FOLDER, FULL, not_its_fault
 from ..base.scratch import ScratchFolder, without_scratch
 from ..interface.interface import Element, Interface, Value, Variable
 from ..interface.obstacles import of_binary, of_loading, this_machine
@@ -134,7 +134,8 @@ class LoadedInstance(ABC):
         if obstacle := of_binary(interface):
             raise InputError(f"{name}: {interface.called} {obstacle}")
         try:
-            self._load(self._unpacked())
+            with CURRENT_FOLDER:
+                self._load(self._unpacked())
         except BaseException:
             self.close()
             raise

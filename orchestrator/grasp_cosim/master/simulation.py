@@ -12,6 +12,7 @@ from numbers import Integral
 from typing import Any, TypeVar
 
 from ..base.errors import InputError, RunInterruptedError, SimulationError, nearest
+from ..base.files import CURRENT_FOLDER
 from ..base.interruption import interruptible, raised
 from ..base.progress import DELAY, Progress, phase
 from ..base.text import counted
@@ -717,12 +718,14 @@ def _guarded() -> Iterator[None]:
 @contextmanager
 def _folder_kept() -> Iterator[None]:
     """Go back to the current folder from wherever an FMU went."""
-    here = os.getcwd()  # noqa: PTH109 - twice in a step, so as fast as can be
+    with CURRENT_FOLDER:
+        here = os.getcwd()  # noqa: PTH109 - twice in a step, so as fast as can be
     try:
         yield
     finally:
-        if os.getcwd() != here:  # noqa: PTH109
-            os.chdir(here)
+        with CURRENT_FOLDER:
+            if os.getcwd() != here:  # noqa: PTH109
+                os.chdir(here)
 
 
 def _drive(session: Session, progress: bool | str, until: Callable[[Session], bool] | None) -> None:
