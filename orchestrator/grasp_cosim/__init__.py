@@ -22,6 +22,7 @@ from .base.errors import InputError, RunInterruptedError, SimulationError
 
 if TYPE_CHECKING:
     __version__: str
+    from .base.quantity import Quantity
     from .comparison.compare import compare
     from .comparison.qualify import qualify
     from .grasp.identification.identification import identify
@@ -46,6 +47,7 @@ __all__ = [
     "AnyOf",
     "InputError",
     "Metric",
+    "Quantity",
     "Realtime",
     "Result",
     "RunInterruptedError",
@@ -73,6 +75,7 @@ __all__ = [
 _HOMES = {
     "AnyOf": "metrics.metric",
     "Metric": "metrics.metric",
+    "Quantity": "base.quantity",
     "Realtime": "system.parts",
     "Result": "recording.result",
     "Session": "master.simulation",

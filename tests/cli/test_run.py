@@ -52,6 +52,30 @@ def test_a_table_with_what_the_plant_tells_of_the_object(command, fmus):
     assert "object damaged" not in command("run", *arguments)[1]
 
 
+def test_with_another_fmu_its_own_values_are_taken_or_said(command, fmus, tmp_path):
+    text = SYSTEM.read_text("utf-8").replace("object_width = 0.07", 'object_width = "6 cm"')
+    file = tmp_path / "wide.toml"
+    file.write_text(re.sub(r'fmu = "', f'fmu = "{fmus.as_posix()}/', text), "utf-8")
+    short = ("--step", "1 ms", "--stop", "10 ms", "--set", "plant.finger_mass[1]=400 g", "--json")
+    swap = ("--swap", f"plant={fmus / 'GripperPlant.fmu'}")
+    widths = {}
+    for own in ((), ("--own-values",)):
+        code, _, err = command("run", file, *short, *swap, *own, "--out", "made")
+        assert code == 0, err
+        said = [line for line in err.splitlines() if "the values of the system stay" in line]
+        assert [line.partition("stay: ")[2].partition(";")[0] for line in said] == [
+            "object_width = 0.06 m (its own is 0.07 m)"
+        ] * (not own)
+        made = json.loads((tmp_path / "made/run.json").read_text("utf-8"))["components"]["plant"]
+        widths[own] = made["values"]
+    assert widths == {
+        (): {"object_width": 0.06, "initial_object_position": 0.03, "finger_mass[1]": 0.4},
+        ("--own-values",): {"finger_mass[1]": 0.4},
+    }
+    code, _, err = command("run", file, "--own-values")
+    assert (code, err) == (2, "grasp-cosim: --own-values: does nothing without --swap\n")
+
+
 def test_what_is_set_is_in_the_settings_of_the_run(command, fmus, tmp_path):
     """The gaps are taken for mm: the sensors see a thousandth of them."""
     line = (

@@ -6,12 +6,23 @@ import pytest
 from grasp_cosim import InputError, System
 from grasp_cosim.base.si_units import BASE, Unit, known_unit
 from grasp_cosim.interface.read import read_interface
-from grasp_cosim.interface.units import conversion
+from grasp_cosim.interface.units import conversion, converted
 from grasp_cosim.system.parts import Component, Connection, Port
 from grasp_cosim.system.validity import connection_transform
 from hypothesis import given
 from hypothesis import strategies as st
 from ssp.hand_made import described
+
+
+@given(st.integers(-999_999, 999_999), st.sampled_from(["m", "c", "d", "k", "u"]))
+def test_a_quantity_in_another_unit_has_the_bits_of_what_is_written(digits, prefix):
+    """50 mm are 0.05 m, which 50 * 0.001 need not be."""
+    power = {"m": -3, "c": -2, "d": -1, "k": 3, "u": -6}[prefix]
+    source, target = known_unit(f"{prefix}m"), known_unit("m")
+    assert converted(digits / 8, source, target) == float(f"{digits * 125}e{power - 3}")
+    assert converted(20, known_unit("degC"), known_unit("K")) == 293.15
+    assert converted(math.inf, source, target) == math.inf
+
 
 exponents = st.tuples(*[st.integers(-4, 4)] * len(BASE))
 factors = st.floats(1e-9, 1e9) | st.floats(-1e9, -1e-9)

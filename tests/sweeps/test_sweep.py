@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
-from grasp_cosim import InputError, System, metric, sweep
+from grasp_cosim import InputError, System, inspect_fmu, metric, simulate, sweep, write_ssp
 from grasp_cosim.metrics.metric import load_metrics
 from grasp_cosim.sweeps.kept import identity_of, keep, opened, write_line
 from grasp_cosim.sweeps.places import cluster
@@ -58,6 +58,23 @@ def test_a_task_that_travels_is_the_same(system, mine):
         shared = packed(task, with_fmus)
         assert run_packed(shared, (3, {"a.gain": 2.0})) == here
         assert bool(shared.fmus) == with_fmus
+
+
+def test_texts_stand_for_paths(system, mine, tmp_path):
+    path, rows = str(tmp_path / "system.toml"), [{"a.gain": 2.0}]
+    assert simulate(path)["a.x"].tolist() == simulate(system)["a.x"].tolist()
+    assert sweep(path, rows, metrics=mine, workers=1) == sweep(system, rows, metrics=mine)
+    fmu = system.components[0].fmu
+    assert inspect_fmu(str(fmu)) == inspect_fmu(fmu)
+    write_ssp(path, str(tmp_path / "system.ssp"))
+    assert System.load(str(tmp_path / "system.ssp")).components[0].name == "a"
+    for call in (
+        simulate,
+        lambda given: sweep(given, rows),
+        lambda given: write_ssp(given, "a.ssp"),
+    ):
+        with pytest.raises(InputError, match=r": int '3': must be a System, as .*, or the path of"):
+            call(3)
 
 
 @pytest.mark.slow

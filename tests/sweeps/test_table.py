@@ -1,4 +1,4 @@
-"""What varies becomes rows in SI units; the table of runs: types, units in files, text, orders."""
+"""What varies becomes rows; the table of runs: types, units in files, text, orders."""
 
 import csv
 from fractions import Fraction
@@ -9,9 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import xarray as xr
-from grasp_cosim import InputError
+from comparison.made import PLANT, write_fmu, write_system
+from grasp_cosim import InputError, Quantity
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.sweeps.rows import as_rows, grid, settings_of, unit_of, varied
+from grasp_cosim.sweeps.rows import as_rows, grid, in_own_units, settings_of, unit_of, varied
 from grasp_cosim.sweeps.table import (
     Outcome,
     Table,
@@ -159,7 +160,7 @@ def test_what_is_no_study():
     assert convergence(table([1e-4, 2e-4], t=[1.0, 2.0]))["t"].order is None
 
 
-# What varies: texts, tables and columns become rows, in SI units.
+# What varies: texts, tables and columns become rows.
 
 
 @pytest.mark.parametrize(
@@ -218,11 +219,60 @@ def test_times_may_be_fractions():
         as_rows([{place: "1/x"}])
 
 
-def test_a_unit_in_the_head_is_converted(tmp_path):
-    path = tmp_path / "rows.csv"
-    path.write_text("plant.width [mm],sensor.angle [deg],t [degC],n\n60,180,20,3\n")
-    (row,) = as_rows(path)
-    assert row == pytest.approx({"plant.width": 0.06, "sensor.angle": np.pi, "t": 293.15, "n": 3})
+@pytest.fixture
+def milli(tmp_path):
+    """A system whose plant has its width in mm."""
+    width = 'causality="parameter" variability="fixed" | Real start="50" unit="mm"'
+    plant = write_fmu(tmp_path / "milli.fmu", {**PLANT, "width": width})
+    return write_system(tmp_path).swap("plant", plant)
+
+
+def test_a_number_is_in_the_unit_of_its_variable_as_in_the_file(milli, tmp_path):
+    """However the rows are given; the head of a column, or the value, may name another unit."""
+    (tmp_path / "rows.csv").write_text("plant.width [cm],experiment.step [ms]\n6,1\n", "utf-8")
+    step = {"experiment.step": 1e-3}
+    for each in (
+        [{"plant.width": 60.0, **step}],
+        [{"plant.width": "6 cm", "experiment.step": "1 ms"}],
+        {"plant.width": (0.06, "m"), "experiment.step [ms]": [1.0]},
+        pd.DataFrame({"plant.width [m]": [0.06], **step}),
+        tmp_path / "rows.csv",
+        grid(dict([varied("plant.width [cm]=6"), varied("experiment.step=1 ms")])),
+    ):
+        rows = in_own_units(milli, as_rows(each))
+        assert rows == [{"plant.width": 60.0, "experiment.step": 1e-3}]
+        (settings,) = settings_of(milli, rows)
+        assert milli.with_settings(settings).start("plant.width") == 60.0
+    assert unit_of(milli, "plant.width") == "mm"
+    found = [v for _, values in [varied("plant.width [cm]=4:6:3")] for v in values]
+    assert found == [Quantity(v, "cm") for v in (4.0, 5.0, 6.0)]
+    assert as_rows({"a.b": Quantity([4, 5], "cm")})[1] == {"a.b": Quantity(5, "cm")}
+
+
+def test_a_row_with_another_fmu_means_the_same_by_its_numbers(milli, tmp_path):
+    """They are in the unit that the table says, whatever the other FMU has."""
+    plant = str(write_fmu(tmp_path / "metre.fmu", PLANT))
+    row = {"plant.width": 60.0, "components.plant.fmu": plant}
+    (settings,) = settings_of(milli, [row])
+    assert milli.with_settings(settings).start("plant.width") == 0.06
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ({"plant.width [kg]": 60}, "sweep: plant.width = 60 kg: cannot be converted into mm"),
+        ({"plant.width [furlong]": 60}, "unit 'furlong' is not known"),
+        ({"plant.mass": "60 g"}, "plant.mass = 60 g: .*declares no unit of it; must have none"),
+        ({"experiment.scheme [mm]": 60}, "experiment.scheme = 60 mm: must have no unit"),
+        ({"experiment.step [mm]": 60}, "experiment.step = 60 mm: must be in a unit of time"),
+        ({"plant.width [mm]": "wide"}, r"row 0, plant.width \[mm\]: 'wide': must be a number"),
+        ({"plant.width [mm]": 6, "plant.width": 6}, "row 0: plant.width has two values"),
+    ],
+)
+def test_a_row_in_a_unit_of_something_else_is_refused(milli, row, said):
+    with pytest.raises(InputError, match=said) as caught:
+        in_own_units(milli, as_rows([row]))
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -232,7 +282,6 @@ def test_a_unit_in_the_head_is_converted(tmp_path):
         ("a.b\n1,2\n", "line 2 has 2 cells; must have 1, as line 1"),
         ("a.b,a.b\n1,2\n", "line 1, column 2 = 'a.b': appears twice; must appear once"),
         ("a.b [mm]\n1\none\n", "line 3, column 1, a.b = 'one': must be a number"),
-        ("a.b [furlong]\n1\n", "'furlong' is no known unit"),
         ("a.b\n", "0 rows; must be 1 to"),
         ([], "0 rows; must be 1 to"),
         ([{}], "nothing varies"),

@@ -4,9 +4,10 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from comparison.made import PLANT, write_fmu, write_system
-from grasp_cosim import InputError, System
+from grasp_cosim import InputError, Quantity, System
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.system.toml import to_do
 
@@ -209,6 +210,109 @@ def test_a_swap_leaves_out_what_the_new_fmu_calculates(tmp_path):
         "swap plant: in other.fmu opening is an output that the FMU calculates from the start on: "
         "its value 2.0 is left out"
     )
+
+
+MILLI = {**PLANT, "width": PLANT["width"].replace('unit="m"', 'unit="mm"').replace('max="1"', "")}
+SAID = [
+    50,
+    50.0,
+    "50",
+    "50 mm",
+    "5 cm",
+    (0.05, "m"),
+    Quantity("50 mm"),
+    np.int64(50),
+    np.array(50.0),
+]
+
+
+@pytest.mark.parametrize("said", SAID)
+def test_a_number_is_in_the_unit_of_its_variable_unless_it_says_one(tmp_path, said):
+    plant = write_fmu(tmp_path / "milli.fmu", MILLI)
+    system = write_system(tmp_path).swap("plant", plant, values={"width": said})
+    again = system.with_values({"plant.width": said}).with_settings({"plant.width": said})
+    for each in (system, again):
+        value = each.component("plant", "test").values["width"]
+        assert (value, type(value)) == (50.0, float)
+
+
+def test_a_file_and_its_presets_may_name_a_unit(grasp, fmus, tmp_path):
+    preset = '[presets.wide]\n"plant.object_width" = "9 cm"\n'
+    text = TEXT.replace("object_width = 0.07", 'object_width = "60 mm"') + preset
+    made = written(text, tmp_path, fmus)
+    assert made.start("plant.object_width") == 0.06  # to the bit
+    assert made.with_presets("wide").start("plant.object_width") == 0.09
+    assert grasp.with_settings({"experiment.step": "0.2 ms"}).step_ns == 200_000
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (
+            "plant.width",
+            "50 kg",
+            "width = 50 kg: cannot be converted into mm; must be in a unit of",
+        ),
+        ("plant.width", (50, "mmm"), "width = 50 mmm: unit 'mmm' is not known; did you mean m.mm"),
+        ("plant.width", "50mm", "finite number from 0 to .* mm; with its unit it is '50 mm'"),
+        ("plant.width", "-5 cm", "width = '-5 cm': must be a finite number from 0"),
+        (
+            "plant.mass",
+            "5 g",
+            "mass = 5 g: milli.fmu declares no unit of it; must have none, or `un",
+        ),
+        ("plant.name", (5, "g"), "name = 5 g: is of type String; must have no unit"),
+        ("experiment.step", "5 g", "experiment.step = 5 g: must be in a unit of time, like ms"),
+    ],
+)
+def test_a_unit_of_something_else_is_refused_in_a_line(tmp_path, place, value, said):
+    plant = MILLI["width"].replace("min", 'max="1000" min')
+    fmu = write_fmu(tmp_path / "milli.fmu", {**MILLI, "width": plant})
+    system = write_system(tmp_path).swap("plant", fmu)
+    with pytest.raises(InputError, match=said) as caught:
+        system.with_settings({place: value})
+    assert "\n" not in str(caught.value)
+
+
+def test_numbers_of_numpy_are_as_good_as_those_of_python(grasp):
+    found = grasp.with_values(
+        {
+            "controller.impact_reduction.enabled": np.bool_(False),
+            "sensor_1.noise.seed": np.int64(4),
+            "plant.object_width": np.float32(0.5),
+            "plant.finger_mass[1]": np.array(0.25),
+        }
+    ).with_experiment(step=np.float64(1e-3), stop=np.int64(2))
+    values = [c.values for c in found.components]
+    assert [type(value) for own in values for value in own.values()] == [float] * 3 + [int, bool]
+    assert (found.step_ns, found.stop_ns) == (1_000_000, 2_000_000_000)
+
+
+def test_what_a_system_sets_and_another_fmu_has_otherwise_is_said_in_a_line(tmp_path):
+    system = write_system(tmp_path)
+    other = PLANT["width"].replace("0.05", "0.02")
+    fmu = write_fmu(tmp_path / "other.fmu", {**PLANT, "width": other})
+    swapped = system.swap("plant", fmu)
+    assert swapped.notes[len(system.notes) :] == (
+        "swap plant: the values of the system stay: width = 0.07 m (its own is 0.02 m); "
+        "--own-values, or swap(..., own_values=True), takes those of other.fmu",
+    )
+    assert swapped.start("plant.width") == 0.07
+    own = system.swap("plant", fmu, values={"mass": 0.3}, own_values=True)
+    assert own.notes == system.notes
+    assert (own.start("plant.width"), own.start("plant.mass")) == (0.02, 0.3)
+    same = PLANT["width"].replace("0.05", "70").replace('"m"', '"mm"').replace('max="1"', "")
+    equal = write_fmu(tmp_path / "equal.fmu", {**PLANT, "width": same})
+    assert "width" not in "".join(system.swap("plant", equal).notes)
+
+
+def test_own_values_are_not_those_of_inputs(grasp, fmus):
+    """Which have no other source."""
+    cut = tuple(c for c in grasp.connections if str(c.target) != "plant.force[1]")
+    plant = replace(grasp.component("plant", "x"), values={"force[1]": 0.5, "object_width": 0.06})
+    system = replace(grasp, components=(plant, *grasp.components[1:]), connections=cut)
+    found = system.swap("plant", fmus / "GripperPlant.fmu", own_values=True)
+    assert found.component("plant", "x").values == {"force[1]": 0.5}
 
 
 TODO = """connections = [

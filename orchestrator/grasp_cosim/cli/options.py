@@ -47,8 +47,9 @@ set_option = click.option(
     "settings",
     multiple=True,
     metavar="PLACE=VALUE",
-    help="Change a value of the system file, by its place there: plant.object_width=0.06, "
-    "experiment.scheme=jacobi, components.plant.isolation=process.",
+    help="Change a value of the system file, by its place there: plant.object_width=0.06, in the "
+    "unit of the variable, or 'plant.object_width=60 mm'; experiment.scheme=jacobi, "
+    "components.plant.isolation=process.",
 )
 
 values_option = click.option(
@@ -67,13 +68,26 @@ map_option = click.option(
     "offset of its time.",
 )
 
-swap_option = click.option(
-    "--swap",
-    "swaps",
-    multiple=True,
-    metavar="COMPONENT=FMU",
-    help="Put another FMU in the place of a component.",
+SWAP_OPTIONS = (
+    click.option(
+        "--swap",
+        "swaps",
+        multiple=True,
+        metavar="COMPONENT=FMU",
+        help="Put another FMU in the place of a component.",
+    ),
+    click.option(
+        "--own-values",
+        is_flag=True,
+        help="With --swap: take the start values of the new FMU, not those that the system sets.",
+    ),
 )
+
+
+def swap_options(command: Command) -> Command:
+    """Other FMUs in the system of a command."""
+    return reduce(lambda made, option: option(made), reversed(SWAP_OPTIONS), command)
+
 
 controller_option = click.option(
     "--controller",
@@ -207,7 +221,10 @@ def chosen_system(given: Mapping[str, Any]) -> System:
             if columns.issuperset(reached(loaded, place)):
                 raise InputError(f"--set {place}: does nothing, as {loaded.input.file} drives it")
     swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
-    system = loaded
+    own = swapped if given.get("own_values") else []
+    if given.get("own_values") and not swapped:
+        raise InputError("--own-values: does nothing without --swap")
+    system = loaded.with_own_values(*own) if own else loaded
     if law := given.get("controller"):
         from ..grasp.system import with_controller
 

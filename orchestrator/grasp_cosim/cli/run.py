@@ -33,7 +33,7 @@ from .options import (
     native_option,
     natively,
     record_option,
-    swap_option,
+    swap_options,
     system_options,
     values_option,
 )
@@ -47,7 +47,7 @@ from .options import (
     type=click.Choice(SCHEMES),
     help="Step the components one after the other (by default), or all at once.",
 )
-@swap_option
+@swap_options
 @click.option(
     "--input",
     type=PATH,

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from ..base.errors import InputError
+from ..base.quantity import Quantity
 from ..interface.interface import Value
 from ..sweeps.pictures import draw_sweep
 from ..sweeps.places import cluster
@@ -32,7 +33,7 @@ from .options import (
     chosen_system,
     many_runs_option,
     settings_of,
-    swap_option,
+    swap_options,
     system_options,
 )
 
@@ -45,12 +46,13 @@ TABLE = Path("sweep.csv")
     "--vary",
     multiple=True,
     metavar="PLACE=START:END:COUNT",
-    help="Vary a value, in SI units: plant.object_width=0.05:0.07:11, or a list as in "
-    "sensor_1.reflectance=0.3,0.57,1.2. Several make every combination.",
+    help="Vary a value: plant.object_width=0.05:0.07:11, or a list as in "
+    "sensor_1.reflectance=0.3,0.57,1.2, in the unit of its variable, or as in "
+    "'plant.object_width [mm]=50:70:11'. Several make every combination.",
 )
 @click.option("--table", type=PATH, help="Take the rows of a table, with a column for each place.")
 @system_options
-@swap_option
+@swap_options
 @metrics_option
 @many_runs_option
 @click.option(
@@ -86,7 +88,7 @@ def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: 
     check_format(out)
     check_outputs(out.parent, plot)
     fixed, _ = settings_of(given)
-    pairs: dict[str, list[Value]] = {}
+    pairs: dict[str, list[Value | Quantity]] = {}
     for place, values in map(varied, given["vary"]):
         if place in pairs or place in fixed:
             raise InputError(f"--vary {place}: is given twice; must be given once")

@@ -90,11 +90,12 @@ class Bands:
                     raise InputError(f"{said}; {nearest(pattern, names)}")
 
 
-def read_bands(path: Path) -> Bands:
+def read_bands(path: str | Path) -> Bands:
     """The bands of a TOML file, or those that a qualification used, of what its --json printed.
 
     InputError names the entry that is wrong.
     """
+    path = Path(path)
     table = _used(path) if path.suffix == ".json" else toml_table(path, "file of bands")
     valid = {"signals": ("absolute", "relative", "time"), "metrics": ("absolute", "relative")}
     for key in table:

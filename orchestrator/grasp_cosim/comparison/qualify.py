@@ -23,7 +23,7 @@ from ..metrics.in_si import in_si
 from ..metrics.metric import Metric, metrics_of
 from ..recording.result import Result
 from ..system.changes import converted, replaced
-from ..system.description import System
+from ..system.description import System, as_system
 from ..system.parts import ISOLATIONS, Component, Connection, Isolation
 from ..system.structure import SCHEMES, unit_of
 from ..system.times import NANOSECONDS, in_seconds
@@ -113,7 +113,7 @@ class Qualification:
 
 
 def qualify(
-    system: System,
+    system: System | str | Path,
     component: str,
     candidate: str | Path | Component,
     *,
@@ -138,6 +138,7 @@ def qualify(
     SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
     """
     choice("isolation", isolation, ISOLATIONS)
+    system = as_system(system, "qualify")
     new = candidate if isinstance(candidate, Component) else Path(candidate)
     swap = prepare_swap(system, component, new, rename or {}, values or {}, isolation, units)
     if swap.swapped is None:

@@ -26,13 +26,13 @@ class Report(dict[str, Any]):
         return on_a_screen(as_text(self, SCREEN).splitlines())
 
 
-def inspect_fmu(path: Path) -> Report:
+def inspect_fmu(path: str | Path) -> Report:
     """Return the declarations of the FMU at path, ready for JSON; InputError where there is no FMU.
 
     `dependencies` is null where an output declares none, which means all inputs in FMI. `sizes`
     name by dimension the variable that holds the length, null where that is fixed.
     """
-    found = describe(path)
+    found = describe(Path(path))
     return Report(
         fmu=str(path),
         model_name=found.model_name,

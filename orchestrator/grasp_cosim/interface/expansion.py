@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from ..base.errors import InputError
+from ..base.quantity import Quantity, as_quantity, is_nested, unwrapped
 from .interface import (
     MOST_ELEMENTS,
     Array,
@@ -42,13 +43,18 @@ def values_of(
     row, or one value for all.
     """
     array: Array | None = interface.arrays.get(name)
+    given = as_quantity(given) or unwrapped(given)
     if array is None:
-        if not isinstance(given, float | int | bool | str):
+        several = is_nested(given.value if isinstance(given, Quantity) else given)
+        if several or not isinstance(given, float | int | bool | str | Quantity):
             raise InputError(f"{place}: {name} = {given!r}: is not an array; must be one value")
         return {name: interface.parse(place, name, given, text)}
     try:
         found: Any = from_text(given) if text and isinstance(given, str) else given
-        flat = flattened(found, array.shape)
+        if isinstance(found, Quantity):
+            flat = [Quantity(v, found.unit) for v in flattened(found.value, array.shape)]
+        else:
+            flat = flattened(found, array.shape)
     except ValueError as error:
         raise InputError(
             f"{place}: {name} = {given!r}: {error}; must be {shape_text(array.shape)}, or "
@@ -144,16 +150,16 @@ def flattened(value: Any, shape: Sequence[int]) -> list[Any]:
     ValueError, which says what it is, where it is none of these.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
-    if not isinstance(value, list | tuple):
+    if not is_nested(value):
         return [value] * size_of(shape)
     found, flat = [len(value)], list(value)
-    while flat and all(isinstance(part, list | tuple) for part in flat):
+    while flat and all(map(is_nested, flat)):
         lengths = {len(part) for part in flat}
         flat = [entry for part in flat for entry in part]
         if len(lengths) > 1:
             raise ValueError("has rows of different lengths")
         found.append(lengths.pop())
-    if any(isinstance(entry, list | tuple) for entry in flat):
+    if any(map(is_nested, flat)):
         raise ValueError("has rows of different lengths")
     if tuple(found) != tuple(shape) and found != [size_of(shape)]:
         raise ValueError(f"is {shape_text(found)}")

@@ -15,9 +15,10 @@ from typing import Any, Literal, Protocol, get_args, runtime_checkable
 
 from ..base.checks import EXACT, integer, known, point_advice, real
 from ..base.errors import InputError, choices
+from ..base.quantity import Quantity, as_quantity, unwrapped
 from ..base.scratch import without_scratch
-from ..base.si_units import Unit, known_unit, spelt_like
-from .units import IDENTITY, Conversion, conversion
+from ..base.si_units import Unit, known_unit, refusal, spelt_like
+from .units import IDENTITY, Conversion, conversion, converted
 
 Value = float | int | bool | str
 
@@ -30,8 +31,11 @@ class Nested(Protocol):
         """The same as lists of lists."""
 
 
-Given = Value | Sequence["Given"] | Nested
-"""A value for a variable, or those of an array as lists of lists or so."""
+Given = Value | Quantity | tuple[Any, str] | Sequence["Given"] | Nested
+"""A value for a variable, or those of an array as lists of lists or so.
+
+A number is in the unit of its variable; one with a unit is a Quantity, (50, "mm") or "50 mm".
+"""
 
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -51,6 +55,10 @@ TYPES_3 = ("Float64", "Float32", *_WHOLE, "Boolean", "String", "Binary", "Enumer
 
 MOST_ELEMENTS = 100_000
 """Of all arrays of an FMU that are taken apart; what would be more is left alone."""
+
+
+_JOINED = re.compile(r"([-+]?[0-9.]+)([^0-9.,\s].*)")
+"""A number and a unit without a space between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -590,12 +598,14 @@ class Interface:
             raise InputError(said)
         return found if found.name == name else found.reversed(name)
 
-    def parse(self, place: str, name: str, value: Value, text: bool = False) -> Value:
+    def parse(self, place: str, name: str, value: Any, text: bool = False) -> Value:
         """The value for input or parameter name, checked against type, range and finiteness.
 
-        place names where the value comes from. An item of an enumeration may be given by its name.
-        With text, a string may stand for a number or a boolean, as on a command line.
+        place names where the value comes from. An item of an enumeration may be given by its name,
+        a number with its unit. With text, a string may stand for a number or a boolean, as on a
+        command line.
         """
+        value = unwrapped(value)
         variable = self.by_name.get(name)
         if variable is None:
             settable = [v.name for v in self.variables if v.settable]
@@ -615,15 +625,58 @@ class Interface:
                 f"{place}: {name} = {value!r}: {name} is of type {variable.nature}, which cannot "
                 "be set; must be left out, it keeps the start value of its FMU"
             )
-        given, converted = value, None
+        given, fitting = value, None
         if isinstance(value, str):
             value = variable.items.get(value, value)
+        if variable.kind != "String" or not isinstance(value, str):
+            quantity = as_quantity(value)
+            if quantity is not None:
+                value = self.in_own_unit(f"{place}: {name}", name, quantity)
+                given = str(quantity)
         if text or variable.kind == "String" or not isinstance(value, str):
-            converted = _convert(variable, value, self.version)
-        if converted is None:
-            advice = point_advice(given) if variable.kind == "Real" else ""
+            fitting = _convert(variable, value, self.version)
+        if fitting is None:
+            advice = _advice(variable, given)
             raise InputError(f"{place}: {name} = {given!r}: must be {_expected(variable)}{advice}")
-        return converted
+        return fitting
+
+    def in_own_unit(self, place: str, name: str, quantity: Quantity) -> float:
+        """The number of a quantity in the unit of a variable; InputError where it has no such unit.
+
+        place begins the error.
+        """
+        variable, given = self.by_name[name], f"{place} = {quantity}"
+        if variable.kind != "Real":
+            raise InputError(f"{given}: is of type {variable.nature}; must have no unit")
+        if variable.unit is None:
+            raise InputError(
+                f"{given}: {self.short} declares no unit of it; must have none, or `units` must "
+                "name one"
+            )
+        source = self.units.get(quantity.unit) or known_unit(quantity.unit)
+        target = self.unit(variable)
+        if quantity.unit == variable.unit:
+            return float(quantity.value)
+        if source is None:
+            raise InputError(f"{given}: {refusal(quantity.unit)}")
+        if target is None or conversion(source, target) is None:
+            raise InputError(
+                f"{given}: cannot be converted into {variable.unit}; must be in a unit of that "
+                "quantity"
+            )
+        if variable.relative:
+            source, target = source.without_offset, target.without_offset
+        return converted(quantity.value, source, target)
+
+
+def _advice(variable: Variable, given: Any) -> str:
+    """What a text for a Real may have been meant to be; empty where nothing is likely."""
+    if variable.kind != "Real":
+        return ""
+    joined = _JOINED.fullmatch(given.strip()) if isinstance(given, str) else None
+    if joined and known_unit(joined[2]):
+        return f"; with its unit it is '{joined[1]} {joined[2]}'"
+    return point_advice(given)
 
 
 def _plain(flag: str) -> str:

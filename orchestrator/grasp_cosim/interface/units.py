@@ -1,6 +1,7 @@
 """Conversions between units."""
 
 import math
+from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from ..base.errors import InputError
@@ -41,6 +42,20 @@ def conversion(source: Unit, target: Unit) -> Conversion | None:
     factor, offset = source.factor / target.factor, (source.offset - target.offset) / target.factor
     possible = factor != 0.0 and math.isfinite(factor) and math.isfinite(offset)
     return Conversion(factor, offset) if possible else None
+
+
+def converted(value: float, source: Unit, target: Unit) -> float:
+    """A number of one unit in another one of its quantity.
+
+    As if factors were the decimals that they are written as, so that 50 mm have the bits of 0.05 m.
+    """
+    if not math.isfinite(value):
+        return value if source.factor * target.factor > 0.0 else -value
+    number, factor, offset, per, zero = (
+        Fraction(repr(float(x)))
+        for x in (value, source.factor, source.offset, target.factor, target.offset)
+    )
+    return float((number * factor + offset - zero) / per)
 
 
 def no_conversion(place: str, unit: str | None, target: str) -> InputError:

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ..base.errors import InputError, nearest
 from ..interface.interface import Variable
 from ..master.simulation import Session
 from ..system.connectors import read_at
-from ..system.description import System
+from ..system.description import System, as_system
 from ..system.parts import Port, as_port, as_signal
 from ..system.times import TimeInput, in_nanoseconds, in_seconds, seconds, written
 from ..system.validity import transforms
@@ -38,7 +39,7 @@ WITH_STATES = ("delay", "dropout")
 
 
 def linearise(
-    system: System,
+    system: System | str | Path,
     at: TimeInput,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] | None = None,
@@ -59,7 +60,7 @@ def linearise(
     meet, or the states of an FMU are not known one by one: those of blocks are; errors of the run
     as of simulate().
     """
-    system = system.with_experiment(step=step, scheme=scheme)
+    system = as_system(system, "linearise").with_experiment(step=step, scheme=scheme)
     for i, fault in enumerate(system.faults):
         if fault.kind in WITH_STATES:
             raise InputError(

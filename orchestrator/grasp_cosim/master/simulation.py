@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from numbers import Integral
+from pathlib import Path
 from typing import Any, TypeVar
 
 from ..base.errors import InputError, RunInterruptedError, SimulationError, nearest
@@ -39,7 +40,7 @@ from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
 from ..recording.result import Known, Result
 from ..system.connectors import given_by_connectors, read_at
 from ..system.declared_steps import check_declared_steps
-from ..system.description import System
+from ..system.description import System, as_system
 from ..system.native import needed_twins
 from ..system.parts import Component, Port, Realtime, as_signal
 from ..system.settings import run_settings, start_values
@@ -86,7 +87,7 @@ class Session:
 
     def __init__(
         self,
-        system: System,
+        system: System | str | Path,
         *,
         step: TimeInput | None = None,
         stop: TimeInput | None = None,
@@ -108,7 +109,7 @@ class Session:
         passed in its place. steered says that set() may be called, so inputs without a source are
         recorded by default.
         """
-        system = system.with_experiment(step, stop, scheme, diverging)
+        system = as_system(system, "simulate").with_experiment(step, stop, scheme, diverging)
         system = system.as_steered() if steered else system
         if not all(c.is_current for c in system.components):
             system = replace(system, components=tuple(replace(c) for c in system.components))
@@ -605,7 +606,7 @@ class Simulate:
 
     def __call__(
         self,
-        system: System,
+        system: System | str | Path,
         *,
         step: TimeInput | None = None,
         stop: TimeInput | None = None,
@@ -621,7 +622,8 @@ class Simulate:
         finish: Finish | None = None,
         until: Callable[[Session], bool] | None = None,
     ) -> Result:
-        """Run a system to its stop time and return what it records at every communication point.
+        """Run a system, or that of a system file, to its stop time; return what it records at every
+        communication point.
 
         These are its outputs, or what System.with_record() names.
 
@@ -672,7 +674,7 @@ class Simulate:
                     finish=keep,
                     steered=False,
                 ) as session,
-                phase(f"{system.name} to {in_seconds(session.system.stop_ns):g} s"),
+                phase(f"{session.system.name} to {in_seconds(session.system.stop_ns):g} s"),
             ):
                 _drive(session, progress, until)
         except KeyboardInterrupt as interrupt:

@@ -67,7 +67,7 @@ class RunFolder:
 
     def __init__(
         self,
-        folder: Path,
+        folder: str | Path,
         of: System | Result,
         command: Sequence[str] = (),
         paced: bool = False,
@@ -78,6 +78,7 @@ class RunFolder:
         If it is `paced`, rows are written in spare() time only. `form` is that of the rows,
         signals.csv or signals.arrow. InputError without pyarrow, where that needs it.
         """
+        folder = Path(folder)
         self._folder, self._paced = folder, paced
         self._place = folder.absolute()  # an FMU may go elsewhere
         self._origin = origin(of.components, command)
@@ -394,7 +395,7 @@ def _typed(place: str, column: npt.NDArray[Any], name: Any) -> npt.NDArray[Any]:
 
 
 def load_log(
-    path: Path,
+    path: str | Path,
     note: Callable[[str], None] = lambda _: None,
     expects: Mapping[str, str] = NOTHING,
     names: LogNames = AS_THEY_ARE,
@@ -409,6 +410,7 @@ def load_log(
     """
     from .signals import LOGS, read_log
 
+    path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such log; must be a {choices(LOGS)} file")
     if path.suffix.lower() not in LOGS:

@@ -17,7 +17,7 @@ from ..interface.interface import Value, Variable
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from ..system.connectors import change_along, taps
-from ..system.description import System
+from ..system.description import System, as_system
 from ..system.parts import Component, Connection, Port
 from ..system.times import in_seconds, written
 from ..system.validity import transforms
@@ -41,8 +41,9 @@ class Written:
     notes: tuple[str, ...]
 
 
-def write_ssp(system: System, path: Path) -> Written:
-    """Write the archive; InputError where path is not that of an .ssp file."""
+def write_ssp(system: System | str | Path, path: str | Path) -> Written:
+    """Write the archive of a system, or of its file; InputError where path is no .ssp file."""
+    system, path = as_system(system, "write_ssp"), Path(path)
     if path.suffix.lower() != ".ssp" or path.is_dir():
         raise InputError(f"{path}: must be a file named like system.ssp")
     if code := next((c for c in system.components if c.code), None):

@@ -1,4 +1,8 @@
-"""What varies: a row for each run, values by their places in the system file, in SI units."""
+"""What varies: a row for each run, values by their places in the system file.
+
+A number is in the unit of its variable, as in that file. One with a unit is a Quantity, a pair like
+(50, "mm") or a text like "50 mm"; or the head of its column has the unit, plant.object_width [mm].
+"""
 
 from __future__ import annotations
 
@@ -11,22 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from ..base.checks import point_advice
+from ..base.checks import is_number, point_advice
 from ..base.errors import InputError
-from ..base.si_units import known_unit
+from ..base.quantity import Quantity, as_quantity
 from ..base.text import counted, on_one_line
 from ..interface.interface import Value
-from ..interface.units import IDENTITY, Conversion
+from ..system.connectors import in_unit
 from ..system.description import System
 from ..system.parts import Port
-from ..system.structure import parameter_in_si
 from ..system.times import LONGEST, in_nanoseconds, in_seconds
 from ..system.toml import place_of, plain
-from ..tables.column import Column, Table
-from ..tables.table import read_table
-from ..tables.text import is_number
+from ..tables.column import Table
+from ..tables.table import read_table, split_head
+from ..tables.text import is_number as spells_number
 
-Row = Mapping[str, Value]
+Row = Mapping[str, Any]
+"""Values by place, some of them with a unit until in_own_units()."""
 
 TIMES = tuple(f"experiment.{key}" for key in ("start", "step", "stop"))
 """The places of times, which may be fractions like 1/30."""
@@ -41,10 +45,10 @@ FEW = 60
 
 ROWS = "must be rows, mappings of places to values, or columns by place, or a data frame"
 
-FORM = "PLACE=START:END:COUNT or PLACE=VALUE,VALUE,..."
+FORM = "PLACE=START:END:COUNT or PLACE=VALUE,VALUE,..., and PLACE may be like 'a.b [mm]'"
 
 
-def grid(varied: Mapping[str, Iterable[Value] | Value]) -> list[dict[str, Value]]:
+def grid(varied: Mapping[str, Any]) -> list[dict[str, Any]]:
     """A row for every combination of the values of each place; the last place varies fastest.
 
     A single value is that of each row.
@@ -53,9 +57,10 @@ def grid(varied: Mapping[str, Iterable[Value] | Value]) -> list[dict[str, Value]
     return [dict(zip(varied, row, strict=True)) for row in itertools.product(*values)]
 
 
-def varied(text: str) -> tuple[str, list[Value]]:
+def varied(text: str) -> tuple[str, list[Value | Quantity]]:
     """The place and the values of a text in the FORM; InputError where it is none."""
-    place, equals, said = text.partition("=")
+    head, equals, said = text.partition("=")
+    place, unit = split_head(head.strip())
     where = f"--vary {text!r}"
     if not equals or place.startswith(".") or not place:
         raise InputError(f"{where}: must be {FORM}")
@@ -64,7 +69,7 @@ def varied(text: str) -> tuple[str, list[Value]]:
         values = [plain(part.strip()) for part in said.split(",")]
         if "" in values:
             raise InputError(f"{where}: an empty value; must be {FORM}")
-        return place, values
+        return place, [_in_unit(where, value, unit) for value in values]
     try:
         start, end, count = float(bounds[0]), float(bounds[1]), int(bounds[2])
         if len(bounds) > 3 or not np.isfinite([start, end]).all():
@@ -73,10 +78,19 @@ def varied(text: str) -> tuple[str, list[Value]]:
         raise InputError(f"{where}: must be {FORM}, with finite numbers") from error
     if not 2 <= count <= MOST:
         raise InputError(f"{where}: {count} values; must be 2 to {MOST}")
-    return place, [float(value) for value in np.linspace(start, end, count)]
+    return place, [_in_unit(where, float(value), unit) for value in np.linspace(start, end, count)]
 
 
-def as_rows(given: Any, alike: bool = False) -> list[dict[str, Value]]:
+def _in_unit(place: str, value: Any, unit: str | None) -> Any:
+    """The value with the unit in the head of its column, if that has one."""
+    if unit is None:
+        return value
+    if not is_number(value):
+        raise InputError(f"{place}: {value!r}: must be a number, as the column is in {unit}")
+    return Quantity(value, unit)
+
+
+def as_rows(given: Any, alike: bool = False) -> list[dict[str, Any]]:
     """The rows of a table, read or in a file, of columns by place, of a data frame, or of rows.
 
     A data frame is one of pandas or polars, a table of pyarrow, a structured array of NumPy, or a
@@ -136,25 +150,33 @@ def _of_columns(given: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _single(given: Any) -> bool:
     """True for one value, where several may be, too."""
+    if quantity := as_quantity(given):
+        return _single(quantity.value)
     listed = isinstance(given, Iterable) and not isinstance(given, str)
     return not listed or getattr(given, "ndim", 1) == 0
 
 
 def _values(given: Any) -> list[Any]:
     """The values of a column, or the single one."""
+    if isinstance(given, Quantity) and not _single(given):
+        return [Quantity(value, given.unit) for value in given.value]
     return [given] if _single(given) else list(given)
 
 
-def _row(number: int, given: Any) -> dict[str, Value]:
+def _row(number: int, given: Any) -> dict[str, Any]:
     """A row by place, without the places that it leaves; InputError where it is none."""
     if not isinstance(given, Mapping):
         raise InputError(f"sweep: row {number} = {_short(given)}: {ROWS}")
-    row = {}
-    for place, value in given.items():
-        if not isinstance(place, str):
-            raise InputError(f"sweep: {place!r}: must be a place in the system, a text")
-        if (found := _plain(place, value)) is not None:
-            row[place] = found
+    row: dict[str, Any] = {}
+    for head, value in given.items():
+        if not isinstance(head, str):
+            raise InputError(f"sweep: {head!r}: must be a place in the system, a text")
+        place, unit = split_head(head)
+        if (found := _plain(place, value)) is None:
+            continue
+        if place in row:
+            raise InputError(f"sweep: row {number}: {place} has two values; must have one")
+        row[place] = _in_unit(f"sweep: row {number}, {head}", found, unit)
     return row
 
 
@@ -169,88 +191,91 @@ def read_rows(path: Path) -> Table:
     return read_table(path, f"--table {path}")
 
 
-def _rows_in(table: Table) -> list[dict[str, Value]]:
-    """The rows of a table whose head has places, with a unit in brackets if it is not of SI.
+def _rows_in(table: Table) -> list[dict[str, Any]]:
+    """The rows of a table whose head has places, with a unit in brackets where that is said.
 
     A cell that is empty has no value. InputError at the first one that is not as it must be.
     """
-    rows: list[dict[str, Value]] = [{} for _ in range(table.count)]
+    rows: list[dict[str, Any]] = [{} for _ in range(table.count)]
     columns = [column for column in table.columns if column.name]
     for column in columns:
         table.named(column.name)  # there is one alone
-        to_si = _to_si(column)
         for row, cell in enumerate(column.texts()):
             text = cell.strip()
             if not text:
                 continue
-            if to_si == IDENTITY:
+            if column.unit is None:
                 rows[row][column.name] = plain(text)
-            elif is_number(text):
-                rows[row][column.name] = to_si(float(text))
+            elif spells_number(text):
+                rows[row][column.name] = Quantity(float(text), column.unit)
             else:
                 advice = point_advice(text)
                 raise InputError(f"{column.place(row)} = {text!r}: must be a number{advice}")
     return [row for row in rows if row]
 
 
-def check_units(system: System, table: Table) -> None:
-    """InputError at the first column of a table that is in a unit of something else than its place.
+def in_own_units(
+    system: System, rows: Sequence[Row], place: str = "sweep"
+) -> list[dict[str, Value]]:
+    """The rows with each number that has a unit in that of its variable, as bare ones are.
 
-    What has no unit in the system takes the values as they are in SI units.
+    InputError, which `place` begins, at the first one that is in a unit of something else.
     """
-    for column in table.columns:
-        unit = unit_of(system, column.name) if column.unit else None
-        if unit and known_unit(unit):
-            column.to_unit(unit)
+    settled = []
+    for row in rows:
+        own = {p: _in_own_unit(system, p, value, f"{place}: {p}") for p, value in row.items()}
+        settled.append(own)
+    return settled
+
+
+def _in_own_unit(system: System, place: str, value: Any, said: str) -> Any:
+    """The value of a place, without a unit; `said` begins the error."""
+    quantity = as_quantity(value)
+    if quantity is None:
+        return value
+    if place in TIMES:
+        return in_seconds(in_nanoseconds(said, quantity, zero=True, low=-LONGEST))
+    if place in system.inputs:
+        unit = system.inputs[place].unit
+        return in_unit(said, quantity, unit) if unit else value
+    port = _port(system, place)
+    interface = system.component(port.component, place).interface if port else None
+    variable = interface.sample(port.variable) if port and interface else None
+    if isinstance(value, str) and (variable is None or variable.kind == "String"):
+        return value
+    if interface is None:
+        raise InputError(f"{said} = {quantity}: must have no unit")
+    return interface.in_own_unit(said, variable.name, quantity) if variable else value
 
 
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
-    """The rows in the units of the system's FMUs; InputError where the first one does not fit."""
-    back: dict[str, Any] = {}
-    for place in {place for row in rows for place in row}:
-        to_si = _in_si(system, place)
-        back[place] = IDENTITY if to_si == IDENTITY else to_si.back
-    found = [{p: _converted(v, back[p]) for p, v in row.items()} for row in rows]
-    system.with_settings(found[0], "sweep: {}".format)
-    return found
+    """The rows as settings of the system; InputError where the first one does not fit."""
+    settings = [_with_units(system, row) for row in rows]
+    system.with_settings(settings[0], "sweep: {}".format)
+    return settings
+
+
+def _with_units(system: System, row: Row) -> dict[str, Value]:
+    """The settings of a row, with their units where its FMU may have the variable in another."""
+    swapped = {c.name for c in system.components if f"components.{c.name}.fmu" in row}
+    settings = dict(row)
+    for place, value in row.items() if swapped else ():
+        port, unit = _port(system, place), unit_of(system, place)
+        if port and port.component in swapped and unit and isinstance(value, float | int):
+            settings[place] = str(Quantity(float(value), unit))
+    return settings
 
 
 def unit_of(system: System, place: str) -> str | None:
-    """The SI unit in which the values of a place are; None where they have none."""
+    """The unit in which the values of a place are; None where they have none."""
     if place in system.inputs:
-        connector_unit = system.inputs[place].unit
-        return connector_unit.base if connector_unit else None
+        unit = system.inputs[place].unit
+        return unit.name if unit else None
     port = _port(system, place)
     if port is None:
         return "s" if place in TIMES else None
-    interface = system.component(port.component, place).interface
-    variable = interface.by_name.get(port.variable)
-    unit = interface.unit(variable) if variable else None
-    if unit and not unit.si:
-        return unit.base
+    variable = system.component(port.component, place).interface.sample(port.variable)
     return variable.unit if variable else None
-
-
-def _in_si(system: System, place: str) -> Conversion:
-    """The conversion of the values of a place to SI base units."""
-    if place in system.inputs:
-        unit = system.inputs[place].unit
-        return Conversion(unit.factor, unit.offset) if unit else IDENTITY
-    port = _port(system, place)
-    return parameter_in_si(system, place, port) if port else IDENTITY
-
-
-def _to_si(column: Column) -> Conversion:
-    """The conversion of the values of a column to SI base units; InputError where it has none."""
-    if column.unit is None:
-        return IDENTITY
-    unit = known_unit(column.unit)
-    if unit is None:
-        raise InputError(
-            f"{column.heading} = {column.head!r}: {column.unit!r} is no known unit; must be one, "
-            "like mm"
-        )
-    return IDENTITY if unit.si else Conversion(unit.factor, unit.offset)
 
 
 def _plain(place: str, value: Any) -> Value | None:
@@ -264,11 +289,6 @@ def _plain(place: str, value: Any) -> Value | None:
     if is_fraction and place in TIMES:
         return in_seconds(in_nanoseconds(f"sweep: {place}", plain_value, zero=True, low=-LONGEST))
     return plain_value  # type: ignore[no-any-return]
-
-
-def _converted(value: Value, change: Any) -> Value:
-    changed: Value = value if change is IDENTITY else change(float(value))
-    return changed
 
 
 def _port(system: System, place: str) -> Port | None:

@@ -15,10 +15,10 @@ from ..base.scratch import ScratchFolder
 from ..base.text import counted
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available, chosen, metrics_of
-from ..system.description import System
+from ..system.description import System, as_system
 from .kept import identity_of, keep, opened
 from .places import elsewhere, here
-from .rows import Row, as_rows, check_units, labels_of, read_rows, settings_of, unit_of
+from .rows import Row, as_rows, in_own_units, labels_of, settings_of, unit_of
 from .run import Task
 from .seeds import seeds_of_runs
 from .signals import Recorded, Store, arrays, begin, recording, times
@@ -26,7 +26,7 @@ from .table import Outcome, Table, made
 
 
 def sweep(
-    system: System,
+    system: System | str | Path,
     rows: Any,
     *,
     metrics: Sequence[Metric | Function | str] = (),
@@ -41,9 +41,11 @@ def sweep(
 ) -> Table:
     """Run the system once for each row, and return a table of rows and metrics.
 
-    rows are mappings of places, as with_settings() has them, to values in SI units; or columns by
-    place, where a single value is that of each row; or a data frame, as of as_rows(); or the path
-    of a table. The index of a pandas DataFrame is that of the table's to_pandas().
+    system may be the path of a system file. rows are mappings of places, as with_settings() has
+    them, to values; or columns by place, where a single value is that of each row; or a data frame,
+    as of as_rows(); or the path of a table. A number is in the unit of its variable; the head of a
+    column may name another one, plant.object_width [mm], and so may a value, (50, "mm"). The table
+    has all in the variable's. The index of a pandas DataFrame is that of the table's to_pandas().
 
     metrics are worked out beside those of the system. signals, named as for with_record(), are kept
     of each run, at each n-th communication point where `every` says so: table.to_xarray() has them
@@ -51,22 +53,21 @@ def sweep(
     which ends in .zarr, else into a temporary folder. With the seed "run" all that is random has
     another seed in each run, see seeds.py, and rows may be alike: [{}] * 100.
 
-    The table is written to `out`, a .csv or
-    .parquet file; until all are done, finished runs are kept beside it, and the same call goes on.
-    workers are so many runs at a time, by default one for each processor: in threads where the FMUs
-    are native and made here and the runs few, else in processes. A script needs no guard for these,
-    and what it defines goes there, see as_bytes(). An executor of concurrent.futures takes their
-    place, and gets the FMUs. The table is the same to the bit in each case; a run that fails is an
-    error in its row. native is as of System.natively().
+    The table is written to `out`, a .csv or .parquet file; until all are done, finished runs are
+    kept beside it, and the same call goes on. workers are so many runs at a time, by default one
+    for each processor: in threads where the FMUs are native and made here and the runs few, else in
+    processes. A script needs no guard for these, and what it defines goes there, see as_bytes(). An
+    executor of concurrent.futures takes their place, and gets the FMUs. The table is the same to
+    the bit in each case; a run that fails is an error in its row. native is as of
+    System.natively().
 
     InputError where the rows do not fit the system, nothing would be measured, a metric cannot go
     to another process, or `out` has runs of something else; SimulationError where processes do not
     start or a run cannot be kept; KeyboardInterrupt at Ctrl-C.
     """
-    if isinstance(rows, str | Path):
-        rows = read_rows(Path(rows))
-        check_units(system, rows)
-    rows_in_si = as_rows(rows, alike=seed is not None)
+    system = as_system(system, "sweep")
+    place = f"--table {rows}" if isinstance(rows, str | Path) else "sweep"
+    settled = in_own_units(system, as_rows(rows, alike=seed is not None), place)
     whole("every", every, 1, must="a whole number, at least 1")
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
@@ -80,20 +81,20 @@ def sweep(
         raise InputError(
             f"{system.name}: has no metric{because}; name a file of yours by --metrics"
         )
-    units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in rows_in_si for p in row)}
-    seeds = seeds_of_runs(system, rows_in_si, seed)
+    units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in settled for p in row)}
+    seeds = seeds_of_runs(system, settled, seed)
     file = Path(out) if out is not None else None
-    recorded = _recorded(system, signals, every, rows_in_si, measured, file) if signals else None
+    recorded = _recorded(system, signals, every, settled, measured, file) if signals else None
     if signals:
         system, _ = recording(system, signals)
     task = Task(system.natively(native), own_metrics, recorded.store if recorded else None)
-    own_rows = zip(settings_of(task.system, rows_in_si), seeds, strict=True)
+    own_rows = zip(settings_of(task.system, settled), seeds, strict=True)
     jobs = [*enumerate({**row, **own} for row, own in own_rows)]
     done: dict[int, Outcome] = {}
     identity = identity_of(task, [row for _, row in jobs], all_metrics) if file else {}
     with opened(file, identity, done) if file else nullcontext() as lines:
         if recorded and file:
-            beside = [{**row, **own} for row, own in zip(rows_in_si, seeds, strict=True)]
+            beside = [{**row, **own} for row, own in zip(settled, seeds, strict=True)]
             begin(recorded, beside, identity, goes_on=bool(done))
             done = {i: o for i, o in done.items() if o.error or recorded.store.has(i)}
         to_do = [job for job in jobs if job[0] not in done]
@@ -107,7 +108,7 @@ def sweep(
                 done[outcome.index] = outcome
                 bar.update()
         outcomes = [done[i] for i, _ in jobs]
-        table = made(rows_in_si, outcomes, units, measured, labels_of(rows), seeds, recorded)
+        table = made(settled, outcomes, units, measured, labels_of(rows), seeds, recorded)
         if file:
             table.write(file)
     return table

@@ -66,7 +66,7 @@ class Table:
 
     Beside what varied and what came out there are `index` and `error`, one line where a run failed,
     and ENDED_AT where an FMU ended one of them before its stop time: the time in s of its end.
-    `units` are those of SI in which the columns are, None where they have none.
+    `units` are those in which the columns are, of metrics those of SI; None where they have none.
     """
 
     columns: Mapping[str, Sequence[Any]] = field(hash=False)

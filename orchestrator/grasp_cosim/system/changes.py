@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Mapping
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
 from ..base.errors import InputError, choices, nearest
 from ..interface.expansion import values_of
-from ..interface.interface import Given, Interface, Value
+from ..interface.interface import Given, Interface, Value, Variable
 from ..interface.read import describe
 from ..interface.units import IDENTITY
 from .parts import Component, literal
@@ -101,8 +102,9 @@ def with_old_values(
     """A component with another FMU with its former values, in the units of that; and notes.
 
     `anew` are variables, or arrays, that get another value. A value of a variable that the new FMU
-    lacks is left out, which a note says. InputError where a value, or another number that the
-    system states, has no meaning in the new unit.
+    lacks is left out, which a note says, as does one where the new FMU has other start values.
+    InputError where a value, or another number that the system states, has no meaning in the new
+    unit.
     """
     before, after = was.interface, now.interface
     arrays = before.arrays
@@ -141,7 +143,43 @@ def with_old_values(
                 f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
                 f"{choices(new)}"
             )
-    return replace(now, values=values), notes
+    still_set = {name: values[name] for name in kept}
+    return replace(now, values=values), [*_other_than_own(now, still_set, place), *notes]
+
+
+def _other_than_own(now: Component, kept: Mapping[str, Value], place: str) -> Iterator[str]:
+    """A note on the values that the system sets and the new FMU has otherwise, if there are any."""
+    others = []
+    for name, value in kept.items():
+        variable = now.interface.by_name[name]
+        own = variable.start_value
+        if _is_own(variable) and own is not None and not _same(value, own):
+            unit = "" if variable.unit in (None, "1") else f" {variable.unit}"
+            others.append(f"{name} = {literal(value)}{unit} (its own is {own!r}{unit})")
+    if others:
+        yield (
+            f"{place}: the values of the system stay: {', '.join(others)}; --own-values, or "
+            f"swap(..., own_values=True), takes those of {now.fmu.name}"
+        )
+
+
+def _is_own(variable: Variable) -> bool:
+    """True for what an FMU may have a value of its own for: not what the system has to feed."""
+    return variable.causality not in ("input", "structuralParameter")
+
+
+def _same(value: Value, own: object) -> bool:
+    """True for equal values, but for the rounding of a conversion."""
+    if isinstance(value, float) and isinstance(own, float):
+        return math.isclose(value, own, rel_tol=1e-12)
+    return value == own
+
+
+def with_own_values(component: Component) -> Component:
+    """The component with the values of its FMU, but for inputs and what decides on sizes."""
+    by_name = component.interface.by_name
+    fed = {name: value for name, value in component.values.items() if not _is_own(by_name[name])}
+    return replace(component, values=fed)
 
 
 def _no_place(before: Interface, now: Component, name: str) -> str:

@@ -13,9 +13,10 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..base.errors import InputError, nearest
+from ..base.quantity import Quantity, as_quantity
 from ..base.si_units import Unit, known_unit
 from ..interface.interface import SETTABLE, Variable
-from ..interface.units import IDENTITY, Conversion, conversion, no_conversion
+from ..interface.units import IDENTITY, Conversion, conversion, converted, no_conversion
 from .parts import Port, Way
 from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of
@@ -136,6 +137,9 @@ def driven_by_connectors(system: Structure, stimuli: Stimuli) -> Stimuli:
 def _values(system: Structure, name: str, value: Any, place: str) -> dict[str, Any]:
     """The values of the variables behind an input of the system."""
     values: dict[str, Any] = {}
+    unit = system.inputs[name].unit
+    if (quantity := as_quantity(value)) and unit:
+        value = in_unit(place, quantity, unit)
     for way in system.inputs[name].ways:
         change = change_along(system, name, way)
         passed_on = value
@@ -146,6 +150,14 @@ def _values(system: Structure, name: str, value: Any, place: str) -> dict[str, A
                 raise InputError(f"{place} = {value!r}: must be a number") from None
         values[str(way.port)] = passed_on
     return values
+
+
+def in_unit(place: str, quantity: Quantity, unit: Unit) -> float:
+    """The number of a quantity in a unit; InputError where it is another quantity."""
+    source = unit if quantity.unit == unit.name else known_unit(quantity.unit)
+    if source is None or conversion(source, unit) is None:
+        raise no_conversion(place, quantity.unit, unit.name)
+    return converted(quantity.value, source, unit)
 
 
 def _column(system: Structure, place: str, name: str, column: Stimulus, way: Way) -> Stimulus:

@@ -10,6 +10,7 @@ from ..base.errors import InputError, nearest
 from ..base.files import check_nature
 from ..base.higher import groups, higher
 from ..interface.interface import Given
+from .changes import with_own_values
 from .connectors import check_connectors, driven_by_connectors, given_by_connectors
 from .from_python import Part, from_sections
 from .names import in_main_names
@@ -173,7 +174,11 @@ class System(Structure):
         return float(value)
 
     def with_values(self, values: Mapping[str, Given]) -> "System":
-        """A copy with other start values, by names like plant.object_width; of an array a list."""
+        """A copy with other start values, by names like plant.object_width; of an array a list.
+
+        A number is in the unit of its variable; one with a unit is Quantity("50 mm"), (50, "mm") or
+        the text "50 mm".
+        """
         return self.with_settings(values, "with_values ".__add__)
 
     def swap(
@@ -183,21 +188,38 @@ class System(Structure):
         *,
         rename: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
+        values: Mapping[str, Given] | None = None,
+        own_values: bool = False,
     ) -> "System":
         """A copy with the FMU of one component replaced by another with the same variables.
 
         Its values are converted where that has them in other units, and left out, with a note,
-        where it has no such variable. rename and units are those of a Component, and go before its
-        own.
+        where it has no such variable; a note also says which of them the new FMU has otherwise.
+        With own_values they are those of the FMU. values are given to it, by its variables and in
+        their units; rename and units are those of a Component, and go before its own.
         """
         own = f"components.{component}"
         self.component(component, f"swap {component}")
+        if own_values:
+            swapped = self.with_own_values(component)
+            return swapped.swap(component, fmu, rename=rename, units=units, values=values)
         settings = {
             f"{own}.fmu": fmu,
+            **{f"{own}.values.{name}": value for name, value in (values or {}).items()},
             **{f"{own}.rename.{name}": theirs for name, theirs in (rename or {}).items()},
             **{f"{own}.units.{name}": unit for name, unit in (units or {}).items()},
         }
         return self.with_settings(settings, lambda _: f"swap {component}")
+
+    def with_own_values(self, *names: str) -> "System":
+        """A copy in which components of these names have the start values of their FMUs.
+
+        Values of inputs, and those that decide on the sizes of arrays, stay.
+        """
+        components = tuple(
+            with_own_values(c) if c.name in names and c.values else c for c in self.components
+        )
+        return replace(self, components=components, connections=as_written(self))
 
     def with_settings(
         self, settings: Mapping[str, Any], place: Callable[[str], str] = "with_settings ".__add__
@@ -314,6 +336,18 @@ class System(Structure):
         vars(made).update(vars(self), components=components)
         vars(made).pop("by_name", None)  # which has the components of self
         return made
+
+
+def as_system(given: Any, who: str) -> System:
+    """A System as it is, or that of the path of a system file; `who` begins the error."""
+    if isinstance(given, str | Path):
+        return System.load(given)
+    if not isinstance(given, System):
+        raise InputError(
+            f"{who}: {type(given).__name__} {str(given)[:40]!r}: must be a System, as "
+            "System.load(), grasp_system() or hand_system() give it, or the path of a system file"
+        )
+    return given
 
 
 def is_archive(path: str | Path) -> bool:

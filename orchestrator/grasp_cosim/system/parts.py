@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 
 from ..base.checks import choice, number, whole
 from ..base.errors import InputError
+from ..base.quantity import as_quantity
 from ..base.si_units import Unit
 from ..interface.expansion import expanded
 from ..interface.interface import Given, Interface, Nested, Value
@@ -41,11 +42,14 @@ FINEST, COARSEST = 1e-13, 0.1
 
 def literal(value: Given) -> str:
     """A value, or those of an array, as the system file writes it."""
-    if not isinstance(value, float | int | bool | str):
-        return f"[{', '.join(map(literal, as_lists(value)))}]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return float.__repr__(value) if isinstance(value, float) else repr(value)
+    plain: Any = as_lists(value)
+    if not isinstance(plain, str) and (quantity := as_quantity(plain)):
+        return str(quantity)
+    if isinstance(plain, bool):
+        return str(plain).lower()
+    if isinstance(plain, float):
+        return float.__repr__(plain)
+    return repr(plain) if isinstance(plain, int | str) else f"[{', '.join(map(literal, plain))}]"
 
 
 def as_lists(given: Given) -> Any:

@@ -18,12 +18,17 @@ import numpy.typing as npt
 
 from ..base.checks import EXACT, number, real
 from ..base.errors import InputError
+from ..base.quantity import Quantity, as_quantity, unwrapped
+from ..base.si_units import known_unit
+from ..interface.units import conversion, converted
 
 Time = int | Fraction
 """An exact time in ns; a Fraction only where it is no whole number of them."""
 
-TimeInput = float | str | Fraction
-"""A time in s as callers give it: a number, a text like "1/30", or a fraction."""
+TimeInput = float | str | Fraction | Quantity | tuple[float, str]
+"""A time as callers give it: a number of s, a text like "1/30", a fraction, or with a unit, like
+"1 ms".
+"""
 
 NANOSECONDS = 1_000_000_000
 """In a second."""
@@ -74,6 +79,9 @@ def in_nanoseconds(place: str, given: Any, zero: bool = False, low: float = 0.0)
     """
     span = f"from {low:g} to" if zero else "greater than 0, at most"
     must = f"a number {span} {LONGEST:g}"
+    given = unwrapped(given)
+    if quantity := as_quantity(given):
+        given = _of_quantity(place, quantity)
     fraction = _fraction(given)
     as_number = given if fraction is None else float(fraction)
     if isinstance(given, str):
@@ -160,6 +168,14 @@ class TimeGrid(NamedTuple):
         """The times of points in s."""
         times: npt.NDArray[np.float64] = (self.start + steps * self.step) / self.per_second
         return times
+
+
+def _of_quantity(place: str, quantity: Quantity) -> float:
+    """The time in s of a quantity; InputError where it is none of time."""
+    unit, second = known_unit(quantity.unit), known_unit("s")
+    if unit is None or second is None or conversion(unit, second) is None:
+        raise InputError(f"{place} = {quantity}: must be in a unit of time, like ms")
+    return converted(quantity.value, unit, second)
 
 
 def _fraction(given: Any) -> Fraction | None:

@@ -26,6 +26,7 @@ from ..base.checks import (
     toml_table,
 )
 from ..base.errors import InputError, nearest
+from ..base.quantity import unwrapped
 from ..interface.read import read_interface
 from .changes import replaced, with_given, with_old_values
 from .parts import (
@@ -341,7 +342,8 @@ def place_of(names: Collection[str], key: str, said: str) -> tuple[str, ...]:
 
 
 def plain(value: Any) -> Any:
-    """A text from a command line as the number or boolean that it spells; all else as it is."""
+    """A text from a command line as the number or boolean that it spells, without NumPy's types."""
+    value = unwrapped(value)
     if not isinstance(value, str):
         return value
     if value in ("true", "false"):

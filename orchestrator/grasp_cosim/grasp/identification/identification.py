@@ -26,7 +26,7 @@ from ...base.text import counted, on_a_screen
 from ...metrics.metric import Signals
 from ...recording.folder import load_log
 from ...recording.log_names import AS_THEY_ARE, LogNames
-from ...system.description import System
+from ...system.description import System, as_system
 from ..metrics import FINGERS
 from ..presets import start_in_si
 from ..published.compared import table_csv
@@ -144,10 +144,10 @@ class Identification:
 
 
 def identify(
-    log: Path | None = None,
+    log: str | Path | None = None,
     *,
     fit: Sequence[str] = DEFAULT,
-    system: System | None = None,
+    system: System | str | Path | None = None,
     progress: bool = False,
     names: LogNames = AS_THEY_ARE,
 ) -> Identification:
@@ -162,7 +162,8 @@ def identify(
     InputError where the log or a name of `fit` is wrong, SimulationError where the fit does not
     come to rest.
     """
-    system = grasp_system() if system is None else system
+    system = grasp_system() if system is None else as_system(system, "identify")
+    log = None if log is None else Path(log)
     if log is None or (not names.file and is_contacts(log)):
         contacts = published_contacts() if log is None else read_contacts(log)
         name = "the published experiments" if log is None else str(log)

@@ -53,7 +53,7 @@ def evaluate(
     *,
     bench: bool = False,
     controller: str = "published",
-    out: Path | None = None,
+    out: str | Path | None = None,
     native: bool | None = None,
     progress: bool = False,
 ) -> Evaluation:
@@ -70,8 +70,9 @@ def evaluate(
     InputError, before anything runs, where `out` cannot be written to or matplotlib is missing that
     draws the pictures; KeyboardInterrupt at Ctrl-C.
     """
-    if out is not None:
-        check_folder(out)
+    folder = None if out is None else Path(out)
+    if folder:
+        check_folder(folder)
         new_figure(1.0, 1.0)
     source: Source = "experiment" if bench else "simulation"
     with Progress("compiling the native FMUs, once for these sources", unit="", shown=progress):
@@ -79,8 +80,8 @@ def evaluate(
     system = with_preset(system, "bench") if bench else system
     evidence = compared(system, source, os.cpu_count() or 1, progress)
     report = as_report(evidence, source)
-    if out is not None:
-        write(out, evidence, report, source)
+    if folder:
+        write(folder, evidence, report, source)
     return report
 
 
