@@ -16,7 +16,7 @@ from ..base.errors import InputError
 from ..base.quantity import as_quantity
 from ..base.si_units import Unit
 from ..interface.expansion import expanded
-from ..interface.interface import Given, Interface, Nested, Value
+from ..interface.interface import Given, Interface, Value
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
 from .python_code import PythonCode
@@ -54,7 +54,8 @@ def literal(value: Given) -> str:
 
 def as_lists(given: Given) -> Any:
     """A value as it is, and those of an array as lists, which fit into JSON."""
-    return given.tolist() if isinstance(given, Nested) else given
+    tolist = getattr(given, "tolist", None)  # to ask for a Nested takes 6 us
+    return given if tolist is None else tolist()
 
 
 @dataclass(frozen=True, slots=True)
