@@ -10,6 +10,7 @@ from grasp_cosim.base.si_units import Unit
 from grasp_cosim.exchange.dispatch import DECADES, FAR, Divergence, largest
 from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.interface.interface import Interface, Variable
+from grasp_cosim.master.master import ENOUGH
 from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.memory import MemoryListener
 from grasp_cosim.system.parts import Port
@@ -40,9 +41,9 @@ def test_a_run_that_is_broken_off_keeps_what_was_recorded(grasp, tmp_path):
 def test_where_a_listener_fails_the_others_keep_their_rows(grasp, tmp_path):
     full, memory = CsvListener(tmp_path / "s.csv"), MemoryListener()
     with simulate.session(grasp, stop=0.1, listeners=[memory, full]) as session:
-        session.step(150)
-        with full_disk(90_000), pytest.raises(SimulationError, match=r"s\.csv: cannot b") as caught:
-            session.step(900)
+        session.step(ENOUGH + 20)
+        with full_disk(360_000), pytest.raises(SimulationError, match=r"s\.csv: cannot b") as caught:
+            session.step(1000 - ENOUGH)
     result = caught.value.result
     assert not result.complete
     rows = len((tmp_path / "s.csv").read_text().splitlines()) - 1

@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import math
 import operator
+import sys
 from array import array
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +30,7 @@ from ..system.connectors import read_at
 from ..system.description import System
 from ..system.faults import FAULTS, INITIAL, Act, Draws, Remembering
 from ..system.names import main_port
-from ..system.parts import Condition, Event, Fault, Port, literal
+from ..system.parts import Condition, Event, Fault, Port, as_lists, literal
 from ..system.scenario import check_setting
 from ..system.times import Time, first_step, seconds
 from ..system.validity import driven_inputs, driven_parameters, is_linear, samples_of
@@ -69,29 +71,50 @@ class _Once:
 Cut = Callable[[float], float]
 """What becomes of a value that is passed where a connection is cut, for an analysis."""
 
+LARGEST = sys.float_info.max
+
+DOUBLES = ("Real", "Float64")
+"""The types that a float64 is, in FMI 2.0 and 3.0."""
+
 NO_CUTS: Mapping[Port, Cut] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
-    """A line of the log: what happened at a step, or how often something was set, and last."""
+class _Line(NamedTuple):
+    """A line of the log: what happened at a step; of what is set the value, how often, and last."""
 
     step: int
     text: str
+    value: Given | None = None
     count: int = 1
     last_step: int = 0
-    last_text: str = ""
+    last: Given | None = None
 
     def said(self, system: System) -> str:
         """The line, with its times."""
         first = seconds(system.time_ns(self.step))
-        if self.count == 1:
-            return f"t = {first}: {self.text}"
+        value = "" if self.value is None else f" = {literal(self.value)}"
+        line = f"t = {first}: {self.text}{value}"
+        if self.last is None:
+            return line
         last = seconds(system.time_ns(self.last_step))
         return (
-            f"t = {first}: {self.text}; set {self.count} times, the last at t = {last}: "
-            f"{self.last_text}"
+            f"{line}; set {self.count} times, the last at t = {last}: "
+            f"{self.text} = {literal(self.last)}"
         )
+
+
+class _Scalar(NamedTuple):
+    """A number that can be set in the run, and where its value is besides, if anywhere."""
+
+    port: Port
+    variable: Variable
+    slot: int | None
+    low: float
+    high: float
+
+    def takes(self, value: Given) -> bool:
+        """True for a number of Python's that needs no further look."""
+        return type(value) is float and self.low <= value <= self.high
 
 
 class Scenario:
@@ -129,7 +152,8 @@ class Scenario:
         self.fault_functions = fault_functions(windows, system.step_ns, cuts)
         self.tunings = tunings_of(system)
         self._due = self._next_step(0)
-        self._settable: set[Port] = set()
+        self._settable: dict[str, Port] = {}
+        self._scalars: dict[str, _Scalar] = {}
 
     def _add_event(self, place: str, event: Event) -> None:
         system, otherwise = self._system, f"{event.when} never held"
@@ -220,24 +244,44 @@ class Scenario:
         InputError where there is none of that name, or where the value does not fit;
         SimulationError where the component refuses it.
         """
-        component, _, variable = name.partition(".")
-        interfaces = {n: instance.interface for n, instance in self._instances.items()}
-        port, place = main_port(interfaces, Port(component, variable)), f"set: {name}"
-        if port not in self._settable:
-            check_setting(self._system, port, value, place)
-            self._settable.add(port)
-        happen = self._setter(place, Event({port: value}))
-        (text,) = happen(step)
+        scalar = self._scalars.get(name)
+        if scalar and scalar.takes(value):
+            port, happen = scalar.port, partial(self._put, scalar, value)
+        else:
+            port = self._settable.get(name) or self._settable_port(name, value)
+            happen = self._setter(f"set: {name}", Event({port: value}))
+        happen(step)
         self._applied.pop(port, None)  # what is set last is set last again
         self._applied[port] = happen
         number = self._line_of.setdefault(port, len(self._lines))
         if number == len(self._lines):
-            self._lines.append(_Line(step, text))
+            self._lines.append(_Line(step, str(port), as_lists(value)))
         else:
-            before = self._lines[number]
-            self._lines[number] = replace(
-                before, count=before.count + 1, last_step=step, last_text=text
+            first = self._lines[number]
+            self._lines[number] = first._replace(
+                count=first.count + 1, last_step=step, last=as_lists(value)
             )
+
+    def _settable_port(self, name: str, value: Given) -> Port:
+        """The port of a name that can be set to a value, which is kept; InputError if it cannot."""
+        component, _, variable = name.partition(".")
+        interfaces = {n: instance.interface for n, instance in self._instances.items()}
+        port = main_port(interfaces, Port(component, variable))
+        check_setting(self._system, port, value, f"set: {name}")
+        self._settable[name] = port
+        v = interfaces[port.component].by_name.get(port.variable)
+        if v and v.type in DOUBLES and not v.element and port not in self._passed:
+            self._scalars[name] = _Scalar(
+                port, v, self._held.get(port), max(v.low, -LARGEST), min(v.high, LARGEST)
+            )
+        return port
+
+    def _put(self, scalar: _Scalar, value: float, _: int) -> Sequence[str]:
+        """Set a number."""
+        self._instances[scalar.port.component].set([scalar.variable], [value])
+        if scalar.slot is not None:
+            self._values[scalar.slot] = value
+        return ()
 
     def pending(self) -> list[str]:
         """A line for each event that has not happened and each fault that has not begun."""
