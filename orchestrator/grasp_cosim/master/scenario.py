@@ -85,7 +85,7 @@ class _Line(NamedTuple):
     step: int
     text: str
     value: Given | None = None
-    count: int = 1
+    times: int = 1
     last_step: int = 0
     last: Given | None = None
 
@@ -98,7 +98,7 @@ class _Line(NamedTuple):
             return line
         last = seconds(system.time_ns(self.last_step))
         return (
-            f"{line}; set {self.count} times, the last at t = {last}: "
+            f"{line}; set {self.times} times, the last at t = {last}: "
             f"{self.text} = {literal(self.last)}"
         )
 
@@ -111,10 +111,6 @@ class _Scalar(NamedTuple):
     slot: int | None
     low: float
     high: float
-
-    def takes(self, value: Given) -> bool:
-        """True for a number of Python's that needs no further look."""
-        return type(value) is float and self.low <= value <= self.high
 
 
 class Scenario:
@@ -245,8 +241,9 @@ class Scenario:
         SimulationError where the component refuses it.
         """
         scalar = self._scalars.get(name)
-        if scalar and scalar.takes(value):
-            port, happen = scalar.port, partial(self._put, scalar, value)
+        if scalar and type(value) is float and scalar.low <= value <= scalar.high:
+            port = scalar.port
+            happen: Callable[[int], Sequence[str]] = partial(self._put, scalar, value)
         else:
             port = self._settable.get(name) or self._settable_port(name, value)
             happen = self._setter(f"set: {name}", Event({port: value}))
@@ -259,7 +256,7 @@ class Scenario:
         else:
             first = self._lines[number]
             self._lines[number] = first._replace(
-                count=first.count + 1, last_step=step, last=as_lists(value)
+                times=first.times + 1, last_step=step, last=as_lists(value)
             )
 
     def _settable_port(self, name: str, value: Given) -> Port:

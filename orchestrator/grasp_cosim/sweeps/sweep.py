@@ -71,16 +71,7 @@ def sweep(
     whole("every", every, 1, must="a whole number, at least 1")
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
-    observed = system.shown
-    own_metrics = chosen(metrics, system.metrics, observed, system.roles)
-    all_metrics = metrics_of(system.metrics, own_metrics)
-    in_si(system, all_metrics)
-    measured, missing = available(all_metrics, observed, system.roles)
-    if not (measured or signals):
-        because = f" ({'; '.join(missing)})" if missing else ""
-        raise InputError(
-            f"{system.name}: has no metric{because}; name a file of yours by --metrics"
-        )
+    own_metrics, all_metrics, measured = _metrics(system, metrics, needed=not signals)
     units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in settled for p in row)}
     seeds = seeds_of_runs(system, settled, seed)
     file = Path(out) if out is not None else None
@@ -112,6 +103,26 @@ def sweep(
         if file:
             table.write(file)
     return table
+
+
+def _metrics(
+    system: System, asked: Sequence[Metric | Function | str], needed: bool
+) -> tuple[tuple[Metric, ...], Sequence[Metric], Sequence[Metric]]:
+    """The metrics of the user's own, all, and those of them that the system permits.
+
+    InputError where some are `needed` and there are none.
+    """
+    observed = system.shown
+    own = chosen(asked, system.metrics, observed, system.roles)
+    every = metrics_of(system.metrics, own)
+    in_si(system, every)
+    measured, missing = available(every, observed, system.roles)
+    if needed and not measured:
+        because = f" ({'; '.join(missing)})" if missing else ""
+        raise InputError(
+            f"{system.name}: has no metric{because}; name a file of yours by --metrics"
+        )
+    return own, every, measured
 
 
 def _check_written(signals: Store | None, outcome: Outcome) -> None:
