@@ -45,6 +45,18 @@ def test_it_is_called_once_at_each_point_with_the_values_there(engine):
     assert result["count.sum"] == pytest.approx([0.0, 0.1, 0.3, 0.6, 1.0, 1.5])
 
 
+@engines
+def test_its_parameters_are_recorded_as_they_are(engine):
+    system = counted(Clock).with_record("source.*")
+    with simulate.session(system, engine=engine) as session:
+        session.step(2)
+        session.set("source.gain", 3.0)
+        session.step(2)
+        result = session.result()
+    assert result["source.gain"].tolist() == [1.0, 1.0, 1.0, 3.0, 3.0]
+    assert result["source.y"] == pytest.approx([0.0, 0.1, 0.2, 0.9, 1.2])
+
+
 def test_a_loop_of_code_is_solved_at_the_start_and_counts_as_one_call():
     """y = 1 - u / 2, which comes back as u = sum of y: 2 / 3 at the start."""
     links = ["count.sum -> half.u", "half.y -> count.u"]

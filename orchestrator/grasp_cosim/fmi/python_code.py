@@ -61,8 +61,7 @@ class CodeInstance:
 
     def get(self, variables: Sequence[Variable]) -> list[Value]:
         self._settle()
-        now = {**self._parameters, **self._inputs, **self._outputs}
-        return [now.get(v.name, v.start_value) for v in variables]  # type: ignore[misc]
+        return self._values(variables)
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         for variable, value in zip(variables, values, strict=True):
@@ -70,11 +69,10 @@ class CodeInstance:
             self._assign(variable, value)
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        names = [v.name for v in variables]
         if action == "get":
 
             def fetch() -> int:
-                data[:] = [self._outputs[name] for name in names]
+                data[:] = self._values(variables)
                 return OK
 
             return Call(fetch)
@@ -149,6 +147,11 @@ class CodeInstance:
 
     def close(self) -> None:
         """Nothing of it is to be freed."""
+
+    def _values(self, variables: Sequence[Variable]) -> list[Value]:
+        """What they have now."""
+        now = {**self._parameters, **self._inputs, **self._outputs}
+        return [now.get(v.name, v.start_value) for v in variables]  # type: ignore[misc]
 
     def _of(self, causality: str) -> list[Variable]:
         return self.interface.of(causality)
