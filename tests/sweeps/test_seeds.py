@@ -40,6 +40,13 @@ def test_alike_rows_differ_by_their_noise_and_the_table_has_the_seeds(noisy):
     assert len({*sweep(noisy, {"experiment.stop": [0.05] * 2}, metrics=[spread])["spread"]}) == 1
 
 
+@needs_compiler
+def test_a_seed_that_is_recorded_too_is_no_signal_but_a_column(noisy):
+    table = sweep(noisy, [{}] * 2, seed="run", signals="sensor_1.noise.*", native=True)
+    signals = {f"sensor_1.noise.{name}" for name in ("enabled", "standard_deviation")}
+    assert {*table.signals.store.arrays} == signals
+
+
 def test_a_fault_has_its_seed_too(grasp):
     faults = (
         Fault(Port("controller", "intensity[1]"), "bias", {"value": 0.0}),

@@ -307,6 +307,17 @@ def test_what_decides_a_row_is_what_kept_runs_are_of(
         pass
 
 
+def test_runs_that_were_kept_have_their_metrics_in_the_order_of_the_others(tmp_path):
+    """It is that of the columns of the table."""
+    with opened(tmp_path / "t.csv", {}, {}) as file:
+        keep(file, Outcome(0, {"width": 1.0, "time": 2.0}))
+        before = Path(file.name).read_bytes()
+    (tmp_path / "t.csv.rows").write_bytes(before)
+    done = {}
+    with opened(tmp_path / "t.csv", {}, done):
+        assert list(done[0].metrics) == ["width", "time"]
+
+
 def test_two_at_a_time_are_refused(system, mine, tmp_path):
     with opened(tmp_path / "t.csv", {}, {}), pytest.raises(InputError, match="another process"):
         sweep(system, [{"a.gain": 1.0}], metrics=mine, out=tmp_path / "t.csv", workers=1)

@@ -34,7 +34,7 @@ FEW = 3
 def keep(file: FileIO, outcome: Outcome) -> None:
     """Keep the outcome of a run from now on; SimulationError where that fails."""
     try:
-        write_line(file, as_line(asdict(outcome)))
+        write_line(file, json.dumps(asdict(outcome)).encode() + b"\n")  # columns in their order
     except OSError as error:
         said = f"{file.name!r}: {error.strerror}"
         raise SimulationError(f"{said}; with room for it the same command goes on") from error

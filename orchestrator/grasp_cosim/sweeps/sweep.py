@@ -75,7 +75,8 @@ def sweep(
     units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in settled for p in row)}
     seeds = seeds_of_runs(system, settled, seed)
     file = Path(out) if out is not None else None
-    recorded = _recorded(system, signals, every, settled, measured, file) if signals else None
+    beside = [{**row, **own} for row, own in zip(settled, seeds, strict=True)]
+    recorded = _recorded(system, signals, every, beside, measured, file) if signals else None
     if signals:
         system, _ = recording(system, signals)
     task = Task(system.natively(native), own_metrics, recorded.store if recorded else None)
@@ -85,7 +86,6 @@ def sweep(
     identity = identity_of(task, [row for _, row in jobs], all_metrics) if file else {}
     with opened(file, identity, done) if file else nullcontext() as lines:
         if recorded and file:
-            beside = [{**row, **own} for row, own in zip(settled, seeds, strict=True)]
             begin(recorded, beside, identity, goes_on=bool(done))
             done = {i: o for i, o in done.items() if o.error or recorded.store.has(i)}
         to_do = [job for job in jobs if job[0] not in done]
