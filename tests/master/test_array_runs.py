@@ -171,9 +171,14 @@ def test_events_set_whole_arrays(tmp_path, engine):
 def test_a_session_sets_a_whole_array(tmp_path):
     system = alone(tmp_path).with_values({"ss.C": 0, "ss.D": np.eye(3)})
     with simulate.session(system) as session:
-        session.set("ss.u", np.array([7.0, 8.0, 9.0]))
-        assert session.step()
-        assert [session[f"ss.y[{i}]"] for i in (1, 2, 3)] == [7.0, 8.0, 9.0]
+        for given in (np.array([7.0, 8.0, 9.0]), [4.0, 5.0, 6.0]):
+            session.set("ss.u", given)
+            assert session.step()
+            given[0] += 1.0  # which is the caller's own
+            assert [session[f"ss.y[{i}]"] for i in (2, 3)] == list(given[1:])
+            assert session["ss.y[1]"] == given[0] - 1.0
+        first, last = "t = 0 s: ss.u = [7.0, 8.0, 9.0]", "ss.u = [4.0, 5.0, 6.0]"
+        assert session.result().log[-1] == f"{first}; set 2 times, the last at t = 0.125 s: {last}"
 
 
 def test_a_recorded_run_reads_back(tmp_path):

@@ -6,12 +6,16 @@ import pytest
 from fmi.test_instances import KINDS, alone
 from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM
+from grasp_cosim.hand.system import hand_system
 from grasp_cosim.system.parts import Component
+from grasp_cosim.tandem.system import SYSTEM as TANDEM
 from master.test_states import EVENTS, FAULTS, FMI_3, LIMITS, MORE, MS, native_grasp, told
 from support.marks import engines, needs_pythonfmu
 from support.native_fmus import EVENT_MODE, build_model, needs_cvode, needs_gcc, state_space
 
 pytestmark = needs_gcc
+
+SHORT = {"step": 0.1, "stop": 1.0}
 
 
 def run(session, steps=10**6, **given):
@@ -105,6 +109,59 @@ def test_a_state_of_before_has_the_values_of_before(natives):
         assert told_of["object_width"] == 0.07
         session.reset()
         assert session["plant.gap[1]"] == pytest.approx(0.045)
+
+
+SLOW, FAST = ({"controller.wrist.bandwidth": hertz} for hertz in (1.0, 5.0))
+
+
+def test_what_metrics_note_of_start_values_is_as_of_a_new_session(natives):
+    """And comes back with a state of before; whoever is told the log misses no line of it."""
+    lines = []
+    with simulate.session(System.load(TANDEM, natives), note=lines.append) as session:
+        session.reset(SLOW)
+        (noted,) = session.result().log
+        assert noted.startswith("controller.wrist.bandwidth = 1 Hz")
+        state = session.save()
+        session.reset(FAST)
+        assert session.result().log == ()
+        session.restore(state)
+        assert session.result().log == (noted,)
+        session.reset(FAST)
+        session.set("plant.moving_mass", 0.4)
+    assert lines == ["t = 0 s: plant.moving_mass = 0.4"]
+
+
+def test_what_metrics_refuse_of_start_values_leaves_the_session_as_it_is():
+    with simulate.session(hand_system(native=True)) as session:
+        session.step(3)
+        with pytest.raises(InputError, match=r"hand\.toml: controller\.weight = 0\.9, 1, 1"):
+            session.reset({"controller.weight[1]": 0.9})
+        assert session.time == pytest.approx(3 * session.system.step_ns * 1e-9)
+        assert session.step()
+
+
+class Line:
+    """1 + gain u, at once."""
+
+    inputs = {"u": 1.0}  # noqa: RUF012
+    outputs = ("y",)
+    parameters = {"gain": 0.0}  # noqa: RUF012
+
+    def step(self, t, inputs):
+        return {"y": 1.0 + self.gain * inputs["u"]}
+
+
+def test_a_state_of_before_has_what_was_said_of_its_initialisation():
+    ring = ["a.y -> b.u", "b.y -> a.u"]
+    made = System(components=dict.fromkeys("ab", Line), connections=ring, experiment=SHORT)
+    with simulate.session(made) as session:
+        state, first = session.save(), session.result().log
+        session.reset({"a.gain": -0.5, "b.gain": 0.5})
+        (solved,) = session.result().log
+        assert solved.startswith("algebraic loop at t = 0 through a.u: solved in")
+        assert first != (solved,)
+        session.restore(state)
+        assert session.result().log == first
 
 
 def test_what_is_no_start_value_of_these_fmus_is_refused(tmp_path, natives):

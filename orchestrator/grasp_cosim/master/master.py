@@ -305,7 +305,8 @@ class Master:
     def _own_state(self) -> tuple[Any, ...]:
         """All but the states of the FMUs."""
         plan, made = self.plan, self._loop
-        told = [*self.ends], dict(self.rejections), self.watches.saved(), self.scenario.saved()
+        acted = self.watches.saved(), self.scenario.saved()
+        told = [*self.log], [*self.ends], dict(self.rejections), *acted
         arrays = [array.copy() for array in (plan.values, plan.clock, plan.warned, *plan.buffers)]
         drives = [drive.row for drive in plan.drives]
         compiled = made.saved() if isinstance(made, CompiledLoop) else None
@@ -328,7 +329,6 @@ class Master:
         for instance in self.instances:
             instance.reset()
         self._restore_own(self._blank)
-        self.log.clear()
 
     def _restore_own(self, saved: tuple[Any, ...]) -> None:
         at, told, arrays, drives, compiled, waiting = saved
@@ -336,8 +336,8 @@ class Master:
         self.steps_done, self.total_steps, self._base, self._pause = at
         self._handed_on, self._aborted = self._base, ""
         self._rows[: len(waiting)] = waiting
-        ends, rejections, watches, scenario = told
-        self.ends = [*ends]
+        log, ends, rejections, watches, scenario = told
+        self.log, self.ends = [*log], [*ends]
         plan.raised.clear()
         self.rejections = dict(rejections)
         self.watches.restore(watches)

@@ -30,7 +30,7 @@ from ..system.connectors import read_at
 from ..system.description import System
 from ..system.faults import FAULTS, INITIAL, Act, Draws, Remembering
 from ..system.names import main_port
-from ..system.parts import Condition, Event, Fault, Port, as_lists, literal
+from ..system.parts import Condition, Event, Fault, Port, literal
 from ..system.scenario import check_setting
 from ..system.times import Time, first_step, seconds
 from ..system.validity import driven_inputs, driven_parameters, is_linear, samples_of
@@ -84,23 +84,28 @@ class _Line(NamedTuple):
 
     step: int
     text: str
-    value: Given | None = None
+    value: float | str | None = None
     times: int = 1
     last_step: int = 0
-    last: Given | None = None
+    last: float | str | None = None
 
     def said(self, system: System) -> str:
         """The line, with its times."""
         first = seconds(system.time_ns(self.step))
-        value = "" if self.value is None else f" = {literal(self.value)}"
+        value = "" if self.value is None else f" = {_written(self.value)}"
         line = f"t = {first}: {self.text}{value}"
         if self.last is None:
             return line
         last = seconds(system.time_ns(self.last_step))
         return (
             f"{line}; set {self.times} times, the last at t = {last}: "
-            f"{self.text} = {literal(self.last)}"
+            f"{self.text} = {_written(self.last)}"
         )
+
+
+def _written(value: float | str) -> str:
+    """What was set as the system file writes it; texts are so, numbers when the log is read."""
+    return value if isinstance(value, str) else literal(value)
 
 
 class _Scalar(NamedTuple):
@@ -241,23 +246,23 @@ class Scenario:
         SimulationError where the component refuses it.
         """
         scalar = self._scalars.get(name)
+        happen: Callable[[int], Sequence[str]]
+        said: float | str
         if scalar and type(value) is float and scalar.low <= value <= scalar.high:
-            port = scalar.port
-            happen: Callable[[int], Sequence[str]] = partial(self._put, scalar, value)
+            port, happen, said = scalar.port, partial(self._put, scalar, value), value
         else:
             port = self._settable.get(name) or self._settable_port(name, value)
             happen = self._setter(f"set: {name}", Event({port: value}))
+            said = literal(value)  # now, as a list of its user's may change
         happen(step)
         self._applied.pop(port, None)  # what is set last is set last again
         self._applied[port] = happen
         number = self._line_of.setdefault(port, len(self._lines))
         if number == len(self._lines):
-            self._lines.append(_Line(step, str(port), as_lists(value)))
+            self._lines.append(_Line(step, str(port), said))
         else:
             first = self._lines[number]
-            self._lines[number] = first._replace(
-                times=first.times + 1, last_step=step, last=as_lists(value)
-            )
+            self._lines[number] = first._replace(times=first.times + 1, last_step=step, last=said)
 
     def _settable_port(self, name: str, value: Given) -> Port:
         """The port of a name that can be set to a value, which is kept; InputError if it cannot."""

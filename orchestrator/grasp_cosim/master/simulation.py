@@ -481,6 +481,7 @@ class Session:
         Then the FMUs that are loaded would not do.
         """
         system = self.system.with_values(values) if values else self.system
+        check_groups(system)  # refuses before any FMU is called
         names = [f.name for f in fields(system) if f.name != "components"]
         both = [(getattr(system, name), getattr(self.system, name)) for name in names]
         same = all(new is old or new == old for new, old in both)
@@ -503,8 +504,11 @@ class Session:
 
     def _take_values_of(self, system: System) -> None:
         """Be a session of the system with these start values, as far as these are told."""
+        if system is not self.system:
+            self._noted = len(system.notes)  # what is known of other values is told at the end
         self.system, self._start = system, None
         self._dispatch.settings = run_settings(system)
+        self._notes = check_groups(system)
         self._remarks = (*system.notes, *self._notes, *system.once(remarks))
 
     def _restore_records(self, records: Sequence[Any]) -> None:
