@@ -201,3 +201,66 @@ def test_other_attributes_and_other_code_are_other_runs(grasp):
     assert one == same
     assert len({one, other, braked(grasp).by_name["brake"].content}) == 3
     assert b"-inputs" in one
+
+
+REFUSED = [
+    ({"components": {}}, r"components = \{\}: must be by name"),
+    ({"components": ["x.fmu"]}, r"components = \['x.fmu'\]: must be by name"),
+    ({"connections": None}, "connections = None: must be a list"),
+    ({"connections": "plant.gap -> a.b"}, "connections = 'plant.gap -> a.b': must be a list"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "said"), REFUSED)
+def test_what_are_no_components_or_connections(grasp, wrong, said):
+    given = {"components": {"plant": grasp.by_name["plant"]}, "experiment": EXPERIMENT}
+    with pytest.raises(InputError, match=f"^system: {said}"):
+        System(**{**given, **wrong})
+
+
+def test_a_block_that_is_not_there_is_named():
+    with pytest.raises(InputError, match=r"components.a: nothing.py: No such file or directory$"):
+        System(components={"a": "nothing.py"}, experiment=EXPERIMENT)
+
+
+DECLARED = [
+    ({3: 1.0}, r"parameters: 3: must be a name, a text"),
+    ({"velocity": 1.0}, r"parameters: 'velocity' is an input, too; must be one of them"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "said"), DECLARED)
+def test_a_name_is_a_text_and_of_one_variable(grasp, parameters, said):
+    code = type("Code", (Brake,), {"parameters": parameters})
+    with pytest.raises(InputError, match=rf"components.brake: {said}"):
+        braked(grasp, code)
+
+
+def test_scalars_of_numpy_are_start_values(grasp):
+    parameters = {"gain": np.float64(5.0), "push": (np.float32(1.0), "N")}
+    made = braked(grasp, type("Code", (Brake,), {"parameters": parameters}))
+    assert (made.start("brake.gain"), made.start("brake.push")) == (5.0, 1.0)
+
+
+@pytest.mark.parametrize("value", ["x", [1.0], np.zeros(2)])
+def test_what_it_returns_are_numbers(grasp, value):
+    def brake(t, inputs):
+        return {"force[1]": value, "force[2]": 0.0}
+
+    said = r"^brake: returned force\[1\] = .*; must be a number at t = 0 s"
+    with pytest.raises(InputError, match=said):
+        simulate(braked(grasp, brake))
+
+
+@pytest.mark.parametrize("values", [None, [1.0], {3: 1.0}])
+def test_values_are_by_place(grasp, values):
+    with pytest.raises(
+        InputError, match=r"^with_values .*: must be a (mapping of places|place in)"
+    ):
+        grasp.with_values(values)
+
+
+def test_an_archive_goes_into_a_folder(grasp, tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=r"cannot write to .*: Not a directory"):
+        write_ssp(grasp, tmp_path / "file" / "system.ssp")

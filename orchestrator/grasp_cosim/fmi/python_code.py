@@ -202,7 +202,12 @@ class CodeInstance:
         for v in outputs:
             if v.name not in found:
                 raise InputError(f"returned no {v.name!r}; must return a value of each output")
-            value = PLAIN[v.kind](found[v.name])
+            try:
+                value = PLAIN[v.kind](found[v.name])
+            except (TypeError, ValueError) as error:
+                raise InputError(
+                    f"returned {v.name} = {found[v.name]!r}; must be a number"
+                ) from error
             if not isfinite(value):
                 raise InputError(f"returned {v.name} = {value!r}; must be finite")
             self._outputs[v.name] = value

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import InputError
+from ..base.files import check_file
 from ..base.si_units import Unit
 from ..base.text import counted
 from ..interface.interface import Value, Variable
@@ -51,6 +52,7 @@ def write_ssp(system: System | str | Path, path: str | Path) -> Written:
             f"{path}: {code.name} is Python code, {code.fmu}; must be an FMU to be in an archive, "
             "like that of a block: grasp-cosim build NAME.py"
         )
+    check_file(path)
     entries: dict[str, bytes] = {}
     sources = {c.name: _fmu_entry(c.fmu, entries) for c in system.components}
     bindings = {c.name: _values_entry(c, entries) for c in system.components if c.values}

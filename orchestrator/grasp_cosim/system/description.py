@@ -24,7 +24,7 @@ from .settings import made_of
 from .stimuli import Stimuli, read_stimuli
 from .structure import Structure, experiment
 from .times import TimeInput
-from .toml import SECTIONS, as_file, read_toml, sections, with_entries
+from .toml import SECTIONS, as_file, check_places, read_toml, sections, with_entries
 from .validity import (
     as_written,
     by_element,
@@ -90,7 +90,7 @@ class System(Structure):
 
         Readers of files give the attributes of a Structure, the components as a tuple.
         """
-        if isinstance(components, Mapping):
+        if not positional and "step_ns" not in attributes:
             attributes = from_sections(name, components, connections, attributes)
             super().__init__(**attributes)
         else:
@@ -233,6 +233,7 @@ class System(Structure):
         comes from, for messages. InputError where there is no such place, or it is given twice, or
         a value does not fit it.
         """
+        check_places(settings, place)
         settings, place = given_by_connectors(self, settings, place)
         file = as_file(self, settings, place)
         tables = file.pop("components", {})

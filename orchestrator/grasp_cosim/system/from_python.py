@@ -33,7 +33,7 @@ KINDS = (
 
 
 def from_sections(
-    name: str, components: Mapping[str, Any], connections: Iterable[Any], sections: dict[str, Any]
+    name: str, components: Any, connections: Any, sections: dict[str, Any]
 ) -> dict[str, Any]:
     """The attributes of a system of that name; InputError where something is wrong.
 
@@ -42,6 +42,14 @@ def from_sections(
     has them.
     """
     place = f"{name}: ".__add__
+    if not isinstance(components, Mapping) or not components:
+        raise InputError(
+            place(f"components = {components!r}: must be by name, as {{'plant': 'Plant.fmu'}}")
+        )
+    if isinstance(connections, str) or not isinstance(connections, Iterable):
+        raise InputError(
+            place(f"connections = {connections!r}: must be a list, as ['a.output -> b.input']")
+        )
     links = [_link(entry) for entry in connections]
     file = {**sections, "components": {**components}, "connections": links}
     checked(file, name, place)
@@ -119,7 +127,9 @@ def _built(place: str, file: Path) -> Path:
 
     try:
         return kept_block(file)
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        raise InputError(f"{place}: {file}: {error.strerror}") from error
+    except ValueError as error:
         raise InputError(f"{place}: {error}") from error
 
 

@@ -27,6 +27,7 @@ from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 from ..base.errors import InputError
+from ..base.quantity import unwrapped
 from ..base.si_units import Unit, known_unit
 from ..interface.interface import Interface, Kind, Value, Variable
 
@@ -105,11 +106,18 @@ def with_interface(place: str, code: Any, connected: Mapping[str, Mapping[str, E
     """
     called = f"{type_of(code).__name__} (Python)"
     variables: list[Variable] = []
+    causalities: dict[str, str] = {}
     units: dict[str, Unit] = {}
     for what, causality in CAUSALITIES.items():
         known = connected.get(causality, {})
         declared = _declared(f"{place}: {what}", getattr(code, what, None))
         for name, end in (known if declared is None else declared).items():
+            if not isinstance(name, str):
+                raise InputError(f"{place}: {what}: {name!r}: must be a name, a text")
+            if (other := causalities.setdefault(name, causality)) is not causality:
+                raise InputError(
+                    f"{place}: {what}: {name!r} is an {other}, too; must be one of them"
+                )
             full = end.or_as(known.get(name, End()))
             if causality == "parameter":
                 full = _of_attribute(full, getattr(code, name, None))
@@ -148,6 +156,7 @@ def _variable(name: str, causality: str, end: End, reference: int) -> Variable:
 
 def _of_attribute(end: End, value: Any) -> End:
     """A parameter that starts as its attribute, if there is one; whole numbers have no unit."""
+    value = unwrapped(value)
     start = value if type(value) in KINDS else 0.0 if end.start is None else end.start
     return End("Real" if end.unit else KINDS[type(start)], end.unit, start)
 
@@ -166,6 +175,7 @@ def _declared(place: str, entries: Any) -> dict[str, End] | None:
 def _end(place: str, entry: Any) -> End:
     """A variable by its start value, its unit, both of them or neither."""
     start, unit = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, None)
+    start = unwrapped(start)
     if isinstance(start, str):
         start, unit = None, start
     if (start is not None and type(start) not in KINDS) or not isinstance(unit, str | None):

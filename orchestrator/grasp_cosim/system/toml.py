@@ -294,6 +294,14 @@ def read_connection(place: str, entry: Any) -> Connection:
     return Connection(source, target, entry.get("factor"), entry.get("offset"))
 
 
+def check_places(settings: object, place: Place) -> None:
+    """InputError where settings are no values by place."""
+    if not isinstance(settings, Mapping):
+        raise InputError(f"{place(repr(settings))}: must be a mapping of places to values")
+    if other := next((key for key in settings if not isinstance(key, str)), None):
+        raise InputError(f"{place(repr(other))}: must be a place in the system, a text")
+
+
 def as_file(system: Structure, settings: Mapping[str, Any], place: Place) -> dict[str, Any]:
     """The tables of a file with these settings; InputError where one is no place, or twice."""
     root: dict[str, Any] = {}
