@@ -52,6 +52,8 @@ init file.toml :: file.toml: is there already; give another name, or --force
 init a.ssp :: a.ssp: must end in .toml, a system file
 init a.py :: a block in Python has --template plant, --template sensor, --template controller
 init my-plant.py --template plant :: my-plant.py: must be NAME.py, NAME of letters, digits and _
+init class.py --template plant :: class.py: is a name of Python's own; must be another, like my_cl
+init math.py --template plant :: math.py: is a name of Python's own; must be another, like my_m
 init gripper_plant.py --template plant :: GripperPlant.fmu is one of the FMUs that come with th
 init a.py --template plant --tandem :: --tandem cannot be used with --template, which is no system
 init folder.toml :: folder.toml: is a folder; must be the name of a file

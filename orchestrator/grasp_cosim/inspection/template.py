@@ -1,7 +1,11 @@
 """Blocks in Python to start from, each with its test: what `init --template` writes."""
 
+import sys
+from keyword import iskeyword
 from pathlib import Path
 from typing import NamedTuple
+
+from ..base.errors import InputError
 
 TEMPLATES = Path(__file__).with_name("templates")
 
@@ -27,7 +31,14 @@ def test_of(file: Path) -> Path:
 
 
 def texts(file: Path, kind: str) -> dict[Path, str]:
-    """The texts of the block of a kind, to be written to a file, and of its test, by file."""
+    """The texts of the block of a kind, to be written to a file, and of its test, by file.
+
+    InputError where the test could not import a module of that name.
+    """
+    if iskeyword(file.stem) or file.stem in sys.stdlib_module_names:
+        raise InputError(
+            f"{file}: is a name of Python's own; must be another, like my_{file.stem}.py"
+        )
     module = KINDS[kind].module
     block, *parts = (
         (TEMPLATES / name).read_text("utf-8")
