@@ -93,3 +93,28 @@ def test_a_vector_of_them_draws_by_its_seed(natives):
     assert (first == rows(3)).all()
     assert (first[0, 0] != first[0, 1]).any()
     assert (first[0] != rows(4)[0]).any()
+
+
+WRONG = [
+    ({"observations": "plant.gap[1]"}, "observations = 'plant.gap.1.': must be a list"),
+    ({"observations": {"plant.gap[1]": 3}}, "observations: .*: must be ranges"),
+    ({"actions": {VISCOSITY: (1.0, 0.0)}}, "actions: .* must be .least, greatest."),
+    ({"reward": 3}, "reward = 3: must be a function"),
+    ({"ends": True}, "ends = True: must be a function"),
+    ({"step": "x"}, "step = 'x' s: must be a number"),
+]
+
+
+@pytest.mark.parametrize(("given", "said"), WRONG)
+def test_what_is_no_environment_is_refused_at_once(natives, given, said):
+    with pytest.raises(InputError, match=f"^{said}"):
+        environment(natives, **given)
+
+
+@pytest.mark.parametrize("action", [0.1, None, [0.1, 0.2]])
+def test_an_action_has_the_shape_of_its_space(natives, action):
+    made = environment(natives)
+    made.reset()
+    with pytest.raises(InputError, match=r"^action = .*: must be an array of 1$"):
+        made.step(action)
+    made.close()

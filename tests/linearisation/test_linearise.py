@@ -133,3 +133,9 @@ def test_what_cannot_be_is_said_in_a_line(where, said):
     given = {"at": 0.0, "inputs": (), "outputs": ["plant.gap[1]"], **where}
     with pytest.raises(InputError, match=said):
         linearise(grasp_system(), **given)
+
+
+def test_a_single_name_may_stand_alone():
+    name = "controller.intensity[1]"
+    found = linearise(grasp_system(), 0.01, name, name)
+    assert (found.inputs, found.outputs) == ((name,), (name,))

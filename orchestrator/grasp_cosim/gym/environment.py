@@ -16,7 +16,7 @@ from ..master.simulation import Session, simulate
 from ..system.connectors import read_at
 from ..system.description import System
 from ..system.parts import as_signal
-from ..system.times import nearest_time, seconds
+from ..system.times import in_nanoseconds, seconds
 
 Floats = npt.NDArray[np.float64]
 Names = Sequence[str] | Mapping[str, tuple[float, float] | None]
@@ -61,14 +61,18 @@ class Environment(Env[Floats, Floats]):
         as `options`. Further options are those of simulate.session(). InputError where a name is
         none; SimulationError, from step(), where an FMU fails.
         """
+        calls = {"reward": reward, "ends": ends, "start": start}
+        for what, call in calls.items():
+            if not (callable(call) or (what == "reward" and isinstance(call, str)) or call is None):
+                raise InputError(f"{what} = {call!r}: must be a function")
         self.session = simulate.session(system, **options)
         try:
-            own, wanted = self.session.system.step_ns, nearest_time(step)
+            own, wanted = self.session.system.step_ns, in_nanoseconds("step", step)
             self._steps = int(wanted // own)
             if self._steps < 1 or wanted % own:
                 raise InputError(f"step = {step!r}: must be a whole number of {seconds(own)}")
-            self.observation_space: Any = self._space(observations)
-            self.action_space: Any = self._space(actions)
+            self.observation_space: Any = self._space("observations", observations)
+            self.action_space: Any = self._space("actions", actions)
             self._observed, self._acting = tuple(observations), tuple(actions)
             self._observe()  # where a name is none
         except BaseException:
@@ -77,11 +81,19 @@ class Environment(Env[Floats, Floats]):
         self._reward = (lambda s: s[reward]) if isinstance(reward, str) else reward
         self._ends, self._draw_start = ends, start
 
-    def _space(self, names: Names) -> Box:
+    def _space(self, what: str, names: Names) -> Box:
         """The box of their ranges."""
+        if isinstance(names, str):
+            raise InputError(f"{what} = {names!r}: must be a list of names, or ranges by name")
         given = names if isinstance(names, Mapping) else dict.fromkeys(names)
         ranges = [self._declared(name) if x is None else x for name, x in given.items()]
-        low, high = np.array(ranges, np.float64).reshape(-1, 2).T
+        try:
+            low, high = np.array(ranges, np.float64).reshape(len(ranges), 2).T
+        except ValueError as error:
+            raise InputError(f"{what}: {given!r}: must be ranges, like (0.0, 1.0)") from error
+        for name, least, greatest in zip(given, low, high, strict=True):
+            if not least <= greatest:
+                raise InputError(f"{what}: {name!r} = {given[name]!r}: must be (least, greatest)")
         return Box(low, high, dtype=np.float64)
 
     def _declared(self, name: str) -> tuple[float, float]:
@@ -103,8 +115,10 @@ class Environment(Env[Floats, Floats]):
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Hold the action for a control step."""
-        session = self.session
-        for name, value in zip(self._acting, np.asarray(action).tolist(), strict=True):
+        session, values = self.session, np.asarray(action)
+        if values.shape != self.action_space.shape:
+            raise InputError(f"action = {action!r}: must be an array of {len(self._acting)}")
+        for name, value in zip(self._acting, values.tolist(), strict=True):
             session.set(name, value)
         session.step(self._steps)
         over = session.complete or session.ended_at is not None

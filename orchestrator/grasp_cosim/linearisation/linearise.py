@@ -41,8 +41,8 @@ WITH_STATES = ("delay", "dropout")
 def linearise(
     system: System | str | Path,
     at: TimeInput,
-    inputs: Sequence[str] = (),
-    outputs: Sequence[str] | None = None,
+    inputs: str | Sequence[str] = (),
+    outputs: str | Sequence[str] | None = None,
     *,
     step: TimeInput | None = None,
     scheme: str | None = None,
@@ -68,10 +68,16 @@ def linearise(
                 "must be of another kind, or left out"
             )
     first, steps = _place(system, at)
-    ports = [_input(system, name) for name in inputs]
+    ports = [_input(system, name) for name in ([inputs] if isinstance(inputs, str) else inputs)]
     fed = {connection.target: connection.source for connection in system.connections}
     cuts = {port: Cut() for port in ports if port in fed}
-    names = [str(port) for port in system.watched] if outputs is None else [*outputs]
+    names = (
+        [str(port) for port in system.watched]
+        if outputs is None
+        else [outputs]
+        if isinstance(outputs, str)
+        else [*outputs]
+    )
     recorded = [name for name in names if as_signal("output", name) not in cuts]
     with Session(system.with_record(*recorded), cuts=cuts) as session:
         if first:

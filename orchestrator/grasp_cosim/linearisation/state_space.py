@@ -126,7 +126,7 @@ class StateSpace:
         lag, crossover = min(lags, key=lambda found: found[0] / found[1], default=(inf, nan))
         turns = [*zeros(lambda w: loop(w)[0].imag, omega, values.imag), float(omega[-1])]
         shares = [(-loop(w)[0].real, w) for w in turns]  # at the end, Nyquist's, it is real
-        gains = [(1.0 / share, w) for share, w in shares if 0.0 < share < 1.0]
+        gains = [(float(1.0 / share), w) for share, w in shares if 0.0 < share < 1.0]
         gain, turn = min(gains, default=(inf, nan))
         return Margins(
             crossover,
