@@ -1,5 +1,6 @@
 """A session that is reset is as a new one; a run that ends where its user says."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -206,6 +207,18 @@ def test_a_run_ends_where_its_user_says(natives, engine, realtime):
     assert simulate(system, until=lambda _: True, **options).ended_at == 0.0
     never = simulate(system, until=lambda _: False, **options)
     assert (never.complete, never.ended_at) == (True, None)
+
+
+@pytest.mark.parametrize("until", [True, "plant.gap[1] < 0.01"])
+def test_until_is_a_function(natives, until):
+    with pytest.raises(InputError, match=f"^until = {re.escape(repr(until))}: must be a function"):
+        simulate(System.load(SYSTEM, natives), until=until)
+
+
+def test_what_ended_by_until_is_not_said_to_be_ended_by_an_fmu(natives):
+    shown = repr(simulate(System.load(SYSTEM, natives), until=lambda _: True))
+    assert "ended there" in shown
+    assert "FMU" not in shown
 
 
 def test_until_may_fail(natives):

@@ -266,6 +266,11 @@ def test_a_row_with_another_fmu_means_the_same_by_its_numbers(milli, tmp_path):
         ({"experiment.scheme [mm]": 60}, "experiment.scheme = 60 mm: must have no unit"),
         ({"experiment.step [mm]": 60}, "experiment.step = 60 mm: must be in a unit of time"),
         ({"plant.width [mm]": "wide"}, r"row 0, plant.width \[mm\]: 'wide': must be a number"),
+        ({"plant.width [mm]": "6 mm"}, r"row 0, plant.width \[mm\]: '6 mm': must be a number"),
+        (
+            {"plant.width [mm]": Quantity("6 mm")},
+            r"\[mm\]: '6 mm': must be a number, as the column",
+        ),
         ({"plant.width [mm]": 6, "plant.width": 6}, "row 0: plant.width has two values"),
     ],
 )
@@ -273,6 +278,13 @@ def test_a_row_in_a_unit_of_something_else_is_refused(milli, row, said):
     with pytest.raises(InputError, match=said) as caught:
         in_own_units(milli, as_rows([row]))
     assert "\n" not in str(caught.value)
+
+
+def test_a_head_with_empty_brackets_says_no_unit(tmp_path):
+    path = tmp_path / "rows.csv"
+    path.write_text("plant.width []\n60\n")
+    assert as_rows(path) == [{"plant.width": 60}]
+    assert as_rows({"plant.width []": [60]}) == [{"plant.width": 60}]
 
 
 @pytest.mark.parametrize(

@@ -654,6 +654,8 @@ class Simulate:
         InputError where an FMU does not load or refuses its parameters; SimulationError, with what
         was recorded as its result, where one fails on the way, or a signal runs away.
         """
+        if until is not None and not callable(until):
+            raise InputError(f"until = {until!r}: must be a function of the session")
         results: list[Result] = []
 
         def keep(result: Result, error: SimulationError | None) -> None:

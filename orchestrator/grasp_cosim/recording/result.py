@@ -400,7 +400,7 @@ class Result(ByName[npt.NDArray[Any]]):
         took = f", took {self.wall_time:.3g} s" if self.wall_time else ""
         broken = "" if self.complete else ", not complete"
         if self.ended_at is not None:
-            broken = ", ended by an FMU"
+            broken = ", ended there"
         step, stop = 1e3 * settings["step"], settings["stop"]
         how = f"in steps of {step:.6g} ms, {settings['scheme']}"
         yield f"  run      {end}{stop:.6g} s {how}{took}{broken}"

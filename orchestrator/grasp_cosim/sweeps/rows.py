@@ -83,10 +83,10 @@ def varied(text: str) -> tuple[str, list[Value | Quantity]]:
 
 def _in_unit(place: str, value: Any, unit: str | None) -> Any:
     """The value with the unit in the head of its column, if that has one."""
-    if unit is None:
+    if not unit:  # the head of a number without one is "name []"
         return value
     if not is_number(value):
-        raise InputError(f"{place}: {value!r}: must be a number, as the column is in {unit}")
+        raise InputError(f"{place}: {str(value)!r}: must be a number, as the column is in {unit}")
     return Quantity(value, unit)
 
 
@@ -204,7 +204,7 @@ def _rows_in(table: Table) -> list[dict[str, Any]]:
             text = cell.strip()
             if not text:
                 continue
-            if column.unit is None:
+            if not column.unit:
                 rows[row][column.name] = plain(text)
             elif spells_number(text):
                 rows[row][column.name] = Quantity(float(text), column.unit)
