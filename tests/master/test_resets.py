@@ -224,3 +224,10 @@ def test_what_ended_by_until_is_not_said_to_be_ended_by_an_fmu(natives):
 def test_until_may_fail(natives):
     with pytest.raises(InputError, match="no such signal"):
         simulate(System.load(SYSTEM, natives), until=lambda session: session["plant.gab[1]"] > 0.0)
+
+
+@pytest.mark.parametrize("act", ["step", "reset"])
+def test_what_is_asked_until_when_does_not_move_the_session(natives, act):
+    system = System.load(SYSTEM, natives)
+    with pytest.raises(InputError, match="until: has stepped or reset the session; must only"):
+        simulate(system, until=lambda s: s.time > 0.01 and bool(getattr(s, act)()))

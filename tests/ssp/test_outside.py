@@ -218,10 +218,10 @@ def test_values_of_each_kind_are_passed_on_and_recorded_as_they_are(tmp_path):
 
 @pytest.mark.slow
 @needs_gcc
-def test_a_sweep_varies_an_input_in_si_units(load):
-    metres = [3.048, 6.096]
-    table = sweep(load(), {"Height": metres}, metrics=[deepest], workers=1)
-    wanted = [height_in_sub(x / FOOT) for x in metres]
+@pytest.mark.parametrize("values", [[10.0, 20.0], ["3.048 m", "6.096 m"]])
+def test_a_sweep_varies_an_input_in_its_unit_or_one_that_is_said(load, values):
+    table = sweep(load(), {"Height": values}, metrics=[deepest], workers=1)
+    wanted = [height_in_sub(feet) for feet in (10.0, 20.0)]
     assert table["deepest"].tolist() == pytest.approx(wanted, rel=1e-12)
 
 

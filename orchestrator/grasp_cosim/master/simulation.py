@@ -780,7 +780,13 @@ def _drive_until(
     """Have it step, one at a time, to where `until` is true, or to its end."""
     shown = time.perf_counter()
     while not session.halt.is_set():
-        if until(session):
+        at = session.master.steps_done
+        wanted = until(session)
+        if session.master.steps_done != at:
+            raise InputError(
+                "until: has stepped or reset the session; must only look at it, and set values"
+            )
+        if wanted:
             session.end_here(f"until {getattr(until, '__name__', 'it')} was true: the run ended")
             return
         if not session.step():
