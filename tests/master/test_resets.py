@@ -11,7 +11,7 @@ from grasp_cosim.hand.system import hand_system
 from grasp_cosim.system.parts import Component
 from grasp_cosim.tandem.system import SYSTEM as TANDEM
 from master.test_states import EVENTS, FAULTS, FMI_3, LIMITS, MORE, MS, native_grasp, told
-from support.marks import engines, needs_pythonfmu
+from support.marks import engines, needs_pythonfmu, slow
 from support.native_fmus import EVENT_MODE, build_model, needs_cvode, needs_gcc, state_space
 
 pytestmark = needs_gcc
@@ -188,7 +188,7 @@ def test_what_is_no_start_value_of_these_fmus_is_refused(tmp_path, natives):
 
 
 @engines
-@pytest.mark.parametrize("realtime", [False, Realtime(factor=1e6)])
+@pytest.mark.parametrize("realtime", [False, slow(Realtime(factor=1e6))])
 def test_a_run_ends_where_its_user_says(natives, engine, realtime):
     """At the first communication point, as all of its rows tell."""
     system = native_grasp(natives)

@@ -80,6 +80,7 @@ def test_the_page_is_whole_and_needs_nothing_from_outside(run):
     assert not re.search(r"\$\w", Elements(html).visible)
 
 
+@pytest.mark.slow
 def test_the_report_of_a_result_is_that_of_its_folder(tmp_path, monkeypatch):
     """Saved or not; a folder may be given as a text."""
     monkeypatch.chdir(tmp_path)

@@ -60,6 +60,7 @@ def test_a_task_that_travels_is_the_same(system, mine):
         assert bool(shared.fmus) == with_fmus
 
 
+@pytest.mark.slow
 def test_texts_stand_for_paths(system, mine, tmp_path):
     path, rows = str(tmp_path / "system.toml"), [{"a.gain": 2.0}]
     assert simulate(path)["a.x"].tolist() == simulate(system)["a.x"].tolist()
@@ -237,6 +238,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path, whom):
     assert any(one.endswith(line) for one in err.splitlines())  # behind what an FMU had begun
 
 
+@pytest.mark.slow
 def test_kept_runs_are_bound_to_what_they_are_of(system, mine, tmp_path):
     out = tmp_path / "t.csv"
     rows = [{"a.gain": 1.0}, {"a.gain": 2.0}]
