@@ -428,8 +428,7 @@ class LoadedInstance(ABC):
 
     def restore(self, saved: Any) -> None:
         state, worst, arrays, inputs, messages = saved
-        if not self._may_be_called:
-            raise self._error("cannot go back after what it returned", self._time())
+        self._check_that_it_may_be_called()
         assert self._kept_states is not None  # noqa: S101 - it has given the state
         status = self._kept_states.put(state)
         if status > WARNING:
@@ -440,8 +439,7 @@ class LoadedInstance(ABC):
         self._messages.restore(messages)
 
     def reset(self) -> None:
-        if not self._may_be_called:
-            raise self._error("cannot go back after what it returned", self._time())
+        self._check_that_it_may_be_called()
         with self._failures():
             self._slave.reset()
         self._worst = OK
@@ -450,6 +448,10 @@ class LoadedInstance(ABC):
         self._arrays.clear()
         self._forget()
         self._choose_categories()
+
+    def _check_that_it_may_be_called(self) -> None:
+        if not self._may_be_called:
+            raise self._error("cannot go back after what it returned", self._time())
 
     def _forget(self) -> None:
         """Be as a new instance, but for what it has loaded and bound."""

@@ -23,7 +23,7 @@ from ..system.description import System, as_system
 from ..system.parts import Port, as_port, as_signal
 from ..system.times import TimeInput, in_nanoseconds, in_seconds, seconds, written
 from ..system.validity import transforms
-from .state_space import Matrix, StateSpace
+from .state_space import Matrix, StateSpace, reaching
 
 SHARE = 6e-6
 """By how much of itself a value is moved: the cube root of the rounding of a float, at which what
@@ -68,16 +68,10 @@ def linearise(
                 "must be of another kind, or left out"
             )
     first, steps = _place(system, at)
-    ports = [_input(system, name) for name in ([inputs] if isinstance(inputs, str) else inputs)]
+    ports = [_input(system, name) for name in _names(inputs)]
     fed = {connection.target: connection.source for connection in system.connections}
     cuts = {port: Cut() for port in ports if port in fed}
-    names = (
-        [str(port) for port in system.watched]
-        if outputs is None
-        else [outputs]
-        if isinstance(outputs, str)
-        else [*outputs]
-    )
+    names = [*map(str, system.watched)] if outputs is None else _names(outputs)
     recorded = [name for name in names if as_signal("output", name) not in cuts]
     with Session(system.with_record(*recorded), cuts=cuts) as session:
         if first:
@@ -98,6 +92,11 @@ def linearise(
         tuple(map(str, ports)),
         tuple(names),
     )
+
+
+def _names(given: str | Sequence[str]) -> list[str]:
+    """The names of several, or a single one."""
+    return [given] if isinstance(given, str) else [*given]
 
 
 def _place(system: System, at: TimeInput) -> tuple[int, int]:
@@ -218,8 +217,7 @@ class MacroStep:
         """The value of an input in the step that was just done."""
         if cut:
             return cut.brought
-        instance = next(i for i in self._master.instances if i.name == port.component)
-        return float(instance.get([instance.interface.by_name[port.variable]])[0])
+        return float(self._master.read(port))
 
     def _reader(
         self, name: str, cuts: dict[Port, Cut], sources: dict[Port, Source]
@@ -266,11 +264,3 @@ def _columns(
         for matrix, before, after in zip(found, low, high, strict=True):
             matrix[:, i] = (after - before) / distance
     return found[0], found[1]
-
-
-def reaching(a: Matrix, c: Matrix) -> list[int]:
-    """The states that reach an output, at once or by others, in order."""
-    reach = (c != 0.0).any(axis=0)
-    while (more := reach | (a[reach] != 0.0).any(axis=0)).sum() > reach.sum():
-        reach = more
-    return np.flatnonzero(reach).tolist()

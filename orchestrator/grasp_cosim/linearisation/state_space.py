@@ -139,9 +139,7 @@ class StateSpace:
 
     def _stable_when_closed(self) -> bool:
         """True if u = y is stable, by the states that the input reaches."""
-        reached = (self.B != 0.0).any(axis=1)
-        while (more := reached | (self.A[:, reached] != 0.0).any(axis=1)).sum() > reached.sum():
-            reached = more
+        reached = reaching(self.A.T, self.B.T)
         closed = self.A + self.B @ self.C / (1.0 - self.D[0, 0])
         poles = np.linalg.eigvals(closed[np.ix_(reached, reached)])
         return bool(np.abs(poles).max(initial=0.0) < 1.0)
@@ -167,6 +165,17 @@ class StateSpace:
         of_poles = np.abs(np.log(poles[poles != 0.0])) / self.step
         within = of_poles[(of_poles > LOWEST * nyquist) & (of_poles < nyquist)]
         return np.unique([*np.geomspace(LOWEST * nyquist, nyquist, POINTS), *within])
+
+
+def reaching(a: Matrix, c: Matrix) -> list[int]:
+    """The states that reach an output of A and C, at once or by others, in order.
+
+    Of the transposed A and B these are the states that an input reaches.
+    """
+    reach = (c != 0.0).any(axis=0)
+    while (more := reach | (a[reach] != 0.0).any(axis=0)).sum() > reach.sum():
+        reach = more
+    return np.flatnonzero(reach).tolist()
 
 
 def zeros(

@@ -67,6 +67,10 @@ class _Kept(Generic[Place]):
     of: Place
     rows: int = 0
 
+    def give(self, rows: int) -> None:
+        """Refer to so many of them from elsewhere."""
+        self.rows = max(self.rows, rows)
+
 
 class MemoryListener:
     """Copies the rows, each n-th of a run, into a table with room for the whole run from the start.
@@ -106,7 +110,7 @@ class MemoryListener:
 
     def saved(self) -> "tuple[_Kept[npt.NDArray[np.float64]], int]":
         """What was recorded until now, for restore()."""
-        self._kept.rows = max(self._kept.rows, self._rows)
+        self._kept.give(self._rows)
         return self._kept, self._rows
 
     def restore(self, saved: "tuple[_Kept[npt.NDArray[np.float64]], int]") -> None:
@@ -125,7 +129,7 @@ class MemoryListener:
         of a row that is not recorded, it is their last.
         """
         steps, table = self._steps[: self._rows], self._kept.of[:, : self._rows]
-        self._kept.rows = max(self._kept.rows, self._rows)
+        self._kept.give(self._rows)
         if next_row:
             steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
         found = zip(self._signals, table, strict=True)
@@ -169,7 +173,7 @@ class EveryRow:
 
     def saved(self) -> "tuple[_Kept[Any], int]":
         """What was kept until now, for restore()."""
-        self._kept.rows = max(self._kept.rows, self._rows)
+        self._kept.give(self._rows)
         return self._kept, self._rows
 
     def restore(self, saved: "tuple[_Kept[Any], int]") -> None:
