@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from .inspection.inspection import inspect_fmu
     from .linearisation.linearise import linearise
     from .linearisation.state_space import StateSpace
-    from .master.simulation import Session, simulate
+    from .master.session import Session
+    from .master.simulation import simulate
     from .metrics.metric import AnyOf, Metric, metric
     from .recording.folder import load_run
     from .recording.result import Result
@@ -78,7 +79,7 @@ _HOMES = {
     "Quantity": "base.quantity",
     "Realtime": "system.parts",
     "Result": "recording.result",
-    "Session": "master.simulation",
+    "Session": "master.session",
     "StateSpace": "linearisation.state_space",
     "System": "system.description",
     "compare": "comparison.compare",

@@ -138,7 +138,7 @@ def test_what_a_call_raises_ends_the_run(tmp_path, engine):
 
 def test_a_value_that_is_not_finite_at_t_0_is_kept_too(tmp_path, monkeypatch):
     mock = Mock(tmp_path, "a", lambda u, t: math.nan)
-    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    monkeypatch.setattr("grasp_cosim.master.session.load", lambda component: mock)
     with pytest.raises(SimulationError, match=r"^a\.y = nan at step 0: must be finite") as caught:
         simulate(make_system([mock], []))
     assert caught.value.result.time.tolist() == [0.0]

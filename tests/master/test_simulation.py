@@ -103,7 +103,7 @@ def test_a_value_that_is_not_finite_is_found_in_its_step(tmp_path, monkeypatch, 
     """Also where it has gone again at the end of the call."""
     monkeypatch.setattr(master, "LONG", math.inf)
     mock = Mock(tmp_path, "a", lambda u, t: math.inf if 0.45 < t < 0.65 else t)
-    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    monkeypatch.setattr("grasp_cosim.master.session.load", lambda component: mock)
     with simulate.session(make_system([mock], [], 10), engine=engine) as session:
         for _ in range(3):
             session.step()
@@ -140,7 +140,7 @@ def ring(folder, monkeypatch, **more):
     mocks = [Mock(folder, "a", lambda u, t: 1.0 - 5.0 * u), Mock(folder, "b", lambda u, t: u)]
     by_name = {m.name: m for m in mocks}
     monkeypatch.setattr(
-        "grasp_cosim.master.simulation.load", lambda component: by_name[component.name]
+        "grasp_cosim.master.session.load", lambda component: by_name[component.name]
     )
     ends = [(Port("a", "y"), Port("b", "u")), (Port("b", "y"), Port("a", "u"))]
     return make_system(mocks, [Connection(*e) for e in ends], 10, **more), mocks[1]

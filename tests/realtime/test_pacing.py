@@ -370,7 +370,7 @@ def test_ctrl_c_does_not_wait_for_the_next_step(tmp_path, monkeypatch, engine):
     """Which would begin only after 1000 s."""
     mock, fake = Mock(tmp_path, "a", lambda u, t: t), Fake()
     fake.on_sleep = lambda: os.kill(os.getpid(), signal.SIGINT)
-    monkeypatch.setattr("grasp_cosim.master.simulation.load", lambda component: mock)
+    monkeypatch.setattr("grasp_cosim.master.session.load", lambda component: mock)
     monkeypatch.setattr("grasp_cosim.realtime.pacer.CLOCK_OF_THE_SYSTEM", fake.clock)
     with pytest.raises(RunInterruptedError) as interrupted:
         simulate(make_system([mock], [], 10), engine=engine, realtime=Realtime(factor=1e-4))

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from ..base.checks import extra_module
 from ..base.errors import InputError
 from ..interface.interface import Given
-from ..master.simulation import Session, simulate
+from ..master.session import Session
+from ..master.simulation import simulate
 from ..system.connectors import read_at
 from ..system.description import System
 from ..system.parts import as_signal

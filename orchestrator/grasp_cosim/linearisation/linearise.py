@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.errors import InputError, nearest
 from ..interface.interface import Variable
-from ..master.simulation import Session
+from ..master.session import Session
 from ..system.connectors import read_at
 from ..system.description import System, as_system
 from ..system.parts import Port, as_port, as_signal

@@ -13,7 +13,7 @@ from grasp_cosim.grasp.presets import SYSTEM, with_preset
 from grasp_cosim.grasp.published import evaluation
 from grasp_cosim.grasp.published.compared import LOOK, close, compared
 from grasp_cosim.grasp.published.evaluation import as_report
-from grasp_cosim.master.simulation import Session
+from grasp_cosim.master.session import Session
 from support.grasps import CASES
 
 QUIET = {f"sensor_{j}.noise.enabled": False for j in (1, 2)}

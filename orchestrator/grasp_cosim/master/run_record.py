@@ -1,0 +1,146 @@
+"""What one run keeps of its rows: the recorded signals, and what its metrics need of every step."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..exchange.dispatch import Dispatcher
+from ..exchange.listener import Listener, Signal, Texts
+from ..interface.units import Conversion
+from ..metrics.in_si import in_si
+from ..metrics.metric import (
+    Function,
+    Metric,
+    Signals,
+    check_groups,
+    chosen,
+    measure,
+    metrics_of,
+    needed,
+)
+from ..recording.memory import Columns, EveryRow, MemoryListener
+from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
+from ..recording.result import Known
+from ..system.description import System
+from ..system.parts import Port
+from ..system.settings import run_settings, start_values
+from ..system.times import in_seconds
+
+
+class RunRecord:
+    """Receives the rows of the master and keeps what the result of the run is made of.
+
+    Every n-th row goes to the memory and to the listeners. Where the metrics need more than that,
+    be it more signals or every row, a temporary file has what they need.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        metrics: Sequence[Metric | Function | str],
+        every: int,
+        in_real_time: bool,
+    ) -> None:
+        """Choose the metrics. InputError, before any FMU is loaded, where they cannot be had."""
+        self._system, self._every = system, every
+        self.metrics = chosen(metrics, system.metrics, system.shown, system.roles)
+        """The metrics of this run beside those of the system."""
+        self._all_metrics = metrics_of(system.metrics, self.metrics)
+        self.group_notes = check_groups(system)
+        """Lines for the log on groups of metrics of the system that are not available."""
+        self._in_si = in_si(system, self._all_metrics)
+        self._memory = MemoryListener(every, in_real_time)
+        self._every_row: EveryRow | None = None
+        signals = needed(self._all_metrics, system.shown, system.roles) | of_proxies(system.shown)
+        if every > 1 or not signals <= system.kept:
+            self._every_row = EveryRow(signals)
+
+    def begin(
+        self, slots: Mapping[Port, int], texts: Mapping[Port, Texts], listeners: Sequence[Listener]
+    ) -> None:
+        """Begin the listeners. Slots are the columns of the rows, texts those of Strings there."""
+        receivers = (self._memory, *listeners)
+        self.dispatcher = Dispatcher(
+            self._system, slots, receivers, self._every, texts, self._every_row
+        )
+        self._at_start = self.saved()
+
+    def receive(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Take rows of all values of the master, and the numbers of their steps."""
+        self.dispatcher(steps, rows)
+
+    def saved(self) -> list[Any]:
+        """What was recorded until now, for restore()."""
+        saved: list[Any] = [self.dispatcher.saved(), self._memory.saved()]
+        if self._every_row:
+            saved.append(self._every_row.saved())
+        return saved
+
+    def restore(self, saved: Sequence[Any]) -> None:
+        """Go back to what was saved."""
+        self.dispatcher.restore(saved[0])
+        self._memory.restore(saved[1])
+        if self._every_row:
+            self._every_row.restore(saved[2])
+
+    def restart(self) -> None:
+        """Go back to before the first row."""
+        self.restore(self._at_start)
+
+    def take_start_values(self, system: System) -> None:
+        """Describe the run by the same system with other start values from now on."""
+        self._system = system
+        self.dispatcher.settings = run_settings(system)
+        self.group_notes = check_groups(system)
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """The settings of the run, as its result has them."""
+        return self.dispatcher.settings
+
+    @property
+    def signals(self) -> Sequence[Signal]:
+        """The signals that are recorded."""
+        return self.dispatcher.signals
+
+    @property
+    def unit_notes(self) -> tuple[str, ...]:
+        """Lines for the log on signals without a unit, which the metrics take to be in SI."""
+        return self._in_si.notes
+
+    def columns(self) -> Columns:
+        """Time in s and the columns of the recorded signals by name, until now."""
+        return self._memory.columns(self.dispatcher.pending)
+
+    def conversions(self) -> dict[str, Conversion]:
+        """How those of the recorded signals that are not in SI are converted, by name."""
+        names = {signal.name for signal in self.signals}
+        return {name: c for name, c in self._in_si.conversions.items() if name in names}
+
+    def known(self) -> Known | None:
+        """What is worked out of every row, where fewer rows or signals are recorded."""
+        if self._every_row is None or self._every_row.lost:
+            return None
+        time, columns = self._every_row.columns()
+        system = self._system
+        conversions = self._in_si.conversions
+        signals = Signals(time, columns, system.roles, conversions, start_values(system))
+        return Known(measure(signals, self._all_metrics), proxy_figures(time, columns))
+
+    def proxy_log(self) -> list[str]:
+        """Lines for the log on the proxies of the run."""
+        if not of_proxies(self._system.observed):
+            return []
+        if self._every_row and not self._every_row.lost:
+            time, columns = self._every_row.columns()
+        else:
+            time, columns = self._memory.columns()
+        return proxy_lines(time, columns, in_seconds(self._system.step_ns))
+
+    def loss_log(self) -> list[str]:
+        """A line for the log where the rows for the metrics could not be kept."""
+        if self._every_row is None or not self._every_row.lost:
+            return []
+        return [f"{self._every_row.lost}: the metrics are of the rows that were recorded"]

@@ -1,0 +1,551 @@
+"""A run that its user advances step by step: reads, sets, goes back, and takes the result of."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
+from numbers import Integral
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..base.errors import InputError, SimulationError, nearest
+from ..base.progress import phase
+from ..exchange.listener import Listener
+from ..fmi.instance import Instance
+from ..fmi.process import load
+from ..interface.interface import Given
+from ..interface.units import IDENTITY
+from ..metrics.metric import Function, Metric, check_groups
+from ..realtime.pacer import Pacer, Privileges, long_waits, privileges
+from ..recording.result import Result
+from ..system.connectors import given_by_connectors, read_at
+from ..system.declared_steps import check_declared_steps
+from ..system.description import System, as_system
+from ..system.native import needed_twins
+from ..system.parts import Component, Port, Realtime, as_signal
+from ..system.times import TimeInput, in_seconds
+from .engine import Engine
+from .master import Master
+from .process_guard import guarded_process, leaves_process_alone, same_folder
+from .run_log import RunLog
+from .run_record import RunRecord
+from .scenario import NO_CUTS, Cut
+
+LOGGER = logging.getLogger(__name__)
+"""Gets what the operating system does not permit, and at the level INFO what a run does."""
+
+MAX_STEPS = 2**62
+"""The highest number of steps, far beyond the longest run."""
+
+Finish = Callable[[Result, SimulationError | None], object]
+"""Takes the result of a run that ended, and the error that ended it."""
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """The state of a session at a time in s, from Session.save()."""
+
+    session: "Session" = field(repr=False)
+    time: float
+    system: System = field(repr=False)
+    master: Any = field(repr=False)
+    records: Sequence[Any] = field(repr=False)
+
+
+class Session:
+    """A run that its user advances. A context manager: leaving it ends and frees the FMUs.
+
+    In real time its schedule begins with the first step.
+    """
+
+    def __init__(
+        self,
+        system: System | str | Path,
+        *,
+        step: TimeInput | None = None,
+        stop: TimeInput | None = None,
+        scheme: str | None = None,
+        every: int = 1,
+        listeners: Sequence[Listener] = (),
+        engine: Engine = "auto",
+        realtime: Realtime | bool = False,
+        metrics: Sequence[Metric | Function | str] = (),
+        diverging: str | None = None,
+        note: Callable[[str], None] | None = None,
+        finish: Finish | None = None,
+        cuts: Mapping[Port, Cut] = NO_CUTS,
+        steered: bool = True,
+    ) -> None:
+        """Load and initialise; see simulate() for the arguments and errors.
+
+        A cut of a connection, by its input, gets each value that is passed there, and says what is
+        passed in its place. steered says that set() may be called, so inputs without a source are
+        recorded by default.
+        """
+        system = as_system(system, "simulate").with_experiment(step, stop, scheme, diverging)
+        if steered:
+            system = system.as_steered()
+        if not all(component.is_current for component in system.components):
+            components = tuple(replace(component) for component in system.components)
+            system = replace(system, components=components)
+        system = system.with_natives(needed_twins(system))
+        _check_count("every", every)
+        self.system = system
+        self._record = RunRecord(system, metrics, every, bool(realtime))
+        self._has_listeners = bool(listeners)
+        self._finish = finish
+        self._wall_time = 0.0
+        self._failed = False
+        self._failure: SimulationError | None = None
+        self._initialised = False
+        self._closed = False
+        self._fmus_leave_process_alone = False
+        self.halt = threading.Event()
+        """Set, it ends the waiting of a run in real time, at a communication point."""
+        pacing = system.realtime if realtime is True else realtime
+        self.pacer = Pacer(system, pacing, self.halt.is_set) if pacing else None
+        self._privileges = Privileges()
+        self._slots_read: dict[str, int] = {}
+        """The slots of the values that were read before, by name, where they need no conversion."""
+        self._start: tuple[Any, Sequence[Any]] | None = None
+        """The saved states of the master and the record at the start, after a reset."""
+        self._stack = ExitStack()
+        check_declared_steps(system)
+        waits = long_waits(system, self.pacer.realtime) if self.pacer else []
+        self._log = RunLog(system, self._record, waits, note)
+        self._log.tell_remarks()
+        try:
+            with guarded_process():
+                self._begin(listeners, engine, cuts)
+            self._log.tell_start(self.master)
+            if pacing:
+                self._ask_for_privileges(pacing)
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def _begin(
+        self, listeners: Sequence[Listener], engine: Engine, cuts: Mapping[Port, Cut]
+    ) -> None:
+        """Load the FMUs, initialise them and hand on the row of t = 0; the stack undoes it all."""
+        self._instances: list[Instance] = []
+        self._stack.callback(self._close_instances)
+        with phase(f"loading {len(self.system.components)} FMUs"):
+            self._load_instances()
+        self.master = Master(
+            self.system,
+            self._instances,
+            self._record.receive,
+            engine,
+            self.pacer,
+            self._renew_instances,
+            cuts,
+        )
+        self._record.begin(self.master.slots, self.master.texts, listeners)
+        if self.pacer:
+            self.pacer.spare = self._record.dispatcher.spare
+        self._stack.callback(self._hand_over)  # before the FMUs are ended, and after:
+        self._stack.callback(self._end)
+        with phase("initialising"), self._failures():  # where the row of t = 0 is not finite
+            self.master.initialise()
+        self._initialised = True
+        self._fmus_leave_process_alone = all(map(leaves_process_alone, self.system.components))
+
+    def _load_instances(self) -> None:
+        for component in self.system.components:
+            LOGGER.info("%s", _description(component))
+            self._instances.append(load(component))
+
+    def _close_instances(self) -> None:
+        """Close them in the opposite order, all of them even where one fails."""
+        with ExitStack() as stack:
+            for instance in self._instances:
+                stack.callback(instance.close)
+        self._instances.clear()
+
+    def _renew_instances(self) -> Sequence[Instance]:
+        """Load new instances of the same FMUs, for a loop that is initialised anew."""
+        self._close_instances()
+        self._load_instances()
+        return self._instances
+
+    def _ask_for_privileges(self, realtime: Realtime) -> None:
+        """Ask the operating system for what a run in real time needs; a refusal is a warning."""
+        self._privileges = self._stack.enter_context(privileges(realtime))
+        for line in self._privileges.refused:
+            LOGGER.warning("%s", line)
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        """A SimulationError breaks the session, and gets what was recorded as its result."""
+        try:
+            yield
+        except SimulationError as error:
+            self._break(error)
+            raise
+
+    def _end(self) -> None:
+        """Hand on the rows that wait, and end the listeners, even where that fails."""
+        with self._failures():
+            try:
+                self.master.hand_on()
+            except BaseException:
+                self._failed = True
+                raise
+            finally:
+                self._record.dispatcher.end(self.complete)
+
+    def _hand_over(self) -> None:
+        """Tell the log and hand the result on: an FMU may take the process along as it ends."""
+        if not self._initialised and self._failure is None:
+            return
+        self._log.tell_end(self.master, self._is_over)
+        if self._finish is None:
+            return
+        if self._failure is not None and self._failure.result is not None:
+            self._finish(self._failure.result, self._failure)
+        elif not self._failed:
+            self._finish(self.result(), None)
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the session."""
+        self.close()
+
+    def close(self) -> None:
+        """End the listeners, then terminate and free the FMUs. A closed session cannot step.
+
+        SimulationError, with the result, where a listener fails at its end.
+        """
+        self._closed = True
+        with same_folder(), self._failures():
+            self._stack.close()
+
+    @property
+    def time(self) -> float:
+        """The communication point reached, in s."""
+        return in_seconds(self.system.time_ns(self.master.steps_done))
+
+    @property
+    def complete(self) -> bool:
+        """True if the stop time is reached without a failure."""
+        return self.master.steps_done == self.system.total_steps and not self._failed
+
+    @property
+    def ended_at(self) -> float | None:
+        """The time in s of the end that an FMU asked for before the stop time, if that is reached.
+
+        None also after a failure.
+        """
+        end = self.master.total_steps
+        ended_early = self.master.steps_done == end < self.system.total_steps
+        return self.time if ended_early and not self._failed else None
+
+    @property
+    def _is_over(self) -> bool:
+        """True if the run came to its end, at the stop time or before, without a failure."""
+        return self.complete or self.ended_at is not None
+
+    def step(self, steps: int = 1) -> bool:
+        """Do a number of communication steps, fewer at the end; False if none was done.
+
+        None is where the end was reached before, be it the stop time or one that an FMU asked for,
+        or where halt ended the wait for the first.
+
+        SimulationError, with what was recorded as its result, where an FMU fails. After that, and
+        after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.
+        """
+        _check_count("steps", steps)
+        dispatcher = self._record.dispatcher
+        start, listeners_took = time.perf_counter(), dispatcher.took
+        try:
+            return self._call_fmus(partial(self.master.advance, int(steps))) > 0
+        finally:
+            self._wall_time += time.perf_counter() - start
+            if not self.pacer:  # which has time for the listeners
+                self._wall_time -= dispatcher.took - listeners_took
+
+    def _call_fmus(self, action: Callable[[], T]) -> T:
+        """Return what an action returns that calls FMUs; whatever it raises breaks the session.
+
+        Refuses a session whose FMUs must not be called.
+        """
+        if self._closed or self._failed:
+            state = "closed" if self._closed else "broken off by a failure or an interruption"
+            raise InputError(f"{self.system.name}: the session is {state}; must be a new one")
+        try:
+            if self._fmus_leave_process_alone:
+                return action()
+            with guarded_process(), self._failures():
+                return action()
+        except InputError:  # which was found before any FMU was called
+            raise
+        except BaseException as error:
+            self._break(error)
+            raise
+
+    def _break(self, error: BaseException) -> None:
+        """An error broke the session; a SimulationError gets what was recorded as its result."""
+        self._failed = True
+        if isinstance(error, SimulationError):
+            self._failure = error
+            error.result = error.result or self.result()
+
+    def shown_by(self, show: Callable[[], None]) -> int:
+        """Have `show` called while a long step goes on; returns the steps that are best at first.
+
+        These are all of them where a run in real time needs no look in between.
+        """
+        self.master.meanwhile = show
+        return self.master.total_steps if self.master.runs_alone else 1
+
+    def __getitem__(self, name: str) -> float:
+        """The value now of any variable, by a name like 'plant.gap[1]' or 'plant.force[1]'.
+
+        A connected input has what was passed to its FMU last, behind its faults; what is neither
+        recorded nor connected is asked of the FMU. Of a Boolean it is 0.0 or 1.0; the text of a
+        String is that of text(). InputError where there is no such variable.
+        """
+        slot = self._slots_read.get(name)
+        if slot is not None:  # as loops ask for the same again and again
+            return float(self.master.values[slot])
+        value = self._value(name)
+        if isinstance(value, str):
+            raise InputError(f"{name!r}: is a String; must be read by session.text({name!r})")
+        return value
+
+    def text(self, name: str) -> str:
+        """The text now of a String, by its name; InputError where there is no such variable."""
+        value = self._value(name)
+        if not isinstance(value, str):
+            raise InputError(f"{name!r}: is a number; must be read by session[{name!r}]")
+        return value
+
+    def _value(self, name: str) -> float | str:
+        """The value now of a variable, from the last row, or else from its FMU."""
+        master = self.master
+        port, conversion = read_at(self.system, as_signal(f"signal {name!r}", name))
+        if port not in master.slots:
+            return self._value_of_fmu(port, name)
+        slot = master.slots[port]
+        value = float(master.values[slot])
+        if port in master.texts:
+            return master.texts[port].listed[int(value)]
+        if conversion != IDENTITY:
+            return conversion(value)
+        self._slots_read[name] = slot
+        return value
+
+    def _value_of_fmu(self, port: Port, name: str) -> float | str:
+        """The value now of a variable that is in no row; InputError where there is none."""
+        component = self.system.by_name.get(port.component)
+        variable = component and component.interface.by_name.get(port.variable)
+        if not variable or not variable.supported:
+            valid = nearest(name, self._ipython_key_completions_())
+            raise InputError(f"{name!r}: no such signal; {valid}")
+        value = self._call_fmus(lambda: self.master.read(port))
+        return value if isinstance(value, str) else float(value)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """The names of what can be read, for Tab behind a bracket in a notebook."""
+        readable = [
+            f"{component.name}.{variable.name}"
+            for component in self.system.components
+            for variable in component.interface.variables
+            if variable.supported
+        ]
+        return list(dict.fromkeys([*self.system.outputs, *map(str, self.master.slots), *readable]))
+
+    def __repr__(self) -> str:
+        """How far it is."""
+        state = ""
+        if self._closed:
+            state = ", closed"
+        elif self._failed:
+            state = ", broken off"
+        stop = in_seconds(self.system.stop_ns)
+        return f"Session of {self.system.name} at {self.time:.6g} of {stop:.6g} s{state}"
+
+    def set(self, name: str, value: Given) -> None:
+        """Set a tunable parameter or an input without a connection, or a whole array of such.
+
+        It has the value from now on.
+        InputError where there is none of that name, or where the value does not fit; errors of
+        FMUs as of step().
+        """
+        values, _ = given_by_connectors(self.system, {name: value}, "set: ".__add__)
+
+        def set_all() -> None:
+            for variable, variable_value in values.items():
+                self.master.scenario.set(variable, variable_value, self.master.steps_done)
+
+        self._call_fmus(set_all)
+
+    def save(self) -> State:
+        """The state of now, to which restore() goes back: what is recorded, and all that decides
+        how the run goes on.
+
+        It is kept until nothing refers to it, at most until the session is closed. InputError where
+        an FMU does not give its state, in real time, and where listeners record elsewhere; errors
+        of FMUs as of step().
+        """
+        self._check_that_it_can_go_back()
+        master = self._call_fmus(self.master.saved)
+        return State(self, self.time, self.system, master, self._record.saved())
+
+    def _check_that_it_can_go_back(self) -> None:
+        if self.pacer:
+            raise InputError(f"{self.system.name}: a run in real time cannot go back")
+        if self._has_listeners:
+            raise InputError(
+                f"{self.system.name}: what listeners have got cannot be taken back; must be a "
+                "session without"
+            )
+
+    def restore(self, state: State) -> None:
+        """Go back to a state of this session that save() gave, as often as you like.
+
+        The run goes on from there with the same bits, as if what came after had not been. So it
+        does after a failure or an interruption, unless an FMU refuses any further call.
+        InputError for a state of another session; SimulationError where an FMU fails.
+        """
+        if not isinstance(state, State) or state.session is not self:
+            raise InputError(f"{self.system.name}: {state!r}: must be a state of this session")
+        self._go_back(state.master, state.records)
+        if state.system is not self.system:
+            self._take_start_values(state.system)
+
+    def _go_back(self, master: Any, records: Sequence[Any]) -> None:
+        """Go back to these saved states of the master and the record."""
+        self._mend()
+        self._call_fmus(partial(self.master.restore, master))
+        self._record.restore(records)
+
+    def _mend(self) -> None:
+        """Forget the failure that broke the session, as it goes back to before that."""
+        if not self._closed:
+            self._failed, self._failure = False, None
+
+    def reset(self, values: Mapping[str, Given] | None = None) -> None:
+        """Go back to the start of the run, as a new session would begin, without loading anew.
+
+        With other start values, where some are given, which stay for the resets after it. So it
+        does after a failure or an interruption, unless an FMU refuses any further call. InputError
+        where save() refuses for other reasons than the FMUs, for values that do not fit, or where
+        an FMU refuses its initialisation, which breaks the session until it is reset.
+        """
+        self._check_that_it_can_go_back()
+        if values or self._start is None:
+            system = self._with_values(values or {})
+            self._mend()
+            self._call_fmus(partial(self._initialise_anew, system))
+        else:
+            self._go_back(*self._start)
+        self._wall_time = 0.0
+
+    def _with_values(self, values: Mapping[str, Given]) -> System:
+        """The system with other start values; InputError for what is none, or changes its signals.
+
+        Then the FMUs that are loaded would not do.
+        """
+        system = self.system.with_values(values) if values else self.system
+        check_groups(system)  # refuses before any FMU is called
+        if not _differs_in_values_alone(system, self.system):
+            raise InputError(
+                f"reset: {', '.join(values)}: must be start values that change no size of an array"
+            )
+        return system
+
+    def _initialise_anew(self, system: System) -> None:
+        """Reset all FMUs and initialise them with the start values of the system."""
+        self._failed = True
+        self.master.reset(system)
+        self._record.restart()
+        self._take_start_values(system)
+        self.master.initialise()
+        self._failed = False
+        with suppress(InputError):  # an FMU that does not give its state is reset each time
+            self._start = self.master.saved(), self._record.saved()
+
+    def _take_start_values(self, system: System) -> None:
+        """Be a session of the system with these start values from now on."""
+        self._start = None
+        self._record.take_start_values(system)
+        if system is not self.system:
+            self._log.describe(system)
+        self.system = system
+
+    def end_here(self, reason: str) -> None:
+        """End the run at the communication point reached, before its stop time.
+
+        It has come to its end then; the reason is a line of the log.
+        """
+        self.master.end_here(reason)
+
+    def result(self) -> Result:
+        """Return the result recorded until now.
+
+        SimulationError, with the result, where a listener does not take it.
+        """
+        with self._failures():
+            self.master.hand_on()
+        master, record = self.master, self._record
+        time, columns = record.columns()
+        timing = None
+        if self.pacer:
+            privileges = self._privileges
+            timing = self.pacer.meter.timing(privileges.granted, privileges.refused)
+        return Result(
+            record.settings,
+            time,
+            columns,
+            {signal.name: signal.unit for signal in record.signals},
+            self._wall_time,
+            self.complete,
+            descriptions={signal.name: signal.description for signal in record.signals},
+            rejections=dict(master.rejections),
+            log=self._log.lines(master, self._is_over),
+            timing=timing,
+            more_metrics=record.metrics,
+            to_si=record.conversions(),
+            known=record.known(),
+            ended_at=self.ended_at,
+            limits=master.watches.trips(),
+            initialised_anew=tuple(master.renewed),
+            peers=master.peers,
+            components=self.system.components,
+        )
+
+
+def _differs_in_values_alone(system: System, running: System) -> bool:
+    """True if two systems differ at most in values, so that the FMUs that are loaded fit both."""
+    for name in (f.name for f in fields(system)):
+        new, old = getattr(system, name), getattr(running, name)
+        if name != "components" and new is not old and new != old:
+            return False
+    pairs = zip(system.components, running.components, strict=True)
+    return all(new.loaded is old.loaded for new, old in pairs)
+
+
+def _description(component: Component) -> str:
+    """Which FMU runs as a component, and how, in words."""
+    fmu = component.loaded
+    kind = "Python" if fmu.python else "a binary"
+    process = ", in a process of its own" if component.isolation == "process" else ""
+    return f"{component.name}: {fmu.path}, FMI {fmu.version}, {kind}{process}"
+
+
+def _check_count(name: str, count: object) -> None:
+    """InputError for what is no number of steps."""
+    if type(count) is int and 1 <= count <= MAX_STEPS:  # as a rule, and fast
+        return
+    is_whole = isinstance(count, Integral) and not isinstance(count, bool)
+    if not is_whole or not 1 <= int(count) <= MAX_STEPS:  # type: ignore[call-overload]
+        raise InputError(f"{name} = {count!r}: must be a whole number from 1 to {MAX_STEPS}")
