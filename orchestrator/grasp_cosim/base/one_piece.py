@@ -26,7 +26,8 @@ def in_one_piece(path: Path) -> Iterator[Path]:
     """Yield a temporary name to write to; at the end it takes the place of the file at path.
 
     Folders above are made. A link stays, and the file that it names is replaced; a device or a pipe
-    gets what was written. OSError, which names path, where that fails, and at once for a folder.
+    gets what was written. Who removes the temporary file has the one at path left as it was.
+    OSError, which names path, where that fails, and at once for a folder.
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder; must be the name of a file", str(path))
@@ -36,14 +37,16 @@ def in_one_piece(path: Path) -> Iterator[Path]:
             _named(path, Path(folder, "part")) as part,
         ):
             yield part
-            with part.open("rb") as made, path.open("ab") as into:
-                shutil.copyfileobj(made, into)
+            if part.exists():
+                with part.open("rb") as written, path.open("ab") as stream:
+                    shutil.copyfileobj(written, stream)
         return
     target = Path(os.path.realpath(path))
     target.parent.mkdir(parents=True, exist_ok=True)
     with _named(path, target.with_name(f"{target.name}.{os.getpid()}.part")) as part:
         yield part
-        part.replace(target)
+        if part.exists():
+            part.replace(target)
 
 
 @contextmanager

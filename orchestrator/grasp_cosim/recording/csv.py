@@ -1,7 +1,7 @@
 """Signals as CSV, in the form of the FMI cross-check, written while a run goes on."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack, nullcontext, suppress
+from contextlib import ExitStack, nullcontext
 from io import FileIO
 from pathlib import Path
 
@@ -41,9 +41,10 @@ class CsvListener:
         self._whole = [i for i, s in enumerate(signals, 1) if s.kind in ("Integer", "Boolean")]
         self._texts = {i: s.texts for i, s in enumerate(signals, 1) if s.kind == "String"}
         names = ("time", *(s.name for s in signals))
-        named = nullcontext(self._place) if self._at_once else in_one_piece(self._place)
+        target = nullcontext(self._place) if self._at_once else in_one_piece(self._place)
         with writing(self._path, InputError), ExitStack() as stack:
-            self._file = stack.enter_context(FileIO(stack.enter_context(named), "w"))
+            self._part = stack.enter_context(target)
+            self._file = stack.enter_context(FileIO(self._part, "w"))
             self._append(",".join(map(quoted, names)) + "\n")
             self._finish = stack.pop_all()
 
@@ -62,10 +63,11 @@ class CsvListener:
             self._empty = False
 
     def end(self, complete: bool) -> None:
-        """Give the file its name; SimulationError where that fails."""
-        with writing(self._path), suppress(EOFError), self._finish:
-            if self._empty:
-                raise EOFError  # has the temporary file removed
+        """Give the file its name, or remove it where it has no row; SimulationError on failure."""
+        with writing(self._path), self._finish:
+            if self._empty and not self._at_once:
+                self._file.close()  # Windows removes no file that is open
+                self._part.unlink()
 
     def _append(self, text: str) -> None:
         """Write all of the text, or none of it and raise OSError; a pipe may have got a part."""

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib.resources import files
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from ...metrics.metric import resolved
 from ...recording.result import Result
 from ...system.description import System
 from ...system.times import in_seconds
+from ...tables.table import read_table
 from ..metrics import FINGERS, IMPACT_WINDOW
 from ..presets import CASES, start_in_si, with_case, with_si_values
 
@@ -101,8 +102,11 @@ def _rows(
 
 
 def _lines(name: str) -> Iterator[dict[str, str]]:
-    text = files(__package__).joinpath(name).read_text("utf-8")
-    yield from csv.DictReader(io.StringIO(text))
+    """The rows of a published table, as texts by the names of its columns."""
+    table = read_table(Path(__file__).with_name(name))
+    cells = {column.name: column.texts() for column in table.columns}
+    for row in range(table.count):
+        yield {column: texts[row] for column, texts in cells.items()}
 
 
 def table_csv(rows: Sequence[Mapping[str, Any]]) -> str:
