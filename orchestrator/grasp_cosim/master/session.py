@@ -1,5 +1,7 @@
 """A run that its user advances step by step: reads, sets, goes back, and takes the result of."""
 
+from __future__ import annotations
+
 import logging
 import threading
 import time
@@ -48,9 +50,17 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """The state of a session at a time in s, from Session.save()."""
+    """The state of a session at a time, from Session.save().
 
-    session: "Session" = field(repr=False)
+    Attributes:
+        session: The session that it is of, the only one that can go back to it.
+        time: The communication point in s.
+        system: The system with the start values of the run.
+        master: The state of the FMUs and of the loop, which nobody but the master reads.
+        records: The states of what keeps the rows.
+    """
+
+    session: Session = field(repr=False)
     time: float
     system: System = field(repr=False)
     master: Any = field(repr=False)
@@ -58,9 +68,14 @@ class State:
 
 
 class Session:
-    """A run that its user advances. A context manager: leaving it ends and frees the FMUs.
+    """A run that its user advances step by step.
 
-    In real time its schedule begins with the first step.
+    It is a context manager: leaving it ends the listeners and frees the FMUs. In real time its
+    schedule begins with the first step.
+
+        with simulate.session(system, stop=2.0) as session:
+            while session.step(100):
+                print(session.time, session["plant.gap[1]"])
     """
 
     def __init__(
@@ -81,11 +96,34 @@ class Session:
         cuts: Mapping[Port, Cut] = NO_CUTS,
         steered: bool = True,
     ) -> None:
-        """Load and initialise; see simulate() for the arguments and errors.
+        """Load the FMUs of a system and initialise them.
 
-        A cut of a connection, by its input, gets each value that is passed there, and says what is
-        passed in its place. steered says that set() may be called, so inputs without a source are
-        recorded by default.
+        Args:
+            system: The system, or the path of a system file, .toml or .ssp.
+            step: The communication step in s, in place of that of the system. It may also be a
+                text, a pair or a Quantity with its unit: "0.5 ms", (0.5, "ms").
+            stop: The stop time in s, in place of that of the system.
+            scheme: "sequential" or "jacobi", in place of that of the system.
+            every: Every how many communication points are recorded; the last point always is.
+            listeners: Get the recorded rows while the run goes on: see exchange.listener.
+            engine: "python", "compiled", which needs a C compiler, or "auto", which is compiled
+                where that pays. The results have the same bits.
+            realtime: True paces the run by the clock as the system says, a Realtime as it says
+                itself.
+            metrics: Metrics to be worked out beside those of the system: see simulate().
+            diverging: "stop" or "continue": what follows on a signal that runs away, in place of
+                what the system says.
+            note: Gets the lines of the log: see simulate().
+            finish: Gets the result and the error that ended the run, or None, before the FMUs are
+                terminated and freed.
+            cuts: Functions by the connected input at which each opens a loop. A cut gets each value
+                that the connection brings, and returns the one that is passed on in its place.
+            steered: Says that set() may be called, so that inputs without a source are recorded by
+                default.
+
+        Raises:
+            InputError: An argument is wrong, or an FMU does not load or refuses its parameters.
+            SimulationError: An FMU fails as it is initialised, or a limit is exceeded at the start.
         """
         system = as_system(system, "simulate").with_experiment(step, stop, scheme, diverging)
         if steered:
@@ -212,7 +250,7 @@ class Session:
         elif not self._failed:
             self._finish(self.result(), None)
 
-    def __enter__(self) -> "Session":
+    def __enter__(self) -> Session:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -222,7 +260,8 @@ class Session:
     def close(self) -> None:
         """End the listeners, then terminate and free the FMUs. A closed session cannot step.
 
-        SimulationError, with the result, where a listener fails at its end.
+        Raises:
+            SimulationError: A listener fails at its end; with the result.
         """
         self._closed = True
         with same_folder(), self._failures():
@@ -240,9 +279,9 @@ class Session:
 
     @property
     def ended_at(self) -> float | None:
-        """The time in s of the end that an FMU asked for before the stop time, if that is reached.
+        """The time in s at which the run ended before its stop time, as an FMU or `until` had it.
 
-        None also after a failure.
+        None where it is not there yet, goes to its stop time, or failed.
         """
         end = self.master.total_steps
         ended_early = self.master.steps_done == end < self.system.total_steps
@@ -254,13 +293,20 @@ class Session:
         return self.complete or self.ended_at is not None
 
     def step(self, steps: int = 1) -> bool:
-        """Do a number of communication steps, fewer at the end; False if none was done.
+        """Do a number of communication steps, or fewer where the run ends before.
 
-        None is where the end was reached before, be it the stop time or one that an FMU asked for,
-        or where halt ended the wait for the first.
+        Args:
+            steps: How many, at least 1.
 
-        SimulationError, with what was recorded as its result, where an FMU fails. After that, and
-        after an interruption such as Ctrl-C, the FMUs are not at one time: InputError.
+        Returns:
+            False if no step was done: the end was reached before, be it the stop time or one that
+            an FMU asked for, or `halt` ended the wait for the first step in real time.
+
+        Raises:
+            InputError: The session is closed or broken: after a failure or an interruption such as
+                Ctrl-C the FMUs are not at one time.
+            SimulationError: An FMU fails, or a signal runs away; with what was recorded as its
+                result.
         """
         _check_count("steps", steps)
         dispatcher = self._record.dispatcher
@@ -299,19 +345,32 @@ class Session:
             error.result = error.result or self.result()
 
     def shown_by(self, show: Callable[[], None]) -> int:
-        """Have `show` called while a long step goes on; returns the steps that are best at first.
+        """Have a function called from time to time while a long step goes on.
 
-        These are all of them where a run in real time needs no look in between.
+        Args:
+            show: Called without arguments, to show how far the run is.
+
+        Returns:
+            How many steps are best done at first: one, or all where a run in real time needs no
+            look in between.
         """
         self.master.meanwhile = show
         return self.master.total_steps if self.master.runs_alone else 1
 
     def __getitem__(self, name: str) -> float:
-        """The value now of any variable, by a name like 'plant.gap[1]' or 'plant.force[1]'.
+        """The present value of any variable, in the unit of its FMU.
 
-        A connected input has what was passed to its FMU last, behind its faults; what is neither
-        recorded nor connected is asked of the FMU. Of a Boolean it is 0.0 or 1.0; the text of a
-        String is that of text(). InputError where there is no such variable.
+        A connected input has what was passed to its FMU last, behind its faults. What is neither
+        recorded nor connected is asked of the FMU.
+
+        Args:
+            name: A name like "plant.gap[1]" or "plant.force[1]".
+
+        Returns:
+            The number; 0.0 or 1.0 of a Boolean. The text of a String is that of text().
+
+        Raises:
+            InputError: There is no such variable, or it is a String.
         """
         slot = self._slots_read.get(name)
         if slot is not None:  # as loops ask for the same again and again
@@ -322,7 +381,17 @@ class Session:
         return value
 
     def text(self, name: str) -> str:
-        """The text now of a String, by its name; InputError where there is no such variable."""
+        """The present text of a String.
+
+        Args:
+            name: A name like "plant.state".
+
+        Returns:
+            The text.
+
+        Raises:
+            InputError: There is no such variable, or it is a number.
+        """
         value = self._value(name)
         if not isinstance(value, str):
             raise InputError(f"{name!r}: is a number; must be read by session[{name!r}]")
@@ -374,11 +443,16 @@ class Session:
         return f"Session of {self.system.name} at {self.time:.6g} of {stop:.6g} s{state}"
 
     def set(self, name: str, value: Given) -> None:
-        """Set a tunable parameter or an input without a connection, or a whole array of such.
+        """Set a tunable parameter, or an input without a connection, from now on.
 
-        It has the value from now on.
-        InputError where there is none of that name, or where the value does not fit; errors of
-        FMUs as of step().
+        Args:
+            name: A name like "sensor_2.reflectance"; that of an array sets all its elements.
+            value: A value in the unit of its variable, of an array a list; or one with its unit, as
+                "50 mm", (50, "mm") or a Quantity.
+
+        Raises:
+            InputError: There is no such variable that may be set now, or the value does not fit it.
+            SimulationError: Its FMU fails.
         """
         values, _ = given_by_connectors(self.system, {name: value}, "set: ".__add__)
 
@@ -389,12 +463,18 @@ class Session:
         self._call_fmus(set_all)
 
     def save(self) -> State:
-        """The state of now, to which restore() goes back: what is recorded, and all that decides
-        how the run goes on.
+        """Keep the present state, to which restore() goes back.
 
-        It is kept until nothing refers to it, at most until the session is closed. InputError where
-        an FMU does not give its state, in real time, and where listeners record elsewhere; errors
-        of FMUs as of step().
+        It is what was recorded, and all that decides how the run goes on. It is kept until nothing
+        refers to it, at most until the session is closed.
+
+        Returns:
+            The state, for restore().
+
+        Raises:
+            InputError: An FMU does not give its state, the run is in real time, or listeners record
+                it elsewhere.
+            SimulationError: An FMU fails.
         """
         self._check_that_it_can_go_back()
         master = self._call_fmus(self.master.saved)
@@ -410,11 +490,17 @@ class Session:
             )
 
     def restore(self, state: State) -> None:
-        """Go back to a state of this session that save() gave, as often as you like.
+        """Go back to a state of this session, as often as you like, also after a failure.
 
-        The run goes on from there with the same bits, as if what came after had not been. So it
-        does after a failure or an interruption, unless an FMU refuses any further call.
-        InputError for a state of another session; SimulationError where an FMU fails.
+        The run goes on from there with the same bits, as if what came after had not been.
+
+        Args:
+            state: What save() of this session returned.
+
+        Raises:
+            InputError: The state is of another session.
+            SimulationError: An FMU fails, or has failed in such a way that it refuses any further
+                call.
         """
         if not isinstance(state, State) or state.session is not self:
             raise InputError(f"{self.system.name}: {state!r}: must be a state of this session")
@@ -436,10 +522,16 @@ class Session:
     def reset(self, values: Mapping[str, Given] | None = None) -> None:
         """Go back to the start of the run, as a new session would begin, without loading anew.
 
-        With other start values, where some are given, which stay for the resets after it. So it
-        does after a failure or an interruption, unless an FMU refuses any further call. InputError
-        where save() refuses for other reasons than the FMUs, for values that do not fit, or where
-        an FMU refuses its initialisation, which breaks the session until it is reset.
+        It does so after a failure or an interruption, too, unless an FMU refuses any further call.
+
+        Args:
+            values: Other start values by names like "plant.object_width", as System.with_values()
+                takes them. They stay for the resets after this one. None changes nothing.
+
+        Raises:
+            InputError: The run is in real time, or listeners record it; a value does not fit; or an
+                FMU refuses its initialisation, which breaks the session until the next reset.
+            SimulationError: An FMU fails.
         """
         self._check_that_it_can_go_back()
         if values or self._start is None:
@@ -485,14 +577,19 @@ class Session:
     def end_here(self, reason: str) -> None:
         """End the run at the communication point reached, before its stop time.
 
-        It has come to its end then; the reason is a line of the log.
+        Args:
+            reason: Why, a line for the log.
         """
         self.master.end_here(reason)
 
     def result(self) -> Result:
-        """Return the result recorded until now.
+        """Return what was recorded until now; the session can go on.
 
-        SimulationError, with the result, where a listener does not take it.
+        Returns:
+            The result, as that of simulate(). What is recorded later does not change it.
+
+        Raises:
+            SimulationError: A listener does not take its rows; with the result.
         """
         with self._failures():
             self.master.hand_on()

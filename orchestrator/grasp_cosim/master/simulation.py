@@ -1,5 +1,7 @@
 """simulate(): a whole run of a system; simulate.session() is the same run, step by step."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -37,8 +39,7 @@ class WithSession(Protocol[Arguments, Returned]):
 
     session: type[Session]
 
-    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Returned:
-        """Call the function."""
+    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Returned: ...
 
 
 def _with_session(function: Callable[Arguments, Returned]) -> WithSession[Arguments, Returned]:
@@ -66,33 +67,48 @@ def simulate(
     finish: Finish | None = None,
     until: Until | None = None,
 ) -> Result:
-    """Run a system, or that of a system file, to its stop time; return what it records at every
-    communication point.
+    """Run a system to its stop time, and return what was recorded at its communication points.
 
-    These are its outputs, or what System.with_record() names.
+    Recorded are the outputs of the system, or what System.with_record() names. Ctrl-C ends the run
+    in good order. simulate.session() is the same run, advanced step by step by its user.
 
-    step and stop in s and the scheme replace those of the system. progress shows on standard
-    error how far it is, by the name of the system or the one given. every keeps only each n-th
-    communication point, and the last. listeners get what is kept while it is recorded. engine
-    is "python", "compiled" (needs a C compiler) or "auto", compiled where that pays; the
-    results have the same bits. realtime paces the run by the clock, as the system says, or as
-    it says itself: the result has a timing, and the same bits.
+    Args:
+        system: The system, or the path of a system file, .toml or .ssp.
+        step: The communication step in s, in place of that of the system. It may also be a text, a
+            pair or a Quantity with its unit: "0.5 ms", (0.5, "ms").
+        stop: The stop time in s, in place of that of the system.
+        scheme: "sequential" or "jacobi", in place of that of the system.
+        progress: True shows on standard error how far the run is; a text is the title of that.
+        every: Every how many communication points are recorded; the last point always is.
+        listeners: Get the recorded rows while the run goes on, like CsvListener: see
+            exchange.listener.
+        engine: "python", "compiled", which needs a C compiler, or "auto", which is compiled where
+            that pays. The results have the same bits.
+        realtime: True paces the run by the clock as the system says, a Realtime as it says itself.
+            The result then has a timing; its signals have the same bits.
+        metrics: Metrics to be worked out beside those of the system: from @metric, or functions of
+            a Signals, whose names they then have. The name of a metric demands that the result has
+            it.
+        diverging: "stop" or "continue": what follows on a signal that runs away, in place of what
+            the system says.
+        note: Gets the lines of the log but for system.notes. Those on the system and on t = 0 come
+            before the first step, the others at the end, also after a failure.
+        finish: Gets the result and the error that ended the run, or None, before the FMUs are
+            terminated and freed: in which they may crash.
+        until: Gets the session at each communication point and returns True where the run is to
+            end. Then ended_at of the result is that time, and the log has a line. A limit in the
+            system file does the same for a condition that is known before, in the loop itself.
 
-    metrics are worked out beside those of the system: from @metric, or functions of their own
-    name; a name among them says that the result must have that metric. diverging, "stop" or
-    "continue", replaces that of the system. note gets the lines of the log but for
-    system.notes: what is known of the system and of t = 0 before the first step, the others at
-    the end, also after a failure. finish gets the result, and the error that ended the run if
-    there is one, before the FMUs are terminated and freed, in which they may crash.
+    Returns:
+        The result: signals of the shape (rows,) by name, in the units of their FMUs, on result.time
+        in s; with metrics, log and settings.
 
-    until is asked at each communication point, of the session, and ends the run there where it
-    is true: ended_at of the result is that time, and the log has a line. A limit does the same
-    for a condition that is known before, in the loop itself.
-
-    Ctrl-C ends the run in good order, then is a KeyboardInterrupt: once FMUs are loaded a
-    RunInterruptedError, with what was recorded as its result.
-    InputError where an FMU does not load or refuses its parameters; SimulationError, with what
-    was recorded as its result, where one fails on the way, or a signal runs away.
+    Raises:
+        InputError: An argument is wrong, or an FMU does not load or refuses its parameters.
+        SimulationError: An FMU fails on the way, or a signal runs away. Its attribute `result` is
+            what was recorded until then.
+        RunInterruptedError: Ctrl-C once the FMUs were loaded, a KeyboardInterrupt. Its attribute
+            `result` is what was recorded until then.
     """
     if until is not None and not callable(until):
         raise InputError(f"until = {until!r}: must be a function of the session")
