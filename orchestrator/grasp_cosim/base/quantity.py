@@ -15,10 +15,15 @@ _TEXT = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A value in a unit: Quantity(50, "mm"), or Quantity("50 mm"); of an array a list of numbers.
+    """A value with its unit: Quantity(50, "mm"), or Quantity("50 mm").
 
-    The unit is one that an FMU defines, or a known one: SI with prefixes, deg, degC, min, ...
-    InputError where it is no number with a unit.
+    Args:
+        value: A number, of an array a list of numbers; or a text with number and unit, "50 mm".
+        unit: One that an FMU defines, or a known one: SI with prefixes, deg, degC, min, ... It is
+            left out where the value is a text.
+
+    Raises:
+        InputError: It is no number with a unit.
     """
 
     value: Any

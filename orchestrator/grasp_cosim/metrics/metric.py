@@ -47,7 +47,11 @@ ALL = "[*]"
 
 @dataclass(frozen=True, slots=True)
 class AnyOf:
-    """The names of signals any one of which will do: AnyOf(("plant.gap", "plant.contact"))."""
+    """A need that any one of several signals meets: AnyOf(("plant.gap", "plant.contact")).
+
+    Args:
+        names: The names of the signals.
+    """
 
     names: tuple[str, ...]
 
@@ -121,17 +125,31 @@ Function = Callable[[Signals], Value | Sequence[Value]]
 class Metric:
     """A function of recorded signals and how its value is named and shown.
 
-    `unit` is that of the value ("1" for a share, None for true or false); in tables the value is
-    shown times `factor` in `shown_unit`. `entries` name its values where it has several, like
-    ("finger 1", "finger 2"). `needs` are the signals without which there is no value, AnyOf where
-    one of several will do; `uses` are those that it reads besides where they are there. A mapping
-    gives the SI unit in which each is expected, or None, so that one of another quantity is refused
-    before a run. plant.gap[*] stands for all elements of an array, and the entry "finger *" then
-    for one each. Each metric is there or not by its own needs, whatever others of its `group` lack;
-    why not is said once for all that lack the same. An `optional` one is left out in silence. A
-    `reason` says why others have no value: it is left out where it has none itself, and a
-    qualification does not compare it. `none` says what having no value means: "nothing was
-    touched".
+    A metric of a system has a value where the signals that it needs are recorded, whatever others
+    of its group lack; why it has none is said once for all that lack the same. As an argument or an
+    entry, "plant.gap[*]" stands for all elements of an array, and "finger *" for one name each.
+
+    Args:
+        name: An identifier, the name of its column.
+        function: Gets the Signals of a run, in SI base units, and returns a number, True or False,
+            None where the moment never comes, or a list of these.
+        unit: The unit of the value, an SI one; "1" for a share, None for true or false.
+        description: What it is, in a line.
+        label: The title in tables and pictures; by default the name in words.
+        factor: Tables show the value times this ...
+        shown_unit: ... in this unit; None for `unit`.
+        entries: The names of the values, where it has several: ("finger 1", "finger 2").
+        needs: The signals without which it has no value, AnyOf where one of several will do. A
+            mapping gives the SI unit in which each is expected, or None, so that one of another
+            quantity is refused before a run.
+        uses: The signals that it reads besides, where they are recorded; as `needs`.
+        group: The package of the group that it is of; "" for a user's own.
+        optional: True leaves it out in silence where it has no value.
+        reason: True says why other metrics have no value. It is left out where it has none itself,
+            and a qualification does not compare it.
+        none: What having no value means: "nothing was touched".
+        origin: The name and the text of the file that it is from, by which it travels to other
+            processes.
     """
 
     name: str
@@ -187,12 +205,27 @@ class Metric:
         return tuple(name for name in names if name.endswith(ALL))
 
     def column_title(self, column: str) -> str:
-        """The title of one of its columns: "time to contact, finger 1"."""
+        """The title of one of its columns: "time to contact, finger 1".
+
+        Args:
+            column: One of `columns`.
+
+        Returns:
+            The title.
+        """
         place = self.columns.index(column)
         return f"{self.title}, {self.entries[place]}" if self.entries else self.title
 
     def of(self, names: Collection[str], roles: Mapping[str, str]) -> Metric:
-        """The metric of so many elements as its first array has in signals of these `names`."""
+        """The metric with as many elements as its first array has in a run.
+
+        Args:
+            names: The names of the signals of the run.
+            roles: The component by role, where its name does not say it.
+
+        Returns:
+            The metric without [*] and *.
+        """
         if not self.arrays:
             return self
         sizes = (_elements(array, names, roles) for array in self.arrays)
@@ -266,10 +299,23 @@ def _elements(array: str, names: Collection[str], roles: Mapping[str, str]) -> i
 
 
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
-    """Make a Metric of the function below; `more` are the other fields of a Metric by keyword.
+    """Make a Metric of the function below.
 
-    Without a `description` it is the first line of the function's docstring. InputError where
-    `name` is no identifier, so that it can be a column and a key, or RESERVED.
+        @metric("peak_force", unit="N", needs={"plant.contact_force[1]": "N"})
+        def peak_force(run):
+            "The largest contact force of finger 1."
+            return float(run["plant.contact_force[1]"].max())
+
+    Args:
+        name: An identifier, the name of the metric and of its column.
+        **more: The other arguments of Metric by name. Without `description` it is the first line of
+            the docstring of the function.
+
+    Returns:
+        The decorator: it takes the function, and returns the Metric.
+
+    Raises:
+        InputError: The name is no identifier, or is RESERVED; or a unit is none of SI.
     """
     if not name.isidentifier():
         raise InputError(f"metric {name!r}: must be a name of letters, digits and _")

@@ -1,5 +1,7 @@
 """The system description: components, connections and the experiment, checked once."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,7 +45,11 @@ FILES = (".toml", ARCHIVE)
 
 @dataclass(frozen=True, init=False, repr=False)
 class System(Structure):
-    """A checked system: every name exists, every input has one source or keeps a value."""
+    """A checked system: every name exists, every input has one source or keeps a value.
+
+    It is made by System(...) in Python, by System.load() of a file, or by grasp_system(),
+    hand_system() and tandem_system(). It does not change: each with_...() returns a copy.
+    """
 
     @overload
     def __init__(
@@ -72,15 +78,7 @@ class System(Structure):
         *positional: Any,
         **attributes: Any,
     ) -> None:
-        """Make a system of `components` by name, `connections` and the `experiment`.
-
-        A component is the path of an FMU, the file of a block of ours, NAME.py, which is built, a
-        Component, or for trials Python code: a function (t, inputs), or a class with step(t,
-        inputs), see system.python_code. Or it is a mapping with that as "fmu" and the other entries
-        of a component in a file, such as "values" and "step". Components step in their order. A
-        connection is "a.y -> b.u" or ("a.y", "b.u"). The experiment has "step" and "stop" in s.
-        What else a system file has are arguments of the same names, like roles and metrics.
-        InputError where something is wrong.
+        """Make a system of components, connections and an experiment.
 
             System(
                 components={"plant": "Plant.fmu", "controller": PI},
@@ -88,7 +86,22 @@ class System(Structure):
                 experiment={"step": 1e-3, "stop": 2.0},
             )
 
-        Readers of files give the attributes of a Structure, the components as a tuple.
+        Args:
+            name: The name of the system.
+            components: What each component is, by its name; they step in this order. It is the path
+                of an FMU, the file of a block of ours, NAME.py, which is built, a Component, or for
+                trials Python code: a function (t, inputs), or a class with step(t, inputs), see
+                system.python_code. Or it is a mapping with that as "fmu" and the other entries of a
+                component in a file, such as "values" and "step".
+            connections: Each a text "a.y -> b.u", a pair ("a.y", "b.u"), or a mapping as in a file.
+            *positional: Further attributes of a Structure, which readers of files give.
+            **attributes: `experiment`, with "step" and "stop" in s, which is required, and what
+                else a system file has, as arguments of the same names: roles, metrics, events, ...
+                Readers of files give the attributes of a Structure here.
+
+        Raises:
+            InputError: Something in it is wrong: a name that does not exist, an input with two
+                sources, a value that does not fit.
         """
         if not positional and "step_ns" not in attributes:
             attributes = from_sections(name, components, connections, attributes)
@@ -144,12 +157,25 @@ class System(Structure):
         start: TimeInput | None = None,
         input: str | Path | Stimuli | None = None,  # noqa: A002 - as in the file and on the command line
         variant: str | None = None,
-    ) -> "System":
-        """The system of a TOML file or SSP archive; an archive has its own FMUs.
+    ) -> System:
+        """Read the system of a TOML file or of an SSP archive.
 
-        start, step and stop in s, and a table of stimuli, go before what it says. fmus is where
-        the FMUs of a TOML file are, by default beside it. variant names the structure of an archive
-        that has several, by default SystemStructure.ssd.
+        Args:
+            path: The file, .toml or .ssp.
+            fmus: The folder of the FMUs of a TOML file, by default its own; an archive has its own
+                FMUs.
+            step: The communication step in s, in place of that of the file.
+            stop: The stop time in s, in place of that of the file.
+            start: The start time in s, in place of that of the file.
+            input: A table of stimuli, CSV, Arrow or Parquet, in place of that of the file.
+            variant: The name of the structure, of an archive that has several; by default
+                SystemStructure.ssd.
+
+        Returns:
+            The system.
+
+        Raises:
+            InputError: The file cannot be read, or something in it is wrong.
         """
         if fmus is not None and is_archive(path):
             raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
@@ -164,7 +190,17 @@ class System(Structure):
         return parameters_of(self)
 
     def start(self, key: str) -> float:
-        """The number that 'component.variable' starts with, given by the system or by its FMU."""
+        """The number that a variable starts with, set by the system or declared by its FMU.
+
+        Args:
+            key: A name like "plant.object_width".
+
+        Returns:
+            The value in the unit of the variable.
+
+        Raises:
+            InputError: There is no such component, or neither has such a start value.
+        """
         name, _, variable = key.partition(".")
         component = self.component(name, key)
         declared = component.interface.by_name.get(variable)
@@ -173,11 +209,19 @@ class System(Structure):
             raise InputError(f"{key}: {component.fmu.name} declares no such start value")
         return float(value)
 
-    def with_values(self, values: Mapping[str, Given]) -> "System":
-        """A copy with other start values, by names like plant.object_width; of an array a list.
+    def with_values(self, values: Mapping[str, Given]) -> System:
+        """A copy with other start values.
 
-        A number is in the unit of its variable; one with a unit is Quantity("50 mm"), (50, "mm") or
-        the text "50 mm".
+        Args:
+            values: Values by names like "plant.object_width"; of an array a list. A number is in
+                the unit of its variable; one with a unit is Quantity("50 mm"), (50, "mm") or the
+                text "50 mm".
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: There is no such variable, or a value does not fit it.
         """
         return self.with_settings(values, "with_values ".__add__)
 
@@ -190,13 +234,26 @@ class System(Structure):
         units: Mapping[str, str] | None = None,
         values: Mapping[str, Given] | None = None,
         own_values: bool = False,
-    ) -> "System":
-        """A copy with the FMU of one component replaced by another with the same variables.
+    ) -> System:
+        """A copy in which another FMU takes the place of that of a component.
 
-        Its values are converted where that has them in other units, and left out, with a note,
-        where it has no such variable; a note also says which of them the new FMU has otherwise.
-        With own_values they are those of the FMU. values are given to it, by its variables and in
-        their units; rename and units are those of a Component, and go before its own.
+        The new FMU has the same variables. The values that the component has stay: they are
+        converted where the new FMU has them in other units, and left out, with a note, where it has
+        no such variable; a note also says which of them the new FMU declares otherwise.
+
+        Args:
+            component: The name of the component.
+            fmu: The path of the new FMU.
+            rename: The names of variables in the new FMU by those that the system has for them.
+            units: The units of variables of the new FMU, where it declares none or a wrong one.
+            values: Start values for the new FMU, by its variables and in their units.
+            own_values: True drops the values that the component has, for those of the FMU.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: There is no such component, the FMU does not load, or it does not fit.
         """
         own = f"components.{component}"
         self.component(component, f"swap {component}")
@@ -211,10 +268,16 @@ class System(Structure):
         }
         return self.with_settings(settings, lambda _: f"swap {component}")
 
-    def with_own_values(self, *names: str) -> "System":
-        """A copy in which components of these names have the start values of their FMUs.
+    def with_own_values(self, *names: str) -> System:
+        """A copy in which components have the start values that their FMUs declare.
 
         Values of inputs, and those that decide on the sizes of arrays, stay.
+
+        Args:
+            *names: The names of the components.
+
+        Returns:
+            The changed system.
         """
         components = tuple(
             with_own_values(c) if c.name in names and c.values else c for c in self.components
@@ -223,15 +286,22 @@ class System(Structure):
 
     def with_settings(
         self, settings: Mapping[str, Any], place: Callable[[str], str] = "with_settings ".__add__
-    ) -> "System":
+    ) -> System:
         """A copy with single values of its file changed, by their places in it.
 
-        "experiment.scheme", "components.plant.fmu" or "components.plant.rename.gap[1]" are such;
-        "plant.object_width" is short for "components.plant.values.object_width". A text stands for
-        a number or a boolean where there must be one. An FMU takes the place of another as by
-        swap(), and values that are given with it are in its units. `place` says of a key where it
-        comes from, for messages. InputError where there is no such place, or it is given twice, or
-        a value does not fit it.
+        Args:
+            settings: Values by places like "experiment.scheme", "components.plant.fmu" or
+                "components.plant.rename.gap[1]"; "plant.object_width" is short for
+                "components.plant.values.object_width". A text stands for a number or a boolean
+                where there must be one. An FMU takes the place of another as by swap(), and values
+                beside it are in its units.
+            place: Says of a key where it comes from, at the beginning of messages.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: There is no such place, one is set twice, or a value does not fit it.
         """
         check_places(settings, place)
         settings, place = given_by_connectors(self, settings, place)
@@ -255,8 +325,18 @@ class System(Structure):
             **sections(self, file, place),
         )
 
-    def with_presets(self, *names: str) -> "System":
-        """A copy with the values of presets, a later one before an earlier one."""
+    def with_presets(self, *names: str) -> System:
+        """A copy with the values of presets.
+
+        Args:
+            *names: The presets of the system; where two have the same place, the later one holds.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: The system has no such preset.
+        """
         system = self
         for name in names:
             if name not in self.presets:
@@ -268,15 +348,32 @@ class System(Structure):
             system = system.with_settings(self.presets[name], place.__add__)
         return system
 
-    def with_input(self, input: str | Path | Stimuli | None) -> "System":  # noqa: A002
-        """A copy whose tunable parameters and inputs without a source a table drives, or none."""
+    def with_input(self, input: str | Path | Stimuli | None) -> System:  # noqa: A002
+        """A copy whose tunable parameters and inputs without a source are driven by a table.
+
+        Args:
+            input: The path of a table of stimuli, CSV, Arrow or Parquet; None for no table.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: The table cannot be read, or names what it cannot drive.
+        """
         return replace(self, input=_stimuli(input))
 
-    def with_record(self, *signals: str) -> "System":
-        """A copy that records other signals: names like plant.gap[1], or plant.* for several.
+    def with_record(self, *signals: str) -> System:
+        """A copy that records other signals.
 
-        One behind a ! is left out: with_record("!plant.clock"). Without any, the outputs are
-        recorded. InputError where one matches nothing.
+        Args:
+            *signals: Names like "plant.gap[1]", or patterns like "plant.*"; one behind a ! is left
+                out: with_record("!plant.clock"). Without any the outputs are recorded.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: A name or pattern matches no signal.
         """
         for signal in signals:
             if not isinstance(signal, str):
@@ -287,22 +384,43 @@ class System(Structure):
         record.check("record:", self.components, self.outputs)
         return replace(self, record=record)
 
-    def as_steered(self) -> "System":
-        """The system as a session has it, which by default records all that it may set."""
+    def as_steered(self) -> System:
+        """The system as a session has it, which by default records all that it may set.
+
+        Returns:
+            The changed system, or itself where that makes no difference.
+        """
         made = replace(self, steered=True)
         return self if made.recorded == self.recorded else made
 
-    def natively(self, native: bool | None = None) -> "System":
-        """A copy that runs native twins of its FMUs, with the same bits; False: as they are named.
+    def natively(self, native: bool | None = None) -> System:
+        """A copy that runs native twins of its FMUs: the same content in C, with the same bits.
 
-        None takes the twins that there are or that can be built; other FMUs run as they are, which
-        the logger says. InputError where with True those of our blocks cannot be built, or with
-        False an FMU in Python has no binary here. What is swapped in afterwards runs as it is.
+        What is swapped in afterwards runs as it is.
+
+        Args:
+            native: None takes the twins that there are or that can be built here; other FMUs run as
+                they are, which the logger says. True demands those of our blocks. False runs all
+                FMUs as they are named.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: With True twins cannot be built; with False an FMU in Python has no binary
+                here.
         """
         return self.with_natives(natives(self, native))
 
-    def with_natives(self, natives: Mapping[str, Path | None]) -> "System":
-        """A copy in which components of these names run native twins of their FMUs, or none."""
+    def with_natives(self, natives: Mapping[str, Path | None]) -> System:
+        """A copy in which components run native twins of their FMUs.
+
+        Args:
+            natives: The path of the twin by the name of its component; None for the FMU itself.
+
+        Returns:
+            The changed system, or itself where nothing changes.
+        """
         components = tuple(
             replace(c, native=natives.get(c.name, c.native)) for c in self.components
         )
@@ -315,8 +433,23 @@ class System(Structure):
         scheme: str | None = None,
         diverging: str | None = None,
         start: TimeInput | None = None,
-    ) -> "System":
-        """A copy with another step, stop or start time in s, or another scheme, or end."""
+    ) -> System:
+        """A copy with another experiment. What is None stays as it is.
+
+        Args:
+            step: The communication step in s. It may also be a text, a pair or a Quantity with its
+                unit: "0.5 ms", (0.5, "ms").
+            stop: The stop time in s.
+            scheme: "sequential" or "jacobi".
+            diverging: "stop" or "continue": what follows on a signal that runs away.
+            start: The start time in s.
+
+        Returns:
+            The changed system.
+
+        Raises:
+            InputError: A value is none of these, or times do not fit each other.
+        """
         given = {
             "step": step,
             "stop": stop,
@@ -327,7 +460,7 @@ class System(Structure):
         changed = {key: value for key, value in given.items() if value is not None}
         return replace(self, **experiment(str, changed)) if changed else self
 
-    def _with_parameters(self, components: tuple[Component, ...]) -> "System":
+    def _with_parameters(self, components: tuple[Component, ...]) -> System:
         """A copy with other values of parameters, which nothing goes by that is checked or shared.
 
         So a thousand runs do not check the rest as often, nor work out what follows from it.

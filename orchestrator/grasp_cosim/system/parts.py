@@ -376,14 +376,21 @@ class Initialisation:
 class Realtime:
     """How a run keeps to the clock.
 
-    factor is the speed relative to real time. overrun is what follows on a step that ends after the
-    next one should have begun: "catch-up" keeps to the schedule, late steps are done without
-    waiting; "continue" shifts it by the delay; "stop" ends the run with a SimulationError, where
-    the delay is more than tolerance, in s. "auto" is "catch-up", but "continue" where a component
-    is a proxy: a burst of steps is nothing for hardware. There a delay of more than stall, in s, is
-    a loss of all peers. priority is that of SCHED_FIFO, 1 to 99, cpu the number of the one to stay
-    on, both None for as it is.
-    lock_memory keeps the process from being swapped out.
+    Args:
+        factor: The speed relative to real time: 2.0 runs twice as fast.
+        overrun: What follows on a step that ends after the next one should have begun. "catch-up"
+            keeps to the schedule: late steps are done without waiting. "continue" shifts the
+            schedule by the delay. "stop" ends the run with a SimulationError where the delay is
+            more than `tolerance`. "auto" is "catch-up", but "continue" where a component is a
+            proxy: a burst of steps is nothing for hardware.
+        priority: The priority of SCHED_FIFO, 1 to 99; None leaves the scheduling as it is.
+        cpu: The number of the processor to stay on; None for any.
+        lock_memory: True keeps the process from being swapped out.
+        tolerance: The delay in s that "stop" lets pass.
+        stall: The delay in s from which a run with proxies counts all its peers as lost.
+
+    Raises:
+        InputError: A value is none of these.
     """
 
     factor: float = 1.0
@@ -407,9 +414,16 @@ class Realtime:
             raise InputError(f"lock_memory = {self.lock_memory!r}: must be True or False")
 
     def period(self, step_ns: Time) -> Fraction:
-        """The wall time in ns between the beginnings of two steps of step_ns; it is exact.
+        """The wall time between the beginnings of two steps, without rounding.
 
-        InputError where that is less than 1 ns, or more than a year.
+        Args:
+            step_ns: The communication step in ns.
+
+        Returns:
+            The time in ns.
+
+        Raises:
+            InputError: It is less than 1 ns, or more than a year.
         """
         period = step_ns / Fraction(repr(float(self.factor)))  # 0.1 is meant to be a tenth
         if not 1 <= period <= 366 * 24 * 3600 * NANOSECONDS:

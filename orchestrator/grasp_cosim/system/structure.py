@@ -3,6 +3,8 @@
 Units are named by a component's `units`, else declared by its FMU. What has neither is in SI.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -112,7 +114,14 @@ class Structure:
         return TimeGrid.of(self.start_ns, self.step_ns)
 
     def time_ns(self, step: int) -> Time:
-        """The time of a communication point."""
+        """The time of a communication point.
+
+        Args:
+            step: Its number, counted from the start.
+
+        Returns:
+            The time in ns.
+        """
         return self.start_ns + step * self.step_ns
 
     @cached_property
@@ -175,7 +184,14 @@ class Structure:
         return {component.name: component for component in self.components}
 
     def once(self, work: Callable[[Any], Made]) -> Made:
-        """What a function makes of the system but for values of parameters, worked out once."""
+        """What a function makes of the system but for values of parameters, worked out once.
+
+        Args:
+            work: A function of the system alone.
+
+        Returns:
+            What the function returned the first time.
+        """
         if work not in self._known:
             self._known[work] = work(self)
         found: Made = self._known[work]
@@ -190,22 +206,57 @@ class Structure:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def step_of(self, component: Component) -> Time:
-        """The communication step of a component: its own, or else that of the system."""
+        """The communication step of a component: its own, or else that of the system.
+
+        Args:
+            component: A component of this system.
+
+        Returns:
+            The step in ns.
+        """
         return self.step_ns if component.step_ns is None else component.step_ns
 
     def period(self, name: str) -> int:
-        """The step of the component of that name, in communication steps of the system."""
+        """The step of a component, counted in communication steps of the system.
+
+        Args:
+            name: The name of the component.
+
+        Returns:
+            How many, at least 1.
+
+        Raises:
+            InputError: There is no such component.
+        """
         return int(self.step_of(self.component(name, name)) // self.step_ns)
 
     def elements(self, port: Port) -> tuple[Port, ...]:
-        """The ports of the elements of a whole array; that of any other variable alone."""
+        """The elements of an array, in their order; of a scalar itself.
+
+        Args:
+            port: A component and one of its variables.
+
+        Returns:
+            A port for each element.
+        """
         array = self.component(port.component, port).interface.arrays.get(port.variable)
         if array is None:
             return (port,)
         return tuple(Port(port.component, name) for name in array.names)
 
     def component(self, name: str, place: object) -> Component:
-        """The component of that name; place says who asks, for the error message."""
+        """The component of a name.
+
+        Args:
+            name: The name of a component.
+            place: Where the name comes from, at the beginning of the message.
+
+        Returns:
+            The component.
+
+        Raises:
+            InputError: There is no such component.
+        """
         if name not in self.by_name:
             raise InputError(f"{place}: no component {name!r}; {nearest(name, self.by_name)}")
         return self.by_name[name]
