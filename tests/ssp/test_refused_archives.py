@@ -266,7 +266,7 @@ def test_what_is_refused(name, tmp_path, snapshot):
     said = message_of(archive(tmp_path, text, fmus, files))
     assert said.startswith("hand.ssp")
     cut = re.sub(
-        r"(against the schema: Element '\S+'|not readable as XML:|as it was written:).*",
+        r"(against the schema: Element '\S+'|not readable as XML:|not JSON in UTF-8:).*",
         r"\1",
         said,
     )
@@ -330,10 +330,18 @@ def test_an_entry_that_leads_out_of_the_archive_is_not_written(tmp_path):
 
 
 ANNOTATED = [
-    ('"scheme": "sequential"', '"scheme": "best"', "'best': must be one of sequential, jacobi"),
-    ('"step_ns": 100000', '"step_ns": "fast"', "'fast': must be of type int"),
+    (
+        '"scheme": "sequential"',
+        '"scheme": "best"',
+        "scheme = 'best'; must be one of sequential, jacobi",
+    ),
+    (
+        '"step_ns": 100000',
+        '"step_ns": "fast"',
+        "step_ns = 'fast'; must be a whole number or a fraction",
+    ),
     ('"step_ns": 100000', '"step": 100000', "unknown entry 'step'; did you mean step_ns?"),
-    ('"events": []', '"events": [', "not as it was written: Expecting"),
+    ('"events": []', '"events": [', "is damaged, not JSON in UTF-8: Expecting"),
     ('"sensor_1": {', '"sensor_3": {', "annotation 'grasp-cosim' is about other components"),
 ]
 

@@ -69,5 +69,5 @@ def test_a_damaged_run_json_is_said(recorded, fmus, tmp_path):
     folder, _ = recorded
     (tmp_path / "signals.csv").write_bytes((folder / "signals.csv").read_bytes())
     (tmp_path / "run.json").write_text("{}")
-    with pytest.raises(InputError, match=r"run\.json: is damaged"):
+    with pytest.raises(InputError, match=r"run\.json: no entry 'connections'; must have one"):
         alone(tmp_path, fmus, tmp_path / "signals.csv")

@@ -12,16 +12,16 @@ the unit of the original:
     time_to_contact = { absolute = 0.002 }    # of both fingers; or "time_to_contact[1]"
 """
 
-import json
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 from ..base.checks import known, number, toml_table
 from ..base.errors import InputError, choices, nearest
+from ..base.typed_json import Decoder, json_in
 from .tube import FAR, Curve, deviation
 
 SHARE = 1e-3
@@ -96,7 +96,10 @@ def read_bands(path: str | Path) -> Bands:
     InputError names the entry that is wrong.
     """
     path = Path(path)
-    table = _used(path) if path.suffix == ".json" else toml_table(path, "file of bands")
+    if path.suffix == ".json":
+        table = _bands_of_qualification(path)
+    else:
+        table = toml_table(path, "file of bands")
     valid = {"signals": ("absolute", "relative", "time"), "metrics": ("absolute", "relative")}
     for key in table:
         known(f"{path}: unknown entry", key, valid)
@@ -104,17 +107,29 @@ def read_bands(path: str | Path) -> Bands:
     return Bands(str(path), *found)
 
 
-def _used(path: Path) -> dict[str, Any]:
-    """The bands in the JSON of a qualification; JSON has null for those that are infinite."""
+class QualificationBands(TypedDict):
+    """The bands in the JSON of a qualification: by kind, pattern and key; null is infinite."""
 
-    def given(entry: dict[str, Any]) -> dict[str, Any]:
-        return {key: inf if value is None else value for key, value in entry.items()}
+    bands: Mapping[str, Mapping[str, Mapping[str, float | None]]]
 
+
+def _bands_of_qualification(path: Path) -> dict[str, Any]:
+    """The bands in the JSON of a qualification, as those of a TOML file."""
+    must = "the file must be what `qualify --json` printed"
     try:
-        bands = json.loads(path.read_text("utf-8"))["bands"]
-        return {kind: {n: given(e) for n, e in of.items()} for kind, of in bands.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: {error!r}; must be what `qualify --json` printed") from error
+        content = json_in(str(path), path.read_bytes())
+        decoded = Decoder().decoded(QualificationBands, str(path), content)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; {must}") from error
+    except InputError as error:
+        raise InputError(f"{error}; {must}") from error
+    return {
+        kind: {
+            pattern: {key: inf if value is None else value for key, value in entry.items()}
+            for pattern, entry in entries.items()
+        }
+        for kind, entries in decoded["bands"].items()
+    }
 
 
 def entry_for(entries: Mapping[str, Given], *names: str) -> Given | None:

@@ -279,6 +279,7 @@ def load_run(folder: str | Path) -> Result:
     folder = run_folder(Path(folder))
     path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS
     written = read_run_json(path)
+    entries: Mapping[str, Any] = written
     units, types, timing = written["units"], written.get("types", {}), written.get("timing")
     if not units and not arrow.exists() and not signals.exists():
         raise InputError(f"{path}: this run recorded no signal; must have recorded one")
@@ -296,7 +297,7 @@ def load_run(folder: str | Path) -> Result:
             f"must be those of the recorded columns: {choices(columns)}"
         )
     read = Result(
-        settings={k: written[k] for k in (*MADE, *MADE_BESIDE) if k in written},
+        settings={key: entries[key] for key in (*MADE, *MADE_BESIDE) if key in entries},
         time=time,
         signals={
             name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
@@ -311,7 +312,7 @@ def load_run(folder: str | Path) -> Result:
         log=tuple(written["log"]),
         timing=None if timing is None else Timing.from_dict(f"{path}: timing", timing),
         more_metrics=_as_recorded(written),
-        origin={key: written[key] for key in ORIGIN if key in written},
+        origin={key: entries[key] for key in ORIGIN if key in entries},
         to_si={name: Conversion(**c) for name, c in written.get("to_si", {}).items()},
         folder=folder,
         limits=tuple(Trip(**trip) for trip in written.get("exceeded", ())),

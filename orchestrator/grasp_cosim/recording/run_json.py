@@ -4,58 +4,22 @@ It has a run's settings (system/settings.py), its figures, as "measured" its met
 known of its signals. Every entry is checked before anything is made of it, down to the last one.
 """
 
-import json
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Required, TypedDict
 
 from ..base.checks import is_number, is_value, known
 from ..base.errors import InputError
-from ..realtime.timing import SPREAD_KEYS
-from ..system.parts import Acceptance
+from ..base.typed_json import Decoder, Valid, json_in
+from ..system.stimuli import RecordedConnection
 from ..system.times import LONGEST, NANOSECONDS
 
-Check = Callable[[str, Any], None]
-"""Takes a place and the value there; raises InputError where it is not as it must be."""
-
-
-def refused(place: str, value: Any, must: str) -> InputError:
-    """The error for an entry."""
-    return InputError(f"{place} = {_short(value)}; must be {must}")
-
-
-SHOWN = 60
-"""Characters of a value that a message shows."""
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
-
-
-def _a(must: str, fits: Callable[[Any], bool]) -> Check:
-    def check(place: str, value: Any) -> None:
-        if not fits(value):
-            raise refused(place, value, must)
-
-    return check
-
-
-def _or_null(must: str, fits: Callable[[Any], bool]) -> Check:
-    return _a(f"{must} or null", lambda value: value is None or fits(value))
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
+MAX_FLOAT = 1.7976931348623157e308
+"""The largest number that is finite as a float64; JSON has larger integers, and Infinity."""
 
 
 def _is_finite(value: Any) -> bool:
-    return is_number(value) and abs(value) <= LARGEST
-
-
-LARGEST = 1.7976931348623157e308
-"""The largest number that is finite as a float64; JSON has larger integers, and Infinity."""
+    return is_number(value) and abs(value) <= MAX_FLOAT
 
 
 def _is_count(value: Any) -> bool:
@@ -72,7 +36,9 @@ def _is_step(value: Any) -> bool:
 
 def _is_logging(value: Any) -> bool:
     categories = value if isinstance(value, list) else []
-    return isinstance(value, bool) or (bool(categories) and all(map(_is_text, categories)))
+    return isinstance(value, bool) or (
+        bool(categories) and all(isinstance(category, str) for category in categories)
+    )
 
 
 def _is_metric(value: Any) -> bool:
@@ -80,192 +46,261 @@ def _is_metric(value: Any) -> bool:
     return all(v is None or isinstance(v, bool) or _is_finite(v) for v in values)
 
 
-def _each(check: Check) -> Check:
-    """A list of such values."""
-
-    def check_list(place: str, value: Any) -> None:
-        if not isinstance(value, list):
-            raise refused(place, value, "a list")
-        for number, entry in enumerate(value):
-            check(f"{place}[{number}]", entry)
-
-    return check_list
+Number = Annotated[float, Valid("a number", _is_finite)]
+Count = Annotated[int, Valid("a whole number, at least 0", _is_count)]
+TimeInS = Annotated[float, Valid(f"a number from -{LONGEST:g} to {LONGEST:g}", _is_time)]
+StepInS = Annotated[float, Valid("a number greater than 0, at least 1e-09", _is_step)]
+Value = Annotated[Any, Valid("a number, boolean or string, or a list of such", is_value)]
+Setting = Annotated[Any, Valid("a number, boolean or string", is_value)]
+Categories = Annotated[bool | list[str], Valid("true or a list of strings", _is_logging)]
+MetricValue = Annotated[Any, Valid("a number, a boolean or null, or a list of such", _is_metric)]
 
 
-def _named(check: Check) -> Check:
-    """An object of such values by names."""
+class SolverEntry(TypedDict):
+    """The tolerance of a solver; further ones may stand beside it."""
 
-    def check_object(place: str, value: Any) -> None:
-        if not isinstance(value, dict):
-            raise refused(place, value, "a JSON object")
-        for name, entry in value.items():
-            check(f"{place}: {name}", entry)
-
-    return check_object
+    relative_tolerance: Number
 
 
-def _object(needed: Mapping[str, Check], others: Mapping[str, Check] | None = None) -> Check:
-    """An object with these entries, of which the others may be missing."""
-    all_checks = {**needed, **(others or {})}
+class ComponentEntry(TypedDict, total=False):
+    """A component."""
 
-    def check_object(place: str, value: Any) -> None:
-        if not isinstance(value, dict):
-            raise refused(place, value, "a JSON object")
-        for name in needed:
-            if name not in value:
-                raise InputError(f"{place}: no entry {name!r}; must have one")
-        for name, entry in value.items():
-            if name in all_checks:
-                all_checks[name](f"{place}: {name}", entry)
-
-    return check_object
+    fmu: Required[str]
+    values: Required[Mapping[str, Value]]
+    step: Required[Number | None]
+    isolation: Required[str]
+    rename: Required[Mapping[str, str]]
+    units: Mapping[str, str]
+    solver: SolverEntry
+    tolerance: Number
+    logging: Categories
 
 
-TEXT, TEXT_OR_NULL = _a("a string", _is_text), _or_null("a string", _is_text)
-NUMBER, NUMBER_OR_NULL = _a("a number", _is_finite), _or_null("a number", _is_finite)
-COUNT = _a("a whole number, at least 0", _is_count)
-TIME = _a(f"a number from -{LONGEST:g} to {LONGEST:g}", _is_time)
-STEP = _a("a number greater than 0, at least 1e-09", _is_step)
-BOOLEAN = _a("true or false", lambda value: isinstance(value, bool))
-VALUE = _a("a number, boolean or string, or a list of such", is_value)
-ANYTHING: Check = _a("anything", lambda _: True)
-METRIC = _a("a number, a boolean or null, or a list of such", _is_metric)
+class EventEntry(TypedDict, total=False):
+    """An event, and when it is."""
 
-COMPONENT = _object(
+    set: Required[Mapping[str, Value]]
+    at: Number
+    when: str
+
+
+FaultEntry = TypedDict(
+    "FaultEntry",
     {
-        "fmu": TEXT,
-        "values": _named(VALUE),
-        "step": NUMBER_OR_NULL,
-        "isolation": TEXT,
-        "rename": _named(TEXT),
+        "connection": Required[str],
+        "kind": Required[str],
+        "from": Number,
+        "until": Number,
+        "when": str,
+        "seed": Number,
     },
-    {
-        "units": _named(TEXT),
-        "solver": _object({"relative_tolerance": NUMBER}),
-        "tolerance": NUMBER,
-        "logging": _a("true or a list of strings", _is_logging),
-    },
+    total=False,
 )
-CONNECTION = _object({"from": TEXT, "to": TEXT, "factor": NUMBER_OR_NULL, "offset": NUMBER_OR_NULL})
-EVENT = _object({"set": _named(VALUE)}, {"at": NUMBER, "when": TEXT})
-FAULT = _object(
-    {"connection": TEXT, "kind": TEXT},
-    {"from": NUMBER, "until": NUMBER, "when": TEXT, "seed": NUMBER},
+"""A fault, and when it is; the parameters of its kind stand beside these."""
+
+
+SpreadEntry = TypedDict(
+    "SpreadEntry",
+    {"median": TimeInS, "p99": TimeInS, "p99.9": TimeInS, "worst": TimeInS, "worst_at": TimeInS},
 )
-
-SPREAD = _object(dict.fromkeys(SPREAD_KEYS, TIME))
-OVERRUN = _object({"step": COUNT, "time": TIME, "late": TIME, "culprit": TEXT, "took": TIME})
-TIMING = _object(
-    {
-        "factor": NUMBER,
-        "period": TIME,
-        "overrun": TEXT,
-        "granted": _each(TEXT),
-        "refused": _each(TEXT),
-        "steps": COUNT,
-        "real_time_factor": NUMBER,
-        "overruns": _object({"count": COUNT, "culprits": _named(COUNT), "listed": _each(OVERRUN)}),
-        "parts": _named(SPREAD),
-        "histograms": _named(_object({"edges": _each(TIME), "counts": _each(COUNT)})),
-    }
-)
-
-MADE: Mapping[str, Check] = {
-    "system": TEXT,
-    "scheme": TEXT,
-    "step": STEP,
-    "stop": TIME,
-    "initialisation": _named(VALUE),
-    "components": _named(COMPONENT),
-    "connections": _each(CONNECTION),
-    "events": _each(EVENT),
-    "faults": _each(FAULT),
-}
-MADE_BESIDE: Mapping[str, Check] = {
-    "roles": _named(TEXT),
-    "input": _named(TEXT),
-    "changed": _named(VALUE),
-    "metrics": _each(TEXT),
-    "diverging": TEXT,
-    "start": TIME,
-    "record": _each(TEXT),
-    "realtime": _named(_or_null("a number, boolean or string", is_value)),
-    "limits": _each(_object({"when": TEXT, "then": TEXT})),
-    "acceptance": _object({}, {f.name: NUMBER for f in fields(Acceptance)}),
-}
-"""Entries that say how the run was made; the latter may be missing."""
-
-ORIGIN: Mapping[str, Check] = {
-    "title": TEXT,
-    "date": TEXT,
-    "versions": _named(TEXT),
-    "fmus": _named(
-        _object(
-            {}, {"guid": TEXT, "tool": TEXT_OR_NULL, "native_twin_of": TEXT, "sha256": TEXT_OR_NULL}
-        )
-    ),
-    "command": _each(TEXT),
-}
-"""Those that say when it was made, and with what; they may be missing."""
-
-OF_THE_RUN: Mapping[str, Check] = {
-    "complete": BOOLEAN,
-    "wall_time": NUMBER_OR_NULL,
-    "steps": COUNT,
-    "rows": COUNT,
-    "measured": _named(METRIC),
-    "log": _each(TEXT),
-    "rejections": _named(_object({"count": COUNT, "first": NUMBER})),
-    "units": _named(TEXT_OR_NULL),
-}
-"""What came out."""
-
-BESIDE: Mapping[str, Check] = {
-    "metric_units": _named(TEXT_OR_NULL),
-    "missing_metrics": _each(TEXT),
-    "types": _named(TEXT),
-    "descriptions": _named(TEXT),
-    "to_si": _named(_object({"factor": NUMBER, "offset": NUMBER})),
-    "proxies": _named(_named(ANYTHING)),
-    "ended_at": NUMBER,
-    "timing": TIMING,
-    "exceeded": _each(
-        _object({"limit": TEXT, "then": TEXT, "first": NUMBER, "value": NUMBER, "steps": COUNT})
-    ),
-    "initialised_anew": _each(NUMBER),
-    "peers": _named(_named(TEXT)),
-    "verdict": _each(_named(ANYTHING)),
-}
-"""What is known of that besides; these may be missing."""
-
-CHECKS = {**MADE, **MADE_BESIDE, **ORIGIN, **OF_THE_RUN, **BESIDE}
-NEEDED = (*MADE, *OF_THE_RUN)
+"""How long a part of the steps took, in s: realtime.timing.SPREAD_KEYS."""
 
 
-def read_run_json(path: Path) -> dict[str, Any]:
+class OverrunEntry(TypedDict):
+    """A step that was late, and what took so long."""
+
+    step: Count
+    time: TimeInS
+    late: TimeInS
+    culprit: str
+    took: TimeInS
+
+
+class OverrunsEntry(TypedDict):
+    """The steps that were late."""
+
+    count: Count
+    culprits: Mapping[str, Count]
+    listed: list[OverrunEntry]
+
+
+class HistogramEntry(TypedDict):
+    """How many steps took how long, between edges in s."""
+
+    edges: list[TimeInS]
+    counts: list[Count]
+
+
+class TimingEntry(TypedDict):
+    """The timing of a run by the clock: realtime.timing.Timing."""
+
+    factor: Number
+    period: TimeInS
+    overrun: str
+    granted: list[str]
+    refused: list[str]
+    steps: Count
+    real_time_factor: Number
+    overruns: OverrunsEntry
+    parts: Mapping[str, SpreadEntry]
+    histograms: Mapping[str, HistogramEntry]
+
+
+class LimitEntry(TypedDict):
+    """A limit of the system."""
+
+    when: str
+    then: str
+
+
+class AcceptanceEntry(TypedDict, total=False):
+    """What the run may come to and still pass: system.parts.Acceptance."""
+
+    lost: Number
+    missed: Number
+    implausible: Number
+    trips: Number
+    limited: Number
+    lead: Number
+    initialised_anew: Number
+    overruns: Number
+    refused: Number
+    warnings: Number
+    unfinished: Number
+
+
+class Made(TypedDict):
+    """How the run was made."""
+
+    system: str
+    scheme: str
+    step: StepInS
+    stop: TimeInS
+    initialisation: Mapping[str, Value]
+    components: Mapping[str, ComponentEntry]
+    connections: list[RecordedConnection]
+    events: list[EventEntry]
+    faults: list[FaultEntry]
+
+
+class MadeBeside(TypedDict, total=False):
+    """How it was made, in entries that may be missing."""
+
+    roles: Mapping[str, str]
+    input: Mapping[str, str]
+    changed: Mapping[str, Value]
+    metrics: list[str]
+    diverging: str
+    start: TimeInS
+    record: list[str]
+    realtime: Mapping[str, Setting | None]
+    limits: list[LimitEntry]
+    acceptance: AcceptanceEntry
+
+
+class FmuEntry(TypedDict, total=False):
+    """Which FMU a component was."""
+
+    guid: str
+    tool: str | None
+    native_twin_of: str
+    sha256: str | None
+
+
+class Origin(TypedDict, total=False):
+    """When the run was made, and with what; all of it may be missing."""
+
+    title: str
+    date: str
+    versions: Mapping[str, str]
+    fmus: Mapping[str, FmuEntry]
+    command: list[str]
+
+
+class RejectionEntry(TypedDict):
+    """How often a component took no step of the length asked for, and when first, in s."""
+
+    count: Count
+    first: Number
+
+
+class OfTheRun(TypedDict):
+    """What came out."""
+
+    complete: bool
+    wall_time: Number | None
+    steps: Count
+    rows: Count
+    measured: Mapping[str, MetricValue]
+    log: list[str]
+    rejections: Mapping[str, RejectionEntry]
+    units: Mapping[str, str | None]
+
+
+class ToSiEntry(TypedDict):
+    """A value in SI is factor * value + offset."""
+
+    factor: Number
+    offset: Number
+
+
+class ExceededEntry(TypedDict):
+    """A limit that was exceeded: first when, in s, with which value, and in how many steps."""
+
+    limit: str
+    then: str
+    first: Number
+    value: Number
+    steps: Count
+
+
+class Beside(TypedDict, total=False):
+    """What is known of that besides; all of it may be missing."""
+
+    metric_units: Mapping[str, str | None]
+    missing_metrics: list[str]
+    types: Mapping[str, str]
+    descriptions: Mapping[str, str]
+    to_si: Mapping[str, ToSiEntry]
+    proxies: Mapping[str, Mapping[str, Any]]
+    ended_at: Number
+    timing: TimingEntry
+    exceeded: list[ExceededEntry]
+    initialised_anew: list[Number]
+    peers: Mapping[str, Mapping[str, str]]
+    verdict: list[Mapping[str, Any]]
+
+
+class RunJson(Made, MadeBeside, Origin, OfTheRun, Beside):
+    """All of run.json."""
+
+
+MADE, MADE_BESIDE = tuple(Made.__annotations__), tuple(MadeBeside.__annotations__)
+ORIGIN = tuple(Origin.__annotations__)
+"""The names of these entries."""
+
+
+def read_run_json(path: Path) -> RunJson:
     """The object in a run.json; InputError at the first entry that is not as it must be."""
     try:
-        written = json.loads(path.read_text("utf-8"))
+        data = path.read_bytes()
     except OSError as error:
         raise unreadable(path, error) from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is damaged, not JSON in UTF-8: {error}") from error
-    if not isinstance(written, dict):
-        raise InputError(f"{path}: is {type(written).__name__}; must be a JSON object")
-    for key in NEEDED:
-        if key not in written:
+    content = json_in(str(path), data)
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: is {type(content).__name__}; must be a JSON object")
+    for key in (*Made.__annotations__, *OfTheRun.__annotations__):
+        if key not in content:
             raise InputError(
                 f"{path}: no entry {key!r}; must have one, as `grasp-cosim run --out` writes it"
             )
-    for key, check in CHECKS.items():
-        if key in written:
-            check(f"{path}: {key}", written[key])
-    for number, connection in enumerate(written["connections"]):
-        for end in ("from", "to"):
-            name = connection[end].partition(".")[0]
-            place = f"{path}: connections[{number}]: {end} = {connection[end]!r}: no component"
-            known(place, name, written["components"])
-    return written
+    run = Decoder().decoded(RunJson, str(path), content)
+    for number, connection in enumerate(run["connections"]):
+        for end, port in (("from", connection["from"]), ("to", connection["to"])):
+            component = port.partition(".")[0]
+            place = f"{path}: connections[{number}]: {end} = {port!r}: no component"
+            known(place, component, run["components"])
+    return run
 
 
 def unreadable(path: Path, error: OSError) -> InputError:

@@ -15,17 +15,16 @@ first of the annotations there. Both let all components take a step at once.
 
 import json
 import math
-from array import array
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from fractions import Fraction
-from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any
 
 from lxml import etree  # type: ignore[import-untyped]
 
 from ..base.checks import check_values
-from ..base.errors import InputError, choices, nearest
+from ..base.errors import InputError, choices
+from ..base.typed_json import Decoder, Text, json_in
 from ..system.description import System
 from ..system.parts import (
     Acceptance,
@@ -119,13 +118,21 @@ def write_extras(annotations: Any, extras: Extras) -> None:
 def read_extras(place: str, annotation: Any) -> Extras:
     """The extras of our annotation; InputError where it is not as we write it."""
     element = annotation.find(_TAG)
-    try:
-        extras: Extras = _typed(Extras, json.loads("" if element is None else element.text or ""))
-    except (ValueError, TypeError, ArithmeticError, RecursionError) as error:
-        raise InputError(f"{place}: annotation {TYPE!r}: not as it was written: {error}") from error
+    text = None if element is None else element.text
+    content = json_in(f"{place}: annotation {TYPE!r}", text or "")
+    extras = _DECODER.decoded(Extras, f"{place}: annotation {TYPE!r}", content)
     for name, values in extras.presets.items():
         check_values(f"{place}: annotation {TYPE!r}: preset {name!r}", values)
     return extras
+
+
+def _port(text: str) -> Port:
+    """The port that a text stands for; without a dot one of the system itself."""
+    component, dot, variable = text.partition(".")
+    return Port(component, variable) if dot else Port("", text)
+
+
+_DECODER = Decoder({Port: Text("'component.variable'", _port)})
 
 
 def _plain(value: Any) -> Any:
@@ -140,46 +147,6 @@ def _plain(value: Any) -> Any:
         return [_plain(entry) for entry in value]
     if hasattr(value, "tolist"):
         return value.tolist()
-    return value
-
-
-def _typed(kind: Any, value: Any) -> Any:
-    """The reverse: a value of the given type; ValueError or TypeError where it is none."""
-    origin, arguments = get_origin(kind), get_args(kind)
-    if kind is Any:
-        return value
-    if kind is Port:
-        component, dot, variable = _typed(str, value).partition(".")
-        return Port(component, variable) if dot else Port("", component)
-    if kind is Fraction:
-        return Fraction(_typed(str, value))
-    if is_dataclass(kind) and isinstance(kind, type):
-        hints = get_type_hints(kind)
-        unknown = [key for key in _typed(dict, value) if key not in hints]
-        if unknown:
-            raise ValueError(f"unknown entry {unknown[0]!r}; {nearest(unknown[0], hints)}")
-        return kind(**{key: _typed(hints[key], entry) for key, entry in value.items()})
-    if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
-        return {
-            _typed(arguments[0], key): _typed(arguments[1], entry)
-            for key, entry in _typed(dict, value).items()
-        }
-    if origin is Sequence:
-        return array("d" if arguments[0] is float else "q", _typed(list, value))
-    if origin is tuple:
-        return tuple(_typed(arguments[0], entry) for entry in _typed(list, value))
-    if origin in (Union, UnionType):
-        if Fraction in arguments and isinstance(value, str) and "/" in value:
-            return _typed(Fraction, value)
-        of_value = tuple if isinstance(value, list) else type(value)
-        fitting = [a for a in arguments if of_value in (a, get_origin(a))]
-        return _typed((fitting or arguments)[0], value)
-    if origin is Literal:
-        if value not in arguments:
-            raise ValueError(f"{value!r}: must be one of {choices(arguments)}")
-        return value
-    if type(value) is not kind and (kind, type(value)) != (float, int):
-        raise ValueError(f"{value!r}: must be of type {kind.__name__}")
     return value
 
 

@@ -12,12 +12,13 @@ from dataclasses import asdict
 from importlib.metadata import version
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from ..base.errors import InputError, SimulationError, choices
 from ..base.files import make_folder
 from ..base.identity import parts_of
 from ..base.scratch import SUFFIX, Lock
+from ..base.typed_json import Decoder, json_in
 from ..metrics.metric import Metric
 from ..recording.memory import writing
 from ..system.settings import settings
@@ -27,8 +28,11 @@ from .table import Outcome, check_format
 
 PACKAGE = "grasp-cosim"
 
-FEW = 3
+MAX_DIFFERENCES = 3
 """Things in which runs differ that are named at most."""
+
+Head = TypedDict("Head", {"runs of": Mapping[str, str]})
+"""The first line of the file: a hash of each thing that decides the results, by its name."""
 
 
 def keep(file: FileIO, outcome: Outcome) -> None:
@@ -93,26 +97,21 @@ def opened(table: Path, identity: Mapping[str, str], done: dict[int, Outcome]) -
 
 def _outcome(path: Path, number: int, line: bytes) -> Outcome:
     """The outcome that a line of the file of runs holds; InputError where it holds none."""
+    place = f"{path}: line {number}"
     try:
-        outcome = Outcome(**json.loads(line))
-        whole = isinstance(outcome.index, int) and isinstance(outcome.metrics, dict)
-    except (ValueError, TypeError):
-        whole = False
-    if not whole:
-        raise InputError(
-            f"{path}: line {number} is damaged; remove the file, or name another --out"
-        )
-    return outcome
+        return Decoder().decoded(Outcome, place, json_in(place, line))
+    except InputError as error:
+        raise InputError(f"{place} is damaged; remove the file, or name another --out") from error
 
 
-def _difference(first: bytes, identity: Mapping[str, str]) -> str:
+def _difference(head: bytes, identity: Mapping[str, str]) -> str:
     """What the runs that the first line of a file tells of differ in."""
     try:
-        was = dict(json.loads(first)["runs of"])
-    except (ValueError, TypeError, KeyError):
-        was = {}
-    names = [n for n in {**identity, **was} if was.get(n) != identity.get(n)]
-    return choices(names, FEW) if was else "all that is known of them"
+        earlier = Decoder().decoded(Head, "head", json_in("head", head))["runs of"]
+    except InputError:
+        return "all that is known of them"
+    names = [n for n in {**identity, **earlier} if earlier.get(n) != identity.get(n)]
+    return choices(names, MAX_DIFFERENCES)
 
 
 def identity_of(task: Task, rows: Sequence[Row], metrics: Sequence[Metric]) -> dict[str, str]:

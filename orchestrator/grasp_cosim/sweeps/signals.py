@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from ..base.errors import InputError
 from ..base.files import make_folder, write_json
 from ..base.one_piece import in_one_piece
 from ..base.scratch import ScratchFolder
+from ..base.typed_json import Decoder, json_in
 from ..exchange.listener import Experiment
 from ..metrics.metric import Metric
 from ..recording.memory import writing
@@ -34,8 +35,15 @@ from .rows import STOP, TIMES, Row
 HEAD = "zarr.json"
 """The file of what a group or an array is."""
 
-OURS = "signals of the sweep"
-"""The attribute of our stores, a hash of what decides the runs."""
+GroupAttributes = TypedDict("GroupAttributes", {"signals of the sweep": str})
+"""The attribute by which a store is ours: a hash of what decides the runs."""
+
+
+class GroupHead(TypedDict):
+    """What is read here of the HEAD of a store."""
+
+    attributes: GroupAttributes
+
 
 RUN, TIME = "run", "time"
 
@@ -226,11 +234,14 @@ def begin(
     with writing(store.folder, InputError):
         beside = {RUN: [*range(len(rows))], **_numbers(rows)}
         heads = _written(recorded, beside)
-        others = " ".join(name for name in beside if name != RUN)
+        attributes = {"signals of the sweep": key}
+        coordinates = [name for name in beside if name != RUN]
+        if coordinates:
+            attributes["coordinates"] = " ".join(coordinates)
         head = {
             **_ZARR,
             "node_type": "group",
-            "attributes": {OURS: key, **({"coordinates": others} if others else {})},
+            "attributes": attributes,
             "consolidated_metadata": {
                 "kind": "inline",
                 "must_understand": False,
@@ -243,8 +254,10 @@ def begin(
 def _key(folder: Path) -> str:
     """The hash of what the runs of a store are of; InputError where it is none of ours."""
     try:
-        return str(json.loads((folder / HEAD).read_text("utf-8"))["attributes"][OURS])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        content = json_in(str(folder / HEAD), (folder / HEAD).read_bytes())
+        head = Decoder().decoded(GroupHead, str(folder / HEAD), content)
+        return head["attributes"]["signals of the sweep"]
+    except (OSError, InputError) as error:
         raise InputError(
             f"{folder}: is there, and has no signals of a sweep; remove it, or name another out"
         ) from error

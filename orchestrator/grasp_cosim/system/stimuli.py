@@ -8,7 +8,6 @@ another one than the variable: `plant.force [kN]`.
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from array import array
 from collections.abc import Mapping, Sequence
@@ -17,10 +16,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 from ..base.checks import choice
 from ..base.errors import InputError, choices
+from ..base.typed_json import Decoder, json_in
 from .parts import Connection, Port, as_port, as_signal
 from .times import LONGEST, NANOSECONDS
 
@@ -32,6 +32,18 @@ INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
 FEW = 3
 """So many columns are named in the repr() of stimuli."""
+
+
+RecordedConnection = TypedDict(
+    "RecordedConnection", {"from": str, "to": str, "factor": float | None, "offset": float | None}
+)
+"""A connection as run.json has it."""
+
+
+class RecordedConnections(TypedDict):
+    """What is read here of run.json."""
+
+    connections: list[RecordedConnection]
 
 
 RECORDED, SETTINGS = "signals", "run.json"
@@ -173,22 +185,20 @@ def recorded_connections(path: Path) -> tuple[Connection, ...] | None:
 
     InputError where its run.json is damaged.
     """
-    beside = path.with_name(SETTINGS)
-    if path.stem != RECORDED or not beside.is_file():
+    settings = path.with_name(SETTINGS)
+    if path.stem != RECORDED or not settings.is_file():
         return None
-    try:
-        entries: list[dict[str, Any]] = json.loads(beside.read_text("utf-8"))["connections"]
-        return tuple(
-            Connection(
-                as_port(str(beside), entry["from"]),
-                as_port(str(beside), entry["to"]),
-                entry["factor"],
-                entry["offset"],
-            )
-            for entry in entries
+    content = json_in(str(settings), settings.read_bytes())
+    entries = Decoder().decoded(RecordedConnections, str(settings), content)["connections"]
+    return tuple(
+        Connection(
+            as_port(str(settings), entry["from"]),
+            as_port(str(settings), entry["to"]),
+            entry["factor"],
+            entry["offset"],
         )
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{beside}: is damaged: {error}; must be that of a run") from error
+        for entry in entries
+    )
 
 
 def _finite_ones(ports: Mapping[Port, Column]) -> dict[Port, Stimulus]:
