@@ -36,11 +36,14 @@ BOTH = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A deviation up to width is allowed, in the unit of what is judged, and a shift in s."""
+    """How far a signal or a metric of two runs may be apart."""
 
     width: float
+    """The deviation that is allowed, in the unit of the signal or metric."""
     time: float
+    """The shift in time that is allowed, in s."""
     source: Literal["given", "derived"]
+    """"given" by the user, or "derived" from the reference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,22 +68,47 @@ class Given:
 
 @dataclass(frozen=True, slots=True)
 class Bands:
-    """The entries of a file by the pattern of names they are for."""
+    """The bands that a user states, as read_bands() has them from a file."""
 
     place: str = ""
+    """The file, at the beginning of messages."""
     signals: Mapping[str, Given] = field(default_factory=dict)
+    """The bands of signals by the pattern of their names."""
     metrics: Mapping[str, Given] = field(default_factory=dict)
+    """The bands of metrics by the pattern of their names."""
 
     def of_signal(self, name: str) -> Given | None:
-        """The entry for a signal."""
+        """The band for a signal.
+
+        Args:
+            name: The name of the signal.
+
+        Returns:
+            The entry whose pattern fits; None where there is none.
+        """
         return entry_for(self.signals, name)
 
     def of_metric(self, name: str) -> Given | None:
-        """The entry for a metric, by its name or that of all its values."""
+        """The band for a metric, by its name or that of all its values.
+
+        Args:
+            name: The name of the metric, or of one of its values, "time_to_contact[1]".
+
+        Returns:
+            The entry whose pattern fits; None where there is none.
+        """
         return entry_for(self.metrics, name, plain(name))
 
     def check(self, signals: Collection[str], metrics: Iterable[str]) -> None:
-        """InputError for a pattern that no name fits: most likely it is misspelt."""
+        """Refuse a pattern that no name fits: most likely it is misspelt.
+
+        Args:
+            signals: The names of the signals.
+            metrics: The names of the metrics.
+
+        Raises:
+            InputError: No name fits a pattern.
+        """
         both = [n for name in metrics for n in dict.fromkeys((plain(name), name))]
         kinds = (("signals", self.signals, signals), ("metrics", self.metrics, both))
         for kind, entries, names in kinds:
@@ -91,9 +119,16 @@ class Bands:
 
 
 def read_bands(path: str | Path) -> Bands:
-    """The bands of a TOML file, or those that a qualification used, of what its --json printed.
+    """Read bands from a file.
 
-    InputError names the entry that is wrong.
+    Args:
+        path: A TOML file; or a JSON file, what `qualify --json` printed: the bands that were used.
+
+    Returns:
+        The bands.
+
+    Raises:
+        InputError: The file cannot be read, or an entry is wrong; with its name.
     """
     path = Path(path)
     if path.suffix == ".json":
@@ -210,21 +245,26 @@ def _entries(place: str, table: Any, valid: Sequence[str]) -> dict[str, Given]:
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """A signal or metric of both runs, in the unit of the original, which is the reference.
-
-    deviation is the largest (inf where only one run has a value of a metric), time in s when that
-    is, original and candidate are the values then, of one the nearest within the shift that its
-    band allows. span is the range of the original's signal. Metrics have no time and span.
-    """
+    """A signal or metric of both runs, in the unit of the original, which is the reference."""
 
     name: str
+    """Its name."""
     unit: str | None
+    """The unit of the values and of the deviation; None without one."""
     band: Band
+    """How far the two may be apart."""
     deviation: float
+    """The largest deviation; inf where only one run has a value of a metric."""
     original: float | None
+    """The value of the original there; None where it has none."""
     candidate: float | None
+    """The value of the candidate there, the nearest within the shift that the band allows; None
+    where it has none.
+    """
     time: float | None = None
+    """The time of the largest deviation in s; None of a metric."""
     span: float | None = None
+    """The range of the original's signal; None of a metric."""
 
     @property
     def ratio(self) -> float:

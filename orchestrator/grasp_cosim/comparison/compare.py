@@ -32,32 +32,41 @@ Values = Mapping[str, float | None]
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Comparison:
-    """Two runs from `begin` to `end` in s; signals and metrics that both have, the worst first.
+    """Two runs beside each other over the time that both have, in the units of the first.
 
     It is true where the two are alike: `if compare(a, b):`.
-
-    Both are in the units of a. `curves` are the signals of a and of b that were compared, `asked`
-    the metrics that were, `absent` those that neither has a value of, `only` the signals that only
-    a has, then those that only b has, and `only_metrics` the metrics. `differences` are those of
-    their settings, where both are runs. `names` are what the two are called, `numerics` is what
-    derived bands are from.
     """
 
     a: Side
+    """The first run, which is the reference."""
     b: Side
+    """The second run."""
     begin: float
+    """The beginning of the time that both have, in s."""
     end: float
+    """Its end, in s."""
     signals: tuple[Compared, ...]
+    """The signals that both have, those farthest out of their bands first."""
     metrics: tuple[Compared, ...]
+    """The metrics that both have, in the same order."""
     curves: tuple[Curves, Curves]
+    """By name the signals of a and those of b that were compared."""
     asked: tuple[Metric, ...]
+    """The metrics that were worked out."""
     absent: tuple[str, ...]
+    """The names of metrics of which neither run has a value."""
     only: tuple[tuple[str, ...], tuple[str, ...]]
+    """The names of signals that only a has, then of those that only b has."""
     only_metrics: tuple[tuple[str, ...], tuple[str, ...]]
+    """The same of metrics."""
     differences: tuple[Difference, ...] = ()
+    """How the settings differ, where both are runs."""
     notes: tuple[str, ...] = ()
+    """Remarks, a line each."""
     numerics: tuple[str, ...] = ("its range", "every second sample")
+    """What the derived bands are from, in words."""
     names: tuple[str, str] = ("A", "B")
+    """What the two runs are called."""
 
     @property
     def unfinished(self) -> tuple[str, ...]:
@@ -90,13 +99,24 @@ def compare(
     metrics: Sequence[Metric] = (),
     names: LogNames = AS_THEY_ARE,
 ) -> Comparison:
-    """Compare two runs: each a result, a folder that `run --out` wrote, or a CSV or MDF file.
+    """Compare two runs: their signals and metrics, each against a band.
 
-    One may be a system file, too: it is run, as long as the other run is.
-    Bands that are not given are derived from a alone, as in a qualification. `metrics` are compared
-    beside those of the system. `names` are those of the columns of a log from elsewhere, with the
-    offset of its time. InputError where one cannot be read, or the two have no time or no signal in
-    common.
+    Args:
+        a: A result, a folder that `run --out` wrote, or a CSV or MDF file. It is the reference. One
+            of the two may be a system file: that is run, as long as the other run is.
+        b: The other run, as `a`.
+        bands: How far signals and metrics may be apart, as read_bands() has it from a file. What it
+            does not name is derived from `a` alone, as in a qualification.
+        metrics: Metrics to be compared beside those of the system.
+        names: The names of the columns of a log from elsewhere, with the offset of its time in s,
+            as read_log_names() has it from a file.
+
+    Returns:
+        The comparison, true where the two are alike.
+
+    Raises:
+        InputError: A run cannot be read, or the two have no time or no signal in common.
+        SimulationError: A system file was given, and its run fails.
     """
     first, second = (_recorded(run, called, names) for run, called in ((a, "A"), (b, "B")))
     first, second = first or _ran(a, second), second or _ran(b, first)

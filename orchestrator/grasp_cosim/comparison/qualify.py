@@ -46,19 +46,24 @@ END = Metric(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Swap:
-    """The system with the original, and with the candidate unless a difference blocks that.
-
-    differences are the worst first. back converts outputs of the candidate to the units of the
-    original, by signal name, None where that cannot be. nominals are those of all signals.
-    """
+    """A system with its FMU, and with the candidate unless a difference blocks that."""
 
     system: System
+    """The system with the original."""
     component: str
+    """The name of the component."""
     candidate: Path
+    """The path of the candidate."""
     differences: tuple[Difference, ...]
+    """How its interface differs from that of the original, the worst first."""
     swapped: System | None
+    """The system with the candidate; None where a difference blocks that."""
     back: Mapping[str, Conversion | None]
+    """By signal, how outputs of the candidate are converted to the units of the original; None
+    where that cannot be.
+    """
     nominals: Mapping[str, float | None]
+    """The nominal values of all signals that the FMUs declare, in their units."""
 
     @property
     def original(self) -> Path:
@@ -68,16 +73,16 @@ class Swap:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Qualification:
-    """The verdict and all that led to it; true where the candidate is qualified.
-
-    failure is why the candidate did not run to the end, None where it did or was not run.
-    comparison is that of the two runs, in which notes are what the candidate's run tells and the
-    original's does not; None where the candidate did not run.
-    """
+    """The verdict and all that led to it; true where the candidate is qualified."""
 
     swap: Swap
+    """The system with the original and with the candidate, and how their interfaces differ."""
     comparison: Comparison | None = None
+    """That of the two runs, in which the notes are the lines of the log that only the candidate's
+    run has; None where the candidate did not run.
+    """
     failure: str | None = None
+    """Why the candidate did not run to the end; None where it did, or was not run."""
 
     @property
     def signals(self) -> tuple[Compared, ...]:
@@ -125,17 +130,34 @@ def qualify(
     progress: bool = False,
     metrics: Sequence[Metric] = (),
 ) -> Qualification:
-    """Compare a candidate FMU with that of a component, as declared and in the closed loop.
+    """Find out whether an FMU may take the place of a component.
 
-    The candidate may be a component of another system, with its names, units and values. An FMU has
-    the names and units of the component it is to replace, as far as they fit it; rename maps the
-    system's names to the candidate's, units variables of the candidate to the names of their units,
-    where it declares none or a wrong one. values like {'plant.object_width': 0.06}
-    are set in both systems, in the unit of the original, or in the one that has such a variable.
-    bands are derived where they are not given. The candidate runs in a process of its own, which a
-    crash does not leave, unless isolation says otherwise. metrics are compared beside those of the
-    system. InputError where the input is wrong or the original refuses,
-    SimulationError where the original fails, KeyboardInterrupt at Ctrl-C.
+    Both are compared as they are declared, and as they run in the closed loop. The candidate runs
+    in a process of its own, so that its crash is a result. Bands that are not stated are derived
+    from the original, which is run with other numerics for that.
+
+    Args:
+        system: The system with the original, or the path of a system file.
+        component: The name of the component.
+        candidate: The path of the FMU; or a component of another system, with its names, units and
+            values. An FMU has the names and units of the component, as far as they fit it.
+        rename: The candidate's names of variables by those of the system.
+        units: The units of variables of the candidate, where it declares none or a wrong one.
+        values: Start values for both systems, by names like "plant.object_width", in the unit of
+            the original, or of the one that has such a variable.
+        bands: How far signals and metrics may be apart, as read_bands() has it from a file. What it
+            does not name is derived from runs of the original.
+        isolation: "process" runs the candidate in a process of its own, "none" in this one.
+        progress: True shows on standard error how far the runs are.
+        metrics: Metrics to be compared beside those of the system.
+
+    Returns:
+        The qualification, true where the candidate is qualified.
+
+    Raises:
+        InputError: An argument is wrong, or the original refuses.
+        SimulationError: The original fails.
+        KeyboardInterrupt: Ctrl-C.
     """
     choice("isolation", isolation, ISOLATIONS)
     system = as_system(system, "qualify")

@@ -103,10 +103,19 @@ def controller_name(system: System) -> str:
 
 
 def grasp_system(controller: str = "published", native: bool | None = None) -> System:
-    """The built-in grasp; its FMUs are in the user's cache, built first if need be.
+    """Make the built-in grasp of two fingers.
 
-    controller is the name of the law: "published", or "adaptive", which minds no colours. native
-    says which FMUs run, as of System.natively(): by default native ones, if they can be built.
+    Its FMUs are in the user's cache, built first if need be.
+
+    Args:
+        controller: The law: "published", or "adaptive", which minds no colours.
+        native: Which FMUs run: see System.natively(). By default native ones, if they can be built.
+
+    Returns:
+        The system.
+
+    Raises:
+        InputError: There is no such law, or the FMUs cannot be built.
     """
     system = as_named()
     chosen = system if controller == "published" else with_controller(system, controller)

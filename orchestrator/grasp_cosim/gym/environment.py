@@ -35,7 +35,8 @@ else:
 class Environment(Env[Floats, Floats]):
     """A system, observed and acted on by the names of its variables, in their units.
 
-    session is the run of the episode, for whatever else is to be known of it.
+    Attributes:
+        session: The run of the episode, for whatever else is to be known of it.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium has it
@@ -52,15 +53,25 @@ class Environment(Env[Floats, Floats]):
         start: Callable[[np.random.Generator], Mapping[str, Given]] | None = None,
         **options: Any,
     ) -> None:
-        """Load the FMUs; they are freed by close().
+        """Load the FMUs, which close() frees.
 
-        actions are free inputs, or tunable parameters, which hold a value for a control `step`, in
-        s, a whole number of the system's own. reward is a signal, or what a function gives of the
-        session after each control step; an episode is terminated where `ends` is true, truncated
-        at the stop time of the system, or where an FMU ends the run. start draws start values from
-        the seeded generator of the environment at each reset; without, reset() may be given them
-        as `options`. Further options are those of simulate.session(). InputError where a name is
-        none; SimulationError, from step(), where an FMU fails.
+        Args:
+            system: The system.
+            observations: The names of the variables that are observed; or by name a range (least,
+                greatest) in the unit of the variable, None for the one that its FMU declares.
+            actions: The names, or ranges by name, of free inputs or tunable parameters. They hold
+                the values of an action for a control step.
+            reward: The name of a signal; or a function that gets the session after each control
+                step and returns a number.
+            step: The control step in s, a whole number of the system's own steps.
+            ends: Gets the session after each control step and returns True where the episode is
+                terminated. It is truncated at the stop time, or where an FMU ends the run.
+            start: Gets the seeded generator of the environment and returns the start values of an
+                episode; None for those of the system.
+            **options: Further arguments of simulate.session().
+
+        Raises:
+            InputError: An argument is wrong, or an FMU does not load.
         """
         calls = {"reward": reward, "ends": ends, "start": start}
         for what, call in calls.items():
@@ -108,14 +119,38 @@ class Environment(Env[Floats, Floats]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode, with start values that are drawn, and those of the options."""
+        """Begin an episode.
+
+        Args:
+            seed: Seeds the generator of the environment; None goes on with it.
+            options: Start values by name, which go before those that `start` draws.
+
+        Returns:
+            The observation of the shape (observations,), and nothing else that is known.
+
+        Raises:
+            InputError: A start value does not fit.
+            SimulationError: An FMU fails.
+        """
         super().reset(seed=seed)
         drawn = self._draw_start(self.np_random) if self._draw_start else {}
         self.session.reset({**drawn, **(options or {})})
         return self._observe(), {}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Hold the action for a control step."""
+        """Hold an action for a control step.
+
+        Args:
+            action: A value for each of the actions, of the shape (actions,).
+
+        Returns:
+            The observation, the reward, True if the episode is terminated, True if it is truncated,
+            and nothing else that is known.
+
+        Raises:
+            InputError: The action has another shape.
+            SimulationError: An FMU fails.
+        """
         session, values = self.session, np.asarray(action)
         if values.shape != self.action_space.shape:
             raise InputError(f"action = {action!r}: must be an array of {len(self._acting)}")

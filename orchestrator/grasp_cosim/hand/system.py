@@ -30,11 +30,23 @@ def hand_system(
     controller: str = "published",
     native: bool | None = None,
 ) -> System:
-    """A hand of 2 to 8 fingers in directions `angles` in degrees; its FMUs are built if need be.
+    """Make a hand of 2 to 8 fingers.
 
-    By default it has three, or as many as there are angles, and they are evenly around.
-    `controller` and `native` are as of grasp_system(). InputError where the fingers cannot hold; a
-    warning where one of them hardly takes part.
+    Its FMUs are in the user's cache, built first if need be. A warning tells where one of the
+    fingers hardly takes part.
+
+    Args:
+        fingers: How many; by default as many as there are angles, else three.
+        angles: The direction of each finger in degrees; by default evenly around.
+        controller: The law: "published", or "adaptive", which minds no colours.
+        native: Which FMUs run: see System.natively().
+
+    Returns:
+        The system.
+
+    Raises:
+        InputError: The fingers cannot hold an object, there is no such law, or the FMUs cannot be
+            built.
     """
     directions = directions_of(fingers, angles)
     if note := faint(directions):

@@ -27,10 +27,18 @@ class Report(dict[str, Any]):
 
 
 def inspect_fmu(path: str | Path) -> Report:
-    """Return the declarations of the FMU at path, ready for JSON; InputError where there is no FMU.
+    """Read what an FMU declares.
 
-    `dependencies` is null where an output declares none, which means all inputs in FMI. `sizes`
-    name by dimension the variable that holds the length, null where that is fixed.
+    Args:
+        path: The FMU.
+
+    Returns:
+        A dictionary ready for JSON. `dependencies` of an output are null where it declares none,
+        which means all inputs in FMI. `sizes` of an array name by dimension the variable that holds
+        the length, null where that is fixed.
+
+    Raises:
+        InputError: There is no FMU.
     """
     found = describe(Path(path))
     return Report(

@@ -47,18 +47,29 @@ def linearise(
     step: TimeInput | None = None,
     scheme: str | None = None,
 ) -> StateSpace:
-    """The linear model of a system about the moment `at` of its run, in s: a communication point.
+    """Make the linear model of a system about a moment of its run, of one macro step.
 
-    inputs are names like "plant.force[1]". One without a connection, or a tunable parameter, is
-    moved as it is; at one with a connection the loop is opened. outputs are names of outputs, by
-    default all of the components: y[k] is what the run has at point k. At an input where the loop
-    is opened, or the output that is connected to it, y[k] is what the connection would bring in
-    step k: with u = y the loop is closed again. States that reach no output are left out. step in s
-    and scheme replace those of the system.
+    Each state and each input is moved a little either way. States that reach no output are left
+    out.
 
-    InputError where there is no such input or output, `at` is no point at which all components
-    meet, or the states of an FMU are not known one by one: those of blocks are; errors of the run
-    as of simulate().
+    Args:
+        system: The system, or the path of a system file, .toml or .ssp.
+        at: The moment in s: a communication point at which all components meet.
+        inputs: Names like "plant.force[1]". An input without a connection, or a tunable parameter,
+            is moved as it is. At an input with a connection the loop is opened.
+        outputs: Names of outputs; None for all of the components. y[k] is what the run has at point
+            k. At an input where the loop is opened, and of the output that is connected to it, y[k]
+            is what the connection would bring in step k: with u = y the loop is closed again.
+        step: The communication step in s, in place of that of the system.
+        scheme: "sequential" or "jacobi", in place of that of the system.
+
+    Returns:
+        The model.
+
+    Raises:
+        InputError: There is no such input, output or moment; or the states of an FMU are not known
+            one by one, as those of blocks are.
+        SimulationError: The run fails.
     """
     system = as_system(system, "linearise").with_experiment(step=step, scheme=scheme)
     for i, fault in enumerate(system.faults):

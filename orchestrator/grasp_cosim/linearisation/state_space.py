@@ -32,19 +32,19 @@ LOWEST = 1e-7
 class Margins(NamedTuple):
     """How far a loop is from instability, by the factor -L that it has where it was opened.
 
-    Of several crossovers each figure is that of the nearest to instability. Where there is none
-    the frequency is NaN and the margin infinite. The margins of a loop that is not stable as it is
-    mean nothing.
+    Of several crossovers each figure is that of the nearest to instability. Where there is none the
+    frequency is NaN and the margin infinite. The margins of a loop that is not stable as it is mean
+    nothing.
     """
 
     crossover: float
-    """rad/s, where |L| is 1 and the delay margin the smallest."""
+    """The frequency in rad/s at which |L| is 1 and the delay margin the smallest."""
     phase_margin: float
-    """Degrees of lag that the loop bears there."""
+    """The lag in degrees that the loop bears there."""
     delay_margin: float
-    """s of delay that it bears."""
+    """The delay in s that the loop bears."""
     phase_crossover: float
-    """rad/s, where -L is real and negative."""
+    """The frequency in rad/s at which -L is real and negative."""
     gain_margin: float
     """The factor above 1 that the loop bears."""
     stable: bool
@@ -61,26 +61,33 @@ class Margins(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:
-    """The linear model of deviations from a run, at points `step` apart, in s.
+    """The linear model of deviations from a run, at points `step` apart.
 
         x[k+1] = A x[k] + B u[k],    y[k] = C x[k] + D u[k]
 
-    A has the shape (states, states), B (states, inputs), C (outputs,
-    states), D (outputs, inputs). The names are in these orders; those of states are the component
-    and a number, or the signal that is held from a step to the next. Values are in the units of
-    the signals.
+    Values are in the units of the signals.
     """
 
     A: Matrix
+    """The matrix of the shape (states, states)."""
     B: Matrix
+    """The matrix of the shape (states, inputs)."""
     C: Matrix
+    """The matrix of the shape (outputs, states)."""
     D: Matrix
+    """The matrix of the shape (outputs, inputs)."""
     step: float
+    """The macro step in s."""
     at: float
-    """The time of the run in s."""
+    """The time of the run in s about which it is."""
     states: tuple[str, ...]
+    """The names of the states, in order: a component and a number, or the signal that is held from
+    one step to the next.
+    """
     inputs: tuple[str, ...]
+    """The names of the inputs, in order."""
     outputs: tuple[str, ...]
+    """The names of the outputs, in order."""
 
     def __repr__(self) -> str:
         """Its size, and what goes in and comes out."""
@@ -96,9 +103,13 @@ class StateSpace:
         return np.linalg.eigvals(self.A).astype(np.complex128)
 
     def frequency_response(self, omega: npt.ArrayLike) -> Response:
-        """D + C (z - A)^-1 B at z = exp(j omega step), for frequencies in rad/s.
+        """D + C (z - A)^-1 B at z = exp(j omega step).
 
-        Of shape (frequencies, outputs, inputs).
+        Args:
+            omega: Frequencies in rad/s, of the shape (frequencies,).
+
+        Returns:
+            Complex factors of the shape (frequencies, outputs, inputs).
         """
         z = np.exp(1j * self.step * np.atleast_1d(np.asarray(omega, np.float64)))
         resolvent = z[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
@@ -106,9 +117,13 @@ class StateSpace:
         return np.asarray(found, np.complex128)
 
     def margins(self) -> Margins:
-        """Those of the loop that was opened between the one input and the one output.
+        """The margins of the loop that was opened between the one input and the one output.
 
-        InputError where there are several.
+        Returns:
+            The margins of the factor -L.
+
+        Raises:
+            InputError: The model has several inputs or outputs.
         """
         if self.D.shape != (1, 1):
             raise InputError(
@@ -145,7 +160,14 @@ class StateSpace:
         return bool(np.abs(poles).max(initial=0.0) < 1.0)
 
     def ss(self) -> control.StateSpace:
-        """The same for python-control, which must be installed."""
+        """The model for python-control.
+
+        Returns:
+            A control.StateSpace with the same step and names.
+
+        Raises:
+            InputError: python-control is not installed.
+        """
         made: Any = extra_module("control", "which has this class", "control").ss(
             self.A,
             self.B,

@@ -50,21 +50,18 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """The state of a session at a time, from Session.save().
-
-    Attributes:
-        session: The session that it is of, the only one that can go back to it.
-        time: The communication point in s.
-        system: The system with the start values of the run.
-        master: The state of the FMUs and of the loop, which nobody but the master reads.
-        records: The states of what keeps the rows.
-    """
+    """The state of a session at a time, from Session.save()."""
 
     session: Session = field(repr=False)
+    """The session that it is of, the only one that can go back to it."""
     time: float
+    """The communication point in s."""
     system: System = field(repr=False)
+    """The system with the start values of the run."""
     master: Any = field(repr=False)
+    """The state of the FMUs and of the loop, which nobody but the master reads."""
     records: Sequence[Any] = field(repr=False)
+    """The states of what keeps the rows."""
 
 
 class Session:

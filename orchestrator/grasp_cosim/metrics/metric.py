@@ -167,7 +167,6 @@ class Metric:
     reason: bool = False
     none: str = ""
     origin: tuple[str, str] | None = None
-    """Of a metric from a file, the file's name and text: so it travels to other processes."""
 
     @property
     def title(self) -> str:

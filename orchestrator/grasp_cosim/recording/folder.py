@@ -268,13 +268,19 @@ def run_folder(path: Path) -> Path:
 
 
 def load_run(folder: str | Path) -> Result:
-    """The result in a folder that `run --out` wrote, or is writing: then as far as it got.
-
-    One of its files stands for it.
+    """Read the result in a folder that `run --out` wrote, or is writing: then as far as it got.
 
     Metrics are worked out anew from the signals; those of a user's file, and of a run that recorded
     only some of its steps or its signals, are as they were recorded.
-    InputError where a file is missing or damaged, or the two files are not of the same run.
+
+    Args:
+        folder: The folder, or one of its files.
+
+    Returns:
+        The result.
+
+    Raises:
+        InputError: A file is missing or damaged, or the two files are not of the same run.
     """
     folder = run_folder(Path(folder))
     path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS

@@ -52,7 +52,17 @@ AS_THEY_ARE = LogNames()
 
 
 def read_log_names(path: Path) -> LogNames:
-    """The map in a TOML file; InputError where it is none, or an entry is wrong."""
+    """Read what another logger calls the signals of a system, from a TOML file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The columns by signal, and those of the time.
+
+    Raises:
+        InputError: The file cannot be read, or an entry is wrong.
+    """
     file = toml_table(path, "map of names")
     check_keys(path.name, file, ("time", "signals"))
     time = as_table(f"{path.name}: [time]", file.get("time", {}))

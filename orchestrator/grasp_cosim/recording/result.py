@@ -138,51 +138,72 @@ class Known:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(ByName[npt.NDArray[Any]]):
-    """Recorded signals by name, like result["plant.gap[1]"], on result.time in s.
+    """The recorded signals of a run by name, like result["plant.gap[1]"], on result.time in s.
 
-    It is the same whether it was just run or read back from a folder. Every signal has the shape
-    of `time`, (rows,), and is in its unit in `units`, that of its FMU. `settings` are those of
-    system.settings, as in run.json. A result is equal to itself alone: see compare().
+    It is the same whether it was just run or read back from a folder. A result is equal to itself
+    alone: whether two are alike says compare().
     """
 
     settings: Mapping[str, Any]
+    """The settings of the run, as in run.json: system, step, stop, scheme, ..."""
     time: npt.NDArray[np.float64]
+    """The recorded communication points in s, of the shape (rows,)."""
     signals: Mapping[str, npt.NDArray[Any]]
+    """The columns by name, each of the shape (rows,): floats, whole numbers, Booleans, or str
+    objects.
+    """
     units: Mapping[str, str | None]
+    """The unit of each signal, that of its FMU; None where it has none."""
     wall_time: float | None
-    """s that it took, files that were written meanwhile not counted; None where it did not end."""
+    """The s that the run took, without the writing of files meanwhile; None where it did not end.
+    """
     complete: bool
-    """True where the stop time was reached: not if it was interrupted, failed, or ended early."""
+    """True where the stop time was reached: not where the run was interrupted, failed, or ended
+    early.
+    """
     descriptions: Mapping[str, str] = field(default_factory=dict)
+    """What each signal is, by name."""
     rejections: Mapping[str, Rejection] = field(default_factory=dict)
-    """By component; only those that rejected steps."""
+    """By component, how often its FMU rejected a step; only those that did."""
     log: tuple[str, ...] = ()
     """Remarks on the run, a line each."""
     timing: Timing | None = None
-    """How it kept to the clock; None where it was not paced."""
+    """How the run kept to the clock; None where it was not paced."""
     more_metrics: tuple[Metric, ...] = ()
-    """Metrics that were asked for beside those of the system."""
+    """The metrics of this run beside those of the system."""
     origin: Mapping[str, Any] = field(default_factory=dict)
     """The date, versions, command and title of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion] = field(default_factory=dict)
-    """The conversions to SI base units of signals in others."""
+    """How those signals are converted to SI base units that are in others."""
     known: Known | None = None
     """What was worked out of every step, where fewer rows were recorded."""
     folder: Path | None = None
-    """Where it was read from; None of a run that was just done."""
+    """The folder that it was read from; None of a run that was just done."""
     components: tuple[Component, ...] = ()
     """What ran; none of a run that was read."""
     ended_at: float | None = None
-    """The time of the last row in s where an FMU asked for the end before the stop time."""
+    """The time of the last row in s where an FMU, or `until`, ended the run before its stop time;
+    else None.
+    """
     limits: tuple[Trip, ...] = ()
     """The limits of the system that were exceeded."""
     initialised_anew: tuple[float, ...] = ()
-    """When the whole loop was initialised anew, in s, as a lost peer was back."""
+    """The times in s at which the whole loop was initialised anew, as a lost peer was back."""
     peers: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    """By component that is a proxy, the name and the build of the peer that it has had last."""
+    """By component that is a proxy, the name and the build of its last peer."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """The signal; KeyError, with the names nearest to it, where there is none."""
+        """A signal of the run.
+
+        Args:
+            name: A name like "plant.gap[1]".
+
+        Returns:
+            The values of the shape (rows,), in the unit units[name], at the times `time`.
+
+        Raises:
+            KeyError: There is no such signal; with the names nearest to it.
+        """
         if name not in self.signals:
             raise UnknownNameError(name, tuple(self.signals), "signal")
         return self.signals[name]
@@ -251,7 +272,12 @@ class Result(ByName[npt.NDArray[Any]]):
     def metrics(self) -> Figures:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
-        InputError where the function of one fails; KeyError, with the nearest names, if not there.
+        A metric is a number in its unit in `metric_units`, True or False, None where it has no
+        value, or a list of these, one for each finger, say.
+
+        Raises:
+            InputError: The function of a metric fails.
+            KeyError: There is no metric of the name that is asked for; with the nearest names.
         """
         self.measured.check()
         return self._figures
@@ -303,32 +329,62 @@ class Result(ByName[npt.NDArray[Any]]):
         return {**self.measured.units, **UNITS, **early}
 
     def save(self, folder: str | Path, form: Literal["csv", "arrow"] = "csv") -> None:
-        """Write what `run --out` does: the signals in a form and run.json; load_run() reads it.
+        """Write what `run --out` does, which load_run() reads: the signals and run.json.
 
-        An older run there is replaced. InputError where the folder is not for us, or without
-        pyarrow, where that is needed; SimulationError where the writing fails.
+        Args:
+            folder: The folder of the run. An older run there is replaced.
+            form: "csv" for signals.csv, "arrow" for signals.arrow.
+
+        Raises:
+            InputError: The folder has something else in it; or pyarrow is needed and not installed.
+            SimulationError: A file cannot be written.
         """
         higher("recording.folder").save_run(self, Path(folder), form)
 
     def to_csv(self, path: str | Path) -> None:
-        """Write time and signals with full precision, a line per communication point."""
+        """Write time and signals with full precision, a line for each communication point.
+
+        Args:
+            path: The file.
+
+        Raises:
+            InputError: The file cannot be written.
+        """
         self._play(path, CsvListener)
 
     def to_arrow(self, path: str | Path) -> None:
-        """Write an Arrow file (Feather 2), with the units; InputError without pyarrow."""
+        """Write time and signals as an Arrow file (Feather 2), with the units.
+
+        Args:
+            path: The file.
+
+        Raises:
+            InputError: The file cannot be written, or pyarrow is not installed.
+        """
         self._play(path, ArrowListener)
 
     def to_mdf(self, path: str | Path) -> None:
-        """Write an ASAM MDF 4 file with the units and the settings; InputError without asammdf."""
+        """Write time and signals as an ASAM MDF 4 file, with the units and the settings.
+
+        Args:
+            path: The file.
+
+        Raises:
+            InputError: The file cannot be written, or asammdf is not installed.
+        """
         self._play(path, MdfListener)
 
     def to_json(self, path: str | Path) -> None:
-        """Write the figures of the run and its settings, as "measured" the metrics, how many rows
+        """Write what is known of the run beside its signals as JSON: the run.json of its folder.
+
+        These are the figures of the run and its settings, as "measured" the metrics, how many rows
         there are, what is known by signal (units, conversions to SI, types, descriptions), the
         units of the metrics, the log, the rejections by component, the timing of a paced run, and
-        its origin.
+        its origin. A metric that fails is a line among the missing ones: the rest of the run is
+        kept.
 
-        A metric that fails is a line among the missing ones: the rest of the run is kept.
+        Args:
+            path: The file.
         """
         types = {name: str(column.dtype) for name, column in self.signals.items()}
         measured = self.measured.values
@@ -355,20 +411,41 @@ class Result(ByName[npt.NDArray[Any]]):
         write_json(Path(path), report)
 
     def plot(self, path: str | Path | None = None, title: str = "") -> Figure:
-        """Draw a grasp as one, of any other system all signals: the figure of matplotlib.
+        """Draw a grasp as one, of any other system all signals.
 
-        With a `path` it is written there too, as its suffix says: .png, .svg or .pdf. InputError
-        where that is another one, or without matplotlib.
+        Args:
+            path: Where the figure is written too, as .png, .svg or .pdf; None for nowhere.
+            title: The title of the figure; by default that of the run.
+
+        Returns:
+            The figure of matplotlib.
+
+        Raises:
+            InputError: The path has another suffix, or matplotlib is not installed.
         """
         run, where = self.titled(title), None if path is None else Path(path)
         return self.view.draw(run, where)  # type: ignore[no-any-return]
 
     def titled(self, title: str) -> Result:
-        """Return the result under another title, which its pictures and pages have; not if ''."""
+        """The result under another title, which its pictures and pages have.
+
+        Args:
+            title: The title; "" for the one that it has.
+
+        Returns:
+            A copy, or the result itself.
+        """
         return replace(self, origin={**self.origin, "title": title}) if title else self
 
     def to_pandas(self) -> pd.DataFrame:
-        """A DataFrame by time in s, the units in its `attrs`; InputError without pandas."""
+        """The signals as a table of pandas.
+
+        Returns:
+            A DataFrame by time in s; its `attrs` have the units.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
         module = extra_module("pandas", "it makes the table", "pandas")
         index = module.Index(self.time, name="time")
         frame: pd.DataFrame = module.DataFrame(dict(self.signals), index=index)
@@ -376,7 +453,14 @@ class Result(ByName[npt.NDArray[Any]]):
         return frame
 
     def to_xarray(self) -> xr.Dataset:
-        """A Dataset over time in s, with `units`, `long_name`; InputError without xarray."""
+        """The signals as a data set of xarray.
+
+        Returns:
+            A Dataset over time in s, with `units` and `long_name`.
+
+        Raises:
+            InputError: xarray is not installed.
+        """
         module = extra_module("xarray", "it makes the data set", "xarray")
         data: xr.Dataset = module.Dataset(attrs=self._about)
         data["time"] = "time", self.time, {"units": "s", "long_name": "time"}
@@ -423,7 +507,11 @@ class Result(ByName[npt.NDArray[Any]]):
         return np.asarray(np.rint(since * per_s), np.int64)
 
     def replay(self, listener: Listener) -> None:
-        """Have a listener hear the recorded run again."""
+        """Have a listener hear the recorded run again.
+
+        Args:
+            listener: Gets the recorded rows: see exchange.listener.
+        """
         said = self.descriptions
         signals = [
             Signal(name, self.units[name], KINDS[column.dtype.kind], said.get(name, ""))

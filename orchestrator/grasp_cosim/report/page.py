@@ -93,12 +93,20 @@ class Scene:
 def write_report(
     run: Result | str | Path, out: str | Path | None = None, title: str = ""
 ) -> list[Path]:
-    """Write the page of a run, and the pictures that there are; where they are.
+    """Write a page on a run, and the pictures of it.
 
-    The run is a result, or what load_run() takes. The page is `out`, by default report.html in the
-    run's folder, of a result that has none in the current one, under the title that the run has or
-    another one. With matplotlib a picture is beside it, and one of the timing of a run in real
-    time. InputError where the folder has no run, or the page cannot be written.
+    Args:
+        run: The result, or what load_run() reads.
+        out: The file of the page; by default report.html in the folder of the run, or in the
+            current one of a result that has none.
+        title: The title; "" for that of the run.
+
+    Returns:
+        The files: the page, and with matplotlib a picture beside it, and one of the timing of a run
+        in real time.
+
+    Raises:
+        InputError: The folder has no run, or the page cannot be written.
     """
     read = run if isinstance(run, Result) else load_run(run)
     folder = read.folder or Path()

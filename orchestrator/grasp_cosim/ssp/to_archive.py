@@ -36,14 +36,27 @@ _TOOL = f"grasp-cosim {version('grasp-cosim')}"
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The entries of an archive, and what other tools will make of it differently."""
+    """An SSP archive that was written."""
 
     entries: tuple[str, ...]
+    """The names of its entries."""
     notes: tuple[str, ...]
+    """What other tools will make of it differently, a line each."""
 
 
 def write_ssp(system: System | str | Path, path: str | Path) -> Written:
-    """Write the archive of a system, or of its file; InputError where path is no .ssp file."""
+    """Write the SSP archive of a system, with its FMUs.
+
+    Args:
+        system: The system, or the path of a system file.
+        path: The archive, .ssp.
+
+    Returns:
+        What was written, and what other tools will make of it differently.
+
+    Raises:
+        InputError: The path is no .ssp file, cannot be written, or a component is Python code.
+    """
     system, path = as_system(system, "write_ssp"), Path(path)
     if path.suffix.lower() != ".ssp" or path.is_dir():
         raise InputError(f"{path}: must be a file named like system.ssp")

@@ -39,31 +39,42 @@ def sweep(
     native: bool | None = None,
     progress: bool = False,
 ) -> Table:
-    """Run the system once for each row, and return a table of rows and metrics.
+    """Run a system once for each row of a table, and return a table of rows and metrics.
 
-    system may be the path of a system file. rows are mappings of places, as with_settings() has
-    them, to values; or columns by place, where a single value is that of each row; or a data frame,
-    as of as_rows(); or the path of a table. A number is in the unit of its variable; the head of a
-    column may name another one, plant.object_width [mm], and so may a value, (50, "mm"). The table
-    has all in the variable's. The index of a pandas DataFrame is that of the table's to_pandas().
+    The table is the same to the bit whatever runs it; a run that fails is an error in its row.
 
-    metrics are worked out beside those of the system. signals, named as for with_record(), are kept
-    of each run, at each n-th communication point where `every` says so: table.to_xarray() has them
-    over run, time and finger. Each run writes its own to disk, into the Zarr store beside `out`,
-    which ends in .zarr, else into a temporary folder. With the seed "run" all that is random has
-    another seed in each run, see seeds.py, and rows may be alike: [{}] * 100.
+    Args:
+        system: The system, or the path of a system file, .toml or .ssp.
+        rows: Mappings of places, as System.with_settings() has them, to values; or columns by
+            place, where a single value is that of each row; or a data frame; or the path of a
+            table. A number is in the unit of its variable. The head of a column may name another
+            one, "plant.object_width [mm]", and so may a value, (50, "mm"): the result has all in
+            that of the variable. The index of a pandas DataFrame is that of the result's
+            to_pandas().
+        metrics: Metrics to be worked out beside those of the system: see simulate().
+        signals: Signals to be kept of each run, named as for System.with_record(): to_xarray() of
+            the result has them over run, time and finger. Each run writes its own to disk, into the
+            Zarr store beside `out`, which ends in .zarr, else into a temporary folder.
+        every: Every how many communication points of the signals are kept.
+        seed: "run" gives all that is random another seed in each run, see seeds.py, so that rows
+            may be alike: [{}] * 100. None leaves the seeds as they are.
+        out: The file of the table, .csv or .parquet. Until all are done, finished runs are kept
+            beside it, and the same call goes on.
+        workers: How many runs at a time, by default one for each processor: in threads where the
+            FMUs are native and made here and the runs few, else in processes. A script needs no
+            guard for these, and what it defines goes there: see as_bytes().
+        executor: An executor of concurrent.futures that does the runs instead, and gets the FMUs.
+        native: Which FMUs run: see System.natively().
+        progress: True shows on standard error how far the sweep is.
 
-    The table is written to `out`, a .csv or .parquet file; until all are done, finished runs are
-    kept beside it, and the same call goes on. workers are so many runs at a time, by default one
-    for each processor: in threads where the FMUs are native and made here and the runs few, else in
-    processes. A script needs no guard for these, and what it defines goes there, see as_bytes(). An
-    executor of concurrent.futures takes their place, and gets the FMUs. The table is the same to
-    the bit in each case; a run that fails is an error in its row. native is as of
-    System.natively().
+    Returns:
+        The table, a row for each run in their order.
 
-    InputError where the rows do not fit the system, nothing would be measured, a metric cannot go
-    to another process, or `out` has runs of something else; SimulationError where processes do not
-    start or a run cannot be kept; KeyboardInterrupt at Ctrl-C.
+    Raises:
+        InputError: The rows do not fit the system, nothing would be measured, a metric cannot go to
+            another process, or `out` has runs of something else.
+        SimulationError: Processes do not start, or a run cannot be kept.
+        KeyboardInterrupt: Ctrl-C.
     """
     system = as_system(system, "sweep")
     place = f"--table {rows}" if isinstance(rows, str | Path) else "sweep"

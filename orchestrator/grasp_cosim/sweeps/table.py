@@ -62,29 +62,42 @@ class Outcome:
 
 @dataclass(frozen=True, repr=False)
 class Table:
-    """Columns of equal length by name, None where there is no value; a row per run, in order.
+    """The table of a sweep: columns of equal length by name, a row for each run, in order.
 
-    Beside what varied and what came out there are `index` and `error`, one line where a run failed,
-    and ENDED_AT where an FMU ended one of them before its stop time: the time in s of its end.
-    `units` are those in which the columns are, of metrics those of SI; None where they have none.
+    Beside what varied and what came out there are the columns `index`, `error`, one line where a
+    run failed, and ENDED_AT, the time in s where an FMU ended a run before its stop time.
     """
 
     columns: Mapping[str, Sequence[Any]] = field(hash=False)
+    """The values by the name of the column; None where there is none."""
     varied: tuple[str, ...]
+    """The names of the columns that vary."""
     metrics: tuple[str, ...]
+    """The names of the columns of metrics."""
     units: Mapping[str, str | None] = field(hash=False)
+    """The units of the columns, of metrics those of SI; None where they have none."""
     measured: tuple[Metric, ...] = ()
     """The metrics whose columns there are."""
     labels: Any = field(default=None, compare=False, repr=False)
     """The index of the pandas DataFrame whose rows these are; None of other rows."""
     signals: Recorded | None = field(default=None, compare=False, repr=False)
-    """Whole signals of the runs, which to_xarray() has, where they were asked for."""
+    """Whole signals of the runs, which to_xarray() has, where they were kept."""
 
     def __len__(self) -> int:
         return len(self.columns["index"])
 
     def __getitem__(self, name: str) -> npt.NDArray[np.float64]:
-        """A column as numbers, NaN where there is none; InputError where there is no such one."""
+        """A column as numbers.
+
+        Args:
+            name: The name of the column.
+
+        Returns:
+            The values of the shape (runs,), in the unit of `units`; NaN where there is none.
+
+        Raises:
+            InputError: There is no such column.
+        """
         if name not in self.columns:
             found = nearest(name, [*self.varied, *self.metrics])
             raise InputError(f"{name!r}: no such column of the sweep; {found}")
@@ -117,7 +130,14 @@ class Table:
         return {i: e for i, e in enumerate(self.columns["error"]) if e is not None}
 
     def shown(self, column: str) -> tuple[str, float, str]:
-        """Title, factor and unit in which text and pictures show a column."""
+        """How text and pictures show a column.
+
+        Args:
+            column: The name of the column.
+
+        Returns:
+            Its title, the factor that its values are shown by, and their unit then.
+        """
         metric = next((m for m in self.measured if column in (m.name, *m.columns)), None)
         if metric:
             title = metric.column_title(column) if column in metric.columns else metric.title
@@ -126,7 +146,11 @@ class Table:
         return column, 1.0, "" if unit in (None, "1") else str(unit)
 
     def summary(self) -> dict[str, dict[str, float | int | None]]:
-        """For each metric: how many runs have a finite one, and its STATISTICS."""
+        """Sum up each metric over the runs.
+
+        Returns:
+            By column of a metric, in how many `runs` it is finite, and its STATISTICS in its unit.
+        """
         found: dict[str, dict[str, float | int | None]] = {}
         for name in self.metrics:
             there = self[name][np.isfinite(self[name])]
@@ -138,9 +162,14 @@ class Table:
         return found
 
     def to_pandas(self) -> pd.DataFrame:
-        """The table as a DataFrame, under the index of the one whose rows these are, if it is one.
+        """The table as one of pandas.
 
-        The units are in its `attrs`. InputError without pandas.
+        Returns:
+            A DataFrame, under the index of the one whose rows these are, if it is one. The units
+            are in its `attrs`.
+
+        Raises:
+            InputError: pandas is not installed.
         """
         pandas = extra_module("pandas", "it holds tables", "pandas")
         frame = pandas.DataFrame({name: list(values) for name, values in self.columns.items()})
@@ -149,11 +178,15 @@ class Table:
         return numbered if self.labels is None else numbered.set_axis(self.labels)
 
     def to_xarray(self) -> xr.Dataset:
-        """The table and the signals of the runs as a Dataset over run, time and finger.
+        """The table and the signals of the runs as a data set of xarray.
 
-        What varied are coordinates of the runs. Entries of a metric, and elements of an array of
-        signals, are along a dimension; what there is none of is NaN. With `units` and `long_name`.
-        InputError without xarray.
+        Returns:
+            A Dataset over run, time and finger, with `units` and `long_name`. What varied are
+            coordinates of the runs. Entries of a metric, and elements of an array of signals, are
+            along a dimension; what there is none of is NaN.
+
+        Raises:
+            InputError: xarray is not installed.
         """
         xarray = extra_module("xarray", "it makes the data set", "xarray")
         data: xr.Dataset = xarray.Dataset(coords={RUN: self.columns["index"]})
@@ -175,10 +208,15 @@ class Table:
         return {"units": unit} if unit else {}
 
     def write(self, path: str | Path) -> None:
-        """Write CSV, or Parquet by its suffix, in one piece; equal tables make equal bytes.
+        """Write the table in one piece; equal tables make equal bytes.
 
-        The unit of a column is in brackets in the head of CSV, and in the metadata of a field of
-        Parquet. InputError for another suffix, or without pyarrow.
+        Args:
+            path: The file, .csv, with the unit of a column in brackets in its head, or .parquet,
+                with the unit in the metadata of a field.
+
+        Raises:
+            InputError: The suffix is another one, pyarrow is needed and not installed, or the file
+                cannot be written.
         """
         path = Path(path)
         check_format(path)

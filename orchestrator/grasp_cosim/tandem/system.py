@@ -11,11 +11,20 @@ SYSTEM = Path(__file__).parent / "tandem.toml"
 
 
 def tandem_system(controller: str = "adaptive", native: bool | None = None) -> System:
-    """The gripper in tandem; its FMUs are in the user's cache, built first if need be.
+    """Make the gripper in tandem on an arm.
 
-    controller is the name of the law: "adaptive", which sends the wrist to the middle whatever the
-    colours are, or "published", which wants a wrist of 100 Hz and its force. native is as of
-    grasp_system().
+    Its FMUs are in the user's cache, built first if need be.
+
+    Args:
+        controller: The law: "adaptive", which sends the wrist to the middle whatever the colours
+            are, or "published", which wants a wrist of 100 Hz and its force.
+        native: Which FMUs run: see System.natively().
+
+    Returns:
+        The system.
+
+    Raises:
+        InputError: There is no such law, or the FMUs cannot be built.
     """
     system = System.load(SYSTEM, shipped_fmus())
     chosen = system if controller == "adaptive" else with_controller(system, controller)

@@ -83,14 +83,20 @@ DEFAULT = ("coulomb", "viscous")
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Identification:
-    """A fit, what it was made from, and what its residuals belong to, in their unit."""
+    """A fit of parameters to measurements."""
 
     data: str
+    """What it was fitted to, in words."""
     unit: str
+    """The unit of the residuals: s of contact times, N of a log."""
     fit: Fit
+    """The estimates with their intervals, and the residuals."""
     rows: Sequence[dict[str, Any]]
+    """What each residual belongs to, with the residual."""
     scatter: float | None = None
-    """Standard deviation of data that were measured under equal conditions, if any were."""
+    """The standard deviation of data that were measured under equal conditions, in `unit`; None
+    where there are none such.
+    """
 
     @property
     def values(self) -> dict[str, float]:
@@ -101,7 +107,11 @@ class Identification:
         return on_a_screen(self.text().splitlines())
 
     def as_json(self) -> dict[str, Any]:
-        """All of it as JSON has it."""
+        """All of it as JSON has it.
+
+        Returns:
+            A dictionary of data, parameters, assumptions, rms, scatter, unit, points and rows.
+        """
         return {
             "data": self.data,
             "parameters": [e._asdict() for e in self.fit.estimates],
@@ -114,7 +124,11 @@ class Identification:
         }
 
     def text(self) -> str:
-        """The parameters and the root mean square of the residuals."""
+        """The parameters and the root mean square of the residuals, as `identify` prints them.
+
+        Returns:
+            A text of several lines.
+        """
         lines = [
             f"{self.data}; {ASSUMPTIONS}",
             *(f"  {e.name:32s}{e.value:10.4g} {_about(e)}" for e in self.fit.estimates),
@@ -127,7 +141,11 @@ class Identification:
         return "\n".join(lines)
 
     def files(self) -> Mapping[str, str]:
-        """The values as the table [values], and the residuals as CSV, by the names of files."""
+        """The values as TOML, and the residuals as CSV.
+
+        Returns:
+            The texts by the names of the files.
+        """
         head = f"# {self.data}: root mean square of the residuals {self.fit.rms:.4g} {self.unit}"
         digits = {e.name: float(f"{e.value:.6g}") for e in self.fit.estimates}
         tables: dict[str, list[str]] = {"values": [], "drives": []}
@@ -151,16 +169,26 @@ def identify(
     progress: bool = False,
     names: LogNames = AS_THEY_ARE,
 ) -> Identification:
-    """Fit friction to a log: the contact times in a table, or the signals of a run.
+    """Fit friction, masses or gains to measurements: contact times, or the signals of a run.
 
-    Of signals it may also be masses, gains and the delay of the drives; `names` are those of the
-    columns of a log from elsewhere.
+    Args:
+        log: A table of contact times, or a log of signals in CSV, Arrow or MDF. None takes
+            the contact times of the published experiments.
+        fit: The names of the groups of parameters that are fitted, among GROUPS: "coulomb",
+            "static", "viscous", "stribeck", and of signals also "mass" or "gain", and "delay" of
+            the drives; "ratio" of contact times.
+        system: What is not fitted is as in this system, or system file; by default the built-in
+            grasp.
+        progress: True shows on standard error how far the fit is.
+        names: The names of the columns of a log from elsewhere, as read_log_names() has it from a
+            file.
 
-    Without `log` these are the contact times of the published experiments. `fit` are names of
-    GROUPS; what is not fitted is as in `system`, by default the built-in grasp.
+    Returns:
+        The fitted values, their intervals and the residuals.
 
-    InputError where the log or a name of `fit` is wrong, SimulationError where the fit does not
-    come to rest.
+    Raises:
+        InputError: The log, or a name of `fit`, is wrong.
+        SimulationError: The fit does not come to rest.
     """
     system = grasp_system() if system is None else as_system(system, "identify")
     log = None if log is None else Path(log)

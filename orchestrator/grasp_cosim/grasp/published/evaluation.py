@@ -59,16 +59,23 @@ def evaluate(
 ) -> Evaluation:
     """Run Cases 0, 1 and 2 in all settings of the paper's simulations, and compare the figures.
 
-    With `bench` they are those of its experiments, on the bench preset. `controller` and `native`
-    are as in grasp_system().
+    Args:
+        bench: True runs the settings of the paper's experiments, with the preset "bench".
+        controller: "published" or "adaptive": see grasp_system().
+        out: A folder for the report: evaluation.json, evaluation.csv and, with pictures,
+            evaluation.html. None writes nothing.
+        native: Which FMUs run: see System.natively().
+        progress: True shows on standard error how far it is.
 
-    Returns `rows`, each a published figure beside ours, `rms` of the differences in s, `claims` of
-    the paper and if they hold, `runs`, the metrics of each grasp, and `units`. With `out`, a
-    folder, this is written there as evaluation.json, the rows as evaluation.csv, and all of it with
-    pictures as a page, evaluation.html.
+    Returns:
+        A dictionary: `rows`, each a published figure beside ours, `rms` of the differences in s,
+        `claims` of the paper and if they hold, `runs`, the metrics of each grasp, and `units`.
 
-    InputError, before anything runs, where `out` cannot be written to or matplotlib is missing that
-    draws the pictures; KeyboardInterrupt at Ctrl-C.
+    Raises:
+        InputError: Before anything runs, `out` cannot be written to, or matplotlib is not installed
+            that draws its pictures.
+        SimulationError: A run fails.
+        KeyboardInterrupt: Ctrl-C.
     """
     folder = None if out is None else Path(out)
     if folder:
