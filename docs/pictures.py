@@ -26,7 +26,7 @@ from grasp_cosim.grasp.published.compared import compared
 from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.view import draw_hand as draw_three_fingers
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report.plot import headed, new_figure, save
 from grasp_cosim.report.system import connections_svg, stand_alone
 from grasp_cosim.report.tables import Caption, about

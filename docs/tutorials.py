@@ -23,7 +23,7 @@ from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import CLOSING, FINGERS
 from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
 from grasp_cosim.inspection.template import TEMPLATES
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.recording.result import Result
 from grasp_cosim.report.plot import (
     BLUE,

@@ -13,17 +13,19 @@ import grasp_cosim
 import pytest
 from grasp_cosim.comparison.bands import Band, Bands, Compared, read_bands
 from grasp_cosim.comparison.compare import Comparison
-from grasp_cosim.comparison.qualify import Qualification, Swap
+from grasp_cosim.comparison.outcome import ComparisonData, QualificationData, Swap
+from grasp_cosim.comparison.qualify import Qualification
 from grasp_cosim.grasp.identification.identification import Identification
 from grasp_cosim.linearisation.state_space import Margins
 from grasp_cosim.master.session import State
 from grasp_cosim.recording.log_names import read_log_names
+from grasp_cosim.recording.recorded_run import RecordedRun
 from grasp_cosim.ssp.to_archive import Written
 from grasp_cosim.sweeps.table import Table
 
 PUBLIC = [getattr(grasp_cosim, name) for name in grasp_cosim.__all__]
 RETURNED = [Band, Bands, Compared, Comparison, Qualification, Swap, Identification, Margins]
-RETURNED += [State, Table, Written]
+RETURNED += [State, Table, Written, RecordedRun, ComparisonData, QualificationData]
 CLASSES = [thing for thing in PUBLIC if inspect.isclass(thing)] + RETURNED
 FUNCTIONS = [thing for thing in PUBLIC if not inspect.isclass(thing)]
 FUNCTIONS += [read_bands, read_log_names]

@@ -8,17 +8,20 @@
     result.plot("grasp.png")
 
 Importing it imports nothing yet, builds nothing and writes nothing: each name below is imported
-when it is asked for. Further in: `grasp_cosim.metrics.metric`, `grasp_cosim.sweeps.sweep`,
+when it is asked for. Further in: `grasp_cosim.metrics.metric`,
+`grasp_cosim.metrics.groups`, `grasp_cosim.sweeps.sweep`,
 `grasp_cosim.exchange.listener`, `grasp_cosim.recording.csv`, `grasp_cosim.recording.mdf`,
 `grasp_cosim.comparison.compare`, `grasp_cosim.comparison.qualify`, `grasp_cosim.comparison.bands`.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from .base.errors import InputError, RunInterruptedError, SimulationError
+from .base.registry import Kind, register
 
 if TYPE_CHECKING:
     __version__: str
@@ -35,7 +38,7 @@ if TYPE_CHECKING:
     from .master.session import Session
     from .master.simulation import simulate
     from .metrics.metric import AnyOf, Metric, metric
-    from .recording.folder import load_run
+    from .recording.read_back import load_run
     from .recording.result import Result
     from .report.page import write_report
     from .ssp.to_archive import write_ssp
@@ -89,7 +92,7 @@ _HOMES = {
     "identify": "grasp.identification.identification",
     "inspect_fmu": "inspection.inspection",
     "linearise": "linearisation.linearise",
-    "load_run": "recording.folder",
+    "load_run": "recording.read_back",
     "metric": "metrics.metric",
     "qualify": "comparison.qualify",
     "simulate": "master.simulation",
@@ -98,6 +101,27 @@ _HOMES = {
     "write_report": "report.page",
     "write_ssp": "ssp.to_archive",
 }
+
+
+def _imported(home: str, name: str) -> object:
+    """What has that name in the module of that name in this package."""
+    return getattr(import_module(f".{home}", __name__), name)
+
+
+_FOR_LOWER_PACKAGES: tuple[tuple[Kind, str, str, str], ...] = (
+    ("groups", "grasp", "grasp.group", "GROUP"),
+    ("groups", "hand", "hand.group", "GROUP"),
+    ("groups", "tandem", "tandem.group", "GROUP"),
+    ("html", "Parameters", "report.system", "parameters_html"),
+    ("html", "Result", "report.tables", "result_html"),
+    ("html", "System", "report.system", "system_html"),
+    ("pictures", "Result", "report.plot", "plot_signals"),
+    ("readers", ".ssp", "ssp.from_archive", "read_ssp"),
+)
+"""What lower packages get of upper ones, see base.registry: kind, name, home, its name there."""
+
+for _kind, _name, _home, _item in _FOR_LOWER_PACKAGES:
+    register(_kind, _name, partial(_imported, _home, _item))
 
 
 def __dir__() -> list[str]:
@@ -112,7 +136,7 @@ if not TYPE_CHECKING:  # who checks types knows the names above, and none beside
 
             value = version("grasp-cosim")
         elif name in _HOMES:
-            value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+            value = _imported(_HOMES[name], name)
         else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         globals()[name] = value

@@ -15,7 +15,7 @@ from grasp_cosim import SimulationError, simulate
 from grasp_cosim.base.interruption import AT_ONCE
 from grasp_cosim.base.scratch import PREFIX, lock_of
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from support.marks import slow
 from support.native_fmus import needs_gcc
 from support.native_systems import driven

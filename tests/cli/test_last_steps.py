@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from support.marks import slow
 from support.native_fmus import needs_gcc, talker
 

@@ -4,7 +4,7 @@ import json
 import sys
 
 import pytest
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report.page import page_html
 from report.runs import grasp_run, write_run
 

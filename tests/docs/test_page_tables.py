@@ -12,7 +12,7 @@ from grasp_cosim import cli, simulate
 from grasp_cosim.fmu_export.contract import declared
 from grasp_cosim.fmu_export.shipped import blocks
 from grasp_cosim.inspection.template import TEMPLATES
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from support.pages import BLOCKS, INDENTED, commands_of, fill_in
 from support.pictures import assert_same_picture
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import System, cli, grasp_system, linearise, simulate
-from grasp_cosim.base.higher import groups
+from grasp_cosim.base.registry import names
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.served import Server
@@ -259,7 +259,7 @@ def test_the_map_has_all_rooms():
     text = PAGES["orchestrator/README.md"]
     rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
     assert sorted(rows) == ROOMS
-    assert groups() == ("grasp", "hand", "tandem")
+    assert names("groups") == ("grasp", "hand", "tandem")
 
 
 def test_the_system_from_python_is_that_of_its_page():

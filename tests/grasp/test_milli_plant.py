@@ -10,7 +10,7 @@ from grasp_cosim.comparison.qualify import qualify
 from grasp_cosim.fmu_export.build import build_block
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.recording.result import UNITS
+from grasp_cosim.recording.recorded_run import UNITS
 from support.marks import needs_pythonfmu
 
 pytestmark = needs_pythonfmu

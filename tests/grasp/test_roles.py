@@ -9,7 +9,7 @@ from grasp_cosim import System, load_run, simulate
 from grasp_cosim.grasp.metrics import METRICS
 from grasp_cosim.grasp.presets import CASES, SYSTEM, with_case, with_preset
 from grasp_cosim.metrics.metric import Signals, measure
-from grasp_cosim.recording.result import UNITS
+from grasp_cosim.recording.recorded_run import UNITS
 from hypothesis import given
 from hypothesis import strategies as st
 from support.marks import needs_pythonfmu

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from grasp_cosim import System, simulate
 from grasp_cosim.cli.entry import main
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from scipy.linalg import expm
 from support.marks import engines
 from support.native_fmus import ARRAY_TYPES as TYPES

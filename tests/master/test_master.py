@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 from grasp_cosim import InputError, SimulationError
-from grasp_cosim.recording.result import Rejection
+from grasp_cosim.recording.recorded_run import Rejection
 from grasp_cosim.system.parts import Connection, Port
 from support.mocks import Mock, Run, make_system
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from grasp_cosim import AnyOf, InputError, Realtime, metric, simulate
 from grasp_cosim.grasp.metrics import METRICS
+from grasp_cosim.metrics.groups import chosen
 from grasp_cosim.metrics.metric import (
     RESERVED,
     MissingSignalError,
     Signals,
     check_portable,
-    chosen,
     load_metrics,
     measure,
     needed,

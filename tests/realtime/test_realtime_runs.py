@@ -17,7 +17,8 @@ from grasp_cosim.master import engine, master
 from grasp_cosim.master.engine import has_compiler
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
-from grasp_cosim.recording.folder import RunFolder, load_run
+from grasp_cosim.recording.folder import RunFolder
+from grasp_cosim.recording.read_back import load_run
 from report.runs import paced
 from support.marks import engines, slow
 from support.native_fmus import TYPES, build

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, SimulationError, simulate
 from grasp_cosim.exchange.listener import Experiment
-from grasp_cosim.recording.folder import FORMS, RunFolder, load_log, load_run
+from grasp_cosim.recording.folder import FORMS, RunFolder
+from grasp_cosim.recording.read_back import load_log, load_run
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, rows
 from support.native_fmus import needs_gcc
 from support.native_systems import integrator

@@ -9,7 +9,7 @@ from grasp_cosim import InputError, compare, load_run, metric, simulate
 from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.recording.result import UNITS
+from grasp_cosim.recording.recorded_run import UNITS
 from recording.rows import EXPERIMENT, SIGNALS, full_disk
 
 

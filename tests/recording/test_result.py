@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, load_run, simulate
 from grasp_cosim.recording.mdf import read_mdf
-from grasp_cosim.recording.result import UNITS, Rejection
+from grasp_cosim.recording.recorded_run import UNITS, Rejection
 from grasp_cosim.system.settings import run_settings
 from report.runs import grasp_run, ring_run, write_run
 

@@ -8,7 +8,8 @@ import pytest
 from grasp_cosim import InputError, Realtime, metric, simulate
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.page import write_comparison
-from grasp_cosim.recording.folder import RunFolder, load_run
+from grasp_cosim.recording.folder import RunFolder
+from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report import terminal
 from grasp_cosim.report.page import write_report
 from grasp_cosim.report.tables import result_html

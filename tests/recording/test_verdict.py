@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 
 import pytest
 from grasp_cosim import simulate
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.recording.verdict import judge
 from grasp_cosim.report.page import page_html
 from grasp_cosim.report.terminal import as_json, as_text

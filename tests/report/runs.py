@@ -4,7 +4,8 @@ from collections import Counter
 
 import numpy as np
 from grasp_cosim.realtime.timing import Histogram, Overrun, Spread, Timing
-from grasp_cosim.recording.result import Rejection, Result
+from grasp_cosim.recording.recorded_run import Rejection
+from grasp_cosim.recording.result import Result
 from grasp_cosim.system.times import NANOSECONDS
 
 WIDTH, CENTRE = 0.07, 0.01

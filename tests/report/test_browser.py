@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.page import comparison_html
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report.page import page_html
 from report.javascript import in_browser
 from report.runs import grasp_run, paced, ring_run, write_run

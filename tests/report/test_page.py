@@ -13,7 +13,7 @@ from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.page import comparison_html
 from grasp_cosim.metrics.metric import Metric
-from grasp_cosim.recording.folder import load_run
+from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report.page import Scene, Zoom, page_html, write_report
 from grasp_cosim.report.tables import about, caption, changes
 from report.runs import grasp_run, paced, ring_run, write_run

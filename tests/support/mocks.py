@@ -1,23 +1,20 @@
 """Components without any binary, input u, output y, tunable p, which do what they are told.
 
-And a group of metrics that is there for a test, as if its folder were in the package.
+And a group of metrics that is registered for a test.
 """
 
-import sys
 import zipfile
 from collections.abc import Callable
-from types import SimpleNamespace
 
 from grasp_cosim import SimulationError, System
+from grasp_cosim.base import registry
 from grasp_cosim.base.calls import Call
 from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.fmi.instance import DISCARD
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.master.master import Master
-from grasp_cosim.metrics import metric
+from grasp_cosim.metrics.groups import Group
 from grasp_cosim.recording.memory import MemoryListener
-from grasp_cosim.recording.result import OF_ANY
-from grasp_cosim.system import description
 from grasp_cosim.system.parts import Component
 
 Function = Callable[[float, float], float]
@@ -183,9 +180,4 @@ class Run:
 
 
 def bring_group(monkeypatch, name, *metrics):
-    for module in (description, metric):
-        monkeypatch.setattr(module, "groups", lambda: ("grasp", name))
-    has = {"metrics": SimpleNamespace(METRICS=metrics), "view": SimpleNamespace(VIEW=OF_ANY)}
-    for part, module in has.items():
-        monkeypatch.setitem(sys.modules, f"grasp_cosim.{name}.{part}", module)
-    monkeypatch.setitem(sys.modules, f"grasp_cosim.{name}", SimpleNamespace())
+    monkeypatch.setitem(registry._OBJECTS, ("groups", name), Group(metrics))

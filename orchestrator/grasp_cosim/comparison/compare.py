@@ -3,92 +3,51 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
 import numpy as np
 
 from ..base.errors import InputError, choices
-from ..base.higher import higher
 from ..interface.units import Conversion
 from ..master.simulation import simulate
-from ..metrics.metric import Metric, metrics_of
+from ..metrics.groups import metrics_of
+from ..metrics.metric import Metric
 from ..recording.log_names import AS_THEY_ARE, LogNames
 from ..recording.result import Result
 from ..system.description import FILES, System
 from ..system.times import in_seconds, nearest_time
 from .bands import SHARE, Band, Bands, Compared, metric_band, plain, signal_band
 from .offset import fit_offset, shifted
-from .side import Difference, Side, differences, read_side, side_of
-from .tube import ROUNDING, Curve, deviation
+from .outcome import ComparisonData
+from .side import Side, differences, read_side, side_of
+from .tube import ROUNDING, deviation
+from .words import short_text
 
 FEWEST_STEPS = 2
 """The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
 
-Curves = Mapping[str, Curve]
 Values = Mapping[str, float | None]
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Comparison:
-    """Two runs beside each other over the time that both have, in the units of the first.
+class Comparison(ComparisonData):
+    """Two runs beside each other: true where they are alike, `if compare(a, b):`.
 
-    It is true where the two are alike: `if compare(a, b):`.
+    What it has of them is as of a ComparisonData.
     """
 
-    a: Side
-    """The first run, which is the reference."""
-    b: Side
-    """The second run."""
-    begin: float
-    """The beginning of the time that both have, in s."""
-    end: float
-    """Its end, in s."""
-    signals: tuple[Compared, ...]
-    """The signals that both have, those farthest out of their bands first."""
-    metrics: tuple[Compared, ...]
-    """The metrics that both have, in the same order."""
-    curves: tuple[Curves, Curves]
-    """By name the signals of a and those of b that were compared."""
-    asked: tuple[Metric, ...]
-    """The metrics that were worked out."""
-    absent: tuple[str, ...]
-    """The names of metrics of which neither run has a value."""
-    only: tuple[tuple[str, ...], tuple[str, ...]]
-    """The names of signals that only a has, then of those that only b has."""
-    only_metrics: tuple[tuple[str, ...], tuple[str, ...]]
-    """The same of metrics."""
-    differences: tuple[Difference, ...] = ()
-    """How the settings differ, where both are runs."""
-    notes: tuple[str, ...] = ()
-    """Remarks, a line each."""
-    numerics: tuple[str, ...] = ("its range", "every second sample")
-    """What the derived bands are from, in words."""
-    names: tuple[str, str] = ("A", "B")
-    """What the two runs are called."""
-
-    @property
-    def unfinished(self) -> tuple[str, ...]:
-        """The names of the runs that did not come to their end."""
-        sides = zip(self.names, (self.a, self.b), strict=True)
-        return tuple(name for name, s in sides if s.result and not s.result.came_to_its_end)
-
-    @property
-    def alike(self) -> bool:
-        """True if both came to their ends, and all that was compared is inside its band."""
-        return not self.unfinished and all(c.inside for c in (*self.signals, *self.metrics))
-
-    def __bool__(self) -> bool:
-        return self.alike
+    __slots__ = ()
 
     def __repr__(self) -> str:
         """The verdict, what the runs are, and the worst signals and metrics."""
-        return str(higher("comparison.words").short_text(self))
+        return short_text(self)
 
     def _repr_html_(self) -> str:
         """The same, as notebooks show it."""
-        return str(higher("comparison.page").short_html(self))
+        from .page import short_html  # only here: pages take long to import
+
+        return short_html(self)
 
 
 def compare(

@@ -30,8 +30,7 @@ from ..report.tables import (
     text_table,
 )
 from .bands import Compared, plain
-from .compare import Comparison
-from .qualify import Qualification
+from .outcome import ComparisonData, QualificationData
 from .side import Side
 from .tube import deviation, tube
 from .words import (
@@ -55,12 +54,12 @@ AROUND = 0.02
 Columns = Mapping[str, npt.NDArray[Any]]
 
 
-def write_comparison(c: Comparison, path: Path) -> None:
+def write_comparison(c: ComparisonData, path: Path) -> None:
     """Write the page of a comparison."""
     write_text(path, comparison_html(c))
 
 
-def write_qualification(q: Qualification, path: Path) -> bool:
+def write_qualification(q: QualificationData, path: Path) -> bool:
     """Write the page of a qualification, as of a comparison; False where there were no two runs.
 
     A page that was there before is gone then.
@@ -75,31 +74,31 @@ def write_qualification(q: Qualification, path: Path) -> bool:
     return True
 
 
-def comparison_html(c: Comparison, limit: int = LIMIT) -> str:
+def comparison_html(c: ComparisonData, limit: int = LIMIT) -> str:
     """Return the page as text; of more than `limit` values the signals are thinned."""
     return _html(c, limit, verdict(c), c.alike, [*absent_lines(c), *notes(c)])
 
 
-def short_html(c: Comparison) -> str:
+def short_html(c: ComparisonData) -> str:
     """The verdict on two runs, what they are, and the worst signals and metrics, for a notebook."""
     sides = zip(c.names, (c.a, c.b), strict=True)
     runs = "<br>".join(escape(f"{name}: {side.name}") for name, side in sides)
     return f"<p><b>{escape(verdict(c))}</b><br>{runs}</p>{_worst(c)}"
 
 
-def short_qualification_html(q: Qualification) -> str:
+def short_qualification_html(q: QualificationData) -> str:
     """The verdict on a candidate and its reason, its interface, and the worst, for a notebook."""
     head = f"<p><b>{escape(qualification_verdict(q))}</b><br>{escape(reason(q))}</p>"
     interface = "<br>".join(map(escape, difference_lines(q.swap.differences)))
     return f"{head}<p>{interface}</p>{'' if q.comparison is None else _worst(q.comparison)}"
 
 
-def _worst(c: Comparison) -> str:
+def _worst(c: ComparisonData) -> str:
     """Tables of the signals and the metrics that are furthest out of their bands."""
     return "".join(text_table(cells(kind, found[:ROWS], c.names)) for kind, found in kinds(c))
 
 
-def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[str]) -> str:
+def _html(c: ComparisonData, limit: int, said: str, good: bool, remarks: Sequence[str]) -> str:
     """Return the page as text, with what is `said` at its top, and remarks on the runs."""
     time = np.union1d(*(run.part(c.begin, c.end).time for run in (c.a, c.b)))
     shown = fit(time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit)
@@ -134,7 +133,7 @@ def _html(c: Comparison, limit: int, said: str, good: bool, remarks: Sequence[st
 
 
 def _drawn(
-    c: Comparison, s: Compared, time: npt.NDArray[np.float64]
+    c: ComparisonData, s: Compared, time: npt.NDArray[np.float64]
 ) -> Iterator[tuple[str, npt.NDArray[Any]]]:
     """The curves of a signal at these times by name: both runs, their deviation, the band."""
     first, second = (run[s.name] for run in c.curves)
@@ -149,7 +148,7 @@ def _drawn(
 
 
 def _state(
-    c: Comparison, shown: Shown, ids: Mapping[str, str], scene: Scene | None,
+    c: ComparisonData, shown: Shown, ids: Mapping[str, str], scene: Scene | None,
     texts: Mapping[str, str],
 ) -> dict[str, Any]:  # fmt: skip
     """Return the data for the scripts, without the values of the signals."""
@@ -180,7 +179,7 @@ def _state(
     }
 
 
-def _runs(c: Comparison, remarks: Sequence[str]) -> str:
+def _runs(c: ComparisonData, remarks: Sequence[str]) -> str:
     """A table of the two runs and of the settings that differ; and what is not compared."""
     sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *c.names))
     about = [_about(side) for side in sides]
@@ -216,7 +215,7 @@ def _row(what: str, cells: Iterable[str]) -> str:
     return f"<td>{escape(what)}</td>" + "".join(f'<td class="w">{cell}</td>' for cell in cells)
 
 
-def _metrics(c: Comparison) -> str:
+def _metrics(c: ComparisonData) -> str:
     """The metrics, in the order in which they are worked out."""
     rows = []
     for metric in c.asked:
@@ -229,13 +228,13 @@ def _metrics(c: Comparison) -> str:
     return table(_heads(c), rows) if rows else "<p>There are no metrics that both have.</p>"
 
 
-def _heads(c: Comparison) -> str:
+def _heads(c: ComparisonData) -> str:
     heads = ("", "at", "deviation", "band", *c.names)
     return "<th></th>" + "".join(f'<th class="n">{head}</th>' for head in heads)
 
 
 def _compared(
-    c: Comparison, one: Compared, title: str, unit: str | None, shown: Callable[[Any], str]
+    c: ComparisonData, one: Compared, title: str, unit: str | None, shown: Callable[[Any], str]
 ) -> str:
     """A row: how many widths of its band it is off; a button goes to the worst moment."""
     said, at = "inside", ""

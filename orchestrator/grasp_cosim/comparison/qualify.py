@@ -7,20 +7,20 @@ the original and with the candidate, and each signal and metric of the two is co
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isclose
 from pathlib import Path
 
 from ..base.checks import choice, known
 from ..base.errors import InputError, SimulationError
-from ..base.higher import higher
 from ..interface.expansion import values_of
 from ..interface.interface import Interface, Value
 from ..interface.read import describe
-from ..interface.units import Conversion, conversion
+from ..interface.units import conversion
 from ..master.simulation import simulate
+from ..metrics.groups import metrics_of
 from ..metrics.in_si import in_si
-from ..metrics.metric import Metric, metrics_of
+from ..metrics.metric import Metric
 from ..recording.result import Result
 from ..system.changes import converted, replaced
 from ..system.description import System, as_system
@@ -28,15 +28,17 @@ from ..system.parts import ISOLATIONS, Component, Connection, Isolation
 from ..system.structure import SCHEMES, unit_of
 from ..system.times import NANOSECONDS, in_seconds
 from ..system.validity import connection_transform, transforms
-from .bands import SHARE, Bands, Compared, plain
-from .compare import FEWEST_STEPS, Comparison, judge
+from .bands import SHARE, Bands, plain
+from .compare import FEWEST_STEPS, judge
 from .interface_difference import (
     SEVERITIES,
     Difference,
     interface_differences,
     use_of,
 )
+from .outcome import QualificationData, Swap
 from .side import Side, differences, side_of
+from .words import short_qualification
 
 END = Metric(
     "end_of_run", lambda run: float(run.time[-1]), "s", "where an FMU asked for the end, else stop"
@@ -44,77 +46,23 @@ END = Metric(
 """Compared where one of the runs ends before the stop time."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Swap:
-    """A system with its FMU, and with the candidate unless a difference blocks that."""
+class Qualification(QualificationData):
+    """Whether a candidate may take the place of an FMU: true where it is qualified.
 
-    system: System
-    """The system with the original."""
-    component: str
-    """The name of the component."""
-    candidate: Path
-    """The path of the candidate."""
-    differences: tuple[Difference, ...]
-    """How its interface differs from that of the original, the worst first."""
-    swapped: System | None
-    """The system with the candidate; None where a difference blocks that."""
-    back: Mapping[str, Conversion | None]
-    """By signal, how outputs of the candidate are converted to the units of the original; None
-    where that cannot be.
+    The verdict and all that led to it are as of a QualificationData.
     """
-    nominals: Mapping[str, float | None]
-    """The nominal values of all signals that the FMUs declare, in their units."""
 
-    @property
-    def original(self) -> Path:
-        """The FMU that the candidate is to replace."""
-        return self.system.component(self.component, "swap").fmu
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Qualification:
-    """The verdict and all that led to it; true where the candidate is qualified."""
-
-    swap: Swap
-    """The system with the original and with the candidate, and how their interfaces differ."""
-    comparison: Comparison | None = None
-    """That of the two runs, in which the notes are the lines of the log that only the candidate's
-    run has; None where the candidate did not run.
-    """
-    failure: str | None = None
-    """Why the candidate did not run to the end; None where it did, or was not run."""
-
-    @property
-    def signals(self) -> tuple[Compared, ...]:
-        """The signals that were compared, the worst first."""
-        return () if self.comparison is None else self.comparison.signals
-
-    @property
-    def metrics(self) -> tuple[Compared, ...]:
-        """The metrics that were compared, the worst first."""
-        return () if self.comparison is None else self.comparison.metrics
-
-    @property
-    def blocks(self) -> tuple[Difference, ...]:
-        """The differences that kept the candidate from being run."""
-        return tuple(d for d in self.swap.differences if d.severity == "blocks")
-
-    @property
-    def qualified(self) -> bool:
-        """True if the candidate may take the original's place: all that there was to compare."""
-        c = self.comparison
-        return c is not None and not self.failure and c.alike and bool(c.signals or c.metrics)
-
-    def __bool__(self) -> bool:
-        return self.qualified
+    __slots__ = ()
 
     def __repr__(self) -> str:
         """The verdict and its reason, the worst signals and metrics, and the interface."""
-        return str(higher("comparison.words").short_qualification(self))
+        return short_qualification(self)
 
     def _repr_html_(self) -> str:
         """The same, as notebooks show it."""
-        return str(higher("comparison.page").short_qualification_html(self))
+        from .page import short_qualification_html  # only here: pages take long to import
+
+        return short_qualification_html(self)
 
 
 def qualify(

@@ -16,8 +16,9 @@ from ..base.si_units import known_unit
 from ..base.text import counted
 from ..interface.units import IDENTITY, Conversion, conversion
 from ..metrics.metric import Metric, Signals, measure
-from ..recording.folder import ARROW, SETTINGS, SIGNALS, load_run
+from ..recording.folder import ARROW, SETTINGS, SIGNALS
 from ..recording.log_names import AS_THEY_ARE, LogNames
+from ..recording.read_back import load_run
 from ..recording.result import Result
 from ..recording.signals import LOGS, Log, read_log
 from ..system.settings import given_values

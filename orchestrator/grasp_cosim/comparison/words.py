@@ -11,9 +11,8 @@ from ..base.errors import choices
 from ..base.text import columns, on_a_screen, significant
 from ..system.times import in_seconds
 from .bands import Compared, plain
-from .compare import Comparison
 from .interface_difference import SEVERITIES, Difference
-from .qualify import Qualification
+from .outcome import ComparisonData, QualificationData
 
 ROWS = 8
 """The most signals, metrics or differences of one severity that the text lists."""
@@ -28,14 +27,14 @@ WIDE = 0.1
 """A band wider than this share of the range of its signal proves little."""
 
 
-def verdict(c: Comparison) -> str:
+def verdict(c: ComparisonData) -> str:
     """The outcome in a line."""
     word = "ALIKE" if c.alike else "DIFFERENT"
     ended = [f"{name} did not come to its end" for name in c.unfinished]
     return f"{word}: {'; '.join([*ended, counts(c)])}, from {c.begin:.6g} to {c.end:.6g} s"
 
 
-def as_text(c: Comparison) -> str:
+def as_text(c: ComparisonData) -> str:
     """The verdict, what the runs are and differ in, and what is out of band, the worst first."""
     sides = zip(c.names, (c.a, c.b), strict=True)
     parts = [[verdict(c), *(f"{name}: {side.name}" for name, side in sides)]]
@@ -47,31 +46,31 @@ def as_text(c: Comparison) -> str:
     return _joined([*parts, *_tables(c), [*absent_lines(c), *notes(c)]])
 
 
-def short_text(c: Comparison) -> str:
+def short_text(c: ComparisonData) -> str:
     """The verdict, what the runs are, and a few of the worst: the repr() of a comparison."""
     sides = zip(c.names, (c.a, c.b), strict=True)
     head = [verdict(c), *(f"  {name}: {side.name}" for name, side in sides)]
     return on_a_screen([*head, *short_lines(c)])
 
 
-def short_qualification(q: Qualification) -> str:
+def short_qualification(q: QualificationData) -> str:
     """The verdict and its reason, a few of the worst, and the interface, as its repr()."""
     interface, *_ = difference_lines(q.swap.differences)
     worst = [] if q.comparison is None else short_lines(q.comparison)
     return on_a_screen([qualification_verdict(q), f"  {reason(q)}", f"  {interface}", *worst])
 
 
-def short_lines(c: Comparison) -> list[str]:
+def short_lines(c: ComparisonData) -> list[str]:
     """A few of the signals and metrics, the worst first."""
     return [f"  {line}" for kind, found in kinds(c) for line in _table(kind, found, c.names, FEW)]
 
 
-def kinds(c: Comparison) -> list[tuple[str, Sequence[Compared]]]:
+def kinds(c: ComparisonData) -> list[tuple[str, Sequence[Compared]]]:
     """The signals and the metrics that were compared, as far as there are any."""
     return [(k, found) for k, found in (("signal", c.signals), ("metric", c.metrics)) if found]
 
 
-def notes(c: Comparison) -> list[str]:
+def notes(c: ComparisonData) -> list[str]:
     """Where the bands are from, what only one has, which is not judged, and what the runs tell."""
     only = [
         f"{kind} only in {run}: {choices(names, 6)}"
@@ -88,7 +87,7 @@ def notes(c: Comparison) -> list[str]:
     return [f"bands: {bands}", *(said if wide else []), *only, *c.notes]
 
 
-def as_json(c: Comparison) -> dict[str, Any]:
+def as_json(c: ComparisonData) -> dict[str, Any]:
     """All of it, ready for JSON; a number that is infinite, or does not exist, is null."""
     return {
         "alike": c.alike,
@@ -108,7 +107,7 @@ def as_json(c: Comparison) -> dict[str, Any]:
     }
 
 
-def qualification_text(q: Qualification) -> str:
+def qualification_text(q: QualificationData) -> str:
     """The verdict, then what is out of band, the worst first, then the interface."""
     c, parts = q.comparison, [[qualification_verdict(q), reason(q)]]
     last = [f"whether this machine loads it: grasp-cosim inspect --load {q.swap.candidate}"]
@@ -118,7 +117,7 @@ def qualification_text(q: Qualification) -> str:
     return _joined([*parts, last if c is not None or q.failure else []])
 
 
-def qualification_verdict(q: Qualification) -> str:
+def qualification_verdict(q: QualificationData) -> str:
     """The outcome in a line, and of which runs."""
     system, word = q.swap.system, "QUALIFIED" if q.qualified else "NOT QUALIFIED"
     step, stop = in_seconds(system.step_ns), in_seconds(system.stop_ns)
@@ -129,7 +128,7 @@ def qualification_verdict(q: Qualification) -> str:
     )
 
 
-def qualification_json(q: Qualification) -> dict[str, Any]:
+def qualification_json(q: QualificationData) -> dict[str, Any]:
     """All of it, ready for JSON; a number that is infinite, or does not exist, is null.
 
     `bands` are those that were used: `qualify --bands` takes the file.
@@ -161,7 +160,7 @@ def qualification_json(q: Qualification) -> dict[str, Any]:
     }
 
 
-def reason(q: Qualification) -> str:
+def reason(q: QualificationData) -> str:
     """Why the verdict is what it is, in one line."""
     if q.blocks:
         names = choices((d.variable for d in q.blocks), FEW)
@@ -185,7 +184,7 @@ def difference_lines(differences: Sequence[Difference]) -> list[str]:
     return lines
 
 
-def counts(c: Comparison) -> str:
+def counts(c: ComparisonData) -> str:
     """How many are out of band: "2 of 30 signals and 1 of 12 metrics out of band"."""
     found = [
         f"{sum(not one.inside for one in compared)} of {len(compared)} {name}"
@@ -195,7 +194,7 @@ def counts(c: Comparison) -> str:
     return f"{' and '.join(found)} out of band"
 
 
-def absent_lines(c: Comparison) -> list[str]:
+def absent_lines(c: ComparisonData) -> list[str]:
     """A line on metrics that have no value in either run, and on what that means."""
     if not c.absent:
         return []
@@ -216,7 +215,7 @@ def _cut(lines: Sequence[str], most: int, indent: str = "") -> list[str]:
     return [*lines[:most], *([f"{indent}{left} more; --json has all"] if left > 0 else [])]
 
 
-def _tables(c: Comparison) -> list[list[str]]:
+def _tables(c: ComparisonData) -> list[list[str]]:
     return [_table(kind, compared, c.names, ROWS) for kind, compared in kinds(c)]
 
 

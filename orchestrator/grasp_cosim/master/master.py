@@ -22,7 +22,7 @@ from ..exchange.listener import Texts
 from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of, length_until
 from ..interface.interface import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer, StallError
-from ..recording.result import Rejection
+from ..recording.recorded_run import Rejection
 from ..system.description import System
 from ..system.faults import INITIAL
 from ..system.parts import Component, Port

@@ -9,20 +9,12 @@ import numpy.typing as npt
 from ..exchange.dispatch import Dispatcher
 from ..exchange.listener import Listener, Signal, Texts
 from ..interface.units import Conversion
+from ..metrics.groups import check_groups, chosen, metrics_of
 from ..metrics.in_si import in_si
-from ..metrics.metric import (
-    Function,
-    Metric,
-    Signals,
-    check_groups,
-    chosen,
-    measure,
-    metrics_of,
-    needed,
-)
+from ..metrics.metric import Function, Metric, Signals, measure, needed
 from ..recording.memory import Columns, EveryRow, MemoryListener
 from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
-from ..recording.result import Known
+from ..recording.recorded_run import Known
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import run_settings, start_values

@@ -20,7 +20,8 @@ from ..fmi.instance import Instance
 from ..fmi.process import load
 from ..interface.interface import Given
 from ..interface.units import IDENTITY
-from ..metrics.metric import Function, Metric, check_groups
+from ..metrics.groups import check_groups
+from ..metrics.metric import Function, Metric
 from ..realtime.pacer import Pacer, Privileges, long_waits, privileges
 from ..recording.result import Result
 from ..system.connectors import given_by_connectors, read_at

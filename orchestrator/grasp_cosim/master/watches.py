@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ..interface.interface import Interface
 from ..recording.proxies import BACK
-from ..recording.result import Trip
+from ..recording.recorded_run import Trip
 from ..system.connectors import read_at
 from ..system.description import System
 from ..system.parts import RELATIONS, Limit, Port

@@ -24,11 +24,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.by_name import ByName
-from ..base.checks import install_command, known
-from ..base.errors import InputError, choices, nearest
+from ..base.checks import install_command
+from ..base.errors import InputError, choices
 from ..base.errors import reason as reason_of
-from ..base.higher import groups, higher
 from ..base.pickles import as_bytes
+from ..base.registry import in_every_process, registered
 from ..base.si_units import refusal
 from ..interface.units import Conversion
 
@@ -245,9 +245,10 @@ class Metric:
         """To another process a metric goes by the text of its file, or by where it is found."""
         if self.origin is not None:
             return _from_text, (*self.origin, self.name)
-        of_group = metrics_of([self.group]) if self.group in groups() else ()
-        if any(self.function is m.function for m in of_group):
-            return _of_group, (self.group, self.name, self.needs, self.uses, self.entries)
+        if self.group and in_every_process("groups", self.group):
+            of_group = registered("groups", self.group).metrics
+            if any(self.function is m.function for m in of_group):
+                return _of_group, (self.group, self.name, self.needs, self.uses, self.entries)
         module, name = (getattr(self.function, key, "") for key in ("__module__", "__qualname__"))
         there = module != "__main__" and getattr(sys.modules.get(module), name, None)
         if there is self:  # it replaced its function there
@@ -256,9 +257,10 @@ class Metric:
 
 
 def _of_group(group: str, name: str, needs: Needs, uses: Needs, entries: tuple[str, ...]) -> Metric:
-    """The metric of that name of a group of ours, in another process."""
-    found = next(m for m in metrics_of([group]) if m.name == name)
-    return replace(found, needs=needs, uses=uses, entries=entries)
+    """The metric of that name of a group, in another process."""
+    metrics: Sequence[Metric] = registered("groups", group).metrics
+    of_group = next(m for m in metrics if m.name == name)
+    return replace(of_group, needs=needs, uses=uses, entries=entries)
 
 
 # ------------------------------------------------------------------------- what it reads
@@ -362,55 +364,6 @@ class Measured:
         return found
 
 
-def metrics_of(names: Iterable[str], more: Iterable[Metric] = ()) -> tuple[Metric, ...]:
-    """The metrics of groups, then `more`; InputError for no such group, or two of one name."""
-    found: dict[str, Metric] = {}
-    for group in names:
-        known("metrics: no group", group, groups())
-        found |= {m.name: m for m in higher(f"{group}.metrics").METRICS}
-    for m in more:
-        if m.name in found:
-            raise InputError(f"metric {m.name!r}: is defined twice; must have another name")
-        found[m.name] = m
-    return tuple(found.values())
-
-
-def check_groups(system: Any) -> list[str]:
-    """What check() of a group's metrics.py notes of a System's values.
-
-    InputError where it has something against them.
-    """
-    checks = (getattr(higher(f"{group}.metrics"), "check", None) for group in system.metrics)
-    return [note for check in checks if check for note in check(system)]
-
-
-def chosen(
-    wanted: Iterable[Metric | Function | str],
-    of_groups: Iterable[str],
-    names: Collection[str],
-    roles: Mapping[str, str],
-) -> tuple[Metric, ...]:
-    """Those of `wanted` that are not in groups anyway: metrics, functions, names of metrics.
-
-    A function is a metric of its own name, without a unit; a name is one of those in the groups.
-    InputError where there is none of that name, or the signals of these `names` do not permit it.
-    """
-    usual, own = {m.name: m for m in metrics_of(of_groups)}, []
-    reasons = {m.name: reason for m, reason in _judged(usual.values(), names, roles)}
-    for item in wanted:
-        if isinstance(item, Metric):
-            own.append(item)
-        elif callable(item):
-            own.append(metric(str(getattr(item, "__name__", type(item).__name__)))(item))
-        elif not isinstance(item, str):
-            raise InputError(f"metrics: {item!r}: must be a metric, a function or a name")
-        elif item not in usual:
-            raise InputError(f"metrics: {item!r}: no such metric; {nearest(item, usual)}")
-        elif reason := reasons[item]:
-            raise InputError(f"metrics: {item}: is not available: {reason}")
-    return tuple(own)
-
-
 def check_portable(metrics: Iterable[Metric]) -> None:
     """InputError where a metric cannot go to other processes."""
     for m in metrics:
@@ -479,6 +432,13 @@ def available(
             lost.setdefault(reason, []).append(m)
     lines = [f"no {_together(some, judged)}: {reason}" for reason, some in lost.items()]
     return [m for m, reason in judged if not reason], lines
+
+
+def reasons_against(
+    metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
+) -> dict[str, str | None]:
+    """Why signals of these `names` do not permit a metric, by its name; None where they do."""
+    return {m.name: reason for m, reason in _judged(metrics, names, roles)}
 
 
 Judged = Sequence[tuple[Metric, str | None]]

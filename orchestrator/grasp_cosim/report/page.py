@@ -30,7 +30,7 @@ from ..base.one_piece import is_stream
 from ..base.text import grouped
 from ..exchange.listener import Texts
 from ..recording.csv import quoted
-from ..recording.folder import load_run
+from ..recording.read_back import load_run
 from ..recording.result import Result
 from .embed import LIMIT, Shown, fit, packed
 from .plot import that_matter

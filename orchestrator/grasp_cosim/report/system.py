@@ -10,11 +10,12 @@ from importlib.resources import files
 from typing import Any
 
 from ..base.text import counted
+from ..system.parameters import Parameters
 from ..system.settings import settings
 from ..system.structure import Structure
 from ..system.times import in_seconds
 from .diagram import Link, diagram_svg
-from .tables import number
+from .tables import number, text_table
 
 
 def system_html(system: Structure) -> str:
@@ -28,6 +29,11 @@ def system_html(system: Structure) -> str:
         f"<p><b>{escape(system.name)}</b>: {escape(experiment)}</p>"
         f'<div style="overflow:auto">{svg.replace(":root", ".diagram")}</div>'
     )
+
+
+def parameters_html(parameters: Parameters) -> str:
+    """The table of all parameters of a system."""
+    return text_table(parameters.rows())
 
 
 def connections_svg(settings: Mapping[str, Any], units: Mapping[str, str | None]) -> str:

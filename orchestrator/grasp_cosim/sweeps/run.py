@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import pickle
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from ..base.pickles import as_bytes
 from ..base.scratch import ScratchFolder
 from ..exchange.listener import Listener
 from ..master.simulation import simulate
+from ..metrics.groups import Group, register_group, script_groups
 from ..metrics.metric import Metric
 from ..recording.result import Result
 from ..system.description import System
@@ -32,11 +33,16 @@ Job = tuple[int, Row]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """All that runs share: the system, a user's metrics, and where their signals are kept."""
+    """All that runs share: the system, a user's metrics, and where their signals are kept.
+
+    `groups` are those of the system's metrics that a script registered: in another process they
+    must be registered, too.
+    """
 
     system: System
     metrics: tuple[Metric, ...] = ()
     signals: Store | None = None
+    groups: Mapping[str, Group] = field(default_factory=dict)
 
 
 def run_row(task: Task, index: int, row: Row, listeners: Sequence[Listener] = ()) -> Outcome:
@@ -76,7 +82,7 @@ def packed(task: Task, with_fmus: bool) -> Packed:
     components = task.system.components if with_fmus else ()
     fmus = tuple(c.native.read_bytes() if c.native else c.content for c in components)
     try:
-        content = as_bytes(task)
+        content = as_bytes(replace(task, groups=script_groups(task.system.metrics)))
     except Exception as error:  # pickle has one of its own for each reason
         raise InputError(
             f"{task.system.name}: cannot go to another process: {error}; must have Python code of "
@@ -110,6 +116,8 @@ def run_there(shared: Packed, job: Job) -> tuple[Outcome, dict[str, bytes]]:
 def _unpack(shared: Packed) -> tuple[Task, ScratchFolder | None]:
     """The task, whose FMUs are in a folder of this process where their contents came along."""
     task: Task = pickle.loads(shared.task)  # noqa: S301 - by packed(), through a pipe or a scheduler
+    for name, group in task.groups.items():
+        register_group(name, group)
     if not shared.fmus:
         return task, None
     folder = ScratchFolder()

@@ -13,8 +13,9 @@ from ..base.errors import InputError, SimulationError
 from ..base.progress import Progress, phase
 from ..base.scratch import ScratchFolder
 from ..base.text import counted
+from ..metrics.groups import chosen, metrics_of
 from ..metrics.in_si import in_si
-from ..metrics.metric import Function, Metric, available, chosen, metrics_of
+from ..metrics.metric import Function, Metric, available
 from ..system.description import System, as_system
 from .kept import identity_of, keep, opened
 from .places import elsewhere, here

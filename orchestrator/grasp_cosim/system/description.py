@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, overload
 
-from ..base.checks import known
 from ..base.errors import InputError, nearest
 from ..base.files import check_nature
-from ..base.higher import groups, higher
+from ..base.registry import check_registered, registered
 from ..interface.interface import Given
 from .changes import with_own_values
 from .connectors import check_connectors, driven_by_connectors, given_by_connectors
@@ -142,7 +141,7 @@ class System(Structure):
         for role, name in self.roles.items():
             self.component(name, f"{self.name}: [roles]: {role} = {name!r}")
         for group in self.metrics:
-            known(f"{self.name}: metrics: no group", group, groups())
+            check_registered(f"{self.name}: metrics: no group", "groups", group)
         if not self.as_read:  # copies keep it
             object.__setattr__(self, "as_read", made_of(self))
 
@@ -507,7 +506,7 @@ def read_system(
         if variant is not None:
             raise InputError(f"{path}: variant = {variant!r}: only an .ssp may have variants")
         return System(**read_toml(path, Path(fmus) if fmus else None, stimuli))
-    system: System = higher("ssp.from_archive").read_ssp(path, times, stimuli, variant)
+    system: System = registered("readers", ARCHIVE)(path, times, stimuli, variant)
     return system
 
 

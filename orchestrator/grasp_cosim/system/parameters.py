@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from ..base.errors import UnknownNameError
-from ..base.higher import higher
+from ..base.registry import registered
 from ..base.text import columns, on_a_screen
 from ..interface.interface import PARAMETERS, Value
 from .structure import Structure
@@ -46,18 +46,18 @@ class Parameters(Mapping[str, Parameter]):
         return len(self._by_name)
 
     def __repr__(self) -> str:
-        return on_a_screen(columns(self._rows(), range(len(HEADS))))
+        return on_a_screen(columns(self.rows(), range(len(HEADS))))
 
     def _repr_html_(self) -> str:
         """A table of all, as notebooks show it."""
-        return str(higher("report.tables").text_table(self._rows()))
+        return str(registered("html", "Parameters")(self))
 
     def _ipython_key_completions_(self) -> list[str]:
         """The names, for Tab behind a bracket in a notebook."""
         return [*self]
 
-    def _rows(self) -> list[list[str]]:
-        """The heads, and a row for each."""
+    def rows(self) -> list[list[str]]:
+        """The parameters as texts: the heads of the columns, and a row for each."""
         return [[*HEADS], *(_row(name, p) for name, p in self.items())]
 
 

@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar, get_args
 
 from ..base.checks import choice
 from ..base.errors import InputError, choices, nearest
-from ..base.higher import higher
+from ..base.registry import registered
 from ..base.si_units import Unit
 from ..base.text import on_a_screen
 from ..interface.interface import Given, Interface, Variable
@@ -101,7 +101,7 @@ class Structure:
 
     def _repr_html_(self) -> str:
         """The diagram of its connections, and its experiment, as notebooks show them."""
-        return str(higher("report.system").system_html(self))
+        return str(registered("html", "System")(self))
 
     @property
     def total_steps(self) -> int:

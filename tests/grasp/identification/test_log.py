@@ -12,7 +12,7 @@ from grasp_cosim.grasp.identification.identification import (
     identify_from_log,
 )
 from grasp_cosim.metrics.metric import Signals
-from grasp_cosim.recording.folder import load_log
+from grasp_cosim.recording.read_back import load_log
 from scipy.integrate import solve_ivp
 
 MASS = 0.5

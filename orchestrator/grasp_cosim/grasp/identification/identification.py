@@ -24,8 +24,8 @@ import numpy as np
 from ...base.errors import InputError, nearest
 from ...base.text import counted, on_a_screen
 from ...metrics.metric import Signals
-from ...recording.folder import load_log
 from ...recording.log_names import AS_THEY_ARE, LogNames
+from ...recording.read_back import load_log
 from ...system.description import System, as_system
 from ..metrics import FINGERS
 from ..presets import start_in_si

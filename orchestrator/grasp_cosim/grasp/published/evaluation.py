@@ -14,7 +14,7 @@ from typing import Any
 from ...base.files import check_folder, write_json, write_text
 from ...base.progress import Progress
 from ...base.text import on_a_screen
-from ...recording.result import UNITS
+from ...recording.recorded_run import UNITS
 from ...report.plot import new_figure
 from ..metrics import IMPACT_WINDOW, METRICS
 from ..presets import start_in_si, with_preset
