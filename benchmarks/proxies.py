@@ -22,7 +22,7 @@ from pathlib import Path
 from grasp_cosim import System, cli, simulate
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.grasp.system import grasp_system
-from grasp_cosim.interface.interface import Value
+from grasp_cosim.interface.fmi_types import Value
 
 from benchmarks.masters import by_turns
 

@@ -9,7 +9,8 @@ from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.base.si_units import Unit
 from grasp_cosim.exchange.dispatch import DECADES, FAR, Divergence, largest
 from grasp_cosim.exchange.listener import Signal
-from grasp_cosim.interface.interface import Interface, Variable
+from grasp_cosim.interface.interface import Interface
+from grasp_cosim.interface.variables import Variable
 from grasp_cosim.master.master import ENOUGH
 from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.memory import MemoryListener

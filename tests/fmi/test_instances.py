@@ -20,8 +20,8 @@ from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi.co_simulation import CONVENTION, SharedInstance, formatted, logger_type
 from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
 from grasp_cosim.fmi.process import load
-from grasp_cosim.interface.interface import Variable
 from grasp_cosim.interface.obstacles import this_platform
+from grasp_cosim.interface.variables import Variable
 from grasp_cosim.system.parts import Component, Connection, Port
 from support.compiled import shared_library
 from support.marks import engines, slow

@@ -14,7 +14,7 @@ from grasp_cosim.base.si_units import known_unit
 from grasp_cosim.fmu_export.native.bench_header import bench_header
 from grasp_cosim.fmu_export.package import write_members
 from grasp_cosim.fmu_export.page import icon
-from grasp_cosim.hil.proxy import link_signature
+from grasp_cosim.hil.proxy_of_fmu import link_signature
 from grasp_cosim.hil.served import Service
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.system.description import System

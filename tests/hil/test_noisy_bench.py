@@ -4,7 +4,7 @@ import random
 
 import pytest
 from grasp_cosim import simulate
-from grasp_cosim.hil.proxy import exchanged
+from grasp_cosim.hil.proxy_of_fmu import exchanged
 from grasp_cosim.hil.served import ServedFmu, Service
 from support.processes import kept_port
 from support.proxies import ANY_PORT, build_proxy, serving_fmu

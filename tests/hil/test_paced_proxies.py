@@ -70,7 +70,7 @@ def test_two_proxies_at_one_port_are_told_that_the_peer_is_busy(benched, grasp):
 def test_a_hand_of_eight_fingers_shakes_hands_in_small_datagrams(grasp, fmus, tmp_path):
     """Its signature is longer than a datagram that no network takes apart."""
     from grasp_cosim.fmu_export.link import LARGEST_HANDSHAKE, Peer
-    from grasp_cosim.hil.proxy import exchanged, link_signature
+    from grasp_cosim.hil.proxy_of_fmu import exchanged, link_signature
     from support.proxies import HandProxy
 
     signature, _ = link_signature(exchanged(fmus / "HandPlant.fmu"))

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 from grasp_cosim import simulate
 from grasp_cosim.base.errors import InputError, SimulationError
-from grasp_cosim.hil.faults import FAILURES, MEANINGS, Rehearsal, Rehearsed
+from grasp_cosim.hil.rehearsal import FAILURES, MEANINGS, Rehearsal, Rehearsed
 from grasp_cosim.hil.served import Service
 from support.proxies import ANY_PORT, build_proxy, serving
 

@@ -12,9 +12,10 @@ from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.fmu_export.link import STEP as STEP_REQUEST
 from grasp_cosim.fmu_export.link import TOO_LONG
-from grasp_cosim.hil.proxy import exchanged, link_signature
+from grasp_cosim.hil.proxy_of_fmu import exchanged, link_signature
 from grasp_cosim.hil.served import BACKLOG, DrivenFmu, ServedFmu, Server, Service
 from grasp_cosim.interface.read import read_interface
+from grasp_cosim.interface.values import parse_value
 from support import native_fmus
 from support.proxies import HandProxy, RefusedError, UdpAsk, serving, wait_until
 
@@ -72,7 +73,7 @@ def starts(fmu, **values):
     signature, _ = link_signature(interface)
     declared = {v.name: interface.by_name[v.name].start or "" for v in signature.request}
     return [
-        values.get(name, interface.parse("", name, start, text=True))
+        values.get(name, parse_value(interface, "", name, start, text=True))
         for name, start in declared.items()
     ]
 

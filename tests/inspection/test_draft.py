@@ -8,8 +8,9 @@ from grasp_cosim import System
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.inspection.alike import candidates, matches
 from grasp_cosim.inspection.draft import alone, replacing
-from grasp_cosim.interface.interface import Interface, Variable
+from grasp_cosim.interface.interface import Interface
 from grasp_cosim.interface.read import read_interface
+from grasp_cosim.interface.variables import Variable
 
 
 @pytest.fixture(scope="module")

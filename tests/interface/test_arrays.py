@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.interface.expansion import expanded, flattened, from_text, values_of
-from grasp_cosim.interface.interface import MOST_ELEMENTS, element_names, size_of
 from grasp_cosim.interface.read import read_interface
+from grasp_cosim.interface.renaming import in_units, renamed
+from grasp_cosim.interface.variables import MAX_ELEMENTS, element_names, size_of
 from hypothesis import given
 from hypothesis import strategies as st
 from support.native_fmus import state_space
@@ -56,7 +57,7 @@ def test_sizes_are_counted_no_further_than_they_matter():
     assert size_of((2, 3)) == 6
     assert size_of(()) == 1
     assert size_of((2**40, 0)) == 0
-    assert size_of([2**64 - 1] * 1000) == size_of([2**40]) == MOST_ELEMENTS + 1
+    assert size_of([2**64 - 1] * 1000) == size_of([2**40]) == MAX_ELEMENTS + 1
     assert element_names("u", (2, 0)) == ()
     assert flattened(1.0, (2, 0)) == flattened([], (0,)) == []
 
@@ -92,7 +93,7 @@ SHOWN = {"types": ("u_", "y_"), "more": ("F",)}
 def test_elements_in_the_place_of_arrays(name, tmp_path, snapshot):
     """The first and the last of each array."""
     made, lengths, rename, units = EXPANDED[name]
-    found = expanded(declared(tmp_path, **made), lengths).renamed(rename).in_units(units)
+    found = in_units(renamed(expanded(declared(tmp_path, **made), lengths), rename), units)
     about = next((SHOWN[key] for key in made), ("",))
     arrays = [f"{n}: {a.shape}: {' '.join(a.names)}" for n, a in found.arrays.items()]
     variables = [
@@ -107,9 +108,9 @@ def test_elements_in_the_place_of_arrays(name, tmp_path, snapshot):
 def test_a_name_of_an_array_that_is_taken_or_not_there(tmp_path):
     found = expanded(declared(tmp_path), {})
     with pytest.raises(InputError, match=r"'u\[1\]' is renamed to 'a\[1\]' already"):
-        found.renamed({"a": "u", "b": "u[1]"})
+        renamed(found, {"a": "u", "b": "u[1]"})
     with pytest.raises(InputError, match=r"no variable 'u\[4\]'"):
-        found.renamed({"a": "u[4]"})
+        renamed(found, {"a": "u[4]"})
 
 
 @pytest.mark.parametrize("dimensions", [(2**40,), (2**20, 2**20), (2**63, 3), (1, 10**5 + 1)])
@@ -118,7 +119,7 @@ def test_too_many_elements_are_left_alone_by_name(tmp_path, dimensions):
     assert "F" not in found.arrays
     assert "u" in found.arrays
     assert not found.by_name["F"].supported
-    with pytest.raises(InputError, match=f"array of Float64 with more than {MOST_ELEMENTS}"):
+    with pytest.raises(InputError, match=f"array of Float64 with more than {MAX_ELEMENTS}"):
         values_of(found, "here", "F", 1.0)
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import fmpy
 import pytest
-from grasp_cosim.interface.interface import typed
+from grasp_cosim.interface.fmi_types import typed
 from grasp_cosim.interface.obstacles import NUMBERS
 from grasp_cosim.interface.read import describe
 from lxml import etree

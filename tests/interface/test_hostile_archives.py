@@ -12,7 +12,7 @@ from grasp_cosim.cli import main
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.inspection.inspection import inspect_fmu
 from grasp_cosim.inspection.loading import examine, unpack
-from grasp_cosim.interface import document, read
+from grasp_cosim.interface import model_description, read
 from grasp_cosim.interface.read import describe, read_interface
 from grasp_cosim.ssp.to_archive import write_ssp
 from hypothesis import HealthCheck, given
@@ -53,8 +53,8 @@ def test_what_is_too_large_is_not_unpacked(tmp_path, monkeypatch, name, message)
     with zipfile.ZipFile(tmp_path / "x.fmu", "w", zipfile.ZIP_DEFLATED) as archive:
         for entry, content in files.items():
             archive.writestr(entry, content)
-    monkeypatch.setattr(document, "LARGEST", 1_000_000)
-    monkeypatch.setattr(document, "LARGEST_UNPACKED", 1_000_000)
+    monkeypatch.setattr(model_description, "MAX_DESCRIPTION_BYTES", 1_000_000)
+    monkeypatch.setattr(model_description, "MAX_UNPACKED_BYTES", 1_000_000)
     monkeypatch.setattr(zipfile.ZipFile, "open", None)
     refused(tmp_path / "x.fmu", message)
 
@@ -94,7 +94,10 @@ REFERENCES = (str(2**32), "-1", "1.0", "1_0", "\u0663", "9" * 5000)
 ENTITY = "has a document type 'd', which may define entities"
 SAME = (f'<Float64 name="{n}" valueReference="7"/>' for n in "ab")
 REFUSED = [
-    *((nested(n), f"more than {document.DEEPEST} elements deep") for n in (257, 200_000)),
+    *(
+        (nested(n), f"more than {model_description.MAX_DEPTH} elements deep")
+        for n in (257, 200_000)
+    ),
     (LAUGHS, ENTITY),
     (UTF_16.encode("utf-16"), ENTITY),
     *(
@@ -125,7 +128,7 @@ def test_a_description_that_is_refused(write, description, message):
 @pytest.mark.parametrize(
     ("description", "names"),
     [
-        (nested(document.DEEPEST), []),
+        (nested(model_description.MAX_DEPTH), []),
         (declared(variable(f'name="a" valueReference="{2**32 - 1}"')), ["a"]),
         (declared(variable('name="Größe.圧力[1]" valueReference="1"')), ["Größe.圧力[1]"]),
         (PLAIN.replace('"m"', '"Größe-1.0 b"'), []),  # the name of its binary
@@ -145,7 +148,7 @@ def test_an_alias_of_a_name_that_is_taken(write, alias):
 
 
 def test_more_elements_than_an_fmu_has(write, monkeypatch):
-    monkeypatch.setattr(document, "MOST_ELEMENTS", 100)
+    monkeypatch.setattr(model_description, "MAX_XML_ELEMENTS", 100)
     assert read_interface(write(f"{HEAD}{'<a/>' * 97}<ModelVariables/>{TAIL}")).identifier == "m"
     refused(write(f"{HEAD}{'<a/>' * 98}<ModelVariables/>{TAIL}"), "more than 100 elements")
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System
-from grasp_cosim.interface.interface import Interface, Variable
+from grasp_cosim.interface.interface import Interface
+from grasp_cosim.interface.variables import Variable
 from grasp_cosim.master.scenario import Scenario
 from grasp_cosim.system import parts
 from grasp_cosim.system.parts import Component, Condition, Connection, Event, Fault, Port

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.interface.read import read_interface
+from grasp_cosim.interface.values import parse_value
 from grasp_cosim.system.parts import Event, Port
 from grasp_cosim.system.validity import connection_transform, remarks
 from support.marks import engines
@@ -57,10 +58,12 @@ def connected(source, target):
 def test_values_must_fit_their_type(tmp_path, name, value, fits):
     interface = read_interface(build(tmp_path))
     if fits:
-        assert interface.parse("here", name, value, text=True) == (7 if value == "7.0" else value)
+        assert parse_value(interface, "here", name, value, text=True) == (
+            7 if value == "7.0" else value
+        )
     else:
         with pytest.raises(InputError, match=f"^here: {name} = .*: must be "):
-            interface.parse("here", name, value, text=True)
+            parse_value(interface, "here", name, value, text=True)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from grasp_cosim.recording.csv import CsvListener
 from grasp_cosim.recording.mdf import MdfListener, read_mdf
 from grasp_cosim.recording.signals import read_signals
 from grasp_cosim.system.settings import settings
-from grasp_cosim.tables import table, text
+from grasp_cosim.tables import delimited, read_table
 from hypothesis import given
 from hypothesis import strategies as st
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, play, rows
@@ -175,9 +175,9 @@ def test_a_large_csv_has_the_same_bits_whoever_reads_it(tmp_path, monkeypatch):
     texts.listed += ['a "b",\n', "", "\\"]
     play(CsvListener(path), np.column_stack((rows(200), np.arange(200) % 3)), signals=signals)
     plain = read_signals(path, {"a.s"})[1]
-    monkeypatch.setattr(text, "LARGE", 0)
+    monkeypatch.setattr(delimited, "LARGE", 0)
     with monkeypatch.context() as only:
-        only.setattr(table, "Numbers", None)
+        only.setattr(read_table, "Numbers", None)
         fast = read_signals(path, {"a.s"})[1]
     assert {n: c.tolist() for n, c in fast.items()} == {n: c.tolist() for n, c in plain.items()}
     with path.open("a") as file:

@@ -5,7 +5,7 @@ import zipfile
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.interface import document
+from grasp_cosim.interface import model_description
 from grasp_cosim.ssp.to_archive import write_ssp
 from ssp.hand_made import (
     archive,
@@ -362,5 +362,5 @@ def test_an_archive_of_which_more_would_be_unpacked_than_there_is(tmp_path, monk
     path = archive(tmp_path, structure(TOP), {"a": A})
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as file:
         file.writestr("resources/zeros", bytes(1_000_000))
-    monkeypatch.setattr(document, "LARGEST_UNPACKED", 100_000)
+    monkeypatch.setattr(model_description, "MAX_UNPACKED_BYTES", 100_000)
     assert re.search(r"its files have \d+ bytes unpacked; must have at most \d+$", message_of(path))

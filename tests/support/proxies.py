@@ -24,7 +24,7 @@ from grasp_cosim.fmu_export.link import (
     pack_hello,
     unpack_text,
 )
-from grasp_cosim.hil.proxy import exchanged
+from grasp_cosim.hil.proxy_of_fmu import exchanged
 from grasp_cosim.hil.relay import Relay
 from grasp_cosim.hil.served import ServedFmu, Server
 

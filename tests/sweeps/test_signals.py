@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, metric, simulate, sweep
 from grasp_cosim.sweeps import sweep as sweep_module
-from grasp_cosim.sweeps.kept import keep
-from grasp_cosim.sweeps.signals import Store, dimension
+from grasp_cosim.sweeps.finished_runs import keep
+from grasp_cosim.sweeps.signal_store import Store, dimension
 from support.marks import needs_compiler
 from support.native_systems import integrator
 

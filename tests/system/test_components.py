@@ -10,6 +10,7 @@ from grasp_cosim import InputError, System, grasp_system, simulate
 from grasp_cosim.base.si_units import Unit
 from grasp_cosim.grasp.system import with_controller
 from grasp_cosim.interface.read import read_interface
+from grasp_cosim.interface.renaming import in_units
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.system.parts import Solver
 from grasp_cosim.system.settings import settings
@@ -60,9 +61,9 @@ def test_a_minus_before_a_unit_turns_the_sign(tmp_path, plant):
     system = load(tmp_path, plant, 'units = { gap = "-mm", width = "-m" }')
     assert gap_to_position(system) == pytest.approx((-1e-3, 0.0), rel=1e-15)
     interface = system.component("plant", "").interface
-    assert interface.in_units({"gap": "-m"}).units["-m"].factor == -1.0
+    assert in_units(interface, {"gap": "-m"}).units["-m"].factor == -1.0
     with pytest.raises(InputError, match="units: 'gap' = '--kg': no unit that"):
-        interface.in_units({"gap": "--kg"})
+        in_units(interface, {"gap": "--kg"})
 
 
 def test_without_a_name_values_are_passed_as_they_are(tmp_path):
@@ -73,7 +74,7 @@ def test_a_definition_of_the_fmu_goes_before_the_known_unit(tmp_path):
     interface = read_interface(write_fmu(tmp_path / "plant.fmu", BARE))
     own = replace(interface, units={"mm": Unit("mm", (0, 1, *[0] * 6), 0.5)})
     for declares, factor in ((own, 0.5), (interface, 1e-3)):
-        found = declares.in_units({"gap": "mm"})
+        found = in_units(declares, {"gap": "mm"})
         unit = found.unit(found.by_name["gap"])
         assert unit.factor == factor
 

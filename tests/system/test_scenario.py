@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 from grasp_cosim import InputError, System
-from grasp_cosim.interface.interface import Interface, Variable
+from grasp_cosim.interface.interface import Interface
+from grasp_cosim.interface.variables import Variable
 from grasp_cosim.system import parts
 from grasp_cosim.system.faults import FAULTS as KINDS
 from grasp_cosim.system.faults import RANDOM

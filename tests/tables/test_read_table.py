@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.tables.table import names_in, read_table, split_head
+from grasp_cosim.tables.read_table import names_in, read_table, split_head
 from hypothesis import given
 from hypothesis import strategies as st
 from support.marks import examples

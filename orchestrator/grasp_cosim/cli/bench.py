@@ -8,8 +8,8 @@ import click
 
 from ..base.errors import InputError
 from ..base.interruption import interrupts
-from ..hil.faults import MEANINGS, Rehearsed
-from ..hil.proxy import LONGEST_SILENCE, exchanged, shared_key
+from ..hil.proxy_of_fmu import LONGEST_SILENCE, exchanged, shared_key
+from ..hil.rehearsal import MEANINGS, Rehearsed
 from ..hil.relay import WORDS, Conditions, Network, Outage, Relay, csv_log
 from ..hil.served import DEFAULT_ADDRESS, ServedFmu, Server, Service
 from ..hil.sockets import is_loopback, read_address, text

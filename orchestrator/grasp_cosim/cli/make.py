@@ -159,7 +159,11 @@ def proxy(
     Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
     For others: grasp-cosim proxy vendor.fmu -o Bench.fmu --target linux64,win64
     """
-    from ..hil.proxy import read_limits, write_peer_header, write_proxy  # it takes time to load
+    from ..hil.proxy_of_fmu import (  # it takes time to load
+        read_limits,
+        write_peer_header,
+        write_proxy,
+    )
 
     if out is None and c_header is None:
         raise InputError("proxy: needs -o FILE.fmu or --c-header FILE, or both")

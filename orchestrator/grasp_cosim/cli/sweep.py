@@ -8,7 +8,7 @@ import click
 
 from ..base.errors import InputError
 from ..base.quantity import Quantity
-from ..interface.interface import Value
+from ..interface.fmi_types import Value
 from ..sweeps.pictures import draw_sweep
 from ..sweeps.places import cluster
 from ..sweeps.rows import grid, varied

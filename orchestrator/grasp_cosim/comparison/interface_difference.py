@@ -14,9 +14,11 @@ from typing import Any, Literal
 
 from ..base.checks import is_number
 from ..base.errors import choices, nearest
-from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable, as_float
+from ..interface.fmi_types import Value, as_float
+from ..interface.interface import Interface
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion
+from ..interface.variables import PARAMETERS, SETTABLE, Variable
 from ..system.changes import stated
 from ..system.description import System
 from ..system.parts import Port, literal

@@ -14,8 +14,10 @@ from pathlib import Path
 from ..base.checks import choice, known
 from ..base.errors import InputError, SimulationError
 from ..interface.expansion import values_of
-from ..interface.interface import Interface, Value
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
 from ..interface.read import describe
+from ..interface.renaming import in_units, renamed
 from ..interface.units import conversion
 from ..master.simulation import simulate
 from ..metrics.groups import metrics_of
@@ -201,8 +203,8 @@ def prepare_swap(
     was = candidate if isinstance(candidate, Component) else replace(place, values={})
     fmu = was.fmu if isinstance(candidate, Component) else candidate
     now = replaced(was, fmu, rename, units or {}, "")
-    theirs = now.sized(describe(fmu)).renamed(now.rename, "rename")
-    theirs = theirs.in_units(now.units, "units")
+    theirs = renamed(now.sized(describe(fmu)), now.rename, "rename")
+    theirs = in_units(theirs, now.units, "units")
     _check_renamed(rename, ours, theirs)
     names = (*theirs.by_name, *(n for n in theirs.arrays if n not in ours.arrays))
     extra = {f"{component}.{name}": name for name in names if name not in ours.by_name}

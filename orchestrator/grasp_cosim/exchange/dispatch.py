@@ -23,7 +23,7 @@ import numpy.typing as npt
 from ..base.checks import EXACT
 from ..base.errors import SimulationError
 from ..base.system_calls import end_fork
-from ..interface.interface import limits
+from ..interface.fmi_types import limits
 from ..interface.units import IDENTITY
 from ..system.connectors import taps
 from ..system.description import System

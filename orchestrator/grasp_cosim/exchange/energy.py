@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.si_units import known_unit
-from ..interface.interface import Interface, Variable
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 from ..system.description import System
 from ..system.parts import Component, Port
 from ..system.record import ENERGY

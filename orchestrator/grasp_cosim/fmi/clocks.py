@@ -11,7 +11,8 @@ from fractions import Fraction
 from math import inf, isfinite
 
 from ..base.errors import SimulationError
-from ..interface.interface import Clock, Interface, Variable
+from ..interface.interface import Interface
+from ..interface.variables import Clock, Variable
 from .instance import AT_POINT, OK, WARNING
 
 NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)

@@ -41,7 +41,8 @@ from fmpy.fmi3 import FMU3Slave
 from ..base.calls import STEP_2, STEP_3, Call, Native
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import c_library
-from ..interface.interface import Interface, Value
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
 from ..system.parts import Logging
 from .instance import DUE, EARLY, EVENT, WARNING
 from .loaded import Lenient, LoadedInstance, MissingFunctionError

@@ -18,7 +18,9 @@ import numpy.typing as npt
 
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError
-from ..interface.interface import Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 from ..system.parts import Logging
 from .clocks import Clocks
 from .co_simulation import NEEDED, SHORT, TERMINATE, Fmi3Instance

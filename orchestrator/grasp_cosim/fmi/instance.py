@@ -12,7 +12,9 @@ import numpy.typing as npt
 
 from ..base.calls import Call
 from ..base.errors import SimulationError, choices
-from ..interface.interface import Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 from ..system.parts import literal
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")

@@ -28,8 +28,10 @@ from ..base.calls import TRANSFER_2, TRANSFER_3, Call, Native
 from ..base.errors import InputError, SimulationError
 from ..base.files import CURRENT_FOLDER, FULL, not_its_fault
 from ..base.scratch import ScratchFolder, without_scratch
-from ..interface.interface import Element, Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
 from ..interface.obstacles import of_binary, of_loading, this_machine
+from ..interface.variables import Element, Variable
 from ..system.parts import Logging
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, WARNING, Inputs
 from .messages import SEVERE, Messages

@@ -20,7 +20,9 @@ from fmpy.fmi3 import FMU3Model
 
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError, choices
-from ..interface.interface import Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 from ..system.parts import Logging, Solver
 from .clocks import Clocks
 from .co_simulation import Fmi3Instance, FmuInstance, Texts3
@@ -181,7 +183,7 @@ class ModelInstance(LoadedInstance):
             if self._states:
                 self._check(self._set_states(self._x, self._states))
             event = event or self._left_zero()
-        if self.interface.exchange and self.interface.exchange.told:
+        if self.interface.exchange and self.interface.exchange.wants_completed_steps:
             wants, ended = self._slave.completedIntegratorStep()
             event = event or wants
             if ended:

@@ -38,7 +38,9 @@ from ..base.calls import Call
 from ..base.errors import InputError, SimulationError, ended
 from ..base.scratch import ScratchFolder
 from ..base.system_calls import end_fork, end_group, listener
-from ..interface.interface import Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 from ..system.parts import Component, Logging, Solver
 from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
 from .instance import CLOCK, EARLY, OK, WARNING, Inputs, Instance, dtype

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError, nearest
-from ..interface.interface import Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.variables import Variable
 from ..system.python_code import PythonCode
 from .instance import ERROR, OK, Inputs
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.checks import known
-from ..interface.interface import Value
+from ..interface.fmi_types import Value
 from ..interface.units import IDENTITY
 from ..metrics.metric import resolved
 from ..system.description import System

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ..base.checks import extra_module
 from ..base.errors import InputError
-from ..interface.interface import Given
+from ..interface.values import Given
 from ..master.session import Session
 from ..master.simulation import simulate
 from ..system.connectors import read_at

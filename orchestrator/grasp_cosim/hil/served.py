@@ -23,11 +23,14 @@ from ..fmu_export.link import (
     Request,
     Signature,
 )
-from ..interface.interface import Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
+from ..interface.values import parse_value
+from ..interface.variables import Variable
 from ..master.master import finish_step
 from ..system.times import NANOSECONDS, Time, in_seconds, nearest_time
-from .faults import Rehearsal, Rehearsed, end_at_once
-from .proxy import link_signature
+from .proxy_of_fmu import link_signature
+from .rehearsal import Rehearsal, Rehearsed, end_at_once
 from .sockets import Address, EventLoop, received, text
 
 BACKLOG = 1_000_000_000
@@ -259,7 +262,7 @@ def _failsafe(interface: Interface, peer: Peer, values: Mapping[str, Value]) -> 
     for name, place in places.items():
         start = interface.by_name[name].start
         chosen = values.get(name, zero[interface.by_name[name].kind] if start is None else start)
-        found[place] = interface.parse(f"failsafe {name}", name, chosen, text=True)
+        found[place] = parse_value(interface, f"failsafe {name}", name, chosen, text=True)
     return found
 
 

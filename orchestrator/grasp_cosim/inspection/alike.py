@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
-from ..interface.interface import Interface, Variable
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 
 _NUMBERS = {
     **dict.fromkeys(("1", "right", "r", "rh", "a"), 1),

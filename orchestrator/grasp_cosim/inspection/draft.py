@@ -15,7 +15,10 @@ from pathlib import Path
 
 from ..base.errors import choices
 from ..base.text import on_one_line
-from ..interface.interface import PARAMETERS, SETTABLE, Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
+from ..interface.renaming import renamed
+from ..interface.variables import PARAMETERS, SETTABLE, Variable
 from ..system.changes import converted, stated
 from ..system.parts import Component
 from ..system.record import by_default
@@ -119,7 +122,7 @@ def replacing(system: Structure, name: str, fmu: Path, path: str, presets: Itera
     names = [v.name for v in variables if v.name in likely]
     found = {n: likely[n] for n in names if n in asked or not likely[n].doubt}
     own = {n: m.variable.name for n, m in found.items()}
-    theirs = theirs.renamed({n: its for n, its in own.items() if its != n})
+    theirs = renamed(theirs, {n: its for n, its in own.items() if its != n})
     draft = Draft(name, "", found, ours, theirs, {})
     listed = [v.name for v in variables if v.name in asked]
     units = {n: text for n in listed if (text := _unit(draft, n, n in needed))}

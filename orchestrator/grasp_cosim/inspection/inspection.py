@@ -7,9 +7,9 @@ from typing import Any
 from ..base.errors import choices
 from ..base.text import WIDEST as SCREEN
 from ..base.text import on_a_screen
-from ..interface.interface import Variable
 from ..interface.obstacles import KINDS, this_platform
 from ..interface.read import describe
+from ..interface.variables import Variable
 
 COLUMNS = (
     "name", "causality", "variability", "type", "unit", "start", "range", "dependencies",

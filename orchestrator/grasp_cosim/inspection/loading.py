@@ -21,8 +21,8 @@ from typing import Literal
 from ..base.checks import install_command
 from ..base.errors import choices
 from ..base.scratch import ScratchFolder
-from ..interface.document import unreadable
 from ..interface.interface import Interface
+from ..interface.model_description import unreadable
 from ..interface.obstacles import of_binary, of_kind, of_loading, this_machine
 from ..interface.read import describe
 

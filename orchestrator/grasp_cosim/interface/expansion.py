@@ -8,17 +8,10 @@ from typing import Any
 
 from ..base.errors import InputError
 from ..base.quantity import Quantity, as_quantity, is_nested, unwrapped
-from .interface import (
-    MOST_ELEMENTS,
-    Array,
-    Element,
-    Given,
-    Interface,
-    Value,
-    Variable,
-    element_names,
-    size_of,
-)
+from .fmi_types import Value
+from .interface import Interface
+from .values import Given, parse_value
+from .variables import MAX_ELEMENTS, Array, Element, Variable, element_names, size_of
 
 Names = tuple[str, ...] | None
 
@@ -31,7 +24,7 @@ def expanded(interface: Interface, lengths: Mapping[str, Value | None]) -> Inter
     name of one.
     """
     given = {n: v for n, v in lengths.items() if isinstance(v, int) and v >= 0}
-    return interface.kept(("sizes", *given.items()), lambda: _expanded(interface, given))
+    return interface.variant(("sizes", *given.items()), lambda: _expanded(interface, given))
 
 
 def values_of(
@@ -39,7 +32,7 @@ def values_of(
 ) -> dict[str, Value]:
     """The values by variable of what is given for a variable or for a whole array, checked.
 
-    As of Interface.parse(); for an array nested lists of its shape, a list of all elements row by
+    As of parse_value(); for an array nested lists of its shape, a list of all elements row by
     row, or one value for all.
     """
     array: Array | None = interface.arrays.get(name)
@@ -48,7 +41,7 @@ def values_of(
         several = is_nested(given.value if isinstance(given, Quantity) else given)
         if several or not isinstance(given, float | int | bool | str | Quantity):
             raise InputError(f"{place}: {name} = {given!r}: is not an array; must be one value")
-        return {name: interface.parse(place, name, given, text)}
+        return {name: parse_value(interface, place, name, given, text)}
     try:
         found: Any = from_text(given) if text and isinstance(given, str) else given
         if isinstance(found, Quantity):
@@ -61,7 +54,7 @@ def values_of(
             "a list of all elements row by row, or one value for all"
         ) from error
     return {
-        element: interface.parse(place, element, value, text)
+        element: parse_value(interface, place, element, value, text)
         for element, value in zip(array.names, flat, strict=True)
     }
 
@@ -104,7 +97,7 @@ def _taken_apart(interface: Interface, shapes: Mapping[str, tuple[int, ...]]) ->
     numbers = [
         v for v in interface.variables if v.shape and v.kind in ("Real", "Integer", "Boolean")
     ]
-    apart, room = {}, MOST_ELEMENTS
+    apart, room = {}, MAX_ELEMENTS
     numbers.sort(key=lambda v: not (v.settable or v.causality == "output"))  # what is most used
     for v in numbers:
         shape, size = shapes[v.name], size_of(shapes[v.name])

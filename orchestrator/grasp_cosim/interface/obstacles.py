@@ -14,8 +14,9 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from ..base.errors import choices
-from .document import HEAD
-from .interface import Interface, Value, typed
+from .fmi_types import Value, typed
+from .interface import Interface
+from .model_description import ELF_HEAD_BYTES
 
 KINDS = {
     "CoSimulation": "co-simulation",
@@ -142,7 +143,7 @@ def this_machine(version: str) -> str:
 
 def processor(head: bytes) -> str:
     """The processor that an ELF file is for, by its first bytes; "" of another kind of file."""
-    if head[:4] != b"\x7fELF" or len(head) < HEAD:
+    if head[:4] != b"\x7fELF" or len(head) < ELF_HEAD_BYTES:
         return ""
     number = int.from_bytes(head[18:20], "little")
     return _PROCESSORS.get(number, f"ELF machine {number}")
@@ -161,7 +162,7 @@ def platform_of(folder: str, head: bytes) -> str:
 def this_platform(version: str) -> str:
     """That of this Python."""
     with Path(sys.executable).open("rb") as python:
-        return platform_of(this_machine(version), python.read(HEAD))
+        return platform_of(this_machine(version), python.read(ELF_HEAD_BYTES))
 
 
 def of_kind(fmu: Interface) -> Obstacle | None:
@@ -214,7 +215,7 @@ def of_binary(fmu: Interface) -> Obstacle | None:
     if fmu.python and fmu.ours:
         remedy += ", or make a native one of its block: grasp-cosim build --native"
     if fmu.sources:
-        from .sources import why_not_compiled  # only here: most FMUs have a binary
+        from .source_code import why_not_compiled  # only here: most FMUs have a binary
 
         lacking = why_not_compiled(fmu)
         way = f"; its sources do not compile as they are: {lacking}"

@@ -20,23 +20,11 @@ from ..base.collector import without_collector
 from ..base.errors import InputError
 from ..base.files import check_fmu_file
 from ..base.si_units import BASE, Unit, known_unit
-from .document import read_document, unreadable
-from .interface import (
-    PARAMETERS,
-    SETTABLE,
-    TYPES,
-    TYPES_3,
-    Clock,
-    Enumeration,
-    Interface,
-    ModelExchange,
-    Value,
-    Variable,
-    kind_of,
-    limits,
-    typed,
-)
+from .fmi_types import FMI_1_AND_2_TYPES, FMI_3_TYPES, Value, kind_of, limits, typed
+from .interface import Interface, ModelExchange
+from .model_description import read_document, unreadable
 from .obstacles import capabilities_of, kinds_of, of_binary, of_kind, platform_of
+from .variables import PARAMETERS, SETTABLE, Clock, Enumeration, Variable
 
 NUMERIC = ("Real", "Integer")
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
@@ -73,7 +61,7 @@ def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
         raise InputError(f"{path}: {obstacle}")
     if found.flaw:
         raise unreadable(path, found.flaw)
-    return replace(found, path=path.resolve(), given=path)
+    return replace(found, path=path.resolve(), user_path=path)
 
 
 def check_runs(path: Path) -> None:
@@ -208,9 +196,9 @@ class _Reader:
     def with_type(self, element: Element) -> Element | None:
         """The element that says the type of a variable: in FMI 3.0 its own, else one within it."""
         if self.major == "3":
-            return element if element.tag in TYPES_3 else None
+            return element if element.tag in FMI_3_TYPES else None
         for inner in element:
-            if inner.tag in TYPES:
+            if inner.tag in FMI_1_AND_2_TYPES:
                 return inner
         return None
 
@@ -331,7 +319,7 @@ class _Reader:
         name = _name(element)
         place = f"variable {name!r}"
         if value is None:
-            types = TYPES_3 if self.major == "3" else TYPES
+            types = FMI_3_TYPES if self.major == "3" else FMI_1_AND_2_TYPES
             raise ValueError(f"{place}: has no type; must be one of {', '.join(types)}")
         kind, attributes = kind_of(value.tag), value.attrib
         type_name = attributes.get("declaredType", "")

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError, nearest
-from ..interface.interface import Variable
+from ..interface.variables import Variable
 from ..master.session import Session
 from ..system.connectors import read_at
 from ..system.description import System, as_system

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from ..interface.interface import Variable
+from ..interface.variables import Variable
 from ..system.connectors import read_at, taps
 from ..system.description import System
 from ..system.parts import PROXY_STATE, Port

@@ -21,7 +21,8 @@ import numpy.typing as npt
 from ..base.errors import InputError, choices
 from ..base.text import counted
 from ..fmi.instance import Instance
-from ..interface.interface import Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.variables import Variable
 from ..system.description import System
 from ..system.faults import INITIAL
 from ..system.parts import Connection, Initialisation, Port

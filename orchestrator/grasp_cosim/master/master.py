@@ -20,7 +20,7 @@ from ..base.errors import InputError, SimulationError, choices
 from ..base.system_calls import cpus
 from ..exchange.listener import Texts
 from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of, length_until
-from ..interface.interface import Value
+from ..interface.fmi_types import Value
 from ..realtime.pacer import HaltError, OverrunError, Pacer, StallError
 from ..recording.recorded_run import Rejection
 from ..system.description import System

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ..base.calls import Call
 from ..exchange.listener import Texts
 from ..fmi.instance import CLOCK, Instance, dtype
-from ..interface.interface import Variable
+from ..interface.variables import Variable
 from ..realtime.pacer import Pacer
 from ..system.description import System
 from ..system.parts import Connection, Port

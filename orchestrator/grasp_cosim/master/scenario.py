@@ -24,8 +24,11 @@ import numpy.typing as npt
 from ..base.checks import exact
 from ..fmi.instance import Instance, dtype
 from ..interface.expansion import values_of
-from ..interface.interface import Given, Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
 from ..interface.units import IDENTITY
+from ..interface.values import Given
+from ..interface.variables import Variable
 from ..system.connectors import read_at
 from ..system.description import System
 from ..system.faults import FAULTS, INITIAL, Act, Draws, Remembering

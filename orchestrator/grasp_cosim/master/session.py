@@ -18,8 +18,8 @@ from ..base.progress import phase
 from ..exchange.listener import Listener
 from ..fmi.instance import Instance
 from ..fmi.process import load
-from ..interface.interface import Given
 from ..interface.units import IDENTITY
+from ..interface.values import Given
 from ..metrics.groups import check_groups
 from ..metrics.metric import Function, Metric
 from ..realtime.pacer import Pacer, Privileges, long_waits, privileges

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from ..base.errors import InputError, choices
 from ..base.si_units import known_unit
-from ..interface.interface import Variable
 from ..interface.units import Conversion
+from ..interface.variables import Variable
 from ..system.connectors import Tap, taps
 from ..system.structure import Structure, naming, signal_units
 from .metric import Metric, available, resolved

@@ -2,7 +2,7 @@
 
 The file is of the IPC format (Feather 2): a signal is a field with its unit and description in the
 metadata. Until its end is written it is a stream of whole batches; so a file can be read that a
-kill left behind, as far as the last of them (tables/arrow.py).
+kill left behind, as far as the last of them (tables/arrow_file.py).
 """
 
 import time
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from ..base.errors import InputError
 from ..exchange.listener import Experiment, Signal
-from ..tables.arrow import pyarrow
+from ..tables.arrow_file import pyarrow
 from .memory import TYPES, Batch, typed, writing
 
 BATCH = 4096

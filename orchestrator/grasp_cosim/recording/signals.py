@@ -12,7 +12,7 @@ from ..base.errors import InputError, nearest
 from ..base.text import from_cell
 from ..system.times import LONGEST
 from ..tables.column import Column, Table
-from ..tables.table import ARROW, TEXT, read_table
+from ..tables.read_table import ARROW, TEXT, read_table
 from .log_names import AS_THEY_ARE, LogColumn, LogNames
 from .mdf import read_mdf
 from .memory import Columns

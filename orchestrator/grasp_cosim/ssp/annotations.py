@@ -42,7 +42,7 @@ from ..system.record import Record
 from ..system.stimuli import Stimuli
 from ..system.structure import Diverging, Scheme
 from ..system.times import Time, in_nanoseconds, in_seconds, written
-from .document import add, at, children
+from .xml_document import add, at, children
 
 TYPE = "grasp-cosim"
 _TAG = "{grasp-cosim:system}System"

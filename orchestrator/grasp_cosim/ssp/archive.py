@@ -17,7 +17,7 @@ from urllib.parse import unquote, urlsplit
 from ..base.errors import InputError, choices, nearest
 from ..base.one_piece import in_one_piece
 from ..base.scratch import ScratchFolder
-from ..interface.document import check_size
+from ..interface.model_description import check_size
 
 SSD = ".ssd"
 STRUCTURE = f"SystemStructure{SSD}"

@@ -13,10 +13,21 @@ from typing import Any, TypeVar
 from ..base.checks import known
 from ..base.errors import InputError, choices
 from ..base.si_units import Unit
-from ..interface.interface import Interface, Variable
+from ..interface.interface import Interface
 from ..interface.read import read_interface
+from ..interface.variables import Variable
 from .archive import Archive
-from .document import Origin, at, child, children, is_true, open_structure, qualified, same, short
+from .xml_document import (
+    Origin,
+    at,
+    child,
+    children,
+    is_true,
+    open_structure,
+    qualified,
+    same,
+    short,
+)
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"

@@ -16,7 +16,9 @@ from typing import Any, NamedTuple
 from ..base.errors import InputError, choices
 from ..base.si_units import known_unit
 from ..interface.expansion import expanded
-from ..interface.interface import Value
+from ..interface.fmi_types import Value
+from ..interface.renaming import in_units, renamed
+from ..interface.values import parse_value
 from ..system.description import System
 from ..system.parts import Component, Connection, Port, Solver
 from ..system.stimuli import Stimuli
@@ -33,12 +35,12 @@ from ..system.times import (
 )
 from .annotations import FOREIGN, TYPE, Beside, Extras, read_extras, read_foreign
 from .archive import SSD, STRUCTURE, Archive, Notes
-from .connectors import Connectors, Part
-from .document import at, child, children, open_structure, qualified, same
 from .elements import Element, Node, Path, read_system
 from .flow import flow_order
-from .outside import system_inputs, system_outputs
-from .parameters import read_settings
+from .network import Network, Part
+from .start_values import read_settings
+from .system_connectors import system_inputs, system_outputs
+from .xml_document import at, child, children, open_structure, qualified, same
 
 
 class Called(NamedTuple):
@@ -90,7 +92,7 @@ def read_ssp(
         at: _called(file, names[at], part, extras.components[names[at]])
         for at, part in _sized(systems, parts, notes).items()
     }
-    network = Connectors(systems, {at: component.part for at, component in called.items()})
+    network = Network(systems, {at: component.part for at, component in called.items()})
     network.check()
     connections = tuple(_connections(network, called))
 
@@ -175,7 +177,7 @@ def _sized(
     if not any(v.shape for part in parts.values() for v in part.interface.variables):
         return dict(parts)
     before = deepcopy(notes.places)
-    sizes = read_settings(Connectors(systems, parts), "structuralParameter")
+    sizes = read_settings(Network(systems, parts), "structuralParameter")
     notes.places = before  # without those on values of elements that are not there yet
     return {
         at: replace(part, interface=expanded(part.interface, sizes.get(at, {})))
@@ -184,15 +186,20 @@ def _sized(
 
 
 def _called(file: str, name: str, part: Part, beside: Beside) -> Called:
+    """The component of a part, under the names and in the units that the system has for it."""
     declared = part.interface
-    renamed = declared.renamed(beside.rename, f"{file}: {name}: rename")
-    pairs = zip(declared.variables, renamed.variables, strict=True)
-    names = {own.name: new.name for own, new in pairs}
-    units = {**{names[own]: unit for own, unit in _units(part).items()}, **beside.units}
-    seen = renamed.in_units(units, f"{file}: {name}")
-    own = tuple(replace(v, name=n) for n, v in zip(names, seen.variables, strict=True))
-    interface = replace(declared, variables=own, units=seen.units)
-    return Called(name, names, units, beside, replace(part, interface=interface))
+    in_system_names = renamed(declared, beside.rename, f"{file}: {name}: rename")
+    pairs = zip(declared.variables, in_system_names.variables, strict=True)
+    system_names = {declared_one.name: renamed_one.name for declared_one, renamed_one in pairs}
+    units = {system_names[fmu_name]: unit for fmu_name, unit in _units(part).items()}
+    units |= beside.units
+    in_system_units = in_units(in_system_names, units, f"{file}: {name}")
+    variables = tuple(
+        replace(variable, name=fmu_name)
+        for fmu_name, variable in zip(system_names, in_system_units.variables, strict=True)
+    )
+    interface = replace(declared, variables=variables, units=in_system_units.units)
+    return Called(name, system_names, units, beside, replace(part, interface=interface))
 
 
 def _units(part: Part) -> dict[str, str]:
@@ -206,7 +213,7 @@ def _units(part: Part) -> dict[str, str]:
     return units
 
 
-def _connections(network: Connectors, called: Mapping[Path, Called]) -> Iterator[Connection]:
+def _connections(network: Network, called: Mapping[Path, Called]) -> Iterator[Connection]:
     """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
         if target.path not in network.parts or network.output(target) is None:
@@ -224,7 +231,7 @@ def _connections(network: Connectors, called: Mapping[Path, Called]) -> Iterator
 
 def _components(
     file: str,
-    network: Connectors,
+    network: Network,
     called: Mapping[Path, Called],
     sourced: Collection[Port],
     notes: list[str],
@@ -254,8 +261,8 @@ def _components(
             has_value = port in sourced or variable.name in values
             if variable.supported and not variable.element and not has_value and start is not None:
                 place = f"{file}: start value of {port}"
-                starts[variable.name] = component.interface.parse(
-                    place, variable.name, start, text=True
+                starts[variable.name] = parse_value(
+                    component.interface, place, variable.name, start, text=True
                 )
                 notes.append(f"input {port} is not connected; keeps its start value {start}")
         yield replace(component, values={**values, **starts})

@@ -14,9 +14,11 @@ from ..base.errors import InputError
 from ..base.files import check_file
 from ..base.si_units import Unit
 from ..base.text import counted
-from ..interface.interface import Value, Variable
+from ..interface.fmi_types import Value
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
+from ..interface.renaming import in_units
+from ..interface.variables import Variable
 from ..system.connectors import change_along, taps
 from ..system.description import System, as_system
 from ..system.parts import Component, Connection, Port
@@ -24,8 +26,8 @@ from ..system.times import in_seconds, written
 from ..system.validity import transforms
 from .annotations import PREFIXES, extras_of, write_extras, write_hint, write_steps
 from .archive import RESOURCES, STRUCTURE, write_archive
-from .document import VERSION, add, new, same, to_bytes, write_units
 from .elements import FMU
+from .xml_document import VERSION, add, new, same, to_bytes, write_units
 
 SET = "initialValues"
 """The name of all parameter sets: Ecos takes those of one name, EcosSimulation.init(...)."""
@@ -206,7 +208,7 @@ def _connected(component: Component) -> list[Variable]:
     """
     own = {**component.rename, **_own_names(component)}
     units = {own[name]: unit for name, unit in component.units.items()}
-    declared = component.sized(read_interface(component.fmu)).in_units(units)
+    declared = in_units(component.sized(read_interface(component.fmu)), units)
     variables = declared.of(*_CAUSALITIES)
     return [v for v in variables if v.supported and not (v.items and v.causality == "parameter")]
 

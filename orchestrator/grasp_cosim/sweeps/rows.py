@@ -19,15 +19,16 @@ from ..base.checks import is_number, point_advice
 from ..base.errors import InputError
 from ..base.quantity import Quantity, as_quantity
 from ..base.text import counted, on_one_line
-from ..interface.interface import Value
+from ..interface.fmi_types import Value
+from ..interface.values import in_own_unit
 from ..system.connectors import in_unit
 from ..system.description import System
 from ..system.parts import Port
 from ..system.times import LONGEST, in_nanoseconds, in_seconds
 from ..system.toml import place_of, plain
 from ..tables.column import Table
-from ..tables.table import read_table, split_head
-from ..tables.text import is_number as spells_number
+from ..tables.delimited import is_number as spells_number
+from ..tables.read_table import read_table, split_head
 
 Row = Mapping[str, Any]
 """Values by place, some of them with a unit until in_own_units()."""
@@ -245,7 +246,7 @@ def _in_own_unit(system: System, place: str, value: Any, said: str) -> Any:
         return value
     if interface is None:
         raise InputError(f"{said} = {quantity}: must have no unit")
-    return interface.in_own_unit(said, variable.name, quantity) if variable else value
+    return in_own_unit(interface, said, variable.name, quantity) if variable else value
 
 
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:

@@ -24,7 +24,7 @@ from ..recording.result import Result
 from ..system.description import System
 from .rows import Row
 from .seeds import with_row
-from .signals import Store
+from .signal_store import Store
 from .table import Outcome
 
 Job = tuple[int, Row]

@@ -17,12 +17,12 @@ from ..metrics.groups import chosen, metrics_of
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available
 from ..system.description import System, as_system
-from .kept import identity_of, keep, opened
+from .finished_runs import identity_of, keep, opened
 from .places import elsewhere, here
 from .rows import Row, as_rows, in_own_units, labels_of, settings_of, unit_of
 from .run import Task
 from .seeds import seeds_of_runs
-from .signals import Recorded, Store, arrays, begin, recording, times
+from .signal_store import Recorded, Store, arrays, begin, recording, times
 from .table import Outcome, Table, made
 
 

@@ -22,10 +22,10 @@ from ..base.checks import extra_module
 from ..base.errors import InputError, choices, nearest
 from ..base.one_piece import in_one_piece
 from ..base.text import columns, counted, on_a_screen, significant
-from ..interface.interface import Value
+from ..interface.fmi_types import Value
 from ..metrics.metric import Metric
 from .rows import Row
-from .signals import RUN, TIME, Recorded, dimension
+from .signal_store import RUN, TIME, Recorded, dimension
 
 if TYPE_CHECKING:
     import pandas as pd

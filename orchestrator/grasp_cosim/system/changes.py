@@ -11,9 +11,13 @@ from shlex import quote
 
 from ..base.errors import InputError, choices, nearest
 from ..interface.expansion import values_of
-from ..interface.interface import Given, Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
 from ..interface.read import describe
+from ..interface.renaming import renamed
 from ..interface.units import IDENTITY
+from ..interface.values import Given
+from ..interface.variables import Variable
 from .parts import Component, literal
 from .structure import Structure, unit_of
 
@@ -70,7 +74,7 @@ def replaced(
     none.
     """
     before = was.code.interface if was.code else describe(was.fmu)
-    ours, theirs = was.sized(before).renamed(was.rename), was.sized(describe(fmu))
+    ours, theirs = renamed(was.sized(before), was.rename), was.sized(describe(fmu))
     names = {
         name: own
         for name, own in was.rename.items()
@@ -78,7 +82,7 @@ def replaced(
     } | dict(rename)
     while taken := (names.keys() & theirs.by_name) - {*rename, *names.values()}:
         names = {name: own for name, own in names.items() if name not in taken}
-    found = theirs.renamed(names, f"{place}rename")
+    found = renamed(theirs, names, f"{place}rename")
     kept = {
         name: unit
         for name, unit in was.units.items()

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 from ..base.errors import InputError, nearest
 from ..base.quantity import Quantity, as_quantity
 from ..base.si_units import Unit, known_unit
-from ..interface.interface import SETTABLE, Variable
 from ..interface.units import IDENTITY, Conversion, conversion, converted, no_conversion
+from ..interface.variables import SETTABLE, Variable
 from .parts import Port, Way
 from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of

@@ -10,7 +10,7 @@ from typing import Any, overload
 from ..base.errors import InputError, nearest
 from ..base.files import check_nature
 from ..base.registry import check_registered, registered
-from ..interface.interface import Given
+from ..interface.values import Given, parse_value
 from .changes import with_own_values
 from .connectors import check_connectors, driven_by_connectors, given_by_connectors
 from .from_python import Part, from_sections
@@ -126,7 +126,7 @@ class System(Structure):
         for component in self.components:
             place = f"{self.name}: {component.name}"
             for name, value in component.values.items():
-                component.interface.parse(f"{place}.{name}", name, value)
+                parse_value(component.interface, f"{place}.{name}", name, value)
             if component.name in SECTIONS:
                 raise InputError(
                     f"{place}: is the name of a section of a system file; must have another name"

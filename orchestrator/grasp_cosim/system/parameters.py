@@ -8,7 +8,8 @@ from typing import NamedTuple
 from ..base.errors import UnknownNameError
 from ..base.registry import registered
 from ..base.text import columns, on_a_screen
-from ..interface.interface import PARAMETERS, Value
+from ..interface.fmi_types import Value
+from ..interface.variables import PARAMETERS
 from .structure import Structure
 
 HEADS = ("parameter", "value", "unit", "range", "description")

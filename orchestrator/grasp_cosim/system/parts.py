@@ -16,9 +16,12 @@ from ..base.errors import InputError
 from ..base.quantity import as_quantity
 from ..base.si_units import Unit
 from ..interface.expansion import expanded
-from ..interface.interface import Given, Interface, Value
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
 from ..interface.obstacles import of_binary
 from ..interface.read import read_interface
+from ..interface.renaming import in_units, renamed
+from ..interface.values import Given
 from .python_code import PythonCode
 from .times import LONGEST, NANOSECONDS, Time, in_seconds
 
@@ -118,12 +121,12 @@ class Component:
     @cached_property
     def interface(self) -> Interface:
         """The interface of the FMU in the system's names and units, with its arrays taken apart."""
-        return self.declared.in_units(self.units, f"{self.name}: units")
+        return in_units(self.declared, self.units, f"{self.name}: units")
 
     @cached_property
     def declared(self) -> Interface:
         """The same with the units that the FMU declares."""
-        return self.sized(self._read[0]).renamed(self.rename, f"{self.name}: rename")
+        return renamed(self.sized(self._read[0]), self.rename, f"{self.name}: rename")
 
     @cached_property
     def loaded(self) -> Interface:

@@ -29,7 +29,9 @@ from typing import Any, NamedTuple, Protocol
 from ..base.errors import InputError
 from ..base.quantity import unwrapped
 from ..base.si_units import Unit, known_unit
-from ..interface.interface import Interface, Kind, Value, Variable
+from ..interface.fmi_types import Kind, Value
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 
 CAUSALITIES = {"inputs": "input", "outputs": "output", "parameters": "parameter"}
 """The causality of what a class declares under a name."""

@@ -13,7 +13,9 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from ..base.errors import InputError, choices, nearest
-from ..interface.interface import SUPPORTED, Interface, Variable
+from ..interface.fmi_types import SUPPORTED_KINDS
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 from .parts import Component, Port
 
 LEFT_OUT = "!"
@@ -183,7 +185,7 @@ def missing(
         component, v = unrecordable
         return (
             f"is of type {v.nature}: {component.name}.{v.name} cannot be recorded; must be "
-            f"{choices(SUPPORTED)}"
+            f"{choices(SUPPORTED_KINDS)}"
         )
     if any(one.matches([name]) for name in (*outputs, *_worked_out(components))):
         return None

@@ -22,7 +22,10 @@ from ..base.checks import (
 )
 from ..base.errors import InputError, choices, nearest
 from ..interface.expansion import values_of
-from ..interface.interface import PARAMETERS, Given, Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
+from ..interface.values import Given, parse_value
+from ..interface.variables import PARAMETERS, Variable
 from .connectors import read_at, taps
 from .faults import FAULTS, RANDOM
 from .parts import (
@@ -294,7 +297,7 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
         if valid and (valid.needed or name in fault.parameters):
             number(at, given, valid.low, valid.high, above=valid.above, must=valid.must)
         elif not valid and name in fault.parameters:
-            exact(at, interface.parse(at, fault.target.variable, fault.parameters[name]))
+            exact(at, parse_value(interface, at, fault.target.variable, fault.parameters[name]))
     of.check(place, fault.parameters, system.step_ns)
     step, start, end = system.step_ns, fault.start_ns, fault.end_ns
     since = system.start_ns

@@ -142,7 +142,7 @@ def read_stimuli(
     InputError where there is none, or at the first cell that is not as it must be, but for what
     depends on the variables: see validity.py.
     """
-    from ..tables.table import read_table  # only here: most runs have no stimuli
+    from ..tables.read_table import read_table  # only here: most runs have no stimuli
 
     path = Path(path)
     chosen: Interpolation = choice(place, interpolation, INTERPOLATIONS)

@@ -15,8 +15,10 @@ from ..base.errors import InputError, choices, nearest
 from ..base.registry import registered
 from ..base.si_units import Unit
 from ..base.text import on_a_screen
-from ..interface.interface import Given, Interface, Variable
+from ..interface.interface import Interface
 from ..interface.units import IDENTITY, Conversion
+from ..interface.values import Given
+from ..interface.variables import Variable
 from .parts import (
     Acceptance,
     Component,

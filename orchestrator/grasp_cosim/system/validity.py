@@ -18,9 +18,12 @@ from ..base.errors import InputError, choices, nearest
 from ..base.si_units import known_unit
 from ..base.text import counted
 from ..interface.expansion import shape_text
-from ..interface.interface import SUPPORTED, Clock, Interface, Value, Variable, limits
+from ..interface.fmi_types import SUPPORTED_KINDS, Value, limits
+from ..interface.interface import Interface
 from ..interface.obstacles import KINDS
 from ..interface.units import IDENTITY, Conversion, conversion, no_conversion
+from ..interface.values import parse_value
+from ..interface.variables import Clock, Variable
 from .declared_steps import of_declared_steps
 from .parts import Component, Connection, Port, Solver
 from .stimuli import Stimuli, Stimulus
@@ -218,7 +221,7 @@ def _check_types(
         if not v.supported:
             raise InputError(
                 f"{place}: {port} is of type {v.nature}, which is not supported; must be "
-                f"{choices(SUPPORTED)}"
+                f"{choices(SUPPORTED_KINDS)}"
             )
     (given, taken), ((least, most), (low, high)) = ends, ranges
     fits, must = True, ""
@@ -487,7 +490,7 @@ def _value(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Valu
     value: Value = column.text(row)
     if change != IDENTITY and not column.texts:
         value = change(column.samples[row])
-    return interface.parse(stimuli.place(port, row), port.variable, value, text=True)
+    return parse_value(interface, stimuli.place(port, row), port.variable, value, text=True)
 
 
 def _conversion(place: str, interface: Interface, port: Port, column: Stimulus) -> Conversion:

@@ -19,7 +19,7 @@ from ...base.parallel import Crew
 from ...base.progress import Progress
 from ...interface.units import IDENTITY
 from ...system.description import System
-from ...tables.table import names_in, read_table
+from ...tables.read_table import names_in, read_table
 from ..metrics import FINGERS
 from ..presets import CASES, start_in_si, with_case, with_si_values
 from ..published.compared import Setting, close, published_rows

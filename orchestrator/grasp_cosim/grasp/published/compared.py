@@ -22,13 +22,13 @@ from ...base.interruption import raised
 from ...base.parallel import Crew
 from ...base.progress import Progress, phase
 from ...base.text import to_cell
-from ...interface.interface import Value
+from ...interface.fmi_types import Value
 from ...master.simulation import simulate
 from ...metrics.metric import resolved
 from ...recording.result import Result
 from ...system.description import System
 from ...system.times import in_seconds
-from ...tables.table import read_table
+from ...tables.read_table import read_table
 from ..metrics import FINGERS, IMPACT_WINDOW
 from ..presets import CASES, start_in_si, with_case, with_si_values
 

@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 from ..base.errors import InputError, nearest
 from ..base.si_units import Unit
-from ..interface.interface import Interface, Variable
-from .document import change, same
+from ..interface.interface import Interface
+from ..interface.variables import Variable
 from .elements import Element, Hop, Node, Path
+from .xml_document import change, same
 
 OTHERWISE = "unit {!r} is defined otherwise by the FMU, whose definition is taken"
 
@@ -46,7 +47,7 @@ class Carried(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Connectors:
+class Network:
     """All systems and components by path, and the hops between their connectors."""
 
     systems: Mapping[Path, Element]

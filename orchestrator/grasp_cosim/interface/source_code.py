@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from xml.parsers.expat import ExpatError
 
-from .document import NAME, parsed
 from .interface import Interface
+from .model_description import NAME, parsed
 
 FOLDER = "sources/"
 BUILD = f"{FOLDER}buildDescription.xml"

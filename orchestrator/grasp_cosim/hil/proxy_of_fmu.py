@@ -24,8 +24,10 @@ from ..fmu_export.link import (
     read_key,
 )
 from ..interface.expansion import expanded
-from ..interface.interface import Interface, Value, Variable
+from ..interface.fmi_types import Value
+from ..interface.interface import Interface
 from ..interface.read import read_interface
+from ..interface.variables import Variable
 from ..system.times import NANOSECONDS
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator
 
 from ..base.errors import InputError
 from ..base.si_units import Unit
-from ..interface.interface import SETTABLE
 from ..interface.units import IDENTITY, conversion
+from ..interface.variables import SETTABLE
 from ..system.parts import Port, SystemInput, SystemOutput, Way
 from ..system.structure import unit_of
-from .connectors import Carried, Connectors
 from .elements import Hop, Node
+from .network import Carried, Network
 
 _TIME = "time"
 """The name of the first column of a recording."""
@@ -23,7 +23,7 @@ Called = Callable[[Node], Port]
 """The name in the system of a variable of a component."""
 
 
-def system_outputs(network: Connectors, called: Called) -> dict[str, SystemOutput]:
+def system_outputs(network: Network, called: Called) -> dict[str, SystemOutput]:
     """The outputs of the systems that come from an output of a component, by name."""
     outputs: dict[str, SystemOutput] = {}
     for name, node, place in _named(network, called, ("output",)):
@@ -49,7 +49,7 @@ def system_outputs(network: Connectors, called: Called) -> dict[str, SystemOutpu
     return outputs
 
 
-def system_inputs(network: Connectors, called: Called) -> dict[str, SystemInput]:
+def system_inputs(network: Network, called: Called) -> dict[str, SystemInput]:
     """The inputs and parameters of the systems that lead to a component, by name."""
     behind: dict[Node, list[tuple[Node, list[Hop]]]] = {}
     for target in network.into:
@@ -96,7 +96,7 @@ def _way(
 
 
 def _named(
-    network: Connectors, called: Called, kinds: tuple[str, ...]
+    network: Network, called: Called, kinds: tuple[str, ...]
 ) -> Iterator[tuple[str, Node, str]]:
     """Yield the connectors of systems of these kinds, by the names that they have in the run.
 

@@ -15,17 +15,17 @@ from ..base.errors import InputError
 from ..base.files import check_fmu_file, not_its_fault
 
 NAME = "modelDescription.xml"
-HEAD = 20
+ELF_HEAD_BYTES = 20
 """Bytes of an ELF file that say which processor it is for."""
-LARGEST = 100_000_000
+MAX_DESCRIPTION_BYTES = 100_000_000
 """Bytes of a modelDescription.xml: some 300,000 variables, more than the largest FMUs have."""
-LARGEST_UNPACKED, MOST_EXPANSION = 500_000_000, 50
+MAX_UNPACKED_BYTES, MAX_EXPANSION = 500_000_000, 50
 """Bytes of all files, allowed beyond that if the archive is at least one 50th as large: binaries
 and tables pack 2 to 20 times, a bomb hundreds of times."""
-DEEPEST = 256
+MAX_DEPTH = 256
 """Elements within each other: the standard needs 6, the annotations of tools some more."""
 _BINARY = re.compile(r"binaries/linux64/[^/]+\.so")
-MOST_ELEMENTS = 1_000_000
+MAX_XML_ELEMENTS = 1_000_000
 """Two or three to a variable."""
 
 
@@ -53,14 +53,16 @@ def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
                 found = near and f"; must be there, and called so: there is {near}"
                 raise ValueError(f"no {NAME} at the top of the archive{found}")
             description = entries[NAME].file_size
-            if description > LARGEST:
-                raise ValueError(f"{NAME} has {description} bytes; must have at most {LARGEST}")
+            if description > MAX_DESCRIPTION_BYTES:
+                raise ValueError(
+                    f"{NAME} has {description} bytes; must have at most {MAX_DESCRIPTION_BYTES}"
+                )
             check_size(archive, path)
             root = parsed(archive.read(NAME))
             files = dict.fromkeys(entries, b"")
             for name in filter(_BINARY.fullmatch, entries):
                 with archive.open(entries[name]) as file:
-                    files[name] = file.read(HEAD)
+                    files[name] = file.read(ELF_HEAD_BYTES)
         if not root.get("fmiVersion"):
             raise ValueError(f"no fmiVersion in {NAME}")
     except Exception as error:  # zipfile and its decompressors raise whatever they like
@@ -71,7 +73,7 @@ def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
 def check_size(archive: zipfile.ZipFile, path: Path) -> None:
     """ValueError where the files of the archive at `path` would be too large, unpacked."""
     total = sum(i.file_size for i in archive.infolist())
-    most = max(LARGEST_UNPACKED, MOST_EXPANSION * path.stat().st_size)
+    most = max(MAX_UNPACKED_BYTES, MAX_EXPANSION * path.stat().st_size)
     if total > most:
         raise ValueError(f"its files have {total} bytes unpacked; must have at most {most}")
 
@@ -86,8 +88,8 @@ def unreadable(path: Path, error: Exception | str) -> InputError:
 
 def parsed(text: bytes) -> ElementTree.Element:
     """The root; of all at once, since expat reads a long name anew with each piece."""
-    if text.count(b"<") - text.count(b"</") > MOST_ELEMENTS:  # as cheap as can be
-        raise ValueError(f"{NAME} has more than {MOST_ELEMENTS} elements")
+    if text.count(b"<") - text.count(b"</") > MAX_XML_ELEMENTS:  # as cheap as can be
+        raise ValueError(f"{NAME} has more than {MAX_XML_ELEMENTS} elements")
     builder = ElementTree.TreeBuilder()
     parser = expat.ParserCreate(None, "}")
 
@@ -105,7 +107,7 @@ def parsed(text: bytes) -> ElementTree.Element:
 def _check_depth(root: ElementTree.Element) -> None:
     """ValueError where elements are too deep within each other."""
     level = [root]
-    for _ in range(DEEPEST):
+    for _ in range(MAX_DEPTH):
         level = [inner for element in level for inner in element]
     if level:
-        raise ValueError(f"{level[0].tag} in {NAME} is more than {DEEPEST} elements deep")
+        raise ValueError(f"{level[0].tag} in {NAME} is more than {MAX_DEPTH} elements deep")

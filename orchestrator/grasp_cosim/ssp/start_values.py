@@ -22,10 +22,11 @@ from typing import Any
 from ..base.checks import known
 from ..base.errors import InputError, choices
 from ..base.si_units import Unit
-from ..interface.interface import Value
-from .connectors import OTHERWISE, Carried, Connectors
-from .document import Origin, at, child, children, is_true, same, short
+from ..interface.fmi_types import Value
+from ..interface.values import parse_value
 from .elements import Element, Hop, Node, Path, linear, transformation
+from .network import OTHERWISE, Carried, Network
+from .xml_document import Origin, at, child, children, is_true, same, short
 
 _READERS: Mapping[str, Callable[[str], Value]] = {
     "Real": float,
@@ -67,7 +68,7 @@ class Given:
     transformation: Any = None
 
 
-def read_settings(network: Connectors, causality: str = "") -> dict[Path, dict[str, Value]]:
+def read_settings(network: Network, causality: str = "") -> dict[Path, dict[str, Value]]:
     """The value that holds for each variable that is given one; of one causality, if that is named.
 
     By the path of the component and the FMU's name of the variable.
@@ -90,7 +91,7 @@ def read_settings(network: Connectors, causality: str = "") -> dict[Path, dict[s
     return values
 
 
-def _settled(network: Connectors) -> Iterator[tuple[Node, Parameter]]:
+def _settled(network: Network) -> Iterator[tuple[Node, Parameter]]:
     """Yield the variables that are given a value, and the one that holds."""
     given: dict[Node, Parameter] = {}
     for element, origin, binding in _bindings(network):
@@ -107,7 +108,7 @@ def _settled(network: Connectors) -> Iterator[tuple[Node, Parameter]]:
             yield node, _arriving(network, node, given)
 
 
-def _bindings(network: Connectors) -> Iterator[tuple[Element, Origin, Any]]:
+def _bindings(network: Network) -> Iterator[tuple[Element, Origin, Any]]:
     """All bindings with what they are at; who goes before another comes after it."""
     components = (part.element for part in network.parts.values())
     inner_first = sorted(network.systems.values(), key=lambda e: len(e.path), reverse=True)
@@ -158,7 +159,7 @@ def _set(origin: Origin, root: Any, prefix: str) -> dict[str, Parameter]:
     return parameters
 
 
-def _nodes(network: Connectors, element: Element, name: str) -> Iterator[Node]:
+def _nodes(network: Network, element: Element, name: str) -> Iterator[Node]:
     """Yield the variables and connectors that a name means at a system or component."""
     if element.path in network.parts:
         if name in network.parts[element.path].interface.by_name:
@@ -172,7 +173,7 @@ def _nodes(network: Connectors, element: Element, name: str) -> Iterator[Node]:
             yield from _nodes(network, inner, name[dot + 1 :])
 
 
-def _arriving(network: Connectors, node: Node, given: Mapping[Node, Parameter]) -> Parameter:
+def _arriving(network: Network, node: Node, given: Mapping[Node, Parameter]) -> Parameter:
     """The value that holds at a node: of what it is connected to, else its own."""
     hops = network.trace(node)
     start = next((k for k, hop in enumerate(hops) if hop.source in given), None)
@@ -190,7 +191,7 @@ def _arriving(network: Connectors, node: Node, given: Mapping[Node, Parameter]) 
     return parameter
 
 
-def _passed(network: Connectors, hop: Hop, given: Parameter) -> Parameter:
+def _passed(network: Network, hop: Hop, given: Parameter) -> Parameter:
     """The parameter after one more hop."""
     if given.type in ("Real", "Integer"):
         carried = network.carry(hop, Carried(given.unit, settled=given.settled))
@@ -203,7 +204,7 @@ def _passed(network: Connectors, hop: Hop, given: Parameter) -> Parameter:
     return given
 
 
-def _adapted(network: Connectors, node: Node, given: Given) -> Parameter:
+def _adapted(network: Network, node: Node, given: Given) -> Parameter:
     """The parameter in the unit of the node, transformed as on a connection, or by a table."""
     own = None if given.suppress else _own_unit(network, node, given.parameter)
     parameter, change, factors = replace(given.parameter, unit=own), given.transformation, None
@@ -215,7 +216,7 @@ def _adapted(network: Connectors, node: Node, given: Given) -> Parameter:
     return _passed(network, Hop(parameter.place, node, node, factors, given.suppress), parameter)
 
 
-def _own_unit(network: Connectors, node: Node, parameter: Parameter) -> Unit | None:
+def _own_unit(network: Network, node: Node, parameter: Parameter) -> Unit | None:
     """The unit of a value for a node; None where it is that of the node, or has no meaning there.
 
     A unit of the name that the FMU gives it is the FMU's, however the set defines it.
@@ -248,11 +249,11 @@ def _mapped(given: Parameter, element: Any) -> Parameter:
     return replace(given, value=targets[given.value])
 
 
-def _value(network: Connectors, node: Node, given: Parameter) -> Value:
+def _value(network: Network, node: Node, given: Parameter) -> Value:
     part = network.parts[node.path]
     variable = part.interface.by_name[node.name]
     fits = given.type == variable.kind or (given.type, variable.kind) == ("Integer", "Real")
     if not fits and not (given.type == "Enumeration" and variable.items):
         said = f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"
         raise InputError(said)
-    return part.interface.parse(given.place, node.name, given.value)
+    return parse_value(part.interface, given.place, node.name, given.value)

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.text import from_cell
-from .arrow import IPC, PARQUET, arrow_table, numbers_of, texts_of
+from .arrow_file import IPC, PARQUET, arrow_table, numbers_of, texts_of
 from .column import Column, Table, Values
-from .text import PIECE, Numbers, TextFile
+from .delimited import PIECE, Numbers, TextFile
 
 ARROW = (*IPC, *PARQUET)
 TEXT = (".csv", ".tsv")
