@@ -131,6 +131,14 @@ def test_each_attribute_of_a_result_is_documented_where_editors_look(cls):
             assert ast.get_docstring(field), field.name
 
 
+def test_each_argument_of_an_environment_is_documented():
+    pytest.importorskip("gymnasium")
+    from grasp_cosim.gym import Environment
+
+    for method in (Environment.__init__, *methods_of(Environment)):
+        check(method, inspect.getdoc(method))
+
+
 def test_a_run_is_a_function_whose_sessions_are_beside_it():
     assert inspect.isfunction(grasp_cosim.simulate)
     assert grasp_cosim.simulate.session is grasp_cosim.Session

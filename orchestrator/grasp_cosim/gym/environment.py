@@ -17,7 +17,7 @@ from ..master.simulation import simulate
 from ..system.connectors import read_at
 from ..system.description import System
 from ..system.parts import as_signal
-from ..system.times import in_nanoseconds, seconds
+from ..system.times import Time, in_nanoseconds, seconds
 
 Floats = npt.NDArray[np.float64]
 Names = Sequence[str] | Mapping[str, tuple[float, float] | None]
@@ -73,48 +73,52 @@ class Environment(Env[Floats, Floats]):
         Raises:
             InputError: An argument is wrong, or an FMU does not load.
         """
-        calls = {"reward": reward, "ends": ends, "start": start}
-        for what, call in calls.items():
-            if not (callable(call) or (what == "reward" and isinstance(call, str)) or call is None):
-                raise InputError(f"{what} = {call!r}: must be a function")
+        if not isinstance(reward, str):
+            _check_function("reward", reward)
+        _check_function("ends", ends)
+        if start is not None:
+            _check_function("start", start)
         self.session = simulate.session(system, **options)
         try:
-            own, wanted = self.session.system.step_ns, in_nanoseconds("step", step)
-            self._steps = int(wanted // own)
-            if self._steps < 1 or wanted % own:
-                raise InputError(f"step = {step!r}: must be a whole number of {seconds(own)}")
+            self._steps = _steps_in(step, self.session.system.step_ns)
             self.observation_space: Any = self._space("observations", observations)
             self.action_space: Any = self._space("actions", actions)
-            self._observed, self._acting = tuple(observations), tuple(actions)
+            self._observed_names, self._action_names = tuple(observations), tuple(actions)
             self._observe()  # where a name is none
         except BaseException:
             self.session.close()
             raise
-        self._reward = (lambda s: s[reward]) if isinstance(reward, str) else reward
+        self._reward = (lambda session: session[reward]) if isinstance(reward, str) else reward
         self._ends, self._draw_start = ends, start
 
-    def _space(self, what: str, names: Names) -> Box:
-        """The box of their ranges."""
+    def _space(self, argument: str, names: Names) -> Box:
+        """The box of the ranges of variables; `argument` is what the user calls these names."""
         if isinstance(names, str):
-            raise InputError(f"{what} = {names!r}: must be a list of names, or ranges by name")
-        given = names if isinstance(names, Mapping) else dict.fromkeys(names)
-        ranges = [self._declared(name) if x is None else x for name, x in given.items()]
+            raise InputError(f"{argument} = {names!r}: must be a list of names, or ranges by name")
+        by_name = names if isinstance(names, Mapping) else dict.fromkeys(names)
+        ranges = [
+            self._declared(name) if limits is None else limits for name, limits in by_name.items()
+        ]
         try:
             low, high = np.array(ranges, np.float64).reshape(len(ranges), 2).T
         except ValueError as error:
-            raise InputError(f"{what}: {given!r}: must be ranges, like (0.0, 1.0)") from error
-        for name, least, greatest in zip(given, low, high, strict=True):
+            raise InputError(f"{argument}: {by_name!r}: must be ranges, like (0.0, 1.0)") from error
+        for name, least, greatest in zip(by_name, low, high, strict=True):
             if not least <= greatest:
-                raise InputError(f"{what}: {name!r} = {given[name]!r}: must be (least, greatest)")
+                raise InputError(
+                    f"{argument}: {name!r} = {by_name[name]!r}: must be (least, greatest)"
+                )
         return Box(low, high, dtype=np.float64)
 
     def _declared(self, name: str) -> tuple[float, float]:
         """The least and the greatest value that an FMU declares; infinite where it does not."""
         system = self.session.system
-        port, change = read_at(system, as_signal(f"signal {name!r}", name))
+        port, conversion = read_at(system, as_signal(f"signal {name!r}", name))
         variable = system.component(port.component, name).interface.by_name.get(port.variable)
-        low, high = (-inf, inf) if variable is None else (variable.low, variable.high)
-        return min(change(low), change(high)), max(change(low), change(high))
+        if variable is None:
+            return -inf, inf
+        limits = conversion(variable.low), conversion(variable.high)
+        return min(limits), max(limits)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -153,19 +157,35 @@ class Environment(Env[Floats, Floats]):
         """
         session, values = self.session, np.asarray(action)
         if values.shape != self.action_space.shape:
-            raise InputError(f"action = {action!r}: must be an array of {len(self._acting)}")
-        for name, value in zip(self._acting, values.tolist(), strict=True):
+            raise InputError(f"action = {action!r}: must be an array of {len(self._action_names)}")
+        for name, value in zip(self._action_names, values.tolist(), strict=True):
             session.set(name, value)
         session.step(self._steps)
-        over = session.complete or session.ended_at is not None
-        terminated = bool(self._ends(session))
+        is_over = session.complete or session.ended_at is not None
+        is_terminated = bool(self._ends(session))
         reward = float(self._reward(session))
-        return self._observe(), reward, terminated, over and not terminated, {}
+        return self._observe(), reward, is_terminated, is_over and not is_terminated, {}
 
     def _observe(self) -> Floats:
+        """The present values of the variables that are observed."""
         session = self.session
-        return np.array([session[name] for name in self._observed], np.float64)
+        return np.array([session[name] for name in self._observed_names], np.float64)
 
     def close(self) -> None:
         """Free the FMUs."""
         self.session.close()
+
+
+def _check_function(argument: str, function: object) -> None:
+    """InputError for what is no function."""
+    if not callable(function):
+        raise InputError(f"{argument} = {function!r}: must be a function")
+
+
+def _steps_in(step: float, step_ns: Time) -> int:
+    """How many steps of a system are in a control step in s; InputError for no whole number."""
+    control_step_ns = in_nanoseconds("step", step)
+    steps = int(control_step_ns // step_ns)
+    if steps < 1 or control_step_ns % step_ns:
+        raise InputError(f"step = {step!r}: must be a whole number of {seconds(step_ns)}")
+    return steps

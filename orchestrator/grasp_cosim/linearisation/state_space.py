@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 Matrix = npt.NDArray[np.float64]
 Response = npt.NDArray[np.complex128]
 
-POINTS = 4000
-"""Frequencies at which a loop is looked at for its crossovers, besides those of its poles."""
+FREQUENCIES = 4000
+"""How many frequencies are searched for the crossovers of a loop, besides those of its poles."""
 
-FEW = 4
-"""So many names of each kind are in the repr() of a model."""
-
-LOWEST = 1e-7
+MIN_FREQUENCY = 1e-7
 """The lowest of them, as a share of the Nyquist frequency."""
+
+MAX_NAMES_SHOWN = 4
+"""How many names of each kind are in the repr() of a model."""
 
 
 class Margins(NamedTuple):
@@ -93,8 +93,8 @@ class StateSpace:
         """Its size, and what goes in and comes out."""
         return (
             f"StateSpace at {self.at:g} s, in steps of {self.step:g} s: "
-            f"{len(self.states)} states, from {choices(self.inputs, FEW)} to "
-            f"{choices(self.outputs, FEW)}"
+            f"{len(self.states)} states, from {choices(self.inputs, MAX_NAMES_SHOWN)} to "
+            f"{choices(self.outputs, MAX_NAMES_SHOWN)}"
         )
 
     @property
@@ -112,9 +112,9 @@ class StateSpace:
             Complex factors of the shape (frequencies, outputs, inputs).
         """
         z = np.exp(1j * self.step * np.atleast_1d(np.asarray(omega, np.float64)))
-        resolvent = z[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
-        found = self.C @ np.linalg.solve(resolvent, self.B.astype(np.complex128)) + self.D
-        return np.asarray(found, np.complex128)
+        z_minus_a = z[:, np.newaxis, np.newaxis] * np.eye(len(self.A)) - self.A
+        response = self.C @ np.linalg.solve(z_minus_a, self.B.astype(np.complex128)) + self.D
+        return np.asarray(response, np.complex128)
 
     def margins(self) -> Margins:
         """The margins of the loop that was opened between the one input and the one output.
@@ -136,20 +136,21 @@ class StateSpace:
 
         omega = self._frequencies()
         values = loop(omega)
-        crossovers = zeros(lambda w: abs(loop(w)[0]) - 1.0, omega, np.abs(values) - 1.0)
-        lags = [(float(np.angle(-loop(w)[0]) % (2.0 * pi)), w) for w in crossovers]
-        lag, crossover = min(lags, key=lambda found: found[0] / found[1], default=(inf, nan))
-        turns = [*zeros(lambda w: loop(w)[0].imag, omega, values.imag), float(omega[-1])]
-        shares = [(-loop(w)[0].real, w) for w in turns]  # at the end, Nyquist's, it is real
-        gains = [(float(1.0 / share), w) for share, w in shares if 0.0 < share < 1.0]
-        gain, turn = min(gains, default=(inf, nan))
+        phase_margin, delay_margin, crossover = inf, inf, nan
+        for frequency in zeros(lambda w: abs(loop(w)[0]) - 1.0, omega, np.abs(values) - 1.0):
+            lag = float(np.angle(-loop(frequency)[0]) % (2.0 * pi))
+            if lag / frequency < delay_margin:
+                phase_margin = degrees((lag + pi) % (2.0 * pi) - pi)
+                delay_margin, crossover = lag / frequency, frequency
+        gain_margin, phase_crossover = inf, nan
+        nyquist = float(omega[-1])  # there the loop is real
+        for frequency in [*zeros(lambda w: loop(w)[0].imag, omega, values.imag), nyquist]:
+            share = -loop(frequency)[0].real
+            if 0.0 < share < 1.0 and 1.0 / share < gain_margin:
+                gain_margin, phase_crossover = float(1.0 / share), frequency
+        is_stable = self._stable_when_closed()
         return Margins(
-            crossover,
-            degrees((lag + pi) % (2.0 * pi) - pi) if lag < inf else inf,
-            lag / crossover if lag < inf else inf,
-            turn,
-            gain,
-            self._stable_when_closed(),
+            crossover, phase_margin, delay_margin, phase_crossover, gain_margin, is_stable
         )
 
     def _stable_when_closed(self) -> bool:
@@ -168,7 +169,8 @@ class StateSpace:
         Raises:
             InputError: python-control is not installed.
         """
-        made: Any = extra_module("control", "which has this class", "control").ss(
+        module: Any = extra_module("control", "which has this class", "control")
+        model: control.StateSpace = module.ss(
             self.A,
             self.B,
             self.C,
@@ -178,15 +180,15 @@ class StateSpace:
             inputs=[*self.inputs],
             outputs=[*self.outputs],
         )
-        return made
+        return model
 
     def _frequencies(self) -> npt.NDArray[np.float64]:
         """From low ones to the Nyquist frequency, in rad/s, those of the poles among them."""
         nyquist = pi / self.step
         poles = self.poles
         of_poles = np.abs(np.log(poles[poles != 0.0])) / self.step
-        within = of_poles[(of_poles > LOWEST * nyquist) & (of_poles < nyquist)]
-        return np.unique([*np.geomspace(LOWEST * nyquist, nyquist, POINTS), *within])
+        within = of_poles[(of_poles > MIN_FREQUENCY * nyquist) & (of_poles < nyquist)]
+        return np.unique([*np.geomspace(MIN_FREQUENCY * nyquist, nyquist, FREQUENCIES), *within])
 
 
 def reaching(a: Matrix, c: Matrix) -> list[int]:
@@ -194,10 +196,12 @@ def reaching(a: Matrix, c: Matrix) -> list[int]:
 
     Of the transposed A and B these are the states that an input reaches.
     """
-    reach = (c != 0.0).any(axis=0)
-    while (more := reach | (a[reach] != 0.0).any(axis=0)).sum() > reach.sum():
-        reach = more
-    return np.flatnonzero(reach).tolist()
+    reached = (c != 0.0).any(axis=0)
+    while True:
+        extended = reached | (a[reached] != 0.0).any(axis=0)
+        if extended.sum() == reached.sum():
+            return np.flatnonzero(reached).tolist()
+        reached = extended
 
 
 def zeros(

@@ -111,7 +111,7 @@ class RunRecord:
         names = {signal.name for signal in self.signals}
         return {name: c for name, c in self._in_si.conversions.items() if name in names}
 
-    def known(self) -> Known | None:
+    def figures_of_every_row(self) -> Known | None:
         """What is worked out of every row, where fewer rows or signals are recorded."""
         if self._every_row is None or self._every_row.lost:
             return None

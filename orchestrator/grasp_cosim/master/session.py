@@ -593,6 +593,8 @@ class Session:
             self.master.hand_on()
         master, record = self.master, self._record
         time, columns = record.columns()
+        units = {signal.name: signal.unit for signal in record.signals}
+        descriptions = {signal.name: signal.description for signal in record.signals}
         timing = None
         if self.pacer:
             privileges = self._privileges
@@ -601,16 +603,16 @@ class Session:
             record.settings,
             time,
             columns,
-            {signal.name: signal.unit for signal in record.signals},
+            units,
             self._wall_time,
             self.complete,
-            descriptions={signal.name: signal.description for signal in record.signals},
+            descriptions=descriptions,
             rejections=dict(master.rejections),
             log=self._log.lines(master, self._is_over),
             timing=timing,
             more_metrics=record.metrics,
             to_si=record.conversions(),
-            known=record.known(),
+            known=record.figures_of_every_row(),
             ended_at=self.ended_at,
             limits=master.watches.trips(),
             initialised_anew=tuple(master.renewed),

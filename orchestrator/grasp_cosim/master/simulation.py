@@ -203,7 +203,6 @@ def _step_one_by_one(session: Session, until: Until, show: Callable[[], None]) -
             return
         if not session.step():
             return
-        now = time.perf_counter()
-        if now - shown_at > LOOK_INTERVAL:
+        if time.perf_counter() - shown_at > LOOK_INTERVAL:
             show()
-            shown_at = now
+            shown_at = time.perf_counter()
