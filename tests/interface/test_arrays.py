@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.interface.expansion import expanded, flattened, from_text, values_of
+from grasp_cosim.interface.expansion import expanded, flattened, from_text, parse_values
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.renaming import in_units, renamed
 from grasp_cosim.interface.variables import MAX_ELEMENTS, element_names, size_of
@@ -120,27 +120,30 @@ def test_too_many_elements_are_left_alone_by_name(tmp_path, dimensions):
     assert "u" in found.arrays
     assert not found.by_name["F"].supported
     with pytest.raises(InputError, match=f"array of Float64 with more than {MAX_ELEMENTS}"):
-        values_of(found, "here", "F", 1.0)
+        parse_values(found, "here", "F", 1.0)
 
 
 def test_values_of_an_array_are_checked_one_by_one(tmp_path):
     found = expanded(declared(tmp_path, types=True), {"k": 1})
     name = "u_Enumeration"
-    assert values_of(found, "here", name, [["fast"], [1]]) == {f"{name}[1,1]": 2, f"{name}[2,1]": 1}
-    assert values_of(found, "here", name, "fast,slow", text=True) == {
+    assert parse_values(found, "here", name, [["fast"], [1]]) == {
+        f"{name}[1,1]": 2,
+        f"{name}[2,1]": 1,
+    }
+    assert parse_values(found, "here", name, "fast,slow", text=True) == {
         f"{name}[1,1]": 2,
         f"{name}[2,1]": 1,
     }
     with pytest.raises(InputError, match=r"^here: u_Int8\[2,1\] = 128: must be "):
-        values_of(found, "here", "u_Int8", [1, 128])
+        parse_values(found, "here", "u_Int8", [1, 128])
     with pytest.raises(InputError, match=r"^here: u_Int8 = .*: is \[3\]; must be \[2, 1\], or"):
-        values_of(found, "here", "u_Int8", [1, 2, 3])
+        parse_values(found, "here", "u_Int8", [1, 2, 3])
     with pytest.raises(InputError, match=r"^here: u_Int8 = '\[1': "):
-        values_of(found, "here", "u_Int8", "[1", text=True)
+        parse_values(found, "here", "u_Int8", "[1", text=True)
     with pytest.raises(InputError, match=r"^here: m = \[1\]: is not an array; must be one value"):
-        values_of(found, "here", "m", [1])
+        parse_values(found, "here", "m", [1])
     with pytest.raises(InputError, match=r"u_Int64\[1,1\] = '9007199254740993.0': must be"):
-        values_of(found, "here", "u_Int64", "9007199254740993.0", text=True)
+        parse_values(found, "here", "u_Int64", "9007199254740993.0", text=True)
 
 
 def test_a_start_that_is_no_number_is_a_flaw(tmp_path):

@@ -17,7 +17,7 @@ from ..interface.read import check_runs
 from ..recording.log_names import LogNames
 from ..report.page import write_report
 from ..system.description import FILES
-from ..system.toml import SECTIONS
+from ..system.overrides import SECTIONS
 from .frame import (
     NEGATIVE,
     PATH,
@@ -31,6 +31,7 @@ from .frame import (
     waiting,
 )
 from .options import (
+    SystemOptions,
     chosen_system,
     load_system,
     many_runs_option,
@@ -38,7 +39,7 @@ from .options import (
     natively,
     preset_option,
     set_option,
-    set_values,
+    set_overrides,
     step_option,
     stop_option,
 )
@@ -74,7 +75,8 @@ def qualify(
     metric_files: tuple[Path, ...],
     out: Path | None,
     as_json: bool,
-    **given: Any,
+    settings: tuple[str, ...],
+    **system_options: Any,
 ) -> int:
     """Find out whether CANDIDATE may take the place of a component.
 
@@ -92,15 +94,15 @@ def qualify(
     is_file = candidate.suffix.lower() in FILES
     if not is_file:
         check_runs(candidate)
-    of_system, of_component, values = _parted(given["settings"], component)
-    system = natively(chosen_system({**given, "settings": of_system}), native)
+    of_system, of_component, values = _parted(settings, component)
+    system = natively(chosen_system(SystemOptions(settings=of_system, **system_options)), native)
     found = run_qualification(
         system,
         component,
         component_of(load_system(candidate), component, system) if is_file else candidate,
         rename=of_component["rename"],
         units=of_component["units"],
-        values=set_values(values),
+        values={override.place: override.value for override in set_overrides(values)},
         bands=read_bands(bands) if bands else None,
         isolation=of_component["isolation"].get("", "process"),
         progress=not is_quiet(),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import click
@@ -16,6 +15,7 @@ from ..base.progress import phase
 from ..recording.log_names import AS_THEY_ARE, read_log_names
 from ..system.connectors import reached
 from ..system.description import System, read_system
+from ..system.overrides import Override
 from ..system.record import Record
 from ..system.stimuli import Stimuli, read_stimuli
 from .frame import PATH, pair, say, waiting
@@ -137,44 +137,76 @@ PLACES = {
 }
 """The places of a system file that have an option of their own."""
 
+TIMES = ("experiment.start", "experiment.step", "experiment.stop")
+"""The places that an archive of another tool may leave open until it is read."""
 
-Option = Callable[[str], str]
-"""The option that says a place, or the beginning of one, for messages."""
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SystemOptions:
+    """What the options of a command say of its system, by the names that click gives them.
 
-def settings_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], Option]:
-    """What options of a command, `given` by name, say of a system, by its places.
-
-    InputError where two say the same place.
+    settings are the texts of --set, swaps those of --swap, record those of --record. fitted is the
+    file of --values. input is the table that drives inputs. Times are texts, in s.
     """
-    said: list[tuple[str, str, Any]] = [
-        (f"--{o}", place, given.get(o)) for o, place in PLACES.items()
-    ]
-    for text in given.get("swaps", ()):
-        name, fmu = pair("--swap", text, "COMPONENT=FMU")
-        said.append((f"--swap {name}", f"components.{name}.fmu", fmu))
-    for text in given.get("settings", ()):
-        place, value = pair("--set", text, "PLACE=VALUE")
-        said.append((f"--set {place}", place, value))
-    values: dict[str, Any] = {}
-    options: dict[str, str] = {}
-    for option, place, value in said:
-        if place in values:
-            other = options[place]
-            raise InputError(f"{option}: {place} is given by {other}, too; must be given once")
+
+    system: Path | None = None
+    controller: str | None = None
+    presets: Sequence[str] = ()
+    case: int | None = None
+    settings: Sequence[str] = ()
+    step: str | None = None
+    stop: str | None = None
+    scheme: str | None = None
+    swaps: Sequence[str] = ()
+    own_values: bool = False
+    input: Path | None = None
+    record: Sequence[str] = ()
+    fitted: Path | None = None
+
+    @property
+    def all_presets(self) -> Sequence[str]:
+        """The presets, that of the case last."""
+        return self.presets if self.case is None else (*self.presets, f"case_{self.case}")
+
+
+def set_overrides(texts: Iterable[str]) -> list[Override]:
+    """The overrides that texts of --set are, PLACE=VALUE; InputError where two have one place."""
+    pairs = (pair("--set", text, "PLACE=VALUE") for text in texts)
+    return _each_once(Override(place, value, "--set {place}") for place, value in pairs)
+
+
+def overrides_of(options: SystemOptions) -> list[Override]:
+    """The overrides that options are: those of places with an option of their own, swaps, --set.
+
+    InputError where two have one place.
+    """
+    overrides = []
+    for option, place in PLACES.items():
+        value = getattr(options, option)
         if value is not None:
-            values[place], options[place] = value, option
-    return values, lambda place: options.get(place, f"--set {place}")
+            overrides.append(Override(place, value, f"--{option}"))
+    for text in options.swaps:
+        name, fmu = pair("--swap", text, "COMPONENT=FMU")
+        overrides.append(Override(f"components.{name}.fmu", fmu, f"--swap {name}"))
+    return _each_once([*overrides, *set_overrides(options.settings)])
 
 
-def set_values(settings: Sequence[str]) -> dict[str, Any]:
-    """The values of --set by their places."""
-    return settings_of({"settings": settings})[0]
+def _each_once(overrides: Iterable[Override]) -> list[Override]:
+    """The overrides; InputError where two have one place."""
+    by_place: dict[str, Override] = {}
+    for override in overrides:
+        if first := by_place.get(override.place):
+            raise InputError(
+                f"{override.label}: {override.place} is given by {first.label}, too; must be given "
+                "once"
+            )
+        by_place[override.place] = override
+    return [*by_place.values()]
 
 
 def load_system(
     path: Path | None,
-    times: Mapping[str, Any] = MappingProxyType({}),
+    times: Iterable[Override] = (),
     stimuli: Stimuli | None = None,
     variant: str | None = None,
 ) -> System:
@@ -197,55 +229,72 @@ def load_system(
     return system
 
 
-def chosen_system(given: Mapping[str, Any]) -> System:
-    """The system of a command with what its options, `given` by name, make of it.
+def chosen_system(options: SystemOptions) -> System:
+    """The system of a command, as its options have it; what is left out of it is said.
 
-    These are its controller, presets, the case last, then single values; what is left out is said.
+    These are its controller, then presets, that of the case last, then what was fitted, then
+    overrides of single values, and what is recorded.
     """
-    settings, option = settings_of(given)
-    times = {
-        key: settings[place]
-        for key in ("start", "step", "stop")
-        if (place := f"experiment.{key}") in settings
-    }
-    stimuli = None
-    if "input.file" in settings:
-        way = settings.pop("input.interpolation", "linear")
-        stimuli = read_stimuli(settings.pop("input.file"), way, "--set input.interpolation")
-        stimuli = replace(stimuli, partial=True)  # FMUs may yet be swapped
-    variant = settings.pop("experiment.variant", None)
-    loaded = load_system(given.get("system"), times, stimuli, variant)
-    if loaded.input:
-        columns = {str(port) for port in loaded.input.columns}
-        for place in settings:
-            if columns.issuperset(reached(loaded, place)):
-                raise InputError(f"--set {place}: does nothing, as {loaded.input.file} drives it")
-    swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in settings]
-    own = swapped if given.get("own_values") else []
-    if given.get("own_values") and not swapped:
-        raise InputError("--own-values: does nothing without --swap")
-    system = loaded.with_own_values(*own) if own else loaded
-    if law := given.get("controller"):
+    overrides = {override.place: override for override in overrides_of(options)}
+    times = [overrides[place] for place in TIMES if place in overrides]
+    stimuli = _stimuli(overrides)
+    variant = overrides.pop("experiment.variant", None)
+    loaded = load_system(options.system, times, stimuli, variant.value if variant else None)
+    _check_not_driven(loaded, overrides)
+    swapped = [c.name for c in loaded.components if f"components.{c.name}.fmu" in overrides]
+    system = loaded
+    if options.own_values:
+        if not swapped:
+            raise InputError("--own-values: does nothing without --swap")
+        system = system.with_own_values(*swapped)
+    if options.controller:
         from ..grasp.system import with_controller
 
-        system = with_controller(system, law, swapped)
-    case = given.get("case")
-    for name in [*given.get("presets", ()), *([] if case is None else [f"case_{case}"])]:
-        if name in system.presets:
-            system = system.with_presets(name)
-        else:
-            from ..grasp.presets import with_preset
-
-            system = with_preset(system, name)
-    if fitted := given.get("fitted"):
+        system = with_controller(system, options.controller, swapped)
+    for preset in options.all_presets:
+        system = _with_preset(system, preset)
+    if options.fitted:
         from ..grasp.identification.values import with_fitted
 
-        system = with_fitted(system, fitted)
-    changed = system.with_settings(settings, option)
-    for note in changed.notes[len(loaded.notes) :]:
+        system = with_fitted(system, options.fitted)
+    system = system.with_overrides(overrides.values())
+    for note in system.notes[len(loaded.notes) :]:
         say(note)
-    if given.get("record"):
-        record = Record.listed(given["record"])
-        record.check("--record", changed.components, changed.outputs)
-        changed = replace(changed, record=record)
-    return changed.with_input(replace(stimuli, partial=False)) if stimuli else changed
+    if options.record:
+        record = Record.listed(options.record)
+        record.check("--record", system.components, system.outputs)
+        system = replace(system, record=record)
+    return system.with_input(replace(stimuli, partial=False)) if stimuli else system
+
+
+def _stimuli(overrides: dict[str, Override]) -> Stimuli | None:
+    """The stimuli of the overrides of [input], which are taken out; None where no file is named.
+
+    They may drive variables of FMUs that are swapped in afterwards.
+    """
+    file = overrides.pop("input.file", None)
+    if file is None:
+        return None
+    interpolation = overrides.pop("input.interpolation", None)
+    between_rows = interpolation.value if interpolation else "linear"
+    stimuli = read_stimuli(file.value, between_rows, "--set input.interpolation")
+    return replace(stimuli, partial=True)
+
+
+def _check_not_driven(system: System, places: Iterable[str]) -> None:
+    """InputError at a place whose value does nothing, as a column of stimuli goes before it."""
+    if system.input is None:
+        return
+    columns = {str(port) for port in system.input.columns}
+    for place in places:
+        if columns.issuperset(reached(system, place)):
+            raise InputError(f"--set {place}: does nothing, as {system.input.file} drives it")
+
+
+def _with_preset(system: System, name: str) -> System:
+    """The system with a preset of its own, or else with one of the built-in grasp."""
+    if name in system.presets:
+        return system.with_presets(name)
+    from ..grasp.presets import with_preset
+
+    return with_preset(system, name)

@@ -12,7 +12,7 @@ from ..grasp.published.evaluation import verdict
 from ..grasp.system import grasp_system
 from ..recording.log_names import LogNames
 from .frame import NEGATIVE, PATH, is_quiet, json_option, show
-from .options import controller_option, many_runs_option, map_option, set_option, set_values
+from .options import controller_option, many_runs_option, map_option, set_option, set_overrides
 
 
 @click.command()
@@ -85,7 +85,7 @@ def identify(
     """
     if out:
         check_folder(out)
-    system = grasp_system().with_settings(set_values(settings), "--set {}".format)
+    system = grasp_system().with_overrides(set_overrides(settings))
     found = run_identification(log, fit=fit, system=system, progress=not is_quiet(), names=names)
     for name, text in found.files().items() if out else ():
         write_text(Path(out or "", name), text)

@@ -29,6 +29,7 @@ from .frame import (
     waiting,
 )
 from .options import (
+    SystemOptions,
     chosen_system,
     native_option,
     natively,
@@ -86,7 +87,7 @@ def run(
     plot: bool,
     mdf: bool,
     as_json: bool,
-    **given: Any,
+    **system_options: Any,
 ) -> int:
     """Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
 
@@ -99,14 +100,15 @@ def run(
         raise InputError("--mdf: needs --out, the folder for signals.mf4")
     if form != "csv" and not out:
         raise InputError(f"--format {form}: needs --out, the folder for signals.{form}")
-    for text in given["settings"]:
+    options = SystemOptions(**system_options)
+    for text in options.settings:
         if text.startswith("realtime.") and not realtime:
             raise InputError(f"--set {text}: does nothing without --realtime")
-    system, metrics = chosen_system(given), chosen_metrics(metric_files)
+    system, metrics = chosen_system(options), chosen_metrics(metric_files)
     if mdf:
         check_mdf()
     check_outputs(out, plot)
-    chosen = system if native is None and given["system"] else natively(system, native)
+    chosen = system if native is None and options.system else natively(system, native)
     command = ("grasp-cosim", *click.get_current_context().find_root().obj)
     with RunFolder(out, chosen, command, realtime, form=form) if out else nullcontext() as folder:
 

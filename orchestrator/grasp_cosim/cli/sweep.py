@@ -30,9 +30,10 @@ from .frame import (
     waiting,
 )
 from .options import (
+    SystemOptions,
     chosen_system,
     many_runs_option,
-    settings_of,
+    overrides_of,
     swap_options,
     system_options,
 )
@@ -68,7 +69,18 @@ TABLE = Path("sweep.csv")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, like tcp://host:8786.")
 @click.option("--plot", is_flag=True, help="Draw the metrics over what varies, beside the table.")
 @json_option
-def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: Any) -> int:
+def sweep(
+    vary: tuple[str, ...],
+    table: Path | None,
+    metric_files: tuple[Path, ...],
+    native: bool | None,
+    out: Path,
+    workers: int | None,
+    scheduler: str | None,
+    plot: bool,
+    as_json: bool,
+    **system_options: Any,
+) -> int:
     """Run a system for each row of a table.
 
     It writes a table of the metrics of each run. SYSTEM is a .toml or .ssp file, by default the
@@ -80,40 +92,40 @@ def sweep(out: Path, scheduler: str | None, plot: bool, as_json: bool, **given: 
     Example: grasp-cosim sweep --vary plant.initial_object_position=0:0.05:11 --case 1 --plot
     Step size: grasp-cosim sweep --vary experiment.step=1e-4,2e-4,4e-4
     """
-    if scheduler and given["workers"]:
+    if scheduler and workers:
         raise InputError("--workers: cannot be used with --scheduler, which has its own")
-    if bool(given["table"]) == bool(given["vary"]):
+    if bool(table) == bool(vary):
         raise InputError("sweep: needs --vary or --table, one of them")
     out = out if out.suffix else out / TABLE
     check_format(out)
     check_outputs(out.parent, plot)
-    fixed, _ = settings_of(given)
-    pairs: dict[str, list[Value | Quantity]] = {}
-    for place, values in map(varied, given["vary"]):
-        if place in pairs or place in fixed:
+    options = SystemOptions(**system_options)
+    fixed = {override.place for override in overrides_of(options)}
+    columns: dict[str, list[Value | Quantity]] = {}
+    for place, values in map(varied, vary):
+        if place in columns or place in fixed:
             raise InputError(f"--vary {place}: is given twice; must be given once")
-        pairs[place] = values
-    rows = given["table"] or grid(pairs)
-    system = chosen_system(given)
+        columns[place] = values
+    system = chosen_system(options)
     try:
         with cluster(scheduler) if scheduler else nullcontext() as executor:
-            table = run_sweep(
+            outcome = run_sweep(
                 system,
-                rows,
-                metrics=chosen_metrics(given["metric_files"]),
+                table or grid(columns),
+                metrics=chosen_metrics(metric_files),
                 out=out,
-                workers=given["workers"],
+                workers=workers,
                 executor=executor,
-                native=given["native"],
+                native=native,
                 progress=not is_quiet(),
             )
     except KeyboardInterrupt:
-        said = f"interrupted; finished runs are kept beside {out}, the same command goes on"
-        return fail(said, INTERRUPTED)
+        message = f"interrupted; finished runs are kept beside {out}, the same command goes on"
+        return fail(message, INTERRUPTED)
     if plot:
         picture = out.with_suffix(".png")
         with waiting("drawing"):
-            draw_sweep(table, picture)
+            draw_sweep(outcome, picture)
         say(f"drew {picture}")
-    show(as_json, {**in_json(table), "table": str(out)}, f"{as_text(table)}\ntable: {out}")
-    return NEGATIVE if len(table.errors) == len(table) else 0
+    show(as_json, {**in_json(outcome), "table": str(out)}, f"{as_text(outcome)}\ntable: {out}")
+    return NEGATIVE if len(outcome.errors) == len(outcome) else 0

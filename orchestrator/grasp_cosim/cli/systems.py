@@ -18,7 +18,7 @@ from ..interface.read import read_interface
 from ..system.description import System
 from ..system.toml import to_do
 from .frame import PATH, json_option, pair, say, show
-from .options import chosen_system, set_option
+from .options import SystemOptions, chosen_system, set_option
 
 NAME = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -270,7 +270,7 @@ def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool
     """
     from ..ssp.to_archive import write_ssp  # only here: its libraries take time to load
 
-    chosen = chosen_system({"system": system, "settings": settings})
+    chosen = chosen_system(SystemOptions(system=system, settings=settings))
     check_file(out)
     written = write_ssp(chosen, out)
     report = {

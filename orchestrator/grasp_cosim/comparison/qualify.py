@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ..base.checks import choice, known
 from ..base.errors import InputError, SimulationError
-from ..interface.expansion import values_of
+from ..interface.expansion import parse_values
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..interface.read import describe
@@ -26,6 +26,7 @@ from ..metrics.metric import Metric
 from ..recording.result import Result
 from ..system.changes import converted, replaced
 from ..system.description import System, as_system
+from ..system.overrides import as_overrides
 from ..system.parts import ISOLATIONS, Component, Connection, Isolation
 from ..system.structure import SCHEMES, unit_of
 from ..system.times import NANOSECONDS, in_seconds
@@ -211,7 +212,7 @@ def prepare_swap(
     own = {n: v for n, v in now.values.items() if n not in ours.by_name}
     own |= {extra[key]: value for key, value in values.items() if key in extra}
     common = {key: value for key, value in values.items() if key not in extra}
-    system = system.with_settings(common, "--set ".__add__)
+    system = system.with_overrides(as_overrides(common, "--set {place}"))
     system = replace(system, record=system.record.with_outputs(system.components))
     use = use_of(system, component)
     differences = interface_differences(ours, theirs, use, own)
@@ -221,7 +222,7 @@ def prepare_swap(
         given = converted(given, ours, theirs) | dict(now.values)
         for name, value in own.items():
             text = f"--set {component}.{name}"
-            given |= values_of(theirs, text, name, value, text=True)
+            given |= parse_values(theirs, text, name, value, text=True)
         place = replace(now, name=component, values=given, isolation=isolation)
         try:
             parts = tuple(place if c.name == component else c for c in system.components)

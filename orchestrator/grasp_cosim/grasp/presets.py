@@ -17,6 +17,7 @@ from ..interface.fmi_types import Value
 from ..interface.units import IDENTITY
 from ..metrics.metric import resolved
 from ..system.description import System
+from ..system.overrides import PLACE, as_overrides
 from ..system.parts import Port
 from ..system.settings import given_values
 from ..system.structure import parameter_in_si
@@ -84,7 +85,7 @@ def with_si_values(system: System, values: Mapping[str, Value], place: str) -> S
         port = _port(system, key)
         to_si = parameter_in_si(system, f"{place} {port}", port)
         given[str(port)] = value if to_si == IDENTITY else to_si.back(float(value))
-    return system.with_settings(given, f"{place} ".__add__)
+    return system.with_overrides(as_overrides(given, f"{place} {PLACE}"))
 
 
 def start_in_si(system: System, key: str) -> float:

@@ -4,7 +4,6 @@ import re
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..base.checks import choice
 from ..base.errors import InputError
@@ -13,6 +12,7 @@ from ..fmu_export.build import shipped_fmus
 from ..interface.read import read_interface
 from ..metrics.metric import resolved
 from ..system.description import System
+from ..system.overrides import Override
 from ..system.parts import Connection, Port
 from .presets import SYSTEM
 
@@ -53,7 +53,7 @@ def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> 
     fmu = beside if beside.is_file() else shipped_fmus(fingers) / file
     if _TANDEM_FMU.fullmatch(now.interface.identifier):
         return _in_tandem(system, name, fmu, place)
-    return system.with_settings({f"components.{name}.fmu": fmu}, lambda _: place)
+    return system.with_overrides([Override(f"components.{name}.fmu", fmu, place)])
 
 
 def _file_of(identifier: str, law: str) -> tuple[str, int | None]:
@@ -75,12 +75,11 @@ def _in_tandem(system: System, controller: str, fmu: Path, place: str) -> System
     held = system
     if any(c.target == measured for c in system.connections):
         held = _with_source(system, measured, 0.0)
-    settings: dict[str, Any] = {f"components.{controller}.fmu": fmu}
+    overrides = [Override(f"components.{controller}.fmu", fmu, place)]
     if WRIST_FORCE in read_interface(fmu).by_name:
-        return _with_source(
-            held.with_settings({**settings, str(measured): 0.0}, lambda _: place), measured, source
-        )
-    return held.with_settings(settings, lambda _: place)
+        overrides.append(Override(str(measured), 0.0, place))
+        return _with_source(held.with_overrides(overrides), measured, source)
+    return held.with_overrides(overrides)
 
 
 def _with_source(system: System, target: Port, source: Port | float) -> System:

@@ -27,7 +27,7 @@ def expanded(interface: Interface, lengths: Mapping[str, Value | None]) -> Inter
     return interface.variant(("sizes", *given.items()), lambda: _expanded(interface, given))
 
 
-def values_of(
+def parse_values(
     interface: Interface, place: str, name: str, given: Given, text: bool = False
 ) -> dict[str, Value]:
     """The values by variable of what is given for a variable or for a whole array, checked.

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from ..base.checks import exact
 from ..fmi.instance import Instance, dtype
-from ..interface.expansion import values_of
+from ..interface.expansion import parse_values
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..interface.units import IDENTITY
@@ -317,7 +317,7 @@ class Scenario:
         placed: dict[int, float] = {}
         for port, value in event.set.items():
             interface = self._instances[port.component].interface
-            for name, parsed in values_of(interface, place, port.variable, value).items():
+            for name, parsed in parse_values(interface, place, port.variable, value).items():
                 element = Port(port.component, name)
                 if element in self._passed:
                     exact(f"{place}: {element}", parsed)

@@ -24,10 +24,11 @@ from ..metrics.groups import check_groups
 from ..metrics.metric import Function, Metric
 from ..realtime.pacer import Pacer, Privileges, long_waits, privileges
 from ..recording.result import Result
-from ..system.connectors import given_by_connectors, read_at
+from ..system.connectors import behind_connectors, read_at
 from ..system.declared_steps import check_declared_steps
 from ..system.description import System, as_system
 from ..system.native import needed_twins
+from ..system.overrides import as_overrides
 from ..system.parts import Component, Port, Realtime, as_signal
 from ..system.times import TimeInput, in_seconds
 from .engine import Engine
@@ -452,11 +453,11 @@ class Session:
             InputError: There is no such variable that may be set now, or the value does not fit it.
             SimulationError: Its FMU fails.
         """
-        values, _ = given_by_connectors(self.system, {name: value}, "set: ".__add__)
+        overrides = behind_connectors(self.system, as_overrides({name: value}, "set: {place}"))
 
         def set_all() -> None:
-            for variable, variable_value in values.items():
-                self.master.scenario.set(variable, variable_value, self.master.steps_done)
+            for override in overrides:
+                self.master.scenario.set(override.place, override.value, self.master.steps_done)
 
         self._call_fmus(set_all)
 

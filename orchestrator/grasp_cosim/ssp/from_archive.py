@@ -10,7 +10,6 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path as FilePath
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..base.errors import InputError, choices
@@ -20,14 +19,14 @@ from ..interface.fmi_types import Value
 from ..interface.renaming import in_units, renamed
 from ..interface.values import parse_value
 from ..system.description import System
+from ..system.entries import experiment
+from ..system.overrides import Override
 from ..system.parts import Component, Connection, Port, Solver
 from ..system.stimuli import Stimuli
-from ..system.structure import experiment
 from ..system.times import (
     LONGEST,
     NANOSECONDS,
     Time,
-    TimeInput,
     in_nanoseconds,
     in_seconds,
     step_of,
@@ -59,14 +58,14 @@ class Called(NamedTuple):
 
 def read_ssp(
     path: FilePath,
-    times: Mapping[str, TimeInput] = MappingProxyType({}),
+    times: Iterable[Override] = (),
     stimuli: Stimuli | None = None,
     variant: str | None = None,
 ) -> System:
     """The system of an archive; stimuli go before those that it names.
 
     So do the times, start, step and stop in s, but for an archive of ours, which names all of them:
-    System.with_experiment() changes them together.
+    System.with_overrides() changes them together.
     Its structure is the variant of that name, by default SystemStructure.ssd, or the only one.
     """
     notes = Notes()
@@ -83,7 +82,7 @@ def read_ssp(
         raise InputError(f"{top.place}: system {top.name!r} has no components; must have some")
     names = component_names(file, parts)
     annotated = _annotated(file, root, names.values())
-    chosen_times = {} if annotated else experiment(str, times)
+    chosen_times = {} if annotated else experiment(times)
     chosen_step_ns = chosen_times.get("step_ns")
     extras, by = annotated, ""
     if extras is None:

@@ -23,9 +23,9 @@ from ..interface.fmi_types import Value
 from ..interface.values import in_own_unit
 from ..system.connectors import in_unit
 from ..system.description import System
+from ..system.overrides import as_overrides, parse_place, plain
 from ..system.parts import Port
 from ..system.times import LONGEST, in_nanoseconds, in_seconds
-from ..system.toml import place_of, plain
 from ..tables.column import Table
 from ..tables.delimited import is_number as spells_number
 from ..tables.read_table import read_table, split_head
@@ -252,7 +252,7 @@ def _in_own_unit(system: System, place: str, value: Any, said: str) -> Any:
 def settings_of(system: System, rows: Sequence[Row]) -> list[dict[str, Value]]:
     """The rows as settings of the system; InputError where the first one does not fit."""
     settings = [_with_units(system, row) for row in rows]
-    system.with_settings(settings[0], "sweep: {}".format)
+    system.with_overrides(as_overrides(settings[0], "sweep: {place}"))
     return settings
 
 
@@ -294,5 +294,5 @@ def _plain(place: str, value: Any) -> Value | None:
 
 def _port(system: System, place: str) -> Port | None:
     """The variable of a place, if it is the place of a value of one."""
-    entries = place_of([c.name for c in system.components], place, f"sweep: {place}")
-    return Port(entries[1], entries[3]) if entries[2:3] == ("values",) else None
+    parsed = parse_place([c.name for c in system.components], place, f"sweep: {place}")
+    return Port(parsed.component, parsed.name) if parsed.is_value else None

@@ -17,6 +17,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..system.description import System
 from ..system.faults import RANDOM
+from ..system.overrides import as_overrides
 from .rows import Row
 
 OF_A_RUN = "run"
@@ -53,13 +54,13 @@ def seeds_of_runs(system: System, rows: Sequence[Row], seed: str | None) -> list
 
 
 def with_row(system: System, row: Row) -> System:
-    """The system with the settings of a row, in the units of its FMUs, seeds of faults among them.
+    """The system with the overrides of a row, in the units of its FMUs, seeds of faults among them.
 
     InputError as of with_settings().
     """
     seeds = {int(found[1]): int(row[p]) for p in row if (found := _FAULT.fullmatch(p))}
-    settings = {place: value for place, value in row.items() if not _FAULT.fullmatch(place)}
-    changed = system.with_settings(settings, "sweep: {}".format)
+    overrides = {place: value for place, value in row.items() if not _FAULT.fullmatch(place)}
+    changed = system.with_overrides(as_overrides(overrides, "sweep: {place}"))
     if not seeds:
         return changed
     faults = enumerate(changed.faults, 1)

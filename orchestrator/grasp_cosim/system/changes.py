@@ -4,64 +4,90 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
 from ..base.errors import InputError, choices, nearest
-from ..interface.expansion import values_of
+from ..interface.expansion import parse_values
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..interface.read import describe
 from ..interface.renaming import renamed
 from ..interface.units import IDENTITY
-from ..interface.values import Given
 from ..interface.variables import Variable
+from .overrides import Override
 from .parts import Component, literal
 from .structure import Structure, unit_of
 
 LOGGER = logging.getLogger(__name__)
 
 
-def with_given(
-    component: Component,
-    place: Callable[[str], str],
-    given: Mapping[str, Given],
-    text: bool = False,
+def with_values(
+    component: Component, overrides: Mapping[str, Override], from_text: bool = False
 ) -> Component:
-    """The component with more values, structural parameters first: they decide sizes.
+    """The component with more values, by variable or array; InputError where one does not fit.
 
-    place says for a name where its value comes from. InputError where one does not fit. A value of
-    a whole array takes the place of all that were given for its elements.
+    Structural parameters come first: they decide sizes. A value of a whole array takes the place of
+    all that its elements had. With from_text a text may stand for a number, as on a command line.
     """
-    before = component.interface
-    sizes = {
-        name: value
-        for name, value in given.items()
-        if name in before.by_name and before.by_name[name].causality == "structuralParameter"
-    }
-    for name, value in sizes.items():
-        own = values_of(component.interface, place(name), name, value, text)
-        component = replace(component, values={**component.values, **own})
-    interface = component.interface
-    names = map(before.main_name, given)
-    arrays = [before.arrays[name] for name in names if name in before.arrays]
-    dropped = {element for array in arrays for element in array.names}
-    values = {name: value for name, value in component.values.items() if name not in dropped}
-    for lost in values:
-        if lost in before.by_name and lost not in interface.by_name:
-            name, value = next(iter(sizes.items()))
-            array = next(name for name, a in before.arrays.items() if lost in a.names)
-            raise InputError(
-                f"{place(name)} = {value!r}: there is then no {lost}, which has a value; {array} "
-                "must be given anew, too"
-            )
-    new: dict[str, Value] = {}
-    for name, value in given.items():
-        if name not in sizes:
-            new |= values_of(interface, place(name), name, value, text)
-    return replace(component, values=values | interface.by_main_names(new, place))
+    old = component.interface
+    sizes, others = dict[str, Override](), dict[str, Override]()
+    for name, override in overrides.items():
+        variable = old.by_name.get(name)
+        is_size = variable is not None and variable.causality == "structuralParameter"
+        (sizes if is_size else others)[name] = override
+    for name, override in sizes.items():
+        size = _parsed(component, name, override, from_text)
+        component = replace(component, values={**component.values, **size})
+    remaining = _without_arrays(component.values, old, overrides)
+    _check_remaining(component, remaining, old, sizes)
+    values: dict[str, Value] = {}
+    labels: dict[str, str] = {}
+    for name, override in others.items():
+        parsed = _parsed(component, name, override, from_text)
+        values |= parsed
+        labels |= {element: override.label_of(f"{component.name}.{element}") for element in parsed}
+    new = component.interface.by_main_names(values, labels.__getitem__)
+    return replace(component, values={**remaining, **new})
+
+
+def _parsed(
+    component: Component, name: str, override: Override, from_text: bool
+) -> dict[str, Value]:
+    """The typed values of the variables that an override stands for."""
+    label = override.label_of(f"{component.name}.{name}")
+    return parse_values(component.interface, label, name, override.value, from_text)
+
+
+def _without_arrays(
+    values: Mapping[str, Value], interface: Interface, overrides: Mapping[str, Override]
+) -> dict[str, Value]:
+    """Values without those of elements of arrays that are overridden as a whole."""
+    names = map(interface.main_name, overrides)
+    arrays = [interface.arrays[name] for name in names if name in interface.arrays]
+    overridden = {element for array in arrays for element in array.names}
+    return {name: value for name, value in values.items() if name not in overridden}
+
+
+def _check_remaining(
+    component: Component,
+    values: Mapping[str, Value],
+    old: Interface,
+    sizes: Mapping[str, Override],
+) -> None:
+    """InputError where another size leaves a value without its element of an array."""
+    for element in values:
+        if element not in old.by_name or element in component.interface.by_name:
+            continue
+        name, size = next(iter(sizes.items()))
+        label = size.label_of(f"{component.name}.{name}")
+        array = next(name for name, array in old.arrays.items() if element in array.names)
+        raise InputError(
+            f"{label} = {size.value!r}: there is then no {element}, which has a value; {array} "
+            "must be given anew, too"
+        )
 
 
 def replaced(

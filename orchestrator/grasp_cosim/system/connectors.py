@@ -8,20 +8,19 @@ behind it, in the unit of that.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..base.errors import InputError, nearest
 from ..base.quantity import Quantity, as_quantity
 from ..base.si_units import Unit, known_unit
 from ..interface.units import IDENTITY, Conversion, conversion, converted, no_conversion
 from ..interface.variables import SETTABLE, Variable
+from .overrides import Override
 from .parts import Port, Way
 from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of
-
-Place = Callable[[str], str]
 
 
 class Tap(NamedTuple):
@@ -86,25 +85,24 @@ def reached(system: Structure, name: str) -> list[str]:
     return [str(way.port) for way in system.inputs[name].ways]
 
 
-def given_by_connectors(
-    system: Structure, settings: Mapping[str, Any], place: Place
-) -> tuple[dict[str, Any], Place]:
-    """Settings with those of inputs of the system as values of the variables behind them.
+def behind_connectors(system: Structure, overrides: Iterable[Override]) -> list[Override]:
+    """Overrides with those of inputs of the system as values of the variables behind them.
 
-    And what says of each where it comes from.
+    InputError where two give a variable its value.
     """
-    values: dict[str, Any] = {}
-    origins: dict[str, str] = {}
-    for key, value in settings.items():
-        ways = {key: value}
-        if key in system.inputs:
-            ways = _values(system, key, value, place(key))
-        for port, passed_on in ways.items():
-            if port in values:
-                two = f"{place(origins[port])} and {place(key)}"
-                raise InputError(f"{two}: both give {port} a value; must be given once")
-            values[port], origins[port] = passed_on, key
-    return values, lambda key: place(origins.get(key, key))
+    passed_on: dict[str, Override] = {}
+    for override in overrides:
+        variables = [override]
+        if override.place in system.inputs:
+            variables = _values(system, override)
+        for variable in variables:
+            if first := passed_on.get(variable.place):
+                raise InputError(
+                    f"{first.label} and {variable.label}: both give {variable.place} a value; "
+                    "must be given once"
+                )
+            passed_on[variable.place] = variable
+    return [*passed_on.values()]
 
 
 def driven_by_connectors(system: Structure, stimuli: Stimuli) -> Stimuli:
@@ -134,22 +132,23 @@ def driven_by_connectors(system: Structure, stimuli: Stimuli) -> Stimuli:
     return replace(stimuli, columns=columns, behind=behind)
 
 
-def _values(system: Structure, name: str, value: Any, place: str) -> dict[str, Any]:
-    """The values of the variables behind an input of the system."""
-    values: dict[str, Any] = {}
-    unit = system.inputs[name].unit
-    if (quantity := as_quantity(value)) and unit:
-        value = in_unit(place, quantity, unit)
-    for way in system.inputs[name].ways:
-        change = change_along(system, name, way)
+def _values(system: Structure, override: Override) -> list[Override]:
+    """The values of the variables behind an input of the system, in their units."""
+    label, value = override.label, override.value
+    system_input = system.inputs[override.place]
+    if (quantity := as_quantity(value)) and system_input.unit:
+        value = in_unit(label, quantity, system_input.unit)
+    overrides: list[Override] = []
+    for way in system_input.ways:
+        change = change_along(system, override.place, way)
         passed_on = value
         if change != IDENTITY:
             try:
                 passed_on = change(float(value))
             except (TypeError, ValueError):
-                raise InputError(f"{place} = {value!r}: must be a number") from None
-        values[str(way.port)] = passed_on
-    return values
+                raise InputError(f"{label} = {value!r}: must be a number") from None
+        overrides.append(Override(str(way.port), passed_on, label))
+    return overrides
 
 
 def in_unit(place: str, quantity: Quantity, unit: Unit) -> float:

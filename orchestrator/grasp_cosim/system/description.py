@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, overload
@@ -12,10 +12,12 @@ from ..base.files import check_nature
 from ..base.registry import check_registered, registered
 from ..interface.values import Given, parse_value
 from .changes import with_own_values
-from .connectors import check_connectors, driven_by_connectors, given_by_connectors
+from .connectors import behind_connectors, check_connectors, driven_by_connectors
+from .entries import sections, with_overrides
 from .from_python import Part, from_sections
 from .names import in_main_names
 from .native import natives
+from .overrides import PLACE, SECTIONS, Override, Overrides, as_overrides, grouped
 from .parameters import Parameters, parameters_of
 from .parts import Component, Connection
 from .record import Record
@@ -23,9 +25,9 @@ from .replay import replayed
 from .scenario import check_scenario
 from .settings import made_of
 from .stimuli import Stimuli, read_stimuli
-from .structure import Structure, experiment
+from .structure import Structure
 from .times import TimeInput
-from .toml import SECTIONS, as_file, check_places, read_toml, sections, with_entries
+from .toml import read_toml
 from .validity import (
     as_written,
     by_element,
@@ -178,10 +180,9 @@ class System(Structure):
         """
         if fmus is not None and is_archive(path):
             raise InputError(f"{path}: has its own FMUs; those in {fmus} cannot take their place")
-        given = {"start": start, "step": step, "stop": stop}
-        times = {key: time for key, time in given.items() if time is not None}
+        times = _of_experiment({"start": start, "step": step, "stop": stop})
         system = read_system(path, times, fmus, _stimuli(input), variant)
-        return system.with_experiment(step, stop, start=start)
+        return system.with_overrides(times)
 
     @property
     def parameters(self) -> Parameters:
@@ -222,7 +223,7 @@ class System(Structure):
         Raises:
             InputError: There is no such variable, or a value does not fit it.
         """
-        return self.with_settings(values, "with_values ".__add__)
+        return self.with_overrides(as_overrides(values, "with_values {place}"))
 
     def swap(
         self,
@@ -254,18 +255,17 @@ class System(Structure):
         Raises:
             InputError: There is no such component, the FMU does not load, or it does not fit.
         """
-        own = f"components.{component}"
         self.component(component, f"swap {component}")
         if own_values:
             swapped = self.with_own_values(component)
             return swapped.swap(component, fmu, rename=rename, units=units, values=values)
-        settings = {
-            f"{own}.fmu": fmu,
-            **{f"{own}.values.{name}": value for name, value in (values or {}).items()},
-            **{f"{own}.rename.{name}": theirs for name, theirs in (rename or {}).items()},
-            **{f"{own}.units.{name}": unit for name, unit in (units or {}).items()},
-        }
-        return self.with_settings(settings, lambda _: f"swap {component}")
+        place = f"components.{component}"
+        overrides: dict[str, Any] = {f"{place}.fmu": fmu}
+        tables = {"values": values, "rename": rename, "units": units}
+        for table, entries in tables.items():
+            for name, value in (entries or {}).items():
+                overrides[f"{place}.{table}.{name}"] = value
+        return self.with_overrides(as_overrides(overrides, f"swap {component}"))
 
     def with_own_values(self, *names: str) -> System:
         """A copy in which components have the start values that their FMUs declare.
@@ -283,18 +283,15 @@ class System(Structure):
         )
         return replace(self, components=components, connections=as_written(self))
 
-    def with_settings(
-        self, settings: Mapping[str, Any], place: Callable[[str], str] = "with_settings ".__add__
-    ) -> System:
+    def with_settings(self, overrides: Mapping[str, Any]) -> System:
         """A copy with single values of its file changed, by their places in it.
 
         Args:
-            settings: Values by places like "experiment.scheme", "components.plant.fmu" or
+            overrides: Values by places like "experiment.scheme", "components.plant.fmu" or
                 "components.plant.rename.gap[1]"; "plant.object_width" is short for
                 "components.plant.values.object_width". A text stands for a number or a boolean
                 where there must be one. An FMU takes the place of another as by swap(), and values
                 beside it are in its units.
-            place: Says of a key where it comes from, at the beginning of messages.
 
         Returns:
             The changed system.
@@ -302,26 +299,44 @@ class System(Structure):
         Raises:
             InputError: There is no such place, one is set twice, or a value does not fit it.
         """
-        check_places(settings, place)
-        settings, place = given_by_connectors(self, settings, place)
-        file = as_file(self, settings, place)
-        tables = file.pop("components", {})
-        components, notes = {c.name: c for c in self.components}, [*self.notes]
-        for name, table in tables.items():
-            components[name], more = with_entries(components[name], table, place, self)
-            notes += more
-        if not file and all(_of_parameters(self, *named) for named in tables.items()):
-            return self._with_parameters(tuple(components.values()))
+        return self.with_overrides(as_overrides(overrides, "with_settings {place}"))
+
+    def with_overrides(self, overrides: Iterable[Override]) -> System:
+        """A copy as of with_settings(), for overrides that know where they come from.
+
+        Args:
+            overrides: What changes, by place; the origin of each is told where it does not fit.
+
+        Returns:
+            The changed system, or this one where nothing of it changes.
+
+        Raises:
+            InputError: There is no such place, one is set twice, or a value does not fit it.
+        """
+        overrides = [*overrides]
+        if not overrides:
+            return self
+        groups = grouped(self, behind_connectors(self, overrides))
+        components, notes = dict(self.by_name), [*self.notes]
+        for name, changes in groups.components.items():
+            components[name], remarks = with_overrides(components[name], changes, self)
+            notes += remarks
         changed = tuple(components.values())
-        record, lost = self.record.without_missing(self.components, changed, self.outputs)
-        notes += [f"record: {text!r} matches no signal any more: it is left out" for text in lost]
+        if not groups.sections and _are_of_parameters(self, groups):
+            return self._with_parameters(changed)
+        attributes = sections(self, groups.sections)
+        if not groups.components and all(getattr(self, n) == v for n, v in attributes.items()):
+            return self  # as where the reader of an archive has taken the times
+        record, missing = self.record.without_missing(self.components, changed, self.outputs)
+        for text in missing:
+            notes.append(f"record: {text!r} matches no signal any more: it is left out")
         return replace(
             self,
             components=changed,
             connections=as_written(self),
             notes=tuple(notes),
             record=record,
-            **sections(self, file, place),
+            **attributes,
         )
 
     def with_presets(self, *names: str) -> System:
@@ -343,8 +358,8 @@ class System(Structure):
                     f"{self.name}: no preset {name!r}; {nearest(name, self.presets)}; a system "
                     "file has them as [presets.NAME]"
                 )
-            place = f"{self.name}: [presets.{name}] "
-            system = system.with_settings(self.presets[name], place.__add__)
+            origin = f"{self.name}: [presets.{name}] {PLACE}"
+            system = system.with_overrides(as_overrides(self.presets[name], origin))
         return system
 
     def with_input(self, input: str | Path | Stimuli | None) -> System:  # noqa: A002
@@ -449,15 +464,9 @@ class System(Structure):
         Raises:
             InputError: A value is none of these, or times do not fit each other.
         """
-        given = {
-            "step": step,
-            "stop": stop,
-            "start": start,
-            "scheme": scheme,
-            "diverging": diverging,
-        }
-        changed = {key: value for key, value in given.items() if value is not None}
-        return replace(self, **experiment(str, changed)) if changed else self
+        entries = {"step": step, "stop": stop, "start": start}
+        entries |= {"scheme": scheme, "diverging": diverging}
+        return self.with_overrides(_of_experiment(entries))
 
     def _with_parameters(self, components: tuple[Component, ...]) -> System:
         """A copy with other values of parameters, which nothing goes by that is checked or shared.
@@ -490,15 +499,16 @@ def is_archive(path: str | Path) -> bool:
 
 def read_system(
     path: str | Path,
-    times: Mapping[str, TimeInput],
+    times: Iterable[Override] = (),
     fmus: str | Path | None = None,
     stimuli: Stimuli | None = None,
     variant: str | None = None,
 ) -> System:
     """The system as a TOML file or an SSP archive has it, but for its stimuli.
 
-    times are the start, step and stop in s that it is to get: an archive of another tool, which may
-    leave them open, gets them here. variant names the structure of an archive that has several.
+    times override the start, step and stop that an archive of another tool has, which may leave
+    them open; all else that is read gets them by with_overrides(). variant names the structure of
+    an archive that has several.
     """
     path = Path(path)
     check_nature(path, "system")
@@ -510,13 +520,27 @@ def read_system(
     return system
 
 
-def _of_parameters(system: System, name: str, table: Mapping[str, Any]) -> bool:
-    """True if entries of a component are values alone, of parameters that are not in arrays."""
-    variables = system.component(name, name).interface.by_name
-    found = [variables.get(key) for key in table.get("values", ())]
-    plain = all(v and v.causality == "parameter" and not v.element for v in found)
-    return plain and [*table] == ["values"]
+def _of_experiment(entries: Mapping[str, Any]) -> list[Override]:
+    """The overrides of entries of [experiment] by name, but for those that are None."""
+    return [
+        Override(f"experiment.{entry}", value, origin=entry)
+        for entry, value in entries.items()
+        if value is not None
+    ]
 
 
-def _stimuli(given: str | Path | Stimuli | None) -> Stimuli | None:
-    return read_stimuli(given) if isinstance(given, str | Path) else given
+def _are_of_parameters(system: System, overrides: Overrides) -> bool:
+    """True if overrides of components are of parameters alone, and none of these in an array."""
+    for name, of_component in overrides.components.items():
+        if of_component.entries or [*of_component.tables] != ["values"]:
+            return False
+        variables = system.component(name, name).interface.by_name
+        for variable in map(variables.get, of_component.table("values")):
+            if not variable or variable.causality != "parameter" or variable.element:
+                return False
+    return True
+
+
+def _stimuli(stimuli: str | Path | Stimuli | None) -> Stimuli | None:
+    """Stimuli as they are, or those of a table at a path."""
+    return read_stimuli(stimuli) if isinstance(stimuli, str | Path) else stimuli

@@ -6,7 +6,7 @@ than the path of an FMU: see component_from().
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -14,12 +14,11 @@ from typing import Any
 
 from ..base.checks import check_keys
 from ..base.errors import InputError
+from .overrides import ENTRIES_OF_COMPONENT
 from .parts import Component, Connection, Port
 from .python_code import End, Function, PythonCode, WithStep, is_code, with_interface
 from .structure import unit_of
-from .toml import ENTRIES, checked, described, read_connection, with_entries
-
-Place = Callable[[str], str]
+from .toml import check_sections, described, read_connection, with_entries
 
 Part = (
     str | Path | Component | ModuleType | type[WithStep] | WithStep | Function | Mapping[str, Any]
@@ -38,33 +37,32 @@ def from_sections(
     """The attributes of a system of that name; InputError where something is wrong.
 
     `components` are by name what component_from() takes, or mappings with that as "fmu" and the
-    other entries of a component in a file; connections as _link() takes them; sections as a file
-    has them.
+    other entries of a component in a file; connections as _connection_entry() takes them; sections
+    as a file has them.
     """
-    place = f"{name}: ".__add__
     if not isinstance(components, Mapping) or not components:
         raise InputError(
-            place(f"components = {components!r}: must be by name, as {{'plant': 'Plant.fmu'}}")
+            f"{name}: components = {components!r}: must be by name, as {{'plant': 'Plant.fmu'}}"
         )
     if isinstance(connections, str) or not isinstance(connections, Iterable):
         raise InputError(
-            place(f"connections = {connections!r}: must be a list, as ['a.output -> b.input']")
+            f"{name}: connections = {connections!r}: must be a list, as ['a.output -> b.input']"
         )
-    links = [_link(entry) for entry in connections]
-    file = {**sections, "components": {**components}, "connections": links}
-    checked(file, name, place)
-    read = [read_connection(place(f"connections[{i}]"), link) for i, link in enumerate(links)]
-    entries = {n: e if isinstance(e, Mapping) else {"fmu": e} for n, e in components.items()}
-    made: dict[str, Component] = {}
-    for with_code in (False, True):  # which is as its other ends are
-        for n, entry in entries.items():
-            if is_code(entry.get("fmu")) is with_code:
-                own = place(f"components.{n}")
-                check_keys(own, entry, ENTRIES)
-                new = component_from(own, n, entry.get("fmu"), made, read)
-                more = {key: value for key, value in entry.items() if key != "fmu"}
-                made[n] = with_entries(new, more, place)[0]
-    return described(file, name, [made[n] for n in entries])
+    entries = [_connection_entry(connection) for connection in connections]
+    file = {**sections, "components": {**components}, "connections": entries}
+    check_sections(file, name)
+    read = [read_connection(f"{name}: connections[{i}]", entry) for i, entry in enumerate(entries)]
+    tables = {n: e if isinstance(e, Mapping) else {"fmu": e} for n, e in components.items()}
+    with_fmus = [n for n, table in tables.items() if not is_code(table.get("fmu"))]
+    with_code = [n for n, table in tables.items() if is_code(table.get("fmu"))]
+    by_name: dict[str, Component] = {}
+    for component in (*with_fmus, *with_code):  # code takes types and units from its other ends
+        table = tables[component]
+        label = f"{name}: components.{component}"
+        check_keys(label, table, ENTRIES_OF_COMPONENT)
+        new = component_from(label, component, table.get("fmu"), by_name, read)
+        by_name[component] = with_entries(new, table, name)
+    return described(file, name, [by_name[n] for n in tables])
 
 
 def component_from(
@@ -133,7 +131,7 @@ def _built(place: str, file: Path) -> Path:
         raise InputError(f"{place}: {error}") from error
 
 
-def _link(entry: Any) -> Any:
+def _connection_entry(entry: Any) -> Any:
     """A connection as a file has it, "a.y -> b.u" or a table; a pair of ports is one, too."""
     if isinstance(entry, Connection):
         scaled = {"factor": entry.factor, "offset": entry.offset}

@@ -21,7 +21,7 @@ from ..base.checks import (
     whole,
 )
 from ..base.errors import InputError, choices, nearest
-from ..interface.expansion import values_of
+from ..interface.expansion import parse_values
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..interface.values import Given, parse_value
@@ -215,7 +215,7 @@ def check_setting(system: Structure, port: Port, value: Given, place: str) -> di
         near = nearest(port, own, interface.listing) if own else "the component has none"
         what = "what can be set in a run is an input without a source, or a tunable parameter"
         raise InputError(f"{place}: {_why_not(system, interface, port)}; {what}; {near}")
-    values = values_of(interface, place, port.variable, value)
+    values = parse_values(interface, place, port.variable, value)
     return {Port(port.component, name): v for name, v in values.items()}
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
 
-from ..base.checks import choice
 from ..base.errors import InputError, choices, nearest
 from ..base.registry import registered
 from ..base.si_units import Unit
@@ -34,7 +33,7 @@ from .parts import (
 )
 from .record import Record
 from .stimuli import Stimuli
-from .times import LONGEST, Time, TimeGrid, in_nanoseconds, in_seconds
+from .times import Time, TimeGrid, in_seconds
 
 Scheme = Literal["sequential", "jacobi"]
 SCHEMES: tuple[str, ...] = get_args(Scheme)
@@ -262,24 +261,6 @@ class Structure:
         if name not in self.by_name:
             raise InputError(f"{place}: no component {name!r}; {nearest(name, self.by_name)}")
         return self.by_name[name]
-
-
-def experiment(place: Callable[[str], str], table: Mapping[str, Any]) -> dict[str, Any]:
-    """The attributes of a system that entries of its [experiment] stand for; place names one."""
-    made: dict[str, Any] = {}
-    for key, value in table.items():
-        if key == "start":
-            made["start_ns"] = in_nanoseconds(place(key), value, zero=True, low=-LONGEST)
-        elif key == "variant":
-            raise InputError(
-                f"{place(key)} = {value!r}: only an .ssp has variants, chosen as it is read: "
-                "--set experiment.variant=NAME, or System.load(path, variant=NAME)"
-            )
-        elif key in ("step", "stop"):
-            made[f"{key}_ns"] = in_nanoseconds(place(key), value)
-        else:
-            made[key] = choice(place(key), value, SCHEMES if key == "scheme" else DIVERGING)
-    return made
 
 
 def signal_units(system: Structure) -> dict[Port, Unit | None]:

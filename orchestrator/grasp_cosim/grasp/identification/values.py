@@ -8,6 +8,7 @@ from pathlib import Path
 from ...base.checks import as_table, check_keys, check_values, is_number, toml_table
 from ...base.errors import InputError
 from ...system.description import System
+from ...system.overrides import PLACE, as_overrides
 from ...system.parts import Connection, Fault, Port
 from ..metrics import FINGERS
 
@@ -29,7 +30,7 @@ def with_fitted(system: System, path: Path) -> System:
     for name, value in drives.items():
         if not is_number(value):
             raise InputError(f"{path.name}: drives.{name} = {value!r}: must be a number")
-    changed = system.with_settings(values, f"{path.name}: ".__add__)
+    changed = system.with_overrides(as_overrides(values, f"{path.name}: {PLACE}"))
     if not drives:
         return changed
     targets = {j: Port(_plant(system), f"force[{j}]") for j in FINGERS}
