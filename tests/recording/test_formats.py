@@ -175,7 +175,7 @@ def test_a_large_csv_has_the_same_bits_whoever_reads_it(tmp_path, monkeypatch):
     texts.listed += ['a "b",\n', "", "\\"]
     play(CsvListener(path), np.column_stack((rows(200), np.arange(200) % 3)), signals=signals)
     plain = read_signals(path, {"a.s"})[1]
-    monkeypatch.setattr(delimited, "LARGE", 0)
+    monkeypatch.setattr(delimited, "MIN_BYTES_FOR_ARROW", 0)
     with monkeypatch.context() as only:
         only.setattr(read_table, "Numbers", None)
         fast = read_signals(path, {"a.s"})[1]

@@ -12,7 +12,8 @@ import xarray as xr
 from comparison.made import PLANT, write_fmu, write_system
 from grasp_cosim import InputError, Quantity
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.sweeps.rows import as_rows, grid, in_own_units, settings_of, unit_of, varied
+from grasp_cosim.sweeps.convergence import observed_order
+from grasp_cosim.sweeps.rows import as_rows, grid, in_own_units, overrides_of, unit_of, varied
 from grasp_cosim.sweeps.table import (
     Outcome,
     Table,
@@ -20,8 +21,7 @@ from grasp_cosim.sweeps.table import (
     as_text,
     convergence,
     is_study,
-    made,
-    observed_order,
+    table_of,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,7 +37,7 @@ def small():
         Outcome(0, {"reach[1]": 0.5, "reach[2]": None, "late": True}),
         Outcome(1, {}, "a: failed, badly"),
     ]
-    return made([{"a.p": 1.5}, {"a.p": 2}], outcomes, {"a.p": "N"}, [reach])
+    return table_of([{"a.p": 1.5}, {"a.p": 2}], outcomes, {"a.p": "N"}, [reach])
 
 
 def test_a_file_has_units_and_values_in_full(tmp_path):
@@ -241,7 +241,7 @@ def test_a_number_is_in_the_unit_of_its_variable_as_in_the_file(milli, tmp_path)
     ):
         rows = in_own_units(milli, as_rows(each))
         assert rows == [{"plant.width": 60.0, "experiment.step": 1e-3}]
-        (settings,) = settings_of(milli, rows)
+        (settings,) = overrides_of(milli, rows)
         assert milli.with_settings(settings).start("plant.width") == 60.0
     assert unit_of(milli, "plant.width") == "mm"
     found = [v for _, values in [varied("plant.width [cm]=4:6:3")] for v in values]
@@ -253,7 +253,7 @@ def test_a_row_with_another_fmu_means_the_same_by_its_numbers(milli, tmp_path):
     """They are in the unit that the table says, whatever the other FMU has."""
     plant = str(write_fmu(tmp_path / "metre.fmu", PLANT))
     row = {"plant.width": 60.0, "components.plant.fmu": plant}
-    (settings,) = settings_of(milli, [row])
+    (settings,) = overrides_of(milli, [row])
     assert milli.with_settings(settings).start("plant.width") == 0.06
 
 
@@ -329,7 +329,7 @@ def test_a_row_that_does_not_fit_is_refused(grasp):
         ({"experiment.stepp": 1.0}, "experiment.step"),
     ):
         with pytest.raises(InputError, match=said):
-            settings_of(grasp, [row])
+            overrides_of(grasp, [row])
 
 
 FRAME = pd.DataFrame({"a.p": [1.5, 2.5], "experiment.scheme": ["jacobi", None]})
@@ -400,7 +400,7 @@ def test_what_is_no_rows_is_said_in_a_line(given, said):
 )
 def test_runs_come_back_under_the_index_of_the_frame(index, in_a_file):
     outcomes = [Outcome(0, {"late": True}), Outcome(1, {}, "a: failed")]
-    table = made([{"a.p": 1.5}, {"a.p": 2.5}], outcomes, {"a.p": "N"}, [], index)
+    table = table_of([{"a.p": 1.5}, {"a.p": 2.5}], outcomes, {"a.p": "N"}, [], index)
     found = table.to_pandas()
     pd.testing.assert_index_equal(found.index, index)
     assert found.attrs["units"]["a.p"] == "N"
@@ -417,14 +417,14 @@ def test_a_table_shows_a_line_for_each_metric():
     text = repr(small())
     assert text.splitlines()[:2] == ["Table of 2 runs, 1 failed", "  varied: a.p"]
     assert "reach" in text
-    many = made([{"a.p": i} for i in range(1000)], [Outcome(i, {"m": 1.0}) for i in range(1000)],
-                {}, [])  # fmt: skip
+    outcomes = [Outcome(i, {"m": 1.0}) for i in range(1000)]
+    many = table_of([{"a.p": i} for i in range(1000)], outcomes, {}, [])
     assert len(repr(many)) < 500
 
 
 def test_a_table_in_a_notebook_has_its_first_rows_as_texts():
-    table = made([{"a.p": i} for i in range(30)], [Outcome(i, {}, f"<i>{i}") for i in range(30)],
-                 {"a.p": "<N>"}, [])  # fmt: skip
+    outcomes = [Outcome(i, {}, f"<i>{i}") for i in range(30)]
+    table = table_of([{"a.p": i} for i in range(30)], outcomes, {"a.p": "<N>"}, [])
     page = table._repr_html_()
     assert "a.p [&lt;N&gt;]" in page
     assert "&lt;i&gt;9" in page

@@ -9,7 +9,8 @@ from tempfile import TemporaryDirectory
 
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.tables.read_table import names_in, read_table, split_head
+from grasp_cosim.tables.column import split_head
+from grasp_cosim.tables.read_table import names_in, read_table
 from hypothesis import given
 from hypothesis import strategies as st
 from support.marks import examples
@@ -39,7 +40,7 @@ def test_files_of_spreadsheets_are_the_same_table(tmp_path, encoding, separator,
     assert [(c.name, c.unit) for c in table.columns] == [
         ("time", "ms"), ("é.u", None), ("a.v", "kN")
     ]  # fmt: skip
-    assert (table.count, time.is_time(), time.time_unit()) == (2, True, Fraction(1, 1000))
+    assert (table.row_count, time.is_time(), time.time_unit()) == (2, True, Fraction(1, 1000))
     assert (list(time.numbers()), list(v.numbers())) == ([0.0, 2.5], [-1000.0, 7.0])
     assert (u.values, u.texts()) == (None, ["1st run", ""])
     assert v.place(1) == f"{tmp_path / 't.csv'}: line 4, column 3, a.v"

@@ -14,7 +14,8 @@ from ..sweeps.places import cluster
 from ..sweeps.rows import grid, varied
 from ..sweeps.sweep import sweep as run_sweep
 from ..sweeps.table import as_json as in_json
-from ..sweeps.table import as_text, check_format
+from ..sweeps.table import as_text
+from ..sweeps.table_files import check_format
 from .frame import (
     INTERRUPTED,
     NEGATIVE,

@@ -11,13 +11,13 @@ from ..base.by_name import ByName
 from ..base.errors import InputError, nearest
 from ..base.text import from_cell
 from ..system.times import LONGEST
-from ..tables.column import Column, Table
-from ..tables.read_table import ARROW, TEXT, read_table
+from ..tables.column import Column, FileTable
+from ..tables.read_table import ARROW_SUFFIXES, TEXT_SUFFIXES, read_table
 from .log_names import AS_THEY_ARE, LogColumn, LogNames
 from .mdf import read_mdf
 from .memory import Columns
 
-LOGS = (*TEXT, ".mf4", *ARROW)
+LOGS = (*TEXT_SUFFIXES, ".mf4", *ARROW_SUFFIXES)
 """The suffixes of logs."""
 
 
@@ -34,7 +34,7 @@ def read_signals(path: Path, texts: Collection[str]) -> Columns:
         raise InputError(f'{path}: is damaged: the first column is {first.head!r}; must be "time"')
     if len({column.head for column in table.columns}) != len(table.columns):
         raise InputError(f"{path}: is damaged: two columns have the same name")
-    if not table.count:
+    if not table.row_count:
         raise InputError(f"{path}: is damaged: it has no whole row; must have one")
     time = np.asarray(first.numbers(), np.float64)
     grows = (np.diff(time, prepend=-np.inf) > 0.0).all()
@@ -119,17 +119,17 @@ def read_log(path: Path, names: LogNames = AS_THEY_ARE) -> Log:
             _of_mdf(path, number, name, units[name], values)
             for number, (name, values) in enumerate(signals.items(), start=1)
         ]
-        table = Table(str(path), columns, len(time))
+        table = FileTable(str(path), columns, len(time))
         return Log(path, time + (names.offset or 0.0), _named(table, columns, names))
     table = read_table(path)
-    clocks = [table.named(names.time)] if names.file else []
+    clocks = [table.column(names.time)] if names.file else []
     clocks = clocks or [column for column in table.columns if column.is_time()]
     if len(clocks) != 1:
         count = "no column" if not clocks else f"{len(clocks)} columns"
         raise InputError(
             f"{path}: {count} of the name 'time'; must be one, in s or as in 'time [ms]'"
         )
-    if not table.count:
+    if not table.row_count:
         raise InputError(f"{path}: has no row below its names; must have one")
     clock = clocks[0] if names.time_unit is None else replace(clocks[0], unit=names.time_unit)
     unit, values = clock.time_unit(), np.asarray(clock.numbers(), np.float64)
@@ -138,10 +138,10 @@ def read_log(path: Path, names: LogNames = AS_THEY_ARE) -> Log:
     return Log(path, time, _named(table, columns, names))
 
 
-def _named(table: Table, columns: Sequence[Column], names: LogNames) -> list[Column]:
+def _named(table: FileTable, columns: Sequence[Column], names: LogNames) -> list[Column]:
     """The columns by the names of signals: those of the map, then the others by their own."""
     mapped = [
-        _as_signal(table.named(entry.column), signal, entry)
+        _as_signal(table.column(entry.column), signal, entry)
         for signal, entry in names.columns.items()
     ]
     used = {entry.column for entry in names.columns.values()} | {*names.columns}

@@ -24,7 +24,8 @@ from ..recording.memory import writing
 from ..system.settings import settings
 from .rows import Row
 from .run import Task
-from .table import Outcome, check_format
+from .table import Outcome
+from .table_files import check_format
 
 PACKAGE = "grasp-cosim"
 
@@ -40,8 +41,9 @@ def keep(file: FileIO, outcome: Outcome) -> None:
     try:
         write_line(file, json.dumps(asdict(outcome)).encode() + b"\n")  # columns in their order
     except OSError as error:
-        said = f"{file.name!r}: {error.strerror}"
-        raise SimulationError(f"{said}; with room for it the same command goes on") from error
+        raise SimulationError(
+            f"{file.name!r}: {error.strerror}; with room for it the same command goes on"
+        ) from error
 
 
 def as_line(content: Any) -> bytes:
@@ -70,20 +72,23 @@ def opened(table: Path, identity: Mapping[str, str], done: dict[int, Outcome]) -
     make_folder(path.parent)
     lock = Lock(path.with_name(path.name + SUFFIX))
     if not lock.taken():
-        said = f"{path}: another process does runs of it"
-        raise InputError(f"{said}; wait for its end, or name another --out")
+        raise InputError(
+            f"{path}: another process does runs of it; wait for its end, or name another --out"
+        )
     try:
         with closing(FileIO(path, "a")) as file:
-            first, *lines = path.read_bytes().splitlines(keepends=True) or [b""]
+            found_head, *lines = path.read_bytes().splitlines(keepends=True) or [b""]
             head = as_line({"runs of": identity})
-            if not first.endswith(b"\n") or (first != head and not lines):  # which has no runs
+            has_runs = found_head.endswith(b"\n") and bool(lines)
+            if not has_runs and found_head != head:
                 with writing(path, InputError):
                     file.truncate(0)
                     write_line(file, head)
-            elif first != head:
+            elif found_head != head:
+                difference = _difference(found_head, identity)
                 raise InputError(
-                    f"{path}: has runs that differ in {_difference(first, identity)}; remove it, "
-                    "or name another --out"
+                    f"{path}: has runs that differ in {difference}; remove it, or name another "
+                    "--out"
                 )
             if lines and not lines[-1].endswith(b"\n"):  # torn by a kill
                 file.truncate(path.stat().st_size - len(lines.pop()))
@@ -121,15 +126,12 @@ def identity_of(task: Task, rows: Sequence[Row], metrics: Sequence[Metric]) -> d
         decisive["the signals"] = [signals.every, {n: a.signals for n, a in signals.arrays.items()}]
     decisive |= {f"the system's {key}": value for key, value in settings(task.system).items()}
     fmus = {f"the FMU of {c.name}": c.content for c in task.system.components}
-    return {
-        **{name: _hash_of(as_line(v)) for name, v in decisive.items()},
-        **{name: _hash_of(content) for name, content in fmus.items()},
-        **{
-            f"metric {m.name!r}, its {part}": found
-            for m in metrics
-            for part, found in parts_of(m.function).items()
-        },
-    }
+    identity = {name: _hash_of(as_line(value)) for name, value in decisive.items()}
+    identity |= {name: _hash_of(content) for name, content in fmus.items()}
+    for metric in metrics:
+        for part, part_hash in parts_of(metric.function).items():
+            identity[f"metric {metric.name!r}, its {part}"] = part_hash
+    return identity
 
 
 def _hash_of(content: bytes) -> str:

@@ -20,23 +20,23 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST = 12
+MAX_PANELS = 12
 """Panels of a picture at most."""
 
-DECADES = 1.5
+MAX_LINEAR_DECADES = 1.5
 """A metric above 0 that spans more has a logarithmic scale of colours."""
 
 
 def draw_sweep(
     table: Table, path: str | Path | None = None, *, of: Sequence[str] = (), title: str = ""
 ) -> Figure:
-    """Draw metrics of a sweep, those `of` these names or the first MOST, over what varies.
+    """Draw metrics of a sweep, those `of` these names or the first MAX_PANELS, over what varies.
 
     With a `path` the figure is written there in the format of its suffix. InputError without
     matplotlib, or where there is nothing to draw.
     """
-    there = [m for m in table.measured if any(c in table.metrics for c in m.columns)]
-    metrics = [m for m in there if m.name in of] if of else there[:MOST]
+    metrics = [m for m in table.measured if any(c in table.metrics for c in m.columns)]
+    metrics = [m for m in metrics if m.name in of] if of else metrics[:MAX_PANELS]
     numbers = [name for name in table.varied if len(set(table[name])) > 1]
     if not metrics:
         raise InputError(f"{path or 'sweep'}: nothing to draw; no run has a metric")
@@ -44,8 +44,8 @@ def draw_sweep(
         figure = _curves(table, numbers[0], metrics)
     else:
         figure = _each_column(table, numbers, metrics)
-    said = f"{counted(len(table), 'run')}, {len(table.errors)} of them failed"
-    headed(figure, Caption(title or f"Sweep of {', '.join(table.varied)}", said))
+    subtitle = f"{counted(len(table), 'run')}, {len(table.errors)} of them failed"
+    headed(figure, Caption(title or f"Sweep of {', '.join(table.varied)}", subtitle))
     return kept(figure, None if path is None else Path(path))
 
 
@@ -65,7 +65,7 @@ def _curves(table: Table, over: str, metrics: Sequence[Metric]) -> Figure:
 
 def _each_column(table: Table, numbers: Sequence[str], metrics: Sequence[Metric]) -> Figure:
     """A panel for each column of the metrics: a map over two numbers, else a histogram."""
-    columns = [c for m in metrics for c in m.columns if c in table.metrics][:MOST]
+    columns = [c for m in metrics for c in m.columns if c in table.metrics][:MAX_PANELS]
     figure, panels = _grid(len(columns))
     for axes, column in zip(panels, columns, strict=True):
         values = table.shown(column)[1] * table[column]
@@ -97,11 +97,12 @@ def _norm(values: Any) -> Any:
     """The scale of the colours."""
     from matplotlib.colors import LogNorm, Normalize
 
-    there = values[np.isfinite(values)]
-    if not len(there):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return Normalize(0.0, 1.0)
-    low, high = there.min(), there.max()
-    return (LogNorm if 0.0 < low < high * 10.0**-DECADES else Normalize)(low, high)
+    low, high = finite.min(), finite.max()
+    is_wide = 0.0 < low < high * 10.0**-MAX_LINEAR_DECADES
+    return LogNorm(low, high) if is_wide else Normalize(low, high)
 
 
 def _grid(count: int) -> tuple[Figure, list[Axes]]:

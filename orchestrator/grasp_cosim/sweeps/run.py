@@ -94,13 +94,13 @@ def packed(task: Task, with_fmus: bool) -> Packed:
 _unpacked: dict[str, tuple[Task, ScratchFolder | None]] = {}
 """What this process has unpacked, by key; the folders of FMUs go with it."""
 
-_one_at_a_time = threading.Lock()
+_RUN_LOCK = threading.Lock()
 """All Python FMUs of a process share its modules, and a compiled loop keeps the others waiting."""
 
 
 def run_packed(shared: Packed, job: Job) -> Outcome:
     """Do a run in this process."""
-    with _one_at_a_time:
+    with _RUN_LOCK:
         if shared.key not in _unpacked:
             _unpacked[shared.key] = _unpack(shared)
         return run_row(_unpacked[shared.key][0], *job)

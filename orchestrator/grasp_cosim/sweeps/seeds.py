@@ -1,7 +1,7 @@
 """A seed of its own for all that is random in each run of a sweep.
 
 The seed of run i at the k-th place, both counted from 0, is the first word of NumPy's
-SeedSequence((own, i, k)) modulo a milliard, where own is the seed that the system has there. So it
+SeedSequence((s, i, k)) modulo a milliard, where s is the seed that the system has there. So it
 is the same on any machine, in any order of the runs, and no two places share their noise.
 """
 
@@ -23,10 +23,10 @@ from .rows import Row
 OF_A_RUN = "run"
 """What is asked for where each run has seeds of its own."""
 
-BELOW = 10**9
+SEED_LIMIT = 10**9
 """Seeds are smaller than this."""
 
-_FAULT = re.compile(r"faults\[(\d+)\]\.seed")
+_FAULT_SEED = re.compile(r"faults\[(\d+)\]\.seed")
 
 
 def seeds_of_runs(system: System, rows: Sequence[Row], seed: str | None) -> list[dict[str, int]]:
@@ -38,19 +38,20 @@ def seeds_of_runs(system: System, rows: Sequence[Row], seed: str | None) -> list
         return [{} for _ in rows]
     if seed != OF_A_RUN:
         raise InputError(f"seed = {seed!r}: must be {OF_A_RUN!r}, or None")
-    if not (own := _places(system)):
+    system_seeds = _system_seeds(system)
+    if not system_seeds:
         raise InputError(
             f"seed = {seed!r}: nothing in {system.name} is random; must have a fault that is, or "
             "an FMU with a parameter seed"
         )
-    return [
-        {
-            place: _drawn(own[place], run, number)
-            for number, place in enumerate(own)
-            if place not in row
+    seeds_by_run = []
+    for run, row in enumerate(rows):
+        seeds = {
+            place: _run_seed(system_seed, run, number)
+            for number, (place, system_seed) in enumerate(system_seeds.items())
         }
-        for run, row in enumerate(rows)
-    ]
+        seeds_by_run.append({place: seeds[place] for place in seeds if place not in row})
+    return seeds_by_run
 
 
 def with_row(system: System, row: Row) -> System:
@@ -58,27 +59,38 @@ def with_row(system: System, row: Row) -> System:
 
     InputError as of with_settings().
     """
-    seeds = {int(found[1]): int(row[p]) for p in row if (found := _FAULT.fullmatch(p))}
-    overrides = {place: value for place, value in row.items() if not _FAULT.fullmatch(place)}
+    fault_seeds: dict[int, int] = {}
+    overrides = {}
+    for place, value in row.items():
+        if match := _FAULT_SEED.fullmatch(place):
+            fault_seeds[int(match[1])] = int(value)
+        else:
+            overrides[place] = value
     changed = system.with_overrides(as_overrides(overrides, "sweep: {place}"))
-    if not seeds:
+    if not fault_seeds:
         return changed
-    faults = enumerate(changed.faults, 1)
-    return replace(changed, faults=tuple(replace(f, seed=seeds.get(i, f.seed)) for i, f in faults))
+    faults = [
+        replace(fault, seed=fault_seeds.get(number, fault.seed))
+        for number, fault in enumerate(changed.faults, 1)
+    ]
+    return replace(changed, faults=tuple(faults))
 
 
-def _places(system: System) -> Mapping[str, int]:
+def _system_seeds(system: System) -> Mapping[str, int]:
     """The seeds that a system has, by place: of parameters called seed, and of random faults."""
-    found: dict[str, Any] = {}
-    for c in system.components:
-        for v in c.interface.variables:
-            whole = v.kind == "Integer" and v.causality == "parameter"
-            if whole and v.name.rpartition(".")[2] == "seed":
-                found[f"{c.name}.{v.name}"] = c.values.get(v.name, v.start_value)
-    random = ((i, f) for i, f in enumerate(system.faults, 1) if f.kind in RANDOM)
-    found |= {f"faults[{i}].seed": f.seed for i, f in random}
-    return {place: int(seed or 0) for place, seed in found.items()}
+    seeds: dict[str, Any] = {}
+    for component in system.components:
+        for variable in component.interface.variables:
+            is_parameter = variable.kind == "Integer" and variable.causality == "parameter"
+            if is_parameter and variable.name.rpartition(".")[2] == "seed":
+                seed = component.values.get(variable.name, variable.start_value)
+                seeds[f"{component.name}.{variable.name}"] = seed
+    for number, fault in enumerate(system.faults, 1):
+        if fault.kind in RANDOM:
+            seeds[f"faults[{number}].seed"] = fault.seed
+    return {place: int(seed or 0) for place, seed in seeds.items()}
 
 
-def _drawn(own: int, run: int, number: int) -> int:
-    return int(np.random.SeedSequence((own, run, number)).generate_state(1)[0]) % BELOW
+def _run_seed(system_seed: int, run: int, number: int) -> int:
+    """The seed of a run at the place of that number."""
+    return int(np.random.SeedSequence((system_seed, run, number)).generate_state(1)[0]) % SEED_LIMIT

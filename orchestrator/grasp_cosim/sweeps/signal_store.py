@@ -83,14 +83,14 @@ class Store:
 
     def blocks(self, result: Result) -> dict[str, bytes]:
         """What is written of a run, by array: its rows, then NaN where it ended early."""
-        found = {}
+        blocks = {}
         for name, array in self.arrays.items():
             block = np.full((self.rows, len(array.signals)), np.nan, "<f8")
             for i, signal in enumerate(array.signals):
                 column = result[signal][:: self.every]
                 block[: len(column), i] = column
-            found[name] = block.tobytes()
-        return found
+            blocks[name] = block.tobytes()
+        return blocks
 
     def write(self, run: int, blocks: Mapping[str, bytes]) -> None:
         """Write what there is of a run; OSError where that fails."""
@@ -113,15 +113,17 @@ class Store:
     def column(self, name: str, runs: int) -> npt.NDArray[np.float64]:
         """All runs of an array, of the shape (runs, rows) or with its elements behind."""
         array = self.arrays[name]
-        whole = np.full((runs, self.rows, *array.size), np.nan)
+        values = np.full((runs, self.rows, *array.size), np.nan)
         for run in range(runs):
-            if (file := self._file(name, run)).is_file():
-                whole[run] = np.fromfile(file, "<f8").reshape(whole.shape[1:])
-        return whole
+            file = self._file(name, run)
+            if file.is_file():
+                values[run] = np.fromfile(file, "<f8").reshape(values.shape[1:])
+        return values
 
     def _file(self, name: str, run: int) -> Path:
-        places = "".join(".0" for _ in self.arrays[name].dimensions[1:])
-        return self.folder / name / f"{run}{places}"
+        """The chunk of a run: the key of Zarr has its index along each dimension."""
+        chunk_indices = [run, *(0 for _ in self.arrays[name].dimensions[1:])]
+        return self.folder / name / ".".join(map(str, chunk_indices))
 
 
 @dataclass(frozen=True)
@@ -138,14 +140,15 @@ def recording(system: System, signals: Sequence[str] | str) -> tuple[System, lis
 
     Also where one is a String.
     """
-    wanted = system.with_record(*([signals] if isinstance(signals, str) else signals))
-    for port, variable in wanted.recorded.items():
+    patterns = [signals] if isinstance(signals, str) else signals
+    requested = system.with_record(*patterns)
+    for port, variable in requested.recorded.items():
         if variable.kind == "String":
             raise InputError(f"signals: {port} is a String; must be numbers or Booleans")
-    names = sorted(wanted.kept, key=_in_order)
-    if wanted.kept <= system.kept:
+    names = sorted(requested.kept, key=_in_order)
+    if requested.kept <= system.kept:
         return system, names
-    return system.with_record(*sorted(system.kept | wanted.kept, key=_in_order)), names
+    return system.with_record(*sorted(system.kept | requested.kept, key=_in_order)), names
 
 
 def times(system: System, rows: Iterable[Row], every: int) -> npt.NDArray[np.float64]:
@@ -167,19 +170,20 @@ def arrays(system: System, names: Sequence[str], metrics: Iterable[Metric]) -> d
 
     The elements are along the dimension of metrics of as many, like finger.
     """
-    words = {len(m.entries): dimension(m)[0] for m in metrics if m.entries}
-    known = {str(port): variable for port, variable in system.observed.items()}
-    found = {}
+    dimensions = {len(m.entries): dimension(m)[0] for m in metrics if m.entries}
+    variables = {str(port): variable for port, variable in system.observed.items()}
+    arrays_by_name = {}
     for name, signals in _grouped(names).items():
-        variable = known.get(signals[0])
-        several = len(signals)
-        found[name.replace("/", "_")] = Array(
+        variable = variables.get(signals[0])
+        is_array = signals != (name,)
+        size = len(signals)
+        arrays_by_name[name.replace("/", "_")] = Array(
             signals,
-            words.get(several, f"element_{several}") if signals != (name,) else None,
+            dimensions.get(size, f"element_{size}") if is_array else None,
             variable.unit if variable else None,
             (variable.description if variable else None) or "",
         )
-    return found
+    return arrays_by_name
 
 
 def dimension(metric: Metric) -> tuple[str, Sequence[Any]]:
@@ -200,14 +204,14 @@ def _grouped(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
     for name in names:
         element = _ELEMENT.fullmatch(name)
         members.setdefault(element[1] if element else name, []).append(name)
-    found: dict[str, tuple[str, ...]] = {}
-    for array, several in members.items():
-        whole = [f"{array}[{i}]" for i in range(1, len(several) + 1)]
-        if len(several) > 1 and several == whole:
-            found[array] = tuple(several)
+    groups: dict[str, tuple[str, ...]] = {}
+    for array, signals in members.items():
+        all_elements = [f"{array}[{i}]" for i in range(1, len(signals) + 1)]
+        if len(signals) > 1 and signals == all_elements:
+            groups[array] = tuple(signals)
         else:
-            found |= {name: (name,) for name in several}
-    return found
+            groups |= {name: (name,) for name in signals}
+    return groups
 
 
 def _in_order(name: str) -> list[Any]:
@@ -232,10 +236,10 @@ def begin(
             return
         shutil.rmtree(store.folder)
     with writing(store.folder, InputError):
-        beside = {RUN: [*range(len(rows))], **_numbers(rows)}
-        heads = _written(recorded, beside)
+        along_runs = {RUN: [*range(len(rows))], **_numbers(rows)}
+        heads = _write_coordinates(recorded, along_runs)
         attributes = {"signals of the sweep": key}
-        coordinates = [name for name in beside if name != RUN]
+        coordinates = [name for name in along_runs if name != RUN]
         if coordinates:
             attributes["coordinates"] = " ".join(coordinates)
         head = {
@@ -278,36 +282,42 @@ def _is_text(value: object) -> bool:
     return not isinstance(value, int | float)
 
 
-def _written(recorded: Recorded, beside: Mapping[str, Sequence[float]]) -> dict[str, Any]:
-    """Write what there is of the arrays before any run; their heads by name."""
-    store, found = recorded.store, {}
+def _write_coordinates(
+    recorded: Recorded, along_runs: Mapping[str, Sequence[float]]
+) -> dict[str, Any]:
+    """Write the coordinates, and the heads of all arrays, before any run; the heads by name."""
+    store, heads = recorded.store, {}
     for name, array in store.arrays.items():
-        shape = len(beside[RUN]), store.rows, *array.size
-        about = {"units": array.unit, "long_name": array.description}
-        found[name] = _head(shape, (1, *shape[1:]), array.dimensions, about)
-    along = {a.dimension: [*range(1, len(a.signals) + 1)] for a in store.arrays.values() if a.size}
-    for column, name, values in (
-        (TIME, TIME, recorded.time),
-        *((name, name, values) for name, values in along.items() if name),
-        *((name, RUN, values) for name, values in beside.items()),
-    ):
-        whole = np.asarray(values, "<f8")
-        about = {"units": "s"} if column == TIME else {}
-        found[column] = _head(whole.shape, whole.shape, (name,), about)
-        make_folder(store.folder / column)
-        (store.folder / column / "0").write_bytes(whole.tobytes())
-    for name, head in found.items():
+        shape = len(along_runs[RUN]), store.rows, *array.size
+        attributes = {"units": array.unit, "long_name": array.description}
+        heads[name] = _head(shape, (1, *shape[1:]), array.dimensions, attributes)
+    dimensions: dict[str, str] = {TIME: TIME}
+    coordinates: dict[str, Any] = {TIME: recorded.time}
+    for array in store.arrays.values():
+        if array.dimension:
+            dimensions[array.dimension] = array.dimension
+            coordinates[array.dimension] = [*range(1, len(array.signals) + 1)]
+    for name, values in along_runs.items():
+        dimensions[name] = RUN
+        coordinates[name] = values
+    for name, values in coordinates.items():
+        numbers = np.asarray(values, "<f8")
+        units = {"units": "s"} if name == TIME else {}
+        heads[name] = _head(numbers.shape, numbers.shape, (dimensions[name],), units)
+        make_folder(store.folder / name)
+        (store.folder / name / "0").write_bytes(numbers.tobytes())
+    for name, head in heads.items():
         write_json(store.folder / name / HEAD, head)
-    return found
+    return heads
 
 
 def _head(
     shape: Sequence[int],
     chunk: Sequence[int],
     dimensions: Sequence[str],
-    about: Mapping[str, Any],
+    attributes: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """What the file HEAD of an array says."""
+    """The content of the file HEAD of an array."""
     return {
         **_ZARR,
         "node_type": "array",
@@ -317,6 +327,6 @@ def _head(
         "chunk_key_encoding": {"name": "v2", "configuration": {"separator": "."}},
         "fill_value": "NaN",
         "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
-        "attributes": {key: text for key, text in about.items() if text},
+        "attributes": {key: text for key, text in attributes.items() if text},
         "dimension_names": list(dimensions),
     }

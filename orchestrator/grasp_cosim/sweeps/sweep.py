@@ -19,11 +19,11 @@ from ..metrics.metric import Function, Metric, available
 from ..system.description import System, as_system
 from .finished_runs import identity_of, keep, opened
 from .places import elsewhere, here
-from .rows import Row, as_rows, in_own_units, labels_of, settings_of, unit_of
+from .rows import Row, as_rows, in_own_units, labels_of, overrides_of, unit_of
 from .run import Task
 from .seeds import seeds_of_runs
 from .signal_store import Recorded, Store, arrays, begin, recording, times
-from .table import Outcome, Table, made
+from .table import Outcome, Table, table_of
 
 
 def sweep(
@@ -79,31 +79,35 @@ def sweep(
     """
     system = as_system(system, "sweep")
     place = f"--table {rows}" if isinstance(rows, str | Path) else "sweep"
-    settled = in_own_units(system, as_rows(rows, alike=seed is not None), place)
+    bare_rows = in_own_units(system, as_rows(rows, alike=seed is not None), place)
     whole("every", every, 1, must="a whole number, at least 1")
     if workers is not None and (workers < 1 or executor):
         raise InputError(f"workers = {workers}: must be at least 1, and without an executor")
-    own_metrics, all_metrics, measured = _metrics(system, metrics, needed=not signals)
-    units = {p: unit_of(system, p) for p in dict.fromkeys(p for row in settled for p in row)}
-    seeds = seeds_of_runs(system, settled, seed)
+    user_metrics, all_metrics, measured = _metrics(system, metrics, needed=not signals)
+    places = dict.fromkeys(place for row in bare_rows for place in row)
+    units = {place: unit_of(system, place) for place in places}
+    seeds = seeds_of_runs(system, bare_rows, seed)
     file = Path(out) if out is not None else None
-    beside = [{**row, **own} for row, own in zip(settled, seeds, strict=True)]
-    recorded = _recorded(system, signals, every, beside, measured, file) if signals else None
+    coordinates = [{**row, **of_run} for row, of_run in zip(bare_rows, seeds, strict=True)]
+    recorded = _recorded(system, signals, every, coordinates, measured, file) if signals else None
     if signals:
         system, _ = recording(system, signals)
-    task = Task(system.natively(native), own_metrics, recorded.store if recorded else None)
-    own_rows = zip(settings_of(task.system, settled), seeds, strict=True)
-    jobs = [*enumerate({**row, **own} for row, own in own_rows)]
+    task = Task(system.natively(native), user_metrics, recorded.store if recorded else None)
+    overrides = overrides_of(task.system, bare_rows)
+    jobs = [*enumerate({**row, **of_run} for row, of_run in zip(overrides, seeds, strict=True))]
     done: dict[int, Outcome] = {}
     identity = identity_of(task, [row for _, row in jobs], all_metrics) if file else {}
     with opened(file, identity, done) if file else nullcontext() as lines:
         if recorded and file:
-            begin(recorded, beside, identity, goes_on=bool(done))
+            begin(recorded, coordinates, identity, goes_on=bool(done))
             done = {i: o for i, o in done.items() if o.error or recorded.store.has(i)}
-        to_do = [job for job in jobs if job[0] not in done]
-        results = elsewhere(executor, task, to_do) if executor else here(task, to_do, workers)
+        remaining = [job for job in jobs if job[0] not in done]
+        if executor:
+            results = elsewhere(executor, task, remaining)
+        else:
+            results = here(task, remaining, workers)
         bar = Progress("sweep", len(jobs), shown=progress, initial=len(done))
-        with phase(f"sweep, {counted(len(to_do), 'run')}"), bar, closing(results):
+        with phase(f"sweep, {counted(len(remaining), 'run')}"), bar, closing(results):
             for outcome in results:
                 _check_written(task.signals, outcome)
                 if lines:
@@ -111,30 +115,30 @@ def sweep(
                 done[outcome.index] = outcome
                 bar.update()
         outcomes = [done[i] for i, _ in jobs]
-        table = made(settled, outcomes, units, measured, labels_of(rows), seeds, recorded)
+        table = table_of(bare_rows, outcomes, units, measured, labels_of(rows), seeds, recorded)
         if file:
             table.write(file)
     return table
 
 
 def _metrics(
-    system: System, asked: Sequence[Metric | Function | str], needed: bool
+    system: System, requested: Sequence[Metric | Function | str], needed: bool
 ) -> tuple[tuple[Metric, ...], Sequence[Metric], Sequence[Metric]]:
     """The metrics of the user's own, all, and those of them that the system permits.
 
     InputError where some are `needed` and there are none.
     """
     observed = system.shown
-    own = chosen(asked, system.metrics, observed, system.roles)
-    every = metrics_of(system.metrics, own)
-    in_si(system, every)
-    measured, missing = available(every, observed, system.roles)
+    user_metrics = chosen(requested, system.metrics, observed, system.roles)
+    all_metrics = metrics_of(system.metrics, user_metrics)
+    in_si(system, all_metrics)
+    measured, missing = available(all_metrics, observed, system.roles)
     if needed and not measured:
-        because = f" ({'; '.join(missing)})" if missing else ""
+        reasons = f" ({'; '.join(missing)})" if missing else ""
         raise InputError(
-            f"{system.name}: has no metric{because}; name a file of yours by --metrics"
+            f"{system.name}: has no metric{reasons}; name a file of yours by --metrics"
         )
-    return own, every, measured
+    return user_metrics, all_metrics, measured
 
 
 def _check_written(signals: Store | None, outcome: Outcome) -> None:
@@ -156,10 +160,14 @@ def _recorded(
 ) -> Recorded:
     """What is kept of the signals, and where: beside the table, else in a temporary folder."""
     time = times(system, rows, every)
-    observing, found = recording(system, signals)
-    names = [name for name in found if not any(name in row for row in rows)]  # a coordinate
-    scratch = None if out else ScratchFolder()
-    folder = Path(scratch.name) if scratch else out.with_suffix(".zarr") if out else Path()
-    return Recorded(
-        Store(folder, arrays(observing, names, metrics), len(time), every), time, scratch
-    )
+    observing, signal_names = recording(system, signals)
+    coordinates = {place for row in rows for place in row}
+    names = [name for name in signal_names if name not in coordinates]
+    scratch = None
+    if out:
+        folder = out.with_suffix(".zarr")
+    else:
+        scratch = ScratchFolder()
+        folder = Path(scratch.name)
+    store = Store(folder, arrays(observing, names, metrics), len(time), every)
+    return Recorded(store, time, scratch)

@@ -1,31 +1,30 @@
 """A table of runs: what varied and what came out, with the unit of each column.
 
-As CSV and Parquet, as text and JSON. Of a study of the step size it says how metrics tend to those
-of the finest step: three results with steps h1 < h2 < h3 that err by C h^p determine p (Roache,
-Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Engineering
-116(3), 1994).
+As text, HTML and JSON, as a table of pandas or xarray, and written to a file by table_files.py. Of
+a study of the step size it says how the metrics tend to those of the finest step: convergence.py.
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..base.checks import extra_module
 from ..base.errors import InputError, choices, nearest
-from ..base.one_piece import in_one_piece
 from ..base.text import columns, counted, on_a_screen, significant
 from ..interface.fmi_types import Value
 from ..metrics.metric import Metric
+from ..tables.column import head_of
+from .convergence import Convergence, convergence_of
 from .rows import Row
 from .signal_store import RUN, TIME, Recorded, dimension
+from .table_files import cell_of, write_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,17 +33,15 @@ if TYPE_CHECKING:
 STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
 """The statistics of a metric, besides how many runs have one."""
 
-FEW, ROWS = 4, 10
-"""So many places that vary are named in the repr() of a table, and rows are in its HTML."""
+MAX_VARIED_NAMES = 4
+"""Places that vary which the repr() of a table names."""
 
-SUFFIXES = (".csv", ".parquet")
+MAX_HTML_ROWS = 10
+"""Rows of the table that its HTML shows."""
 
 STEP = "experiment.step"
 
 ENDED_AT = "ended at"
-
-LOWEST, HIGHEST = 0.25, 4.0
-"""Orders outside are none: the results do not settle, or what is seen is noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,15 +96,15 @@ class Table:
             InputError: There is no such column.
         """
         if name not in self.columns:
-            found = nearest(name, [*self.varied, *self.metrics])
-            raise InputError(f"{name!r}: no such column of the sweep; {found}")
+            advice = nearest(name, [*self.varied, *self.metrics])
+            raise InputError(f"{name!r}: no such column of the sweep; {advice}")
         values = self.columns[name]
         return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
 
     def __repr__(self) -> str:
         """How many runs there are, what varied, what failed, and a line for each metric."""
         first, *lines = as_text(self).splitlines()
-        varied = f"  varied: {choices(self.varied, FEW)}"
+        varied = f"  varied: {choices(self.varied, MAX_VARIED_NAMES)}"
         return on_a_screen([f"Table of {first}", varied, *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
@@ -151,15 +148,15 @@ class Table:
         Returns:
             By column of a metric, in how many `runs` it is finite, and its STATISTICS in its unit.
         """
-        found: dict[str, dict[str, float | int | None]] = {}
+        statistics: dict[str, dict[str, float | int | None]] = {}
         for name in self.metrics:
-            there = self[name][np.isfinite(self[name])]
-            found[name] = {"runs": len(there), **dict.fromkeys(STATISTICS)}
-            if len(there):
-                middle = np.percentile(there, (5.0, 50.0, 95.0))
-                values = (there.min(), *middle, there.max(), there.mean())
-                found[name] |= zip(STATISTICS, map(float, values), strict=True)
-        return found
+            finite = self[name][np.isfinite(self[name])]
+            statistics[name] = {"runs": len(finite), **dict.fromkeys(STATISTICS)}
+            if len(finite):
+                percentiles = np.percentile(finite, (5.0, 50.0, 95.0))
+                values = (finite.min(), *percentiles, finite.max(), finite.mean())
+                statistics[name] |= zip(STATISTICS, map(float, values), strict=True)
+        return statistics
 
     def to_pandas(self) -> pd.DataFrame:
         """The table as one of pandas.
@@ -190,19 +187,20 @@ class Table:
         """
         xarray = extra_module("xarray", "it makes the data set", "xarray")
         data: xr.Dataset = xarray.Dataset(coords={RUN: self.columns["index"]})
-        beside = {*self.metrics, "index", "error"}
-        for name in (n for n in self.columns if n not in beside):
-            data.coords[name] = RUN, _numbers_or_texts(self.columns[name]), self._about(name)
-        for m in self.measured:
-            _add_metric(data, self, m)
-        for name in (n for n in self.metrics if n.partition("[")[0] not in data):
-            data[name] = RUN, self[name], self._about(name)
+        for name, column in self.columns.items():
+            if name not in (*self.metrics, "index", "error"):
+                data.coords[name] = RUN, _numbers_or_texts(column), self._attributes(name)
+        for metric in self.measured:
+            _add_metric(data, self, metric)
+        for name in self.metrics:
+            if name.partition("[")[0] not in data:
+                data[name] = RUN, self[name], self._attributes(name)
         data["error"] = RUN, [error or "" for error in self.columns["error"]]
         if self.signals:
             _add_signals(data, self.signals)
         return data
 
-    def _about(self, name: str) -> dict[str, str]:
+    def _attributes(self, name: str) -> dict[str, str]:
         """The unit of a column, if it has one, as xarray has it."""
         unit = self.units.get(name)
         return {"units": unit} if unit else {}
@@ -218,28 +216,7 @@ class Table:
             InputError: The suffix is another one, pyarrow is needed and not installed, or the file
                 cannot be written.
         """
-        path = Path(path)
-        check_format(path)
-        with in_one_piece(path) as part:
-            (self._write_parquet if path.suffix == ".parquet" else self._write_csv)(part)
-
-    def _write_csv(self, path: Path) -> None:
-        units = {name: f" [{unit}]" for name, unit in self.units.items() if unit}
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(name + units.get(name, "") for name in self.columns)
-            for row in zip(*self.columns.values(), strict=True):
-                writer.writerow(_cell(value) for value in row)
-
-    def _write_parquet(self, path: Path) -> None:
-        arrow, parquet = _pyarrow()
-        arrays = [_array(arrow, name, column) for name, column in self.columns.items()]
-        fields = [
-            arrow.field(name, array.type, metadata={"unit": self.units.get(name) or ""})
-            for name, array in zip(self.columns, arrays, strict=True)
-        ]
-        with path.open("wb") as file:  # pyarrow closes its own when it likes; Windows minds
-            parquet.write_table(arrow.table(arrays, schema=arrow.schema(fields)), file)
+        write_table(Path(path), self.columns, self.units)
 
 
 def _numbers_or_texts(column: Sequence[Any]) -> npt.NDArray[Any]:
@@ -253,18 +230,20 @@ def _numbers_or_texts(column: Sequence[Any]) -> npt.NDArray[Any]:
 
 def _add_metric(data: xr.Dataset, table: Table, metric: Metric) -> None:
     """Add what there is of a metric, of several entries along a dimension."""
-    there = [name for name in metric.columns if name in table.columns]
-    if not there:
+    present = [name for name in metric.columns if name in table.columns]
+    if not present:
         return
-    about = {"long_name": metric.title, **({"units": metric.unit} if metric.unit else {})}
-    if metric.entries:
-        along, places = dimension(metric)
-        nothing = np.full(len(table), np.nan)
-        columns = [table[name] if name in there else nothing for name in metric.columns]
-        data.coords[along] = along, list(places)
-        data[metric.name] = (RUN, along), np.stack(columns, axis=1), about
-    else:
-        data[metric.name] = RUN, table[metric.name], about
+    attributes = {"long_name": metric.title}
+    if metric.unit:
+        attributes["units"] = metric.unit
+    if not metric.entries:
+        data[metric.name] = RUN, table[metric.name], attributes
+        return
+    dimension_name, coordinates = dimension(metric)
+    no_values = np.full(len(table), np.nan)
+    columns = [table[name] if name in present else no_values for name in metric.columns]
+    data.coords[dimension_name] = dimension_name, list(coordinates)
+    data[metric.name] = (RUN, dimension_name), np.stack(columns, axis=1), attributes
 
 
 def _add_signals(data: xr.Dataset, recorded: Recorded) -> None:
@@ -273,12 +252,12 @@ def _add_signals(data: xr.Dataset, recorded: Recorded) -> None:
     for name, array in recorded.store.arrays.items():
         if array.dimension and array.dimension not in data.coords:
             data.coords[array.dimension] = [*range(1, len(array.signals) + 1)]
-        about = {"units": array.unit, "long_name": array.description}
-        whole = recorded.store.column(name, len(data[RUN]))
-        data[name] = array.dimensions, whole, {key: text for key, text in about.items() if text}
+        attributes = {"units": array.unit, "long_name": array.description}
+        attributes = {key: text for key, text in attributes.items() if text}
+        data[name] = array.dimensions, recorded.store.column(name, len(data[RUN])), attributes
 
 
-def made(
+def table_of(
     rows: Sequence[Row],
     outcomes: Sequence[Outcome],
     units: Mapping[str, str | None],
@@ -296,67 +275,25 @@ def made(
     measured = tuple(dict.fromkeys(name for o in outcomes for name in o.metrics))
     columns: dict[str, Sequence[Any]] = {"index": _index(labels, len(rows))}
     columns |= {place: [row.get(place) for row in rows] for place in varied}
-    seeded = dict.fromkeys(place for of_run in seeds for place in of_run)
-    columns |= {p: [{**r, **s}.get(p) for r, s in zip(rows, seeds, strict=True)] for p in seeded}
+    for place in dict.fromkeys(place for of_run in seeds for place in of_run):
+        columns[place] = [
+            row.get(place, of_run.get(place)) for row, of_run in zip(rows, seeds, strict=True)
+        ]
     columns |= {name: [o.metrics.get(name) for o in outcomes] for name in measured}
     if any(o.ended_at is not None for o in outcomes):
         columns[ENDED_AT] = [o.ended_at for o in outcomes]
         units = {**units, ENDED_AT: "s"}
     columns["error"] = [o.error for o in outcomes]
-    of_metrics = {m.name: m.unit for m in metrics}
-    found = {name: of_metrics.get(name.partition("[")[0]) for name in measured}
-    return Table(columns, varied, measured, {**units, **found}, tuple(metrics), labels, signals)
+    unit_of_metric = {m.name: m.unit for m in metrics}
+    all_units = {**units, **{n: unit_of_metric.get(n.partition("[")[0]) for n in measured}}
+    return Table(columns, varied, measured, all_units, tuple(metrics), labels, signals)
 
 
-def _index(labels: Any, count: int) -> Sequence[Any]:
-    """What a file has of the labels; the numbers of the rows, where it cannot have them."""
-    listed = [] if labels is None else labels.tolist()
-    kinds = {type(label) for label in listed}
-    return listed if kinds in ({int}, {str}) else list(range(count))
-
-
-def check_format(path: Path) -> None:
-    """InputError where a table cannot be written to a file of that name."""
-    if path.suffix not in SUFFIXES:
-        raise InputError(f"{path}: must end in {' or '.join(SUFFIXES)}")
-    if path.suffix == ".parquet":
-        _pyarrow()
-
-
-def _pyarrow() -> tuple[Any, Any]:
-    names = ("pyarrow", "pyarrow.parquet")
-    arrow, parquet = (extra_module(n, "it writes Parquet", "parquet") for n in names)
-    return arrow, parquet
-
-
-def _cell(value: Any) -> Any:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(value) if isinstance(value, float) else value
-
-
-def _array(arrow: Any, name: str, column: Sequence[Any]) -> Any:
-    """The column with the narrowest type that holds all values; numbers where there is none."""
-    there = [value for value in column if value is not None]
-    kinds = {type(value) for value in there}
-    if name == "error" or str in kinds:
-        return arrow.array([v if v is None else str(v) for v in column], type=arrow.string())
-    if kinds in ({bool}, {int}):
-        return arrow.array(column)
-    numbers = [None if value is None else float(value) for value in column]
-    return arrow.array(numbers, type=arrow.float64())
-
-
-class Convergence(NamedTuple):
-    """How far a metric is from that of the finest step, for each of the coarser `steps` in s.
-
-    They are in its SI unit. order is that of the three finest steps; None where they show none.
-    """
-
-    steps: tuple[float, ...]
-    finest: float | None
-    errors: tuple[float | None, ...]
-    order: float | None
+def _index(labels: Any, row_count: int) -> Sequence[Any]:
+    """The labels where a file can have them; else the numbers of the rows."""
+    values = [] if labels is None else labels.tolist()
+    types = {type(value) for value in values}
+    return values if types in ({int}, {str}) else list(range(row_count))
 
 
 def is_study(table: Table) -> bool:
@@ -367,39 +304,18 @@ def is_study(table: Table) -> bool:
 def convergence(table: Table) -> Mapping[str, Convergence]:
     """How each metric of a study of the step tends to that of the finest, by column."""
     rising = np.argsort(table[STEP])
-    steps = table[STEP][rising]
-    found = {}
+    steps = table[STEP][rising].tolist()
+    study = {}
     for name in table.metrics:
-        values = [None if np.isnan(v) else float(v) for v in table[name][rising]]
-        finest = values[0]
-        errors = tuple(None if v is None or finest is None else v - finest for v in values[1:])
-        order = observed_order(steps[:3].tolist(), values[:3]) if len(steps) > 2 else None
-        found[name] = Convergence(tuple(map(float, steps[1:])), finest, errors, order)
-    return found
-
-
-def observed_order(steps: Sequence[float], results: Sequence[float | None]) -> float | None:
-    """The p from LOWEST to HIGHEST of three results that err by C h^p, for rising steps h in s."""
-    y_1, y_2, y_3 = results
-    if y_1 is None or y_2 is None or y_3 is None or y_2 == y_1:
-        return None
-    h_1, h_2, h_3 = (h / steps[0] for h in steps)
-
-    def excess(p: float) -> float:
-        """Of (h3^p - h2^p) / (h2^p - h1^p), which rises with p, over what was seen."""
-        ratio: float = (h_3**p - h_2**p) / (h_2**p - h_1**p)
-        return ratio - (y_3 - y_2) / (y_2 - y_1)
-
-    if not excess(LOWEST) <= 0.0 <= excess(HIGHEST):
-        return None
-    from scipy.optimize import brentq  # only here: it takes time to load
-
-    return float(brentq(excess, LOWEST, HIGHEST))
+        results = [None if np.isnan(v) else float(v) for v in table[name][rising]]
+        study[name] = convergence_of(steps, results)
+    return study
 
 
 def as_json(table: Table) -> dict[str, Any]:
     """The object of `sweep --json`: the summary of each metric, and the orders of a study."""
     study = convergence(table) if is_study(table) else {}
+    orders = {name: of_metric._asdict() for name, of_metric in study.items()}
     return {
         "runs": len(table),
         "failed": len(table.errors),
@@ -407,7 +323,7 @@ def as_json(table: Table) -> dict[str, Any]:
         "ended_early": {str(i): time for i, time in table.ended_early.items()},
         "varied": list(table.varied),
         "metrics": table.summary(),
-        "convergence": {name: c._asdict() for name, c in study.items()},
+        "convergence": orders,
         "units": dict(table.units),
     }
 
@@ -422,23 +338,24 @@ def as_html(table: Table) -> str:
     """The same for a notebook, and the first rows of the table."""
     from ..report.tables import text_table  # only here: it takes time to load
 
-    first, *more = (f"{escape(line)}<br>" for line in _heads(table))
+    summary, *failures = (f"{escape(line)}<br>" for line in _heads(table))
     rows = _study_rows(table) if is_study(table) else _statistics(table)
-    shown = [name for name in table.columns if name != "error" or table.errors]
-    heads = [f"{n} [{table.units[n]}]" if table.units.get(n) else n for n in shown]
-    cells = [[_shown(table.columns[n][i]) for n in shown] for i in range(min(ROWS, len(table)))]
+    names = [name for name in table.columns if name != "error" or table.errors]
+    heads = [head_of(name, table.units.get(name)) for name in names]
+    row_count = min(MAX_HTML_ROWS, len(table))
+    cells = [[_for_the_eye(table.columns[name][i]) for name in names] for i in range(row_count)]
     return (
-        f"<p><b>{first}</b>{''.join(more)}</p>{text_table(rows)}"
+        f"<p><b>{summary}</b>{''.join(failures)}</p>{text_table(rows)}"
         f"<details><summary>the first {counted(len(cells), 'row')}</summary>"
         f"{text_table([heads, *cells])}</details>"
     )
 
 
-def _shown(value: Any) -> str:
-    """A value of the table for the eye."""
+def _for_the_eye(value: Any) -> str:
+    """A value of the table in as many digits as one reads."""
     if isinstance(value, float):
         return significant(value)
-    return "" if value is None else str(_cell(value))
+    return "" if value is None else str(cell_of(value))
 
 
 def _heads(table: Table) -> list[str]:
@@ -462,17 +379,18 @@ def _statistics(table: Table) -> list[list[str]]:
 
 def _study_rows(table: Table) -> list[list[str]]:
     """The errors of each metric against the finest step, by step, and the observed order."""
-    found = convergence(table)
-    first = next(iter(found.values()))
-    finest = 1e3 * min(table["experiment.step"])
-    heads = [f"{1e3 * step:.4g} ms" for step in first.steps]
-    rows = [[f"error against {finest:g} ms", "", "value", *heads, "order"]]
-    for name, c in found.items():
+    study = convergence(table)
+    first_metric = next(iter(study.values()))
+    finest_ms = 1e3 * min(table[STEP])
+    heads = [f"{1e3 * step:.4g} ms" for step in first_metric.steps]
+    rows = [[f"error against {finest_ms:g} ms", "", "value", *heads, "order"]]
+    for name, of_metric in study.items():
         title, factor, unit = table.shown(name)
-        numbers = [_scaled(x, factor) for x in (c.finest, *c.errors)]
-        rows.append([title, unit, *numbers, significant(c.order, 3, "-")])
+        numbers = [_scaled(value, factor) for value in (of_metric.finest, *of_metric.errors)]
+        rows.append([title, unit, *numbers, significant(of_metric.order, 3, "-")])
     return rows
 
 
 def _scaled(value: float | None, factor: float) -> str:
+    """A number times a factor, as the table shows it."""
     return significant(None if value is None else factor * value, 4, "-")

@@ -153,7 +153,7 @@ def read_stimuli(
             f"{time.heading} = {time.head!r}: must be time, then component.variable, with commas, "
             "semicolons or tabs between them and points in numbers"
         )
-    if not table.count:
+    if not table.row_count:
         raise InputError(f"{path.name}: has no row below its names; must have one")
     ports: dict[Port, Column] = {}
     for column in others:

@@ -13,11 +13,10 @@ from ..base.checks import extra_module
 from ..base.errors import InputError
 from ..base.files import not_its_fault
 
-MAGIC = 8
-"""Bytes before the first batch."""
+MAGIC_BYTES = 8
+"""Bytes of a file of the IPC format before its stream of batches."""
 
-IPC, PARQUET = (".arrow", ".feather"), (".parquet",)
-"""Suffixes of their files."""
+IPC_SUFFIXES, PARQUET_SUFFIXES = (".arrow", ".feather"), (".parquet",)
 
 
 def pyarrow() -> Any:
@@ -26,29 +25,30 @@ def pyarrow() -> Any:
     return extra_module("pyarrow", "it writes and reads Arrow", "arrow")
 
 
-def arrow_table(path: Path, called: str) -> Any:
-    """The pyarrow.Table of a file, of an IPC file that was cut off that of its whole batches.
+def arrow_table(path: Path, label: str) -> Any:
+    """The pyarrow.Table of a file, which messages call by its label.
 
-    InputError without pyarrow, or where the file is missing or damaged.
+    Of an IPC file that was cut off it has the whole batches. InputError without pyarrow, or where
+    the file is missing or damaged.
     """
     arrow = pyarrow()
-    kind = "Parquet" if path.suffix.lower() in PARQUET else "Arrow"
+    file_format = "Parquet" if path.suffix.lower() in PARQUET_SUFFIXES else "Arrow"
     try:
-        if kind == "Parquet":
+        if file_format == "Parquet":
             parquet = extra_module("pyarrow.parquet", "it reads Parquet", "parquet")
             table = parquet.read_table(path)
         else:
             with path.open("rb") as file:
-                file.seek(MAGIC)
+                file.seek(MAGIC_BYTES)
                 stream = arrow.ipc.open_stream(file)
                 table = arrow.Table.from_batches(_whole_batches(arrow, stream), stream.schema)
         table.validate(full=True)  # lengths of texts, which would be read from anywhere
         return table
     except (OSError, ValueError, MemoryError, arrow.ArrowException) as error:
         if limit := not_its_fault(error):
-            raise InputError(f"{called}: cannot be read: {limit}") from error
+            raise InputError(f"{label}: cannot be read: {limit}") from error
         reason = " ".join(f"{error}".split())
-        raise InputError(f"{called}: is damaged, or no {kind} file: {reason}") from error
+        raise InputError(f"{label}: is damaged, or no {file_format} file: {reason}") from error
 
 
 def _whole_batches(arrow: Any, stream: Any) -> Iterator[Any]:
@@ -64,8 +64,9 @@ def numbers_of(column: Any) -> Any:
 
     A value that is missing is NaN.
     """
-    types, kind = pyarrow().types, column.type
-    if not (types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind)):
+    types, cell_type = pyarrow().types, column.type
+    is_number = types.is_integer(cell_type) or types.is_floating(cell_type)
+    if not is_number and not types.is_boolean(cell_type):
         return None
     values = column.to_numpy()
     if values.dtype == object:  # Booleans of which some are missing
@@ -79,6 +80,7 @@ def texts_of(column: Any) -> list[str]:
 
 
 def _text(value: Any) -> str:
+    """A value as a CSV file would have it."""
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,11 +25,11 @@ Values = Union[Sequence[float], "npt.NDArray[Any]"]
 class Column:
     """The cells of a file that stand below one name.
 
-    `head` is what stands there, `name` and `unit` what it says: the unit is the text in brackets
-    behind the name, None where there is none. `values` are the cells as numbers, None where one of
-    them is no number; `read_texts` reads them as they stand in the file. `lines` are those of the
-    rows in a file of lines; where it is empty, they are simply one after the other, below the
-    first. `number` counts the columns from 1.
+    `head` is the text at the top of the column. It holds the `name` and, in brackets behind it, the
+    `unit`, which is None where there is none. `values` are the cells as numbers, None where one of
+    them is no number; `read_texts` reads them as they stand in the file. `lines` are the numbers of
+    the lines in which the rows stand; where it is empty, the rows follow each other below the
+    heads. `number` counts the columns from 1.
     """
 
     file: str
@@ -43,8 +44,8 @@ class Column:
 
     def place(self, row: int | None = None) -> str:
         """The column for a message, and in it the cell of a row: "a.csv: line 3, column 2, u"."""
-        where = self.heading if row is None else f"{self.row_place(row)}, column {self.number}"
-        return f"{where}, {self.name}" if self.name else where
+        place = self.heading if row is None else f"{self.row_place(row)}, column {self.number}"
+        return f"{place}, {self.name}" if self.name else place
 
     def row_place(self, row: int) -> str:
         """A row for a message: "a.csv: line 3"."""
@@ -71,7 +72,10 @@ class Column:
             try:
                 numbers.append(real(cell))
             except ValueError:
-                problem = NOT_A_NUMBER.format(cell.strip()) if cell.strip() else MISSING
+                text = cell.strip()
+                problem = (
+                    f" = {text!r}: must be a number" if text else ": missing; must be a number"
+                )
                 raise InputError(f"{self.place(row)}{problem}{point_advice(cell)}") from None
         return numbers  # decimal ones of Arrow, say
 
@@ -81,10 +85,10 @@ class Column:
         InputError where the column is in a unit of something else, or in one that is not known.
         """
         source, target = known_unit(self.unit or name), known_unit(name)
-        change = conversion(source, target) if source and target else None
-        if change is None:
+        to_target = conversion(source, target) if source and target else None
+        if to_target is None:
             raise no_conversion(self.place(), self.unit, name)
-        return change
+        return to_target
 
     def is_time(self) -> bool:
         """True for the column of the time: `time`, or `Time`, with a unit or without."""
@@ -98,26 +102,37 @@ class Column:
         return Fraction(repr(unit.factor))
 
 
-MISSING = ": missing; must be a number"
-NOT_A_NUMBER = " = {!r}: must be a number"
+_NAME_AND_UNIT = re.compile(r"(.*\S)\s+\[([^\[\]]*)\]", re.DOTALL)
+_TIME_AND_UNIT = re.compile(r"(time)\s*\[([^\[\]]*)\]", re.IGNORECASE)
+"""The time may have its unit without a space before it."""
+
+
+def split_head(head: str) -> tuple[str, str | None]:
+    """The name and the unit in the head of a column; `u[1]` is a name without a unit."""
+    match = _NAME_AND_UNIT.fullmatch(head) or _TIME_AND_UNIT.fullmatch(head)
+    return (match[1], match[2]) if match else (head, None)
+
+
+def head_of(name: str, unit: str | None) -> str:
+    """The head of a column with a name and a unit, which split_head() takes apart again."""
+    return f"{name} [{unit}]" if unit else name
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class FileTable:
     """The columns of a file, in its order, and how many rows there are."""
 
     file: str
     columns: Sequence[Column]
-    count: int
+    row_count: int
 
-    def named(self, name: str) -> Column:
+    def column(self, name: str) -> Column:
         """The column of that name; InputError where there is none, or where there are several."""
-        same = [column for column in self.columns if column.name == name]
-        if not same:
+        matches = [column for column in self.columns if column.name == name]
+        if not matches:
             names = [column.name for column in self.columns if column.name]
             raise InputError(f"{self.file}: no column {name!r}; {nearest(name, names)}")
-        if len(same) > 1:
-            raise InputError(
-                f"{same[1].heading} = {same[1].head!r}: appears twice; must appear once"
-            )
-        return same[0]
+        if len(matches) > 1:
+            second = matches[1]
+            raise InputError(f"{second.heading} = {second.head!r}: appears twice; must appear once")
+        return matches[0]

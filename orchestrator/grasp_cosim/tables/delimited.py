@@ -21,30 +21,37 @@ from ..base.text import counted
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 
-SHOWN = 5
+LINES_FOR_SEPARATOR = 5
 """Lines that show which separator it is, where the names hold several."""
 
-PIECE = 1024
+BLOCK_ROWS = 1024
 """Rows that are made numbers at once."""
 
-LARGE = 5_000_000
-"""Bytes of a file that is worth another reader."""
+MIN_BYTES_FOR_ARROW = 5_000_000
+"""Bytes of a file from which pyarrow reads it, where that is installed: it takes time to load."""
 
-MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+BYTE_ORDER_MARKS = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
 """The encodings by the bytes with which a file begins; without any it is UTF-8."""
 
 
 class TextFile:
     """The rows of a file of text, as often as they are asked for; a stream is kept in memory."""
 
-    def __init__(self, path: Path, called: str, torn: bool = False) -> None:
-        """Messages call it so; with `torn`, a last line that has no end does not count."""
-        self.called = called
+    def __init__(self, path: Path, label: str, torn: bool = False) -> None:
+        """Messages call the file by its label; with `torn`, a last line without an end is ignored.
+
+        OSError where there is no such file.
+        """
+        self.label = label
         self._path, self._torn = path, torn
-        self._kept = None if path.is_file() else path.read_bytes()
+        self._stream_content = None if path.is_file() else path.read_bytes()
         with self._bytes() as file:
-            begin = file.read(3)
-        encodings = [name for mark, name in MARKS.items() if begin.startswith(mark)]
+            begin = file.read(max(map(len, BYTE_ORDER_MARKS)))
+        encodings = [name for mark, name in BYTE_ORDER_MARKS.items() if begin.startswith(mark)]
         self.encoding = encodings[0] if encodings else "utf-8"
         self.separator = self._separator()
 
@@ -58,42 +65,40 @@ class TextFile:
             width = width or len(row)
             if len(row) != width:
                 raise InputError(
-                    f"{self.called}: line {line} has {counted(len(row), 'cell')}; must have "
+                    f"{self.label}: line {line} has {counted(len(row), 'cell')}; must have "
                     f"{width}, as line 1"
                 )
             yield line, row
 
-    def texts(self, place: int) -> list[str]:
-        """The cells of a column, by its place from 0."""
-        return [row[place] for _, row in islice(self.rows(), 1, None)]
+    def texts(self, index: int) -> list[str]:
+        """The cells of a column, by its index from 0."""
+        return [row[index] for _, row in islice(self.rows(), 1, None)]
 
     def columns_of_large(self, width: int) -> list[Any] | None:
         """The columns of a large file in a tenth of the time, if pyarrow is here and they are good.
 
         Those whose first cell is no number are texts. None where the slower way is to be taken.
         """
-        if self._kept is not None or self.encoding.startswith("utf-16"):
+        if self._stream_content is not None or self.encoding.startswith("utf-16"):
             return None
-        if self._path.stat().st_size < LARGE or (self._torn and not self._is_whole()):
+        if self._path.stat().st_size < MIN_BYTES_FOR_ARROW or (self._torn and not self._is_whole()):
             return None
         try:
             arrow = extra_module("pyarrow", "it reads large files", "arrow")
             reader = extra_module("pyarrow.csv", "it reads large files", "arrow")
         except InputError:
             return None
-        first = [row for _, row in islice(self.rows(), 1, 2)]
-        names = [str(place) for place in range(width)]
-        kinds = {
-            name: arrow.float64() if is_number(cell) else arrow.string()
-            for row in first
-            for name, cell in zip(names, row, strict=True)
-        }
+        names = [str(index) for index in range(width)]
+        column_types = {}
+        for _, first_row in islice(self.rows(), 1, 2):
+            for name, cell in zip(names, first_row, strict=True):
+                column_types[name] = arrow.float64() if is_number(cell) else arrow.string()
         try:
             table = reader.read_csv(
                 self._path,
                 reader.ReadOptions(skip_rows=1, column_names=names),
                 reader.ParseOptions(delimiter=self.separator),
-                reader.ConvertOptions(column_types=kinds, null_values=[]),
+                reader.ConvertOptions(column_types=column_types, null_values=[]),
             )
         except arrow.ArrowInvalid:  # which the slower way says better
             return None
@@ -106,23 +111,25 @@ class TextFile:
             return bool(file.read() == b"\n")
 
     def _bytes(self) -> Any:
-        return self._path.open("rb") if self._kept is None else BytesIO(self._kept)
+        return (
+            self._path.open("rb") if self._stream_content is None else BytesIO(self._stream_content)
+        )
 
     def _separator(self) -> str:
         """The separator that the lines show; InputError where they fit several."""
-        shown: dict[str, list[int]] = {}
+        widths: dict[str, list[int]] = {}
         for separator in SEPARATORS:
             with suppress(InputError):  # where it does not separate; else it is said later
-                rows = islice(self._split(separator), SHOWN)
-                shown[separator] = [len(row) for _, row in rows]
-        splitting = [s for s, widths in shown.items() if widths and widths[0] > 1]
-        if len(splitting) < 2:
-            return splitting[0] if splitting else ","
-        even = [s for s in splitting if len(set(shown[s])) == 1 and len(shown[s]) > 1]
+                rows = islice(self._split(separator), LINES_FOR_SEPARATOR)
+                widths[separator] = [len(row) for _, row in rows]
+        candidates = [s for s, of_lines in widths.items() if of_lines and of_lines[0] > 1]
+        if len(candidates) < 2:
+            return candidates[0] if candidates else ","
+        even = [s for s in candidates if len(set(widths[s])) == 1 and len(widths[s]) > 1]
         if len(even) != 1:
-            names = " and ".join(SEPARATORS[s] for s in splitting)
+            names = " and ".join(SEPARATORS[s] for s in candidates)
             raise InputError(
-                f"{self.called}: line 1 holds {names}; must be separated by one of them, with "
+                f"{self.label}: line 1 holds {names}; must be separated by one of them, with "
                 "names that hold another one in double quotes"
             )
         return even[0]
@@ -142,10 +149,8 @@ class TextFile:
                     if any(map(str.strip, row)):
                         yield line, row
         except (OSError, UnicodeDecodeError, csv.Error) as error:
-            after = f"after line {line}: " if line else ""
-            raise InputError(
-                f"{self.called}: {after}{reason(error)}; must be a CSV file"
-            ) from error
+            place = f"{self.label}: after line {line}" if line else self.label
+            raise InputError(f"{place}: {reason(error)}; must be a CSV file") from error
 
 
 class Numbers:

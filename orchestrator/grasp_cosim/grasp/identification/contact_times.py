@@ -97,12 +97,12 @@ def read_contacts(path: Path) -> list[Contact]:
             f"{path}: the columns are {choices(names)}, without {choices(missing)}; must be "
             f"{choices(COLUMNS)}, and may be {choices(OPTIONAL)}"
         )
-    if not table.count:
+    if not table.row_count:
         raise InputError(f"{path}: has no line below its columns; must have contact times")
     used = [name for name in UNITS if name in names]
     if others := [name for name in names if name not in used]:
         LOGGER.warning("%s: not used: the columns %s", path, choices(others, 6))
-    columns = [table.named(name) for name in used]
+    columns = [table.column(name) for name in used]
     changes = [column.to_unit(UNITS[column.name]) for column in columns]
     numbers = [
         [change(float(value)) if change != IDENTITY else float(value) for value in column.numbers()]

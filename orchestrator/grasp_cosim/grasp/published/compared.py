@@ -105,7 +105,7 @@ def _lines(name: str) -> Iterator[dict[str, str]]:
     """The rows of a published table, as texts by the names of its columns."""
     table = read_table(Path(__file__).with_name(name))
     cells = {column.name: column.texts() for column in table.columns}
-    for row in range(table.count):
+    for row in range(table.row_count):
         yield {column: texts[row] for column, texts in cells.items()}
 
 
