@@ -106,7 +106,7 @@ def test_dir_and_help_have_the_public_names_alone():
     assert [n for n in dir(grasp_cosim) if not n.startswith("_")] == grasp_cosim.__all__
     page = pydoc.render_doc(grasp_cosim, renderer=pydoc.plaintext)
     assert "class System(" in page
-    assert "Run the system once for each row" in page
+    assert "Run a system once for each row of a table" in page
     names: dict[str, object] = {}
     exec("from grasp_cosim import *", names)
     assert {*names} == {*grasp_cosim.__all__, "__builtins__"}
