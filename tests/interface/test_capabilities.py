@@ -5,7 +5,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from grasp_cosim.interface.fmi_types import typed
-from grasp_cosim.interface.obstacles import NUMBERS
+from grasp_cosim.interface.obstacles import NUMERIC_CAPABILITIES
 from grasp_cosim.interface.read import describe
 from lxml import etree
 from ssp.hand_made import described
@@ -34,7 +34,9 @@ def defaults(version, kind):
         texts = attributes(schema, of_type.format("InterfaceType"))
         texts |= attributes(schema, of_type.format(kind))
     del texts["modelIdentifier"]
-    return {flag: typed(NUMBERS.get(flag, "Boolean"), text) for flag, text in texts.items()}
+    return {
+        flag: typed(NUMERIC_CAPABILITIES.get(flag, "Boolean"), text) for flag, text in texts.items()
+    }
 
 
 def read(folder, version, kinds, more=""):

@@ -114,7 +114,7 @@ REFUSED = [
     ),
     (
         declared(variable(f'name="{"x" * 2001}" valueReference="1"')),
-        f"2001 characters; must have at most {read.LONGEST_NAME}",
+        f"2001 characters; must have at most {read.MAX_NAME_LENGTH}",
     ),
     (declared_3(*SAME), "variables 'a' and 'b' have the valueReference 7 both; must be unique"),
 ]

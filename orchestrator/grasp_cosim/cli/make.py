@@ -100,7 +100,7 @@ def build(
             built = build_chosen(block, folder, plan, fingers)
             if not native and (obstacle := of_binary(describe(built[0].path))):
                 built += build_chosen(block, folder.parent / NATIVE_FOLDER.name, planned(), fingers)
-                notes.append(f"built native FMUs, too: {built[0].path} {obstacle.what}")
+                notes.append(f"built native FMUs, too: {built[0].path} {obstacle.reason}")
     except ValueError as error:
         raise InputError(f"build: {error}") from error
     except CompilerError as error:

@@ -16,7 +16,7 @@ from ..base.checks import is_number
 from ..base.errors import choices, nearest
 from ..interface.fmi_types import Value, as_float
 from ..interface.interface import Interface
-from ..interface.obstacles import KINDS
+from ..interface.obstacles import FMU_KINDS
 from ..interface.units import IDENTITY, Conversion
 from ..interface.variables import PARAMETERS, SETTABLE, Variable
 from ..system.changes import stated
@@ -249,7 +249,7 @@ def capability_differences(
     if versions[0] != versions[1]:
         text = f"FMI {versions[1]} instead of {versions[0]}"
         yield Difference("notes", "capability", "fmiVersion", text, *versions)
-    was, now = ([KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate))
+    was, now = ([FMU_KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate))
     if not {"CoSimulation", "ModelExchange"} & set(candidate.kinds):
         text = f"is for {choices(now)}; must be for co-simulation or model exchange"
         yield Difference("blocks", "capability", "kind", text, was, now)

@@ -7,7 +7,7 @@ from typing import Any
 from ..base.errors import choices
 from ..base.text import WIDEST as SCREEN
 from ..base.text import on_a_screen
-from ..interface.obstacles import KINDS, this_platform
+from ..interface.obstacles import FMU_KINDS, this_platform
 from ..interface.read import describe
 from ..interface.variables import Variable
 
@@ -45,7 +45,7 @@ def inspect_fmu(path: str | Path) -> Report:
         fmu=str(path),
         model_name=found.model_name,
         fmi_version=found.version,
-        kinds=[KINDS[key] for key in found.kinds],
+        kinds=[FMU_KINDS[key] for key in found.kinds],
         generation_tool=found.tool,
         guid=found.guid or None,
         default_experiment=dict(found.experiment),

@@ -128,11 +128,11 @@ def description(fmu: Unpacked) -> Verdict:
     kind = ", ".join([f"FMI {fmu.declared.version}", *fmu.declared.kinds])
     text = f"{kind}, made by {fmu.declared.tool or 'an unknown tool'}; {source}"
     if obstacle := of_kind(fmu.declared):
-        return "problem", f"{text}; {obstacle.what}", obstacle.remedy
+        return "problem", f"{text}; {obstacle.reason}", obstacle.remedy
     if "CoSimulation" not in fmu.declared.kinds:
         text += "; run here by a solver, elsewhere ask the vendor for an export for co-simulation"
     if tied := of_loading(fmu.declared, ""):
-        return "warning", f"{text}; {tied.what}", tied.remedy
+        return "warning", f"{text}; {tied.reason}", tied.remedy
     return "ok", text, None
 
 
@@ -140,7 +140,7 @@ def binary(fmu: Unpacked) -> Verdict:
     """Check that there is a binary for this system and processor, of the name that it must have."""
     wanted, ours = fmu.binary.relative_to(fmu.folder).as_posix(), fmu.binary.parent.name
     if obstacle := of_binary(fmu.declared):
-        return "problem", obstacle.what, obstacle.remedy
+        return "problem", obstacle.reason, obstacle.remedy
     there = f"there is: {choices(fmu.declared.platforms)}; this machine: {ours}"
     if fmu.binary.is_file():
         return "ok", f"{wanted}; {there}", None

@@ -118,14 +118,17 @@ class Interface:
 
     def capability(self, flag: str) -> Value | None:
         """The value of a capability, under the name that FMI 2.0 or 3.0 has for it."""
-        wanted = _plain(flag)
-        return next((v for name, v in self.capabilities.items() if _plain(name) == wanted), None)
+        common_name = _common_name(flag)
+        for name, value in self.capabilities.items():
+            if _common_name(name) == common_name:
+                return value
+        return None
 
     def __repr__(self) -> str:
         """What FMU it is of, and how many variables that has of which causality."""
-        found = Counter(v.causality for v in self.variables)
-        counts = ", ".join(f"{count} {causality}" for causality, count in found.items())
-        return f"Interface of {self.path.name}, FMI {self.version}: {counts or 'no variables'}"
+        counts = Counter(variable.causality for variable in self.variables)
+        variables = ", ".join(f"{count} {causality}" for causality, count in counts.items())
+        return f"Interface of {self.path.name}, FMI {self.version}: {variables or 'no variables'}"
 
     @property
     def can_vary_step(self) -> bool:
@@ -149,8 +152,9 @@ class Interface:
         It then may end a step at one. An FMU that cannot vary its step handles events itself, but
         for those of clocks.
         """
-        has = self.version.startswith("3") and self.capability("hasEventMode") is True
-        return has and (self.can_vary_step or bool(self.input_clocks))
+        if not self.version.startswith("3") or self.capability("hasEventMode") is not True:
+            return False
+        return self.can_vary_step or bool(self.input_clocks)
 
     @property
     def step(self) -> float | None:
@@ -187,14 +191,14 @@ class Interface:
         FMI 3.0 declares such aliases; in FMI 2.0 variables of one value reference are the same one.
         Among them the input is the main one, or a parameter, or else what is declared first.
         """
-        three = self.version.startswith("3")
+        is_fmi_3 = self.version.startswith("3")
         main: dict[tuple[int, str, int], Variable] = {}
         names: dict[str, str] = {}
         settable = [v for v in self.variables if v.settable]
         settable.sort(key=lambda v: (v.causality != "input", v.causality not in PARAMETERS))
         for v in settable:
             place = v.element.place if v.element else 0
-            first = main.setdefault((v.reference, "" if three else v.kind, place), v)
+            first = main.setdefault((v.reference, "" if is_fmi_3 else v.kind, place), v)
             if first is v:
                 continue
             names[v.name] = first.name
@@ -220,24 +224,25 @@ class Interface:
         """
         name_of: dict[str, str] = {}
         for name, value in values.items():
-            other = name_of.setdefault(self.main_name(name), name)
-            if values[other] != value:
+            first = name_of.setdefault(self.main_name(name), name)
+            if values[first] != value:
                 raise InputError(
-                    f"{place(name)} = {value!r}: is another name of {other}, which is "
-                    f"{values[other]!r}; must have one value"
+                    f"{place(name)} = {value!r}: is another name of {first}, which is "
+                    f"{values[first]!r}; must have one value"
                 )
         return {main: values[name] for main, name in name_of.items()}
 
-    def conversion(self, name: str, other: "Interface") -> Conversion | None:
-        """The conversion of a variable into the unit that `other` has it in; None for no way.
+    def conversion(self, name: str, target: "Interface") -> Conversion | None:
+        """The conversion of a variable into the unit that `target` has it in; None for no way.
 
-        A unit that is not declared is taken as the other one.
+        A unit that is not declared is taken to be the same as the other.
         """
-        source, target = self.by_name[name], other.by_name[name]
-        if source.unit is None or target.unit is None or source.unit == target.unit:
+        source_variable, target_variable = self.by_name[name], target.by_name[name]
+        names = (source_variable.unit, target_variable.unit)
+        if None in names or names[0] == names[1]:
             return IDENTITY
-        start, end = self.unit(source), other.unit(target)
-        return conversion(start, end) if start and end else None
+        source_unit, target_unit = self.unit(source_variable), target.unit(target_variable)
+        return conversion(source_unit, target_unit) if source_unit and target_unit else None
 
     @property
     def listing(self) -> str:
@@ -247,10 +252,11 @@ class Interface:
     @property
     def short(self) -> str:
         """The FMU in a message on a name that it does not have."""
-        several = f", where several are called {choices(self.ambiguous)}," * bool(self.ambiguous)
-        return f"{self.path.name}{several}"
+        if not self.ambiguous:
+            return self.path.name
+        return f"{self.path.name}, where several are called {choices(self.ambiguous)},"
 
 
-def _plain(flag: str) -> str:
+def _common_name(flag: str) -> str:
     """A capability by a name that FMI 2 and 3 have in common."""
     return flag.lower().removesuffix("s")

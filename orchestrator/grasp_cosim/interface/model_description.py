@@ -24,6 +24,8 @@ MAX_UNPACKED_BYTES, MAX_EXPANSION = 500_000_000, 50
 and tables pack 2 to 20 times, a bomb hundreds of times."""
 MAX_DEPTH = 256
 """Elements within each other: the standard needs 6, the annotations of tools some more."""
+ENCRYPTED = 1
+"""The flag of an entry of a zip file that is encrypted."""
 _BINARY = re.compile(r"binaries/linux64/[^/]+\.so")
 MAX_XML_ELEMENTS = 1_000_000
 """Two or three to a variable."""
@@ -39,24 +41,7 @@ def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
     check_fmu_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            locked = next((i.filename for i in archive.infolist() if i.flag_bits & 1), None)
-            if locked:
-                raise ValueError(f"{locked} is encrypted; ask the vendor for it without a password")
-            entries = {i.filename.replace("\\", "/"): i for i in archive.infolist()}
-            out = next((n for n in entries if n.startswith("/") or ".." in n.split("/")), None)
-            if out is not None:
-                raise ValueError(
-                    f"{out} leads out of the archive; must be the path of a file in it"
-                )
-            if NAME not in entries:
-                near = next((n for n in entries if n.lower().endswith(NAME.lower())), "")
-                found = near and f"; must be there, and called so: there is {near}"
-                raise ValueError(f"no {NAME} at the top of the archive{found}")
-            description = entries[NAME].file_size
-            if description > MAX_DESCRIPTION_BYTES:
-                raise ValueError(
-                    f"{NAME} has {description} bytes; must have at most {MAX_DESCRIPTION_BYTES}"
-                )
+            entries = _checked_entries(archive)
             check_size(archive, path)
             root = parsed(archive.read(NAME))
             files = dict.fromkeys(entries, b"")
@@ -70,12 +55,33 @@ def read_document(path: Path) -> tuple[ElementTree.Element, dict[str, bytes]]:
     return root, files
 
 
+def _checked_entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """The entries by name; ValueError where one may do harm, or there is no description."""
+    for entry in archive.infolist():
+        if entry.flag_bits & ENCRYPTED:
+            raise ValueError(
+                f"{entry.filename} is encrypted; ask the vendor for it without a password"
+            )
+    entries = {entry.filename.replace("\\", "/"): entry for entry in archive.infolist()}
+    for name in entries:
+        if name.startswith("/") or ".." in name.split("/"):
+            raise ValueError(f"{name} leads out of the archive; must be the path of a file in it")
+    if NAME not in entries:
+        alike = next((name for name in entries if name.lower().endswith(NAME.lower())), None)
+        advice = "" if alike is None else f"; must be there, and called so: there is {alike}"
+        raise ValueError(f"no {NAME} at the top of the archive{advice}")
+    size = entries[NAME].file_size
+    if size > MAX_DESCRIPTION_BYTES:
+        raise ValueError(f"{NAME} has {size} bytes; must have at most {MAX_DESCRIPTION_BYTES}")
+    return entries
+
+
 def check_size(archive: zipfile.ZipFile, path: Path) -> None:
     """ValueError where the files of the archive at `path` would be too large, unpacked."""
     total = sum(i.file_size for i in archive.infolist())
-    most = max(MAX_UNPACKED_BYTES, MAX_EXPANSION * path.stat().st_size)
-    if total > most:
-        raise ValueError(f"its files have {total} bytes unpacked; must have at most {most}")
+    limit = max(MAX_UNPACKED_BYTES, MAX_EXPANSION * path.stat().st_size)
+    if total > limit:
+        raise ValueError(f"its files have {total} bytes unpacked; must have at most {limit}")
 
 
 def unreadable(path: Path, error: Exception | str) -> InputError:

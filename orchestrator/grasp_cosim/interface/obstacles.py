@@ -18,13 +18,13 @@ from .fmi_types import Value, typed
 from .interface import Interface
 from .model_description import ELF_HEAD_BYTES
 
-KINDS = {
+FMU_KINDS = {
     "CoSimulation": "co-simulation",
     "ModelExchange": "model exchange",
     "ScheduledExecution": "scheduled execution",
 }
 """The kinds as elements of a model description, and in words."""
-NUMBERS = {
+NUMERIC_CAPABILITIES = {
     "maxOutputDerivativeOrder": "Integer",
     "recommendedIntermediateInputSmoothness": "Integer",
     "fixedInternalStepSize": "Real",
@@ -47,34 +47,36 @@ _OF_FMI_3 = (
     "canSerializeFMUState", "providesDirectionalDerivatives", "providesAdjointDerivatives",
     "providesPerElementDependencies",
 )  # fmt: skip
+_CO_SIMULATION_2 = (
+    *_OF_FMI_2, "canHandleVariableCommunicationStepSize", "canInterpolateInputs",
+    "maxOutputDerivativeOrder", "canRunAsynchronuously",
+)  # fmt: skip
+_CO_SIMULATION_3 = (
+    *_OF_FMI_3, "canHandleVariableCommunicationStepSize", "fixedInternalStepSize",
+    "maxOutputDerivativeOrder", "recommendedIntermediateInputSmoothness",
+    "providesIntermediateUpdate", "mightReturnEarlyFromDoStep",
+    "canReturnEarlyAfterIntermediateUpdate", "hasEventMode", "providesEvaluateDiscreteStates",
+)  # fmt: skip
+_MODEL_EXCHANGE_2 = (*_OF_FMI_2, "completedIntegratorStepNotNeeded")
+_MODEL_EXCHANGE_3 = (*_OF_FMI_3, "needsCompletedIntegratorStep", "providesEvaluateDiscreteStates")
 CAPABILITIES: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("1", "CoSimulation"): _OF_FMI_1,
     ("1", "ModelExchange"): (),
-    ("2", "CoSimulation"): (
-        *_OF_FMI_2, "canHandleVariableCommunicationStepSize", "canInterpolateInputs",
-        "maxOutputDerivativeOrder", "canRunAsynchronuously",
-    ),
-    ("2", "ModelExchange"): (*_OF_FMI_2, "completedIntegratorStepNotNeeded"),
-    ("3", "CoSimulation"): (
-        *_OF_FMI_3, "canHandleVariableCommunicationStepSize", "fixedInternalStepSize",
-        "maxOutputDerivativeOrder", "recommendedIntermediateInputSmoothness",
-        "providesIntermediateUpdate", "mightReturnEarlyFromDoStep",
-        "canReturnEarlyAfterIntermediateUpdate", "hasEventMode", "providesEvaluateDiscreteStates",
-    ),
-    ("3", "ModelExchange"): (
-        *_OF_FMI_3, "needsCompletedIntegratorStep", "providesEvaluateDiscreteStates",
-    ),
+    ("2", "CoSimulation"): _CO_SIMULATION_2,
+    ("2", "ModelExchange"): _MODEL_EXCHANGE_2,
+    ("3", "CoSimulation"): _CO_SIMULATION_3,
+    ("3", "ModelExchange"): _MODEL_EXCHANGE_3,
     ("3", "ScheduledExecution"): _OF_FMI_3,
-}  # fmt: skip
+}
 """The capabilities that the standard names, by version and kind of FMU."""
 
-RUN = ("CoSimulation", "ModelExchange")
+RUNNABLE_KINDS = ("CoSimulation", "ModelExchange")
 """The kinds that the master runs, the one it prefers first."""
 
-CLOCKS = ("constant", "fixed", "calculated", "tunable", "changing", "countdown")
+TIME_BASED_CLOCKS = ("constant", "fixed", "calculated", "tunable", "changing", "countdown")
 """The variabilities of the interval of a clock that ticks by time."""
 
-TIME_BASED = choices(CLOCKS, len(CLOCKS))
+TIME_BASED = choices(TIME_BASED_CLOCKS, len(TIME_BASED_CLOCKS))
 
 _PROCESSORS = {3: "x86", 40: "ARM", 62: "x86-64", 183: "AArch64", 243: "RISC-V"}
 """By their number in ELF."""
@@ -86,13 +88,13 @@ _SYMBOL = re.compile(r"undefined symbol:? \S+", re.IGNORECASE)
 
 
 class Obstacle(NamedTuple):
-    """The reason why an FMU does not run here, and what would."""
+    """The reason why an FMU does not run here, a predicate, and what would help."""
 
-    what: str
+    reason: str
     remedy: str
 
     def __str__(self) -> str:
-        return f"{self.what}; {self.remedy}"
+        return f"{self.reason}; {self.remedy}"
 
 
 def kinds_of(root: Element, major: str) -> dict[str, Element]:
@@ -101,10 +103,10 @@ def kinds_of(root: Element, major: str) -> dict[str, Element]:
         implementation = root.find("Implementation")
         if implementation is None:
             return {"ModelExchange": Element("Capabilities")}
-        capable = implementation.find(".//Capabilities")
-        return {"CoSimulation": implementation if capable is None else capable}
-    found = {kind: root.find(kind) for kind in KINDS}
-    return {kind: element for kind, element in found.items() if element is not None}
+        capabilities = implementation.find(".//Capabilities")
+        return {"CoSimulation": implementation if capabilities is None else capabilities}
+    elements = {kind: root.find(kind) for kind in FMU_KINDS}
+    return {kind: element for kind, element in elements.items() if element is not None}
 
 
 def capabilities_of(kinds: Mapping[str, Element], major: str) -> dict[str, Value | None]:
@@ -120,16 +122,20 @@ def capabilities_of(kinds: Mapping[str, Element], major: str) -> dict[str, Value
             if flag == "modelIdentifier":
                 continue
             text = element.get(flag)
-            value = _default(flag) if text is None else typed(NUMBERS.get(flag, "Boolean"), text)
-            capabilities[flag if kind == first else f"{flag} ({KINDS[kind]})"] = value
+            value = (
+                _default(flag)
+                if text is None
+                else typed(NUMERIC_CAPABILITIES.get(flag, "Boolean"), text)
+            )
+            capabilities[flag if kind == first else f"{flag} ({FMU_KINDS[kind]})"] = value
     return capabilities
 
 
 def _default(flag: str) -> Value | None:
     """The value of a capability that is not declared; None for a step that is not fixed."""
-    if flag not in NUMBERS:
+    if flag not in NUMERIC_CAPABILITIES:
         return False
-    return 0 if NUMBERS[flag] == "Integer" else None
+    return 0 if NUMERIC_CAPABILITIES[flag] == "Integer" else None
 
 
 def this_machine(version: str) -> str:
@@ -154,8 +160,8 @@ def platform_of(folder: str, head: bytes) -> str:
 
     FMI 2.0 has one folder for all processors of 64 bit.
     """
-    its = processor(head) if folder == "linux64" else ""
-    return f"{folder} ({its})" if its not in ("", "x86-64") else folder
+    processor_name = processor(head) if folder == "linux64" else ""
+    return folder if processor_name in ("", "x86-64") else f"{folder} ({processor_name})"
 
 
 @cache
@@ -167,13 +173,14 @@ def this_platform(version: str) -> str:
 
 def of_kind(fmu: Interface) -> Obstacle | None:
     """The obstacle that no machine removes: a version of FMI, a kind or a clock not supported."""
-    wanted = " or ".join(KINDS[kind] for kind in RUN)
-    wanted = f"ask the vendor for an export as FMI 2.0 or 3.0, for {wanted}"
-    kinds = " and ".join(KINDS[kind] for kind in fmu.kinds)
+    runnable = " or ".join(FMU_KINDS[kind] for kind in RUNNABLE_KINDS)
+    remedy = f"ask the vendor for an export as FMI 2.0 or 3.0, for {runnable}"
+    kinds = " and ".join(FMU_KINDS[kind] for kind in fmu.kinds)
     if fmu.version == "1.0":
-        return Obstacle(f"is FMI 1.0, for {kinds}", wanted)
-    if not set(RUN) & set(fmu.kinds):
-        return Obstacle(f"is for {kinds} only" if kinds else "declares no kind of FMU", wanted)
+        return Obstacle(f"is FMI 1.0, for {kinds}", remedy)
+    if not set(RUNNABLE_KINDS) & set(fmu.kinds):
+        reason = f"is for {kinds} only" if kinds else "declares no kind of FMU"
+        return Obstacle(reason, remedy)
     return of_clocks(fmu)
 
 
@@ -181,54 +188,56 @@ def of_clocks(fmu: Interface) -> Obstacle | None:
     """The obstacle that is an input clock which the master cannot tick."""
     for v in fmu.input_clocks:
         variability = v.clock.variability if v.clock else ""
-        what = f"has the input clock {v.name!r}"
+        noun = f"has the input clock {v.name!r}"
         if v.shape:
-            return Obstacle(f"{what}, an array", "must have scalar clocks")
+            return Obstacle(f"{noun}, an array", "must have scalar clocks")
         if variability == "triggered":
             return Obstacle(
-                f"{what}, which another FMU has to tick (intervalVariability = 'triggered')",
+                f"{noun}, which another FMU has to tick (intervalVariability = 'triggered')",
                 f"must have clocks that tick by time, as clocks are not connected: {TIME_BASED}",
             )
-        if variability not in CLOCKS:
+        if variability not in TIME_BASED_CLOCKS:
             return Obstacle(
-                f"{what} with intervalVariability = {variability!r}", f"must be {TIME_BASED}"
+                f"{noun} with intervalVariability = {variability!r}", f"must be {TIME_BASED}"
             )
         if variability in ("constant", "fixed") and v.clock and v.clock.interval is None:
             return Obstacle(
-                f"{what}, {variability}, without an interval",
+                f"{noun}, {variability}, without an interval",
                 "must declare intervalDecimal, or intervalCounter and resolution",
             )
         if "ModelExchange" not in fmu.kinds and fmu.capability("hasEventMode") is not True:
-            return Obstacle(f"{what}, which ticks in event mode", "must declare hasEventMode")
+            return Obstacle(f"{noun}, which ticks in event mode", "must declare hasEventMode")
     return None
 
 
 def of_binary(fmu: Interface) -> Obstacle | None:
     """The obstacle on this machine: the FMU has no binary for it."""
-    here = this_platform(fmu.version)
-    if here in fmu.platforms:
+    local_platform = this_platform(fmu.version)
+    if local_platform in fmu.platforms:
         return None
-    what = f"has a binary for {choices(fmu.platforms)} only"
-    if not fmu.platforms:
-        what = "is source-only, C without a binary" if fmu.sources else "has no binary at all"
-    remedy = f"ask the vendor for an FMU with a binary for {here}"
+    if fmu.platforms:
+        reason = f"has a binary for {choices(fmu.platforms)} only"
+    elif fmu.sources:
+        reason = "is source-only, C without a binary"
+    else:
+        reason = "has no binary at all"
+    remedy = f"ask the vendor for an FMU with a binary for {local_platform}"
     if fmu.python and fmu.ours:
         remedy += ", or make a native one of its block: grasp-cosim build --native"
     if fmu.sources:
         from .source_code import why_not_compiled  # only here: most FMUs have a binary
 
-        lacking = why_not_compiled(fmu)
-        way = f"; its sources do not compile as they are: {lacking}"
-        if not lacking:
-            way = ", or compile its sources: LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
-        remedy += way
-    return Obstacle(f"{what}; this machine: {here}", remedy)
+        if problem := why_not_compiled(fmu):
+            remedy += f"; its sources do not compile as they are: {problem}"
+        else:
+            remedy += ", or compile its sources: LDFLAGS=-Wl,--no-as-needed,-lm fmpy compile FMU"
+    return Obstacle(f"{reason}; this machine: {local_platform}", remedy)
 
 
-def of_loading(fmu: Interface, said: str) -> Obstacle | None:
-    """The likely obstacle where the FMU does not instantiate and says something or nothing."""
+def of_loading(fmu: Interface, message: str) -> Obstacle | None:
+    """The likely obstacle where an FMU does not instantiate, by its message, which may be empty."""
     tool = fmu.tool or "the tool that made it"
-    if _LICENCE.search(_SYMBOL.sub("", said)):
+    if _LICENCE.search(_SYMBOL.sub("", message)):
         return Obstacle(
             "needs a licence on this machine",
             f"have that of {tool} found here, or ask the vendor for an export that needs none",
@@ -238,7 +247,7 @@ def of_loading(fmu: Interface, said: str) -> Obstacle | None:
             f"is a link to {tool} and needs it here (needsExecutionTool)",
             "install that and its licence, or ask the vendor for an export that runs by itself",
         )
-    if "failed to map segment" in said:
+    if "failed to map segment" in message:
         return Obstacle(
             f"was extracted to {gettempdir()}, on a file system without execution (noexec)",
             "set TMPDIR to a folder on another one",

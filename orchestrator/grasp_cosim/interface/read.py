@@ -29,12 +29,11 @@ from .variables import PARAMETERS, SETTABLE, Clock, Enumeration, Variable
 NUMERIC = ("Real", "Integer")
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 """Characters that end a line of a message or table, or move the cursor of a terminal."""
-LONGEST_NAME = 2000
+MAX_NAME_LENGTH = 2000
 """Characters; those of the largest FMUs have some hundreds."""
-MOST_DEPENDENCIES = 5_000_000
+MAX_DEPENDENCIES = 5_000_000
 """In all: of 2,000 outputs on 2,000 inputs, and some."""
-MOST_INDICATORS = 1_000_000
-"""Event indicators of an FMU."""
+MAX_EVENT_INDICATORS = 1_000_000
 EXPERIMENT = {
     "start_time": "startTime", "stop_time": "stopTime", "tolerance": "tolerance",
     "step_size": "stepSize",
@@ -56,18 +55,19 @@ def read_interface(path: Path) -> Interface:
 
 @lru_cache(maxsize=64)
 def _for_master(path: Path, identity: tuple[int, ...]) -> Interface:
-    found = _described(path, identity)
-    if obstacle := of_kind(found):
+    interface = _described(path, identity)
+    if obstacle := of_kind(interface):
         raise InputError(f"{path}: {obstacle}")
-    if found.flaw:
-        raise unreadable(path, found.flaw)
-    return replace(found, path=path.resolve(), user_path=path)
+    if interface.flaw:
+        raise unreadable(path, interface.flaw)
+    return replace(interface, path=path.resolve(), user_path=path)
 
 
 def check_runs(path: Path) -> None:
     """InputError where the FMU at `path` is not for this master, or this machine."""
-    found = describe(path)
-    if obstacle := of_kind(found) or of_binary(found):
+    interface = describe(path)
+    obstacle = of_kind(interface) or of_binary(interface)
+    if obstacle:
         raise InputError(f"{path}: {obstacle}")
 
 
@@ -102,29 +102,29 @@ def _read(path: Path) -> Interface:
         reader = _Reader(root, version[0])
         variables, units = reader.variables(), reader.units()
         kinds = kinds_of(root, reader.major)
-        identified = root if reader.major == "1" else next(iter(kinds.values()), root)
-        identifier = identified.get("modelIdentifier", "")
+        first_kind = root if reader.major == "1" else next(iter(kinds.values()), root)
+        identifier = first_kind.get("modelIdentifier", "")
         with reader.tolerated():
             _check_identifier(identifier)
         exchange = reader.exchange(kinds)
-        experiment = {} if (e := root.find("DefaultExperiment")) is None else e.attrib
-        with reader.tolerated():
-            _real("DefaultExperiment: stepSize", experiment.get("stepSize", "0"))
+        experiment = reader.experiment()
     except ValueError as error:
         raise unreadable(path, error) from error
+    log_categories = [e.get("name", "") for e in root.iterfind("LogCategories/Category")]
+    guid_attribute = "instantiationToken" if reader.major == "3" else "guid"
     return Interface(
         path=path,
-        guid=root.get("instantiationToken" if reader.major == "3" else "guid", ""),
+        guid=root.get(guid_attribute, ""),
         identifier=identifier,
         variables=variables,
         version=version,
         units=units,
         kinds=tuple(kinds),
         capabilities=capabilities_of(kinds, reader.major),
-        experiment={key: typed("Real", experiment.get(name)) for key, name in EXPERIMENT.items()},
-        log_categories=tuple(e.get("name", "") for e in root.iterfind("LogCategories/Category")),
+        experiment=experiment,
+        log_categories=tuple(log_categories),
         platforms=_platforms(files),
-        sources=any(re.match(r"sources/.*\.c(c|pp|xx)?$", name) for name in files),
+        sources=any(map(_SOURCE_FILE.match, files)),
         python="resources/slavemodule.txt" in files,
         model_name=root.get("modelName"),
         tool=root.get("generationTool"),
@@ -134,10 +134,17 @@ def _read(path: Path) -> Interface:
     )
 
 
+_SOURCE_FILE = re.compile(r"sources/.*\.c(c|pp|xx)?$")
+_BINARY = re.compile(r"binaries/([^/]+)/[^/]+\.(so|dll|dylib)")
+
+
 def _platforms(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    parts = {name: name.split("/") for name in files if name.endswith((".so", ".dll", ".dylib"))}
-    inside = {n: p[1] for n, p in parts.items() if p[0] == "binaries" and len(p) == 3}
-    return tuple(sorted({platform_of(folder, files[name]) for name, folder in inside.items()}))
+    """The platforms that an FMU has a binary for, by its files and the first bytes of each."""
+    platforms = set()
+    for name, head in files.items():
+        if match := _BINARY.fullmatch(name):
+            platforms.add(platform_of(match[1], head))
+    return tuple(sorted(platforms))
 
 
 class _Reader:
@@ -150,23 +157,41 @@ class _Reader:
         parent = root.find("ModelVariables")
         if parent is None:
             raise ValueError("no ModelVariables")
-        self.elements = [e for e in parent if e.get("name") is not None]
+        self.elements = [element for element in parent if element.get("name") is not None]
         for element in self.elements:
             _printable("variable", _name(element))
         self.references = [
             _whole(f"variable {_name(e)!r}: valueReference", e.get("valueReference"), 2**32 - 1)
             for e in self.elements
         ]
-        self.typed = [self.with_type(e) for e in self.elements]
+        self.type_elements = [self.with_type(e) for e in self.elements]
         self.check_references()
         keys = self.references if major == "3" else range(1, len(self.elements) + 1)
         self.places = dict(zip(keys, self.elements, strict=True))
         self.names = {str(key): _name(e) for key, e in self.places.items()}
-        types = {n: t for t in root.iterfind("TypeDefinitions/*") if (n := t.get("name"))}
-        self.types = types if major == "3" else {n: t[0] for n, t in types.items() if len(t)}
+        self.types = self.declared_types()
         self.enumerations = {name: self.enumeration(name, t) for name, t in self.types.items()}
-        place = INFINITE.get(major, INFINITE["2"])
-        self.infinite = frozenset(e.get("variable") for e in root.iterfind(place))
+        infinite = root.iterfind(INFINITE.get(major, INFINITE["2"]))
+        self.infinite = frozenset(element.get("variable") for element in infinite)
+
+    def declared_types(self) -> dict[str, Element]:
+        """The elements of type definitions by name; before FMI 3.0 each is within another one."""
+        types: dict[str, Element] = {}
+        for element in self.root.iterfind("TypeDefinitions/*"):
+            name = element.get("name")
+            if name and self.major == "3":
+                types[name] = element
+            elif name and len(element):
+                types[name] = element[0]
+        return types
+
+    def experiment(self) -> dict[str, Value | None]:
+        """The default experiment; a step that is no number is a flaw."""
+        element = self.root.find("DefaultExperiment")
+        attributes = {} if element is None else element.attrib
+        with self.tolerated():
+            _real("DefaultExperiment: stepSize", attributes.get("stepSize", "0"))
+        return {key: typed("Real", attributes.get(name)) for key, name in EXPERIMENT.items()}
 
     def check_references(self) -> None:
         """ValueError where two variables of FMI 3.0 have the same: it says what depends on what.
@@ -175,23 +200,25 @@ class _Reader:
         """
         if len(set(self.references)) == len(self.references):
             return
-        seen: dict[tuple[int, str], tuple[str, str | None]] = {}
-        for element, value, reference in zip(
-            self.elements, self.typed, self.references, strict=True
+        earlier: dict[tuple[int, str], tuple[str, str | None]] = {}
+        for element, type_element, reference in zip(
+            self.elements, self.type_elements, self.references, strict=True
         ):
-            key, name, causality = (reference, ""), _name(element), element.get("causality")
+            name, causality = _name(element), element.get("causality")
+            key = (reference, "")
             if self.major != "3":
                 if causality not in SETTABLE:
                     continue
-                key = (reference, "" if value is None else kind_of(value.tag))
-            if key in seen:
-                other, its = seen[key]
-                text = f"{other!r} and {name!r} have the valueReference {reference} both"
+                key = (reference, "" if type_element is None else kind_of(type_element.tag))
+            if key in earlier:
+                earlier_name, earlier_causality = earlier[key]
+                names = f"variables {earlier_name!r} and {name!r}"
+                message = f"{names} have the valueReference {reference} both"
                 if self.major == "3":
-                    raise ValueError(f"variables {text}; must be unique")
-                if "input" in (causality, its):
-                    self.flaws.append(f"variables {text}; one of them at most may be set")
-            seen[key] = (name, causality)
+                    raise ValueError(f"{message}; must be unique")
+                if "input" in (causality, earlier_causality):
+                    self.flaws.append(f"{message}; one of them at most may be set")
+            earlier[key] = (name, causality)
 
     def with_type(self, element: Element) -> Element | None:
         """The element that says the type of a variable: in FMI 3.0 its own, else one within it."""
@@ -226,34 +253,44 @@ class _Reader:
         Some tools write every unit without a dimension: one that is known to have one, like mm, is
         then not defined.
         """
-        found = {}
+        units = {}
         for element in self.root.iterfind("UnitDefinitions/Unit"):
-            name, base = _printable("unit", element.get("name", "")), element.find("BaseUnit")
-            if base is not None:
-                with self.tolerated():
-                    unit, known = base_unit(name, base.attrib), known_unit(name)
-                    empty = unit.si and not any(unit.exponents)
-                    if not (empty and known and not known.measures(unit)):
-                        found[name] = unit
-        return found
+            name = _printable("unit", element.get("name", ""))
+            base = element.find("BaseUnit")
+            if base is None:
+                continue
+            with self.tolerated():
+                unit, unit_of_name = base_unit(name, base.attrib), known_unit(name)
+                is_empty = unit.si and not any(unit.exponents)
+                is_wrong = is_empty and unit_of_name and not unit_of_name.measures(unit)
+                if not is_wrong:
+                    units[name] = unit
+        return units
 
     def variables(self) -> tuple[Variable, ...]:
         """The variables, then the aliases of FMI 3.0; not those of a name that several have."""
-        now, initially = self.unknowns("Output"), self.unknowns("InitialUnknown")
+        dependencies, initial_dependencies = (
+            self.unknowns("Output"),
+            self.unknowns("InitialUnknown"),
+        )
         inputs = tuple(_name(e) for e in self.elements if e.get("causality") == "input")
-        initially = {name: inputs if n is None else n for name, n in initially.items()}
-        parts = zip(self.elements, self.typed, self.references, strict=True)
+        for name, names in initial_dependencies.items():
+            if names is None:
+                initial_dependencies[name] = inputs
+        parts = zip(
+            self.elements, self.type_elements, self.references, self.names.values(), strict=True
+        )
         variables = [
-            self.variable(e, value, reference, now.get(name), initially.get(name))
-            for (e, value, reference), name in zip(parts, self.names.values(), strict=True)
+            self.variable(e, kind, key, dependencies.get(name), initial_dependencies.get(name))
+            for e, kind, key, name in parts
         ]
         if self.major == "3":
             variables += list(self.aliases(variables))
-        names = Counter(v.name for v in variables)
-        self.ambiguous = tuple(name for name, count in names.items() if count > 1)
+        counts = Counter(variable.name for variable in variables)
+        self.ambiguous = tuple(name for name, count in counts.items() if count > 1)
         if not self.ambiguous:
             return tuple(variables)
-        return tuple(v for v in variables if names[v.name] == 1)
+        return tuple(variable for variable in variables if counts[variable.name] == 1)
 
     def aliases(self, variables: Sequence[Variable]) -> Iterator[Variable]:
         """The other names of variables, which stand within their elements."""
@@ -270,17 +307,12 @@ class _Reader:
     def unknowns(self, group: str) -> dict[str, Names]:
         """By name of an unknown what it depends on; FMI 1.0 has that at its variables."""
         if self.major == "1":
-            direct = {_name(e): e.find("DirectDependency") for e in self.elements}
-            return {
-                name: tuple(child.text for child in e.iter("Name") if child.text)
-                for name, e in direct.items()
-                if e is not None
-            }
-        key, way = "index", f"{group}s/Unknown"
+            return self.direct_dependencies()
+        key, path = "index", f"{group}s/Unknown"
         if self.major == "3":
-            key, way = "valueReference", group
+            key, path = "valueReference", group
 
-        def called(place: str, text: str | None) -> str:
+        def name_of(place: str, text: str | None) -> str:
             if text in self.names:
                 return self.names[text]
             element = self.places.get(_whole(place, text))
@@ -288,50 +320,60 @@ class _Reader:
                 raise ValueError(f"{place} = {text!r}: must be the {key} of a variable")
             return _name(element)
 
-        found: dict[str, Names] = {}
-        entries = self.root.findall(f"ModelStructure/{way}")
+        unknowns: dict[str, Names] = {}
+        entries = self.root.findall(f"ModelStructure/{path}")
         total = sum(e.get("dependencies", "").count(" ") for e in entries)
-        if total > MOST_DEPENDENCIES:
-            raise ValueError(f"{way}: {total} dependencies; must have at most {MOST_DEPENDENCIES}")
-        place = f"{group}: {key}"
-        for element in entries:
-            name, listed = called(place, element.get(key)), element.get("dependencies")
-            if listed is None:
-                found[name] = None
+        if total > MAX_DEPENDENCIES:
+            raise ValueError(f"{path}: {total} dependencies; must have at most {MAX_DEPENDENCIES}")
+        for entry in entries:
+            name = name_of(f"{group}: {key}", entry.get(key))
+            dependencies = entry.get("dependencies")
+            if dependencies is None:
+                unknowns[name] = None
                 continue
-            parts = listed.split()
+            keys = dependencies.split()
             try:
-                found[name] = tuple(map(self.names.__getitem__, parts))
-            except KeyError:  # which is written otherwise, or is wrong
-                within = f"{group} {name!r}: dependencies"
-                found[name] = tuple(called(within, part) for part in parts)
-        return found
+                unknowns[name] = tuple(map(self.names.__getitem__, keys))
+            except KeyError:  # a number that is written otherwise, like 01, or is wrong
+                place = f"{group} {name!r}: dependencies"
+                unknowns[name] = tuple(name_of(place, text) for text in keys)
+        return unknowns
+
+    def direct_dependencies(self) -> dict[str, Names]:
+        """What the variables of FMI 1.0 depend on, those for which that is declared."""
+        dependencies: dict[str, Names] = {}
+        for element in self.elements:
+            direct = element.find("DirectDependency")
+            if direct is not None:
+                names = [child.text for child in direct.iter("Name") if child.text]
+                dependencies[_name(element)] = tuple(names)
+        return dependencies
 
     def variable(
         self,
         element: Element,
-        value: Element | None,
+        type_element: Element | None,
         reference: int,
-        now: Names,
-        initially: Names,
+        dependencies: Names,
+        initial_dependencies: Names,
     ) -> Variable:
-        """One variable, whose type is in value; it depends on others now and in initialisation."""
+        """One variable, whose type `type_element` says."""
         name = _name(element)
         place = f"variable {name!r}"
-        if value is None:
+        if type_element is None:
             types = FMI_3_TYPES if self.major == "3" else FMI_1_AND_2_TYPES
             raise ValueError(f"{place}: has no type; must be one of {', '.join(types)}")
-        kind, attributes = kind_of(value.tag), value.attrib
+        kind, attributes = kind_of(type_element.tag), type_element.attrib
         type_name = attributes.get("declaredType", "")
-        declared = self.types.get(type_name)
-        if declared is not None:
-            stated = {key: text for key, text in attributes.items() if text}
-            attributes = {**declared.attrib, **stated}
+        declared_type = self.types.get(type_name)
+        if declared_type is not None:
+            own_attributes = {key: text for key, text in attributes.items() if text}
+            attributes = {**declared_type.attrib, **own_attributes}
         low = high = nominal = None
         if kind in NUMERIC and not attributes.keys().isdisjoint(BOUNDS):
-            low, high, nominal = self.bounds(place, value.tag, attributes)
+            low, high, nominal = self.bounds(place, type_element.tag, attributes)
         causality, variability = self.nature(element, kind)
-        start = value.get("start")
+        start = type_element.get("start")
         starts: tuple[str, ...] = ()
         shape: tuple[int, ...] = ()
         sizes: tuple[str | None, ...] = ()
@@ -344,7 +386,12 @@ class _Reader:
             start = starts[0] if starts else None
         if kind in NUMERIC and start is not None:
             texts = start.split() if shape else (start,)
-            self.check_starts(f"{place}: start", value.tag, texts)
+            self.check_starts(f"{place}: start", type_element.tag, texts)
+        enumeration = (
+            self.enumerations.get(type_name) if type_element.tag == "Enumeration" else None
+        )
+        clock = self.clock(place, attributes) if kind == "Clock" else None
+        clocks = _references(place, attributes["clocks"]) if "clocks" in attributes else ()
         return Variable(
             name,
             kind,
@@ -354,22 +401,22 @@ class _Reader:
             start,
             low,
             high,
-            value.tag,
+            type_element.tag,
             variability=variability,
-            dependencies=now,
-            initial_dependencies=initially,
+            dependencies=dependencies,
+            initial_dependencies=initial_dependencies,
             shape=shape,
             sizes=sizes,
             description=element.get("description"),
             magnitude=nominal,
             relative=attributes.get("relativeQuantity") in ("true", "1"),
-            enumeration=self.enumerations.get(type_name) if value.tag == "Enumeration" else None,
+            enumeration=enumeration,
             initial=self.initial(element, causality, variability),
             display_unit=attributes.get("displayUnit") or None,
             starts=starts,
             infinite=name in self.infinite,
-            clock=self.clock(place, attributes) if kind == "Clock" else None,
-            clocks=_references(place, attributes["clocks"]) if "clocks" in attributes else (),
+            clock=clock,
+            clocks=clocks,
         )
 
     def clock(self, place: str, attributes: Mapping[str, str]) -> Clock:
@@ -456,21 +503,23 @@ class _Reader:
         with self.tolerated():
             _check_identifier(identifier)
             key = "numberOfEventIndicators"
-            indicators = _whole(key, self.root.get(key, "0"), MOST_INDICATORS)
+            indicators = _whole(key, self.root.get(key, "0"), MAX_EVENT_INDICATORS)
         states = len(self.root.findall("ModelStructure/Derivatives/Unknown"))
         if self.major == "3":
-            told = element.get("needsCompletedIntegratorStep") in ("true", "1")
+            is_needed = element.get("needsCompletedIntegratorStep") in ("true", "1")
         else:
-            told = element.get("completedIntegratorStepNotNeeded") not in ("true", "1")
-        return ModelExchange(identifier, states, indicators, told)
+            is_needed = element.get("completedIntegratorStepNotNeeded") not in ("true", "1")
+        return ModelExchange(identifier, states, indicators, is_needed)
 
     def dimension(self, place: str, element: Element) -> tuple[int, str | None]:
         """The size in a dimension of an array, and the variable that holds it; None if fixed."""
-        text, name, place = element.get("start"), None, f"{place}: Dimension"
+        place = f"{place}: Dimension"
+        text, name = element.get("start"), None
         if text is None:
             key = _whole(f"{place}: valueReference", element.get("valueReference"))
             holder = self.places.get(key)
-            text, name = (None, None) if holder is None else (holder.get("start"), _name(holder))
+            if holder is not None:
+                text, name = holder.get("start"), _name(holder)
         return _whole(place, text, 2**64 - 1), name
 
 
@@ -481,8 +530,10 @@ def base_unit(name: str, base: Mapping[str, str]) -> Unit:
     factor = _real(f"{place}: factor", base.get("factor", "1"))
     offset = _real(f"{place}: offset", base.get("offset", "0"))
     if not factor or not math.isfinite(factor) or not math.isfinite(offset):
-        said = f"{place}: factor = {factor:g}, offset = {offset:g}"
-        raise ValueError(f"{said}: must be finite, and the factor other than 0")
+        raise ValueError(
+            f"{place}: factor = {factor:g}, offset = {offset:g}: must be finite, and the factor "
+            "other than 0"
+        )
     return Unit(name, exponents, factor, offset)
 
 
@@ -496,14 +547,14 @@ def _name(element: Element) -> str:
     return element.get("name", "")
 
 
-def _printable(what: str, name: str) -> str:
+def _printable(noun: str, name: str) -> str:
     """The name; ValueError where it is very long or holds a control character."""
-    if len(name) > LONGEST_NAME:
+    if len(name) > MAX_NAME_LENGTH:
         raise ValueError(
-            f"{what} {name[:40]!r}...: {len(name)} characters; must have at most {LONGEST_NAME}"
+            f"{noun} {name[:40]!r}...: {len(name)} characters; must have at most {MAX_NAME_LENGTH}"
         )
     if CONTROL.search(name):
-        raise ValueError(f"{what} {name!r}: must have no control characters")
+        raise ValueError(f"{noun} {name!r}: must have no control characters")
     return name
 
 
@@ -538,6 +589,6 @@ def _whole(place: str, text: str | None, high: int | None = None) -> int:
         else:
             if high is None or 0 <= number <= high:
                 return number
-    must = "a whole number" + ("" if high is None else f" from 0 to {high}")
-    found = "missing" if text is None else repr(text)
-    raise ValueError(f"{place} = {found}: must be {must}")
+    must = "a whole number" if high is None else f"a whole number from 0 to {high}"
+    quoted = "missing" if text is None else repr(text)
+    raise ValueError(f"{place} = {quoted}: must be {must}")

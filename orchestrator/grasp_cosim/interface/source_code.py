@@ -43,9 +43,9 @@ def why_not_compiled(fmu: Interface) -> str:
     files = [file.get("name", "") for file in root.iterfind(f".//{element}")]
     if not files:
         return f"{place} lists no source files"
-    lost = next((name for name in files if FOLDER + name not in names), None)
-    if lost is not None:
-        return f"{place} lists {lost}, which is not there"
+    for name in files:
+        if FOLDER + name not in names:
+            return f"{place} lists {name}, which is not there"
     return _lacking_header(texts) or _prefix(texts, fmu.identifier)
 
 

@@ -92,7 +92,7 @@ def _notes(system: System) -> Iterable[str]:
         yield f"only OSP reads the steps of {', '.join(own)}"
     for component in system.components:
         if obstacle := of_binary(component.interface):
-            yield f"{component.name}: {component.interface.called} {obstacle.what}"
+            yield f"{component.name}: {component.interface.called} {obstacle.reason}"
         if arrays := component.interface.arrays:
             yield (
                 f"{component.name}: SSP 1.0 has no arrays: {', '.join(arrays)} by elements, which "

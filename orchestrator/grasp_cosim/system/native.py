@@ -57,7 +57,7 @@ def needed_twins(system: Structure) -> dict[str, Path | None]:
 def _lacking(component: Component) -> str:
     """The binary that the FMU of a component lacks, in words."""
     obstacle = of_binary(component.interface)
-    return f"{component.interface.called} {obstacle.what if obstacle else ''}"
+    return f"{component.interface.called} {obstacle.reason if obstacle else ''}"
 
 
 def _users_twins(component: Component) -> list[Path]:

@@ -20,7 +20,7 @@ from ..base.text import counted
 from ..interface.expansion import shape_text
 from ..interface.fmi_types import SUPPORTED_KINDS, Value, limits
 from ..interface.interface import Interface
-from ..interface.obstacles import KINDS
+from ..interface.obstacles import FMU_KINDS
 from ..interface.units import IDENTITY, Conversion, conversion, no_conversion
 from ..interface.values import parse_value
 from ..interface.variables import Clock, Variable
@@ -103,8 +103,9 @@ def _check_own_solver(place: str, fmu: Interface, solver: Solver) -> None:
     """InputError where the solver of a co-simulation FMU would need what it is not told."""
     for entry in ("absolute_tolerance", "maximum_step"):
         if getattr(solver, entry) is not None:
+            kinds = choices(FMU_KINDS[kind] for kind in fmu.kinds)
             raise InputError(
-                f"{place}: {entry}: {fmu.path.name} is for {choices(KINDS[k] for k in fmu.kinds)} "
+                f"{place}: {entry}: {fmu.path.name} is for {kinds} "
                 "alone, with a solver of its own, which gets relative_tolerance; must be left out"
             )
 
