@@ -86,6 +86,41 @@ def test_a_bad_status_ends_the_run(mock, clock, scheme, phase, status):
     assert len(run.signals()["a.y"]) == 3
 
 
+def _with_statuses(mock, scheme, statuses):
+    """A run whose components return these statuses in the third step."""
+    mocks = [mock(name, through) for name in "abc"]
+    run = Run(make_system(mocks, [], scheme=scheme), mocks)
+    run.master.initialise()
+    run.master.advance(2)
+    for one, status in zip(mocks, statuses, strict=True):
+        one.statuses["step"] = status
+    return run, mocks
+
+
+def test_all_components_that_fail_in_a_step_of_jacobi_are_named(mock):
+    run, mocks = _with_statuses(mock, "jacobi", (3, 0, 4))
+    message = r"^a: status 3 at 0\.2; c: status 4 at 0\.2$"
+    with pytest.raises(SimulationError, match=message):
+        run.master.advance(2)
+    assert [sum(call.startswith("step") for call in one.calls) for one in mocks] == [3, 3, 3]
+    assert run.master.steps_done == 2
+
+
+def test_in_sequence_none_steps_from_values_of_one_that_failed(mock):
+    run, mocks = _with_statuses(mock, "sequential", (3, 0, 4))
+    with pytest.raises(SimulationError, match=r"^a: status 3 at 0\.2$"):
+        run.master.advance(2)
+    assert [sum(call.startswith("step") for call in one.calls) for one in mocks] == [3, 2, 2]
+
+
+def test_after_a_fatal_status_no_instance_of_the_same_fmu_is_called(mock):
+    run, (a, _, c) = _with_statuses(mock, "jacobi", (4, 3, 3))
+    c.path = a.path
+    with pytest.raises(SimulationError, match=r"^a: status 4 at 0\.2; b: status 3 at 0\.2$"):
+        run.master.advance(2)
+    assert sum(call.startswith("step") for call in c.calls) == 2
+
+
 @pytest.mark.parametrize("phase", ["send", "step", "receive"])
 def test_a_warning_does_not_end_the_run(mock, clock, phase):
     a = mock("a", through)

@@ -306,6 +306,6 @@ def test_rows_of_many_signals_take_little_memory(tmp_path, monkeypatch):
     """Fewer of them wait together; nothing else changes."""
     system = alone(inner(tmp_path), "a.*", "!a.label", steps=100)
     usual = simulate(system)
-    monkeypatch.setattr(master, "MOST_BYTES", 4096)
+    monkeypatch.setattr(master, "MAX_BYTES", 4096)
     few = simulate(system)
     assert [few[n].tobytes() for n in few] == [usual[n].tobytes() for n in usual]

@@ -20,7 +20,8 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, Realtime, RunInterruptedError, SimulationError, simulate
 from grasp_cosim.exchange.dispatch import Dispatcher
-from grasp_cosim.master.master import CHUNK, Master
+from grasp_cosim.master.master import CHUNK
+from grasp_cosim.master.paced import PacedMaster
 from grasp_cosim.master.plan import Planner
 from grasp_cosim.realtime.pacer import SOME, SPIN_NS, Pacer, permitted, privileges
 from grasp_cosim.recording.memory import MemoryListener
@@ -75,7 +76,7 @@ class Paced:
         pace = realtime or Realtime()
         self.pacer = Pacer(self.system, pace, lambda: self.halted, self.fake.clock)
         self.memory = MemoryListener()
-        self.master = Master(self.system, mocks, self._receive, engine, self.pacer)
+        self.master = PacedMaster(self.system, mocks, self._receive, self.pacer, engine)
         self.dispatch = Dispatcher(self.system, self.master.slots, [self.memory])
         self.master.initialise()
 

@@ -27,7 +27,7 @@ from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..interface.values import parse_value
 from ..interface.variables import Variable
-from ..master.master import finish_step
+from ..master.step_completion import finish_step
 from ..system.times import NANOSECONDS, Time, in_seconds, nearest_time
 from .proxy_of_fmu import link_signature
 from .rehearsal import Rehearsal, Rehearsed, end_at_once

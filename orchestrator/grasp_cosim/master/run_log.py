@@ -69,7 +69,7 @@ class RunLog:
             *master.watches.log,
             *master.warnings(),
             *_rejections(master),
-            *master.ends,
+            *master.end.requests,
             *pending,
             *self._record.proxy_log(),
             *self._record.loss_log(),

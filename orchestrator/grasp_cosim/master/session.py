@@ -33,6 +33,7 @@ from ..system.parts import Component, Port, Realtime, as_signal
 from ..system.times import TimeInput, in_seconds
 from .engine import Engine
 from .master import Master
+from .paced import PacedMaster
 from .process_guard import guarded_process, leaves_process_alone, same_folder
 from .run_log import RunLog
 from .run_record import RunRecord
@@ -174,14 +175,12 @@ class Session:
         self._stack.callback(self._close_instances)
         with phase(f"loading {len(self.system.components)} FMUs"):
             self._load_instances()
-        self.master = Master(
-            self.system,
-            self._instances,
-            self._record.receive,
-            engine,
-            self.pacer,
-            self._renew_instances,
-            cuts,
+        rows_to, renew = self._record.receive, self._renew_instances
+        instances = self._instances
+        self.master = (
+            PacedMaster(self.system, instances, rows_to, self.pacer, engine, renew, cuts)
+            if self.pacer
+            else Master(self.system, instances, rows_to, engine, renew, cuts)
         )
         self._record.begin(self.master.slots, self.master.texts, listeners)
         if self.pacer:
@@ -353,6 +352,8 @@ class Session:
             How many steps are best done at first: one, or all where a run in real time needs no
             look in between.
         """
+        if not isinstance(self.master, PacedMaster):
+            return 1
         self.master.meanwhile = show
         return self.master.total_steps if self.master.runs_alone else 1
 
