@@ -13,7 +13,8 @@ import threading
 import pytest
 from grasp_cosim import InputError, Realtime, RunInterruptedError, SimulationError, System, simulate
 from grasp_cosim.base.calls import PACE
-from grasp_cosim.master import engine, paced
+from grasp_cosim.master import engine
+from grasp_cosim.master import paced as paced_master
 from grasp_cosim.master.engine import has_compiler
 from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
@@ -163,9 +164,9 @@ def test_it_has_the_bits_of_a_free_run_in_its_folder_too(two, tmp_path, version,
 
 def test_rows_go_round_in_their_room(two, monkeypatch):
     system = two()
-    monkeypatch.setattr(paced, "MAX_ROWS_ASIDE", 7)
+    monkeypatch.setattr(paced_master, "MAX_ROWS_ASIDE", 7)
     monkeypatch.setattr(engine, "PAUSE", 1e-6)
-    monkeypatch.setattr(paced, "LONG", 0.0)
+    monkeypatch.setattr(paced_master, "LONG", 0.0)
     assert same_bits(simulate(system), simulate(system, realtime=FAST))
 
 
