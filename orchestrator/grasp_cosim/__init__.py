@@ -109,6 +109,7 @@ def _imported(home: str, name: str) -> object:
 
 
 _FOR_LOWER_PACKAGES: tuple[tuple[Kind, str, str, str], ...] = (
+    ("blocks", ".py", "fmu_export.build", "kept_block"),
     ("groups", "grasp", "grasp.group", "GROUP"),
     ("groups", "hand", "hand.group", "GROUP"),
     ("groups", "tandem", "tandem.group", "GROUP"),
@@ -117,6 +118,7 @@ _FOR_LOWER_PACKAGES: tuple[tuple[Kind, str, str, str], ...] = (
     ("html", "System", "report.system", "system_html"),
     ("pictures", "Result", "report.plot", "plot_signals"),
     ("readers", ".ssp", "ssp.from_archive", "read_ssp"),
+    ("twins", "System", "twins.twins", "natives"),
 )
 """What lower packages get of upper ones, see base.registry: kind, name, home, its name there."""
 

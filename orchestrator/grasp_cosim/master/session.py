@@ -27,10 +27,10 @@ from ..recording.result import Result
 from ..system.connectors import behind_connectors, read_at
 from ..system.declared_steps import check_declared_steps
 from ..system.description import System, as_system
-from ..system.native import needed_twins
 from ..system.overrides import as_overrides
 from ..system.parts import Component, Port, Realtime, as_signal
 from ..system.times import TimeInput, in_seconds
+from ..twins.twins import needed_twins
 from .engine import Engine
 from .master import Master
 from .paced import PacedMaster

@@ -16,7 +16,6 @@ from .connectors import behind_connectors, check_connectors, driven_by_connector
 from .entries import sections, with_overrides
 from .from_python import Part, from_sections
 from .names import in_main_names
-from .native import natives
 from .overrides import PLACE, SECTIONS, Override, Overrides, as_overrides, grouped
 from .parameters import Parameters, parameters_of
 from .parts import Component, Connection
@@ -424,7 +423,7 @@ class System(Structure):
             InputError: With True twins cannot be built; with False an FMU in Python has no binary
                 here.
         """
-        return self.with_natives(natives(self, native))
+        return self.with_natives(registered("twins", "System")(self, native))
 
     def with_natives(self, natives: Mapping[str, Path | None]) -> System:
         """A copy in which components run native twins of their FMUs.

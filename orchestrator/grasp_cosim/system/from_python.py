@@ -14,6 +14,7 @@ from typing import Any
 
 from ..base.checks import check_keys
 from ..base.errors import InputError
+from ..base.registry import registered
 from .overrides import ENTRIES_OF_COMPONENT
 from .parts import Component, Connection, Port
 from .python_code import End, Function, PythonCode, WithStep, is_code, with_interface
@@ -121,14 +122,13 @@ def _end(others: Mapping[str, Component], port: Port) -> End:
 
 def _built(place: str, file: Path) -> Path:
     """The FMU of the block in a file, which is kept for as long as the file stays as it is."""
-    from ..fmu_export.build import kept_block  # only here: few systems have such a component
-
     try:
-        return kept_block(file)
+        fmu: Path = registered("blocks", ".py")(file)
     except OSError as error:
         raise InputError(f"{place}: {file}: {error.strerror}") from error
     except ValueError as error:
         raise InputError(f"{place}: {error}") from error
+    return fmu
 
 
 def _connection_entry(entry: Any) -> Any:

@@ -1,0 +1,1 @@
+"""The native twins of FMUs in Python."""
