@@ -19,7 +19,6 @@ from lxml import etree  # type: ignore[import-untyped]
 from ..base.checks import known
 from ..base.errors import InputError
 from ..base.si_units import BASE, Unit, known_unit
-from ..fmi import fmpy
 from ..interface.read import base_unit
 from ..interface.units import conversion
 from .archive import Archive, Notes
@@ -39,6 +38,9 @@ ROOTS = {
     "ssb": "ssb:SignalDictionary",
 }
 """The root element of each format."""
+
+SCHEMAS = Path(__file__).parent / "schemas"
+"""The schemas of SSP 1.0 as the Modelica Association publishes them, with their licence in each."""
 
 _UNDECLARED = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
 """The one error of XML that is taken: annotations in circulation have a prefix for no namespace."""
@@ -236,9 +238,9 @@ def add(parent: Any, name: str, /, **attributes: str) -> Any:
 
 @lru_cache(maxsize=len(ROOTS))
 def _schema(form: str) -> Any:
-    """The official schema, version 1.0, as FMPy brings it along."""
-    name = re.sub(".*/", "", NAMESPACES[form])
-    return etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp/schema" / f"{name}.xsd"))
+    """The official schema of a form."""
+    name = NAMESPACES[form].rpartition("/")[2]
+    return etree.XMLSchema(file=str(SCHEMAS / f"{name}.xsd"))
 
 
 def read_units(file: str, parent: Any, prefix: str) -> Mapping[str, Unit]:
