@@ -54,10 +54,10 @@ _OSP_TYPE, _OMS_TYPE = "com.opensimulationplatform", "org.openmodelica"
 FOREIGN = (_OSP_TYPE, "org.open-simulation-platform", _OMS_TYPE)
 """The types of the annotations that are read here; the second is an earlier one of OSP."""
 
-_BASE = {"FixedStepAlgorithm": "baseStepSize", "FixedStepMaster": "stepSize"}
+_STEP_ATTRIBUTES = {"FixedStepAlgorithm": "baseStepSize", "FixedStepMaster": "stepSize"}
 """The elements that name a step, in any namespace, and in which attribute."""
 
-_TOP: tuple[tuple[str, ...], ...] = (("ssd:DefaultExperiment",), ("ssd:System",), ())
+_PARENTS: tuple[tuple[str, ...], ...] = (("ssd:DefaultExperiment",), ("ssd:System",), ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,33 +151,36 @@ def _plain(value: Any) -> Any:
 
 
 def read_foreign(
-    file: str, root: Any, components: Iterable[str], given_ns: Time | None
+    file: str, root: Any, components: Iterable[str], chosen_ns: Time | None
 ) -> tuple[Extras, str]:
     """The extras of an archive without our annotation, and who names its step in another.
 
     Who names a step means that all components take it at once; without one it is 0, and nobody.
-    InputError where the annotations contradict each other, and no step is given.
+    InputError where the annotations contradict each other, and no step is chosen.
     """
-    found: dict[Time, str] = {}
-    for step, place in _named(file, root):
-        found.setdefault(step, place)
-    if len(found) > 1 and given_ns is None:
-        listed = choices(f"{written(step)} s" for step in found)
+    places: dict[Time, str] = {}
+    for step, place in _system_steps(file, root):
+        places.setdefault(step, place)
+    if len(places) > 1 and chosen_ns is None:
+        steps = choices(f"{written(step)} s" for step in places)
         raise InputError(
-            f"{file}: its annotations name several steps, {listed}; give one: "
+            f"{file}: its annotations name several steps, {steps}; give one: "
             "--set experiment.step=..."
         )
-    base, said = next(iter(found.items()), (0, ""))
-    own = _hints(file, root, given_ns or base) if base else {}
-    beside = {name: Beside({}, own.get(name), "none") for name in components}
-    return Extras(base, "jacobi" if base else "sequential", beside, Initialisation(), (), ()), said
+    base, base_place = next(iter(places.items()), (0, ""))
+    component_steps = _hints(file, root, chosen_ns or base) if base else {}
+    beside = {name: Beside({}, component_steps.get(name), "none") for name in components}
+    scheme: Scheme = "jacobi" if base else "sequential"
+    return Extras(base, scheme, beside, Initialisation(), (), ()), base_place
 
 
-def _named(file: str, root: Any) -> Iterator[tuple[Time, str]]:
+def _system_steps(file: str, root: Any) -> Iterator[tuple[Time, str]]:
     """Yield the steps that are named for the whole system, and where."""
-    for parent in _TOP:
+    for parent in _PARENTS:
         for annotation in children(root, *parent, "ssd:Annotations", "ssc:Annotation"):
-            for name, attribute in _BASE.items() if annotation.get("type") in FOREIGN else ():
+            if annotation.get("type") not in FOREIGN:
+                continue
+            for name, attribute in _STEP_ATTRIBUTES.items():
                 for element in annotation.iter(f"{{*}}{name}"):
                     place = f"{at(file, element)}: annotation {annotation.get('type')!r}"
                     yield _time(f"{place}: step", element.get(attribute)), place
@@ -210,12 +213,12 @@ def _time(place: str, text: str | None) -> Time:
 
 def _hints(file: str, root: Any, base: Time) -> dict[str, Time]:
     """The components' own steps: the multiples of the base step that are nearest to the hints."""
-    own: dict[str, Time] = {}
+    steps: dict[str, Time] = {}
     path = ("ssd:System", "ssd:Elements", "ssd:Component")
     for component in children(root, *path):
         for hint in component.iter("{*}StepSizeHint"):
             hinted = _time(f"{at(file, hint)}: StepSizeHint", hint.get("value"))
             multiple = max(1, math.floor(Fraction(hinted) / base + Fraction(1, 2))) * base
             if multiple != base:
-                own[component.get("name").replace(".", "_")] = multiple
-    return own
+                steps[component.get("name").replace(".", "_")] = multiple
+    return steps

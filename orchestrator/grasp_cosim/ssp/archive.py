@@ -53,19 +53,19 @@ class Archive:
 
     def __init__(self, path: Path, notes: Notes, place: str = "", needs: str = "") -> None:
         self.place = place or path.name
-        said = place or str(path)
+        label = place or str(path)
         try:
             self._file = zipfile.ZipFile(path)  # closed when nobody has the archive any more
             check_size(self._file, path)
         except FileNotFoundError:
-            raise InputError(f"{said}: no such system file") from None
+            raise InputError(f"{label}: no such system file") from None
         except Exception as error:  # zipfile raises whatever it likes
-            raise InputError(f"{said}: not readable as an SSP archive: {error}") from error
-        self._said, self._notes = said, notes
+            raise InputError(f"{label}: not readable as an SSP archive: {error}") from error
+        self._label, self._notes = label, notes
         self._entries = _entries(self._file.namelist(), needs or STRUCTURE, self.place, notes)
         self._extracted: dict[str, Path] = {}
         if needs not in self._entries and (needs or not self.structures):
-            raise InputError(f"{said}: no {needs or STRUCTURE} in it; must be an SSP archive")
+            raise InputError(f"{label}: no {needs or STRUCTURE} in it; must be an SSP archive")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,13 +87,13 @@ class Archive:
             name = variant.removesuffix(SSD)
             if name not in variants:
                 valid = choices(variants)
-                raise InputError(f"{self._said}: no variant {variant!r}; valid: {valid}")
+                raise InputError(f"{self._label}: no variant {variant!r}; valid: {valid}")
             return f"{name}{SSD}"
         if STRUCTURE in self.structures:
             return STRUCTURE
         if len(variants) > 1:
             raise InputError(
-                f"{self._said}: has no {STRUCTURE}, but the variants {choices(variants)}; must be "
+                f"{self._label}: has no {STRUCTURE}, but the variants {choices(variants)}; must be "
                 f"chosen: --set experiment.variant={variants[0]}"
             )
         return self.structures[0]
@@ -104,7 +104,7 @@ class Archive:
             return self._file.read(self._entries[entry])
         except Exception as error:  # its decompressors, too
             reason = " ".join(str(error).split()) or type(error).__name__
-            raise InputError(f"{self._said}: {entry}: not readable: {reason}") from error
+            raise InputError(f"{self._label}: {entry}: not readable: {reason}") from error
 
     def resolve(self, place: str, uri: str, base: str = "") -> str:
         """The entry that a source names, a path relative to the folder `base` in the archive.

@@ -31,7 +31,7 @@ from .xml_document import (
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
-_BY_SUFFIX = {".ssd": _DEFINITION, ".ssp": _PACKAGE}
+_TYPE_OF_SUFFIX = {".ssd": _DEFINITION, ".ssp": _PACKAGE}
 _SOURCES = ("output", "calculatedParameter")
 _CAUSALITIES = ("input", "parameter", *_SOURCES)
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
@@ -119,15 +119,22 @@ def read_system(
     name, place = element.get("name"), at(origin.place, element)
     entries = children(element, "ssd:SignalDictionaries", "ssd:SignalDictionary")
     dictionaries = [_dictionary(origin, entry, path) for entry in entries]
-    own = _by_name(dictionaries, f"system {name!r}: two signal dictionaries")
-    reachable = {**(around or {}), **own}
+    own_dictionaries = _by_name(dictionaries, f"system {name!r}: two signal dictionaries")
+    reachable = {**(around or {}), **own_dictionaries}
     elements = [
         _element(origin, entry, path, reachable)
         for entry in element.iterfind(f"{qualified('ssd:Elements')}/*")
     ]
-    inside = _by_name(elements, f"system {name!r}: two elements")
-    connectors, bindings = _connectors(origin, element), _bindings(origin, element)
-    system = Element(place, path, name, origin, connectors, bindings, None, inside, (), own)
+    system = Element(
+        place,
+        path,
+        name,
+        origin,
+        _connectors(origin, element),
+        _bindings(origin, element),
+        elements=_by_name(elements, f"system {name!r}: two elements"),
+        dictionaries=own_dictionaries,
+    )
     connections = children(element, "ssd:Connections", "ssd:Connection")
     return replace(system, hops=tuple(_hop(origin, entry, system) for entry in connections))
 
@@ -143,13 +150,13 @@ def linear(element: Any) -> tuple[float, float]:
 
 
 def _by_name(parts: Iterable[Part], twice: str) -> dict[str, Part]:
-    """The parts by their names, which must differ; else `twice` is said of them."""
-    found: dict[str, Part] = {}
+    """The parts by their names; InputError, in which `twice` is said of them, if two are alike."""
+    by_name: dict[str, Part] = {}
     for part in parts:
-        if part.name in found:
+        if part.name in by_name:
             raise InputError(f"{part.place}: {twice} {part.name!r}; must differ")
-        found[part.name] = part
-    return found
+        by_name[part.name] = part
+    return by_name
 
 
 def _bindings(origin: Origin, entry: Any) -> tuple[tuple[Origin, Any], ...]:
@@ -164,15 +171,20 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     if tag == "ssd:SignalDictionaryReference":
         return _reference(origin, entry, reachable)
     kind, place = entry.get("type", FMU), f"{place}: component {name!r}"
-    named = entry.get("source").partition("#")[0]
-    suffix = splitext(named)[1].lower()
-    if "type" not in entry.attrib and suffix in _BY_SUFFIX:
-        kind = _BY_SUFFIX[suffix]
+    source_file = entry.get("source").partition("#")[0]
+    suffix = splitext(source_file)[1].lower()
+    if "type" not in entry.attrib and suffix in _TYPE_OF_SUFFIX:
+        kind = _TYPE_OF_SUFFIX[suffix]
         entry.set("type", kind)
-        origin.notes.add(place, f"names no type; {named} is taken as {kind}")
+        origin.notes.add(place, f"names no type; {source_file} is taken as {kind}")
     known(f"{place}: type", kind, (FMU, _PACKAGE, _DEFINITION), " is not supported")
     if kind != FMU:
         return _nested(origin, entry, path, place)
+    return _component(origin, entry, path, place)
+
+
+def _component(origin: Origin, entry: Any, path: Path, place: str) -> Element:
+    """A component that is an FMU."""
     fmu = origin.resolve(place, entry.get("source"))
     file = origin.archive.extract(fmu)
     try:
@@ -180,16 +192,22 @@ def _element(origin: Origin, entry: Any, parent: Path, reachable: Dictionaries) 
     except InputError as error:
         reason = str(error).removeprefix(f"{file}: ")
         raise InputError(f"{place}: {fmu}: {reason}") from error
-    asked = entry.get("implementation", "any")
-    if asked != "any" and asked not in interface.kinds:
+    kind = entry.get("implementation", "any")
+    if kind != "any" and kind not in interface.kinds:
         raise InputError(
-            f"{place}: implementation {asked!r}: {entry.get('source')} has none; must be "
+            f"{place}: implementation {kind!r}: {entry.get('source')} has none; must be "
             f"{choices(interface.kinds)}, or any"
         )
-    connectors = _connectors(origin, entry, interface)
-    bindings, exchange = _bindings(replace(origin, fmu=fmu), entry), asked == "ModelExchange"
-    line = at(origin.place, entry)
-    return Element(line, path, name, origin, connectors, bindings, interface, exchange=exchange)
+    return Element(
+        at(origin.place, entry),
+        path,
+        entry.get("name"),
+        origin,
+        _connectors(origin, entry, interface),
+        _bindings(replace(origin, fmu=fmu), entry),
+        interface,
+        exchange=kind == "ModelExchange",
+    )
 
 
 def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
@@ -198,7 +216,8 @@ def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
     The component's parameter bindings come after its own and so go before them.
     """
     source = entry.get("source")
-    system = read_system(*_referred(origin, entry, place, source), path)
+    inner, element = _source_system(origin, entry, place, source)
+    system = read_system(inner, element, path)
     connectors = dict(system.connectors)
     for name, outer in _connectors(origin, entry).items():
         known(f"{outer.place}: {system.name} has no connector", name, connectors)
@@ -213,7 +232,7 @@ def _nested(origin: Origin, entry: Any, path: Path, place: str) -> Element:
     return replace(system, name=entry.get("name"), connectors=connectors, bindings=bindings)
 
 
-def _referred(origin: Origin, entry: Any, place: str, source: str) -> tuple[Origin, Any]:
+def _source_system(origin: Origin, entry: Any, place: str, source: str) -> tuple[Origin, Any]:
     """The element of a system that a source names, and where it stands.
 
     It is the top one of an archive, of its structure or a variant, or of an SSD; or, by its id, one
@@ -225,12 +244,12 @@ def _referred(origin: Origin, entry: Any, place: str, source: str) -> tuple[Orig
         by_id = {system.get("id"): system for system in systems if system.get("id")}
         known(f"{place}: source {source!r}: no system of the id", fragment, by_id)
         return origin.inside(source), by_id[fragment]
-    found = origin.resolve(place, file)
+    resolved = origin.resolve(place, file)
     if entry.get("type") == _DEFINITION:
-        archive, structure = origin.archive, found
+        archive, structure = origin.archive, resolved
     else:
-        within = f"{origin.archive.place}: {found}"
-        archive = Archive(origin.archive.extract(found), origin.notes, within)
+        label = f"{origin.archive.place}: {resolved}"
+        archive = Archive(origin.archive.extract(resolved), origin.notes, label)
         structure = archive.resolve(place, fragment) if fragment else archive.structure()
     inner, root = open_structure(archive, origin.notes, structure, origin.around)
     return inner, child(root, "ssd:System")
@@ -252,14 +271,14 @@ def _reference(origin: Origin, entry: Any, reachable: Dictionaries) -> Element:
     name, place = entry.get("name"), at(origin.place, entry)
     known(f"{place}: {name!r}: no signal dictionary", entry.get("dictionary"), reachable)
     dictionary = reachable[entry.get("dictionary")]
-    listed = children(entry, "ssd:Connectors", "ssd:Connector")
+    entries = children(entry, "ssd:Connectors", "ssd:Connector")
     connectors = _by_name(
-        [_connector(origin, at(origin.place, e), e, e.get("kind"), None) for e in listed],
+        [_connector(origin, at(origin.place, e), e, e.get("kind"), None) for e in entries],
         f"{name}: two connectors",
     )
     for connector in connectors.values():
-        said = f"{connector.place}: signal dictionary {dictionary.name} has no entry"
-        known(said, connector.name, dictionary.connectors)
+        lacking = f"{connector.place}: signal dictionary {dictionary.name} has no entry"
+        known(lacking, connector.name, dictionary.connectors)
     return replace(dictionary, place=place, name=name, connectors=connectors, refers=True)
 
 
@@ -286,32 +305,33 @@ def _connector(
     declared = types[0] if types else None
     if declared is not None:
         known(f"{place}: connector {name!r}: type", declared, _TYPES, " is not supported")
-    unit = origin.unit_name(child(entry, "ssc:Real")) if declared == "Real" else None
-    own = variable.unit if variable else None
-    type_ = "Integer" if declared == "Enumeration" else declared
-    return Connector(place, name, kind, type_, origin.unit(f"{place}: {name!r}", unit, own))
+    unit_name = origin.unit_name(child(entry, "ssc:Real")) if declared == "Real" else None
+    fmu_unit = variable.unit if variable else None
+    unit = origin.unit(f"{place}: {name!r}", unit_name, fmu_unit)
+    return Connector(place, name, kind, "Integer" if declared == "Enumeration" else declared, unit)
 
 
 def _hop(origin: Origin, entry: Any, system: Element) -> Hop:
     """A connection of a system, from the end that gives a value there to the one that takes it."""
     ends = [(entry.get(f"{side}Element"), entry.get(f"{side}Connector")) for side in _SIDES]
-    said = " - ".join(".".join(filter(None, end)) for end in ends)
-    place = f"{at(origin.place, entry)}: connection '{said}'"
-    change = transformation(entry)
-    if change is not None and not short(change.tag).endswith("LinearTransformation"):
+    names = " - ".join(".".join(filter(None, end)) for end in ends)
+    place = f"{at(origin.place, entry)}: connection '{names}'"
+    element = transformation(entry)
+    if element is not None and not short(element.tag).endswith("LinearTransformation"):
         raise InputError(
-            f"{place}: {short(change.tag)} is not supported on a connection; "
+            f"{place}: {short(element.tag)} is not supported on a connection; "
             "must be linear, or in the mapping of a parameter"
         )
-    (a, gives_a), (b, gives_b) = (_end(place, system, *end) for end in ends)
-    if gives_a is None:
-        gives_a = None if gives_b is None else not gives_b
-    if gives_a == gives_b:
-        does = {True: "give", False: "take", None: "may give or take"}[gives_a]
-        said = f"{place}: both {does} a value; must lead from one that gives to one that takes"
-        raise InputError(said)
-    source, target = (a, b) if gives_a else (b, a)
-    factors = None if change is None else linear(change)
+    (start, start_gives), (end, end_gives) = (_end(place, system, *side) for side in ends)
+    if start_gives is None and end_gives is not None:
+        start_gives = not end_gives
+    if start_gives == end_gives:
+        verb = {True: "give", False: "take", None: "may give or take"}[start_gives]
+        raise InputError(
+            f"{place}: both {verb} a value; must lead from one that gives to one that takes"
+        )
+    source, target = (start, end) if start_gives else (end, start)
+    factors = None if element is None else linear(element)
     return Hop(place, source, target, factors, is_true(entry, "suppressUnitConversion"))
 
 

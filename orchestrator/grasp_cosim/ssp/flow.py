@@ -33,10 +33,10 @@ def flow_order(
     for source, targets in enumerate(takers):
         behind[loop_of[source]].update(loop_of[target] for target in targets)
     waits = [0] * len(components)
-    for loop, after in enumerate(behind):
-        after.discard(loop)
-        for other in after:
-            waits[other] += 1
+    for loop, later_loops in enumerate(behind):
+        later_loops.discard(loop)
+        for later in later_loops:
+            waits[later] += 1
     ready = [node for node, loop in enumerate(loop_of) if not waits[loop]]
     heapify(ready)
     unplaced = [len(nodes) for nodes in members]
@@ -48,10 +48,10 @@ def flow_order(
         unplaced[loop] -= 1
         if unplaced[loop]:
             continue
-        for other in behind[loop]:
-            waits[other] -= 1
-            if not waits[other]:
-                for member in members[other]:
+        for later in behind[loop]:
+            waits[later] -= 1
+            if not waits[later]:
+                for member in members[later]:
                     heappush(ready, member)
     return tuple(order)
 
@@ -70,23 +70,23 @@ def loops(forward: Graph, backward: Graph) -> list[int]:
     return loop_of
 
 
-def finished(graph: Graph, starts: Iterable[int], seen: set[int]) -> list[int]:
+def finished(graph: Graph, starts: Iterable[int], visited: set[int]) -> list[int]:
     """The nodes that are reached from the starts, in the order in which a search leaves them.
 
-    The search is depth first, and does not enter nodes that were seen; it adds to these.
+    The search is depth first, and does not enter nodes that were visited; it adds to these.
     """
     order: list[int] = []
     for start in starts:
-        path = [] if start in seen else [start]
+        path = [] if start in visited else [start]
         edges = [iter(graph[node]) for node in path]
-        seen.update(path)
+        visited.update(path)
         while path:
-            following = next((node for node in edges[-1] if node not in seen), None)
+            following = next((node for node in edges[-1] if node not in visited), None)
             if following is None:
                 order.append(path.pop())
                 edges.pop()
             else:
-                seen.add(following)
+                visited.add(following)
                 path.append(following)
                 edges.append(iter(graph[following]))
     return order

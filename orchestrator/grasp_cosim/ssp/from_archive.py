@@ -21,7 +21,7 @@ from ..interface.values import parse_value
 from ..system.description import System
 from ..system.entries import experiment
 from ..system.overrides import Override
-from ..system.parts import Component, Connection, Port, Solver
+from ..system.parts import Component, Connection, Port, Solver, SystemInput
 from ..system.stimuli import Stimuli
 from ..system.times import (
     LONGEST,
@@ -37,12 +37,12 @@ from .archive import SSD, STRUCTURE, Archive, Notes
 from .elements import Element, Node, Path, read_system
 from .flow import flow_order
 from .network import Network, Part
-from .start_values import read_settings
+from .start_values import read_start_values
 from .system_connectors import system_inputs, system_outputs
 from .xml_document import at, child, children, open_structure, qualified, same
 
 
-class Called(NamedTuple):
+class NamedComponent(NamedTuple):
     """A component under its name in the system.
 
     names are its variables' names there by its FMU's own, units those that the archive names by the
@@ -84,41 +84,43 @@ def read_ssp(
     annotated = _annotated(file, root, names.values())
     chosen_times = {} if annotated else experiment(times)
     chosen_step_ns = chosen_times.get("step_ns")
-    extras, by = annotated, ""
+    extras, step_source = annotated, ""
     if extras is None:
-        extras, by = read_foreign(file, root, names.values(), chosen_step_ns)
-    called = {
-        at: _called(file, names[at], part, extras.components[names[at]])
-        for at, part in _sized(systems, parts, notes).items()
+        extras, step_source = read_foreign(file, root, names.values(), chosen_step_ns)
+    named_components = {
+        path: _named_component(file, names[path], part, extras.components[names[path]])
+        for path, part in _sized(systems, parts, notes).items()
     }
-    network = Network(systems, {at: component.part for at, component in called.items()})
+    network = Network(systems, {path: c.part for path, c in named_components.items()})
     network.check()
-    connections = tuple(_connections(network, called))
+    connections = tuple(_connections(network, named_components))
 
-    def port(node: Node) -> Port:
-        return Port(called[node.path].name, called[node.path].names[node.name])
+    def port_of(node: Node) -> Port:
+        component = named_components[node.path]
+        return Port(component.name, component.names[node.name])
 
-    inputs, outputs = system_inputs(network, port), system_outputs(network, port)
+    inputs, outputs = system_inputs(network, port_of), system_outputs(network, port_of)
     stimuli = stimuli or extras.input
-    sourced = {c.target for c in connections}
-    for column in stimuli.columns if stimuli else ():
-        outside = inputs.get(str(column))
-        sourced |= {way.port for way in outside.ways} if outside else {column}
+    driven = {connection.target for connection in connections} | _driven_by(stimuli, inputs)
     decided: list[str] = []
-    components = tuple(_components(file, network, called, sourced, decided))
+    components = tuple(_components(file, network, named_components, driven, decided))
     if annotated is None:
         components = flow_order(components, connections)
         decided.append(f"order of execution: {', '.join(c.name for c in components)}")
-    if by:
-        decided.append(f"scheme = {extras.scheme}, as meant by {by}")
+    if step_source:
+        decided.append(f"scheme = {extras.scheme}, as meant by {step_source}")
     start_ns, stop_ns = _times(file, root, parts.values(), chosen_times, decided)
-    if by and not chosen_step_ns:
-        decided.append(f"step = {written(extras.step_ns)} s, by {by}")
+    if step_source and not chosen_step_ns:
+        decided.append(f"step = {written(extras.step_ns)} s, by {step_source}")
     step_ns = chosen_step_ns or extras.step_ns
     step_ns = step_ns or _shortest_step(file, parts.values(), stop_ns - start_ns, decided)
-    used = {TYPE, *FOREIGN} if annotated or by else {TYPE}
-    other_names = {".".join(path): name for path, name in names.items()}
-    said = [f"component {n} is called {name} here" for n, name in other_names.items() if n != name]
+    used_annotations = {TYPE, *FOREIGN} if annotated or step_source else {TYPE}
+    all_notes = (
+        *_unused(archive, structure, root, used_annotations),
+        *_renamed_components(names),
+        *notes.lines(),
+        *decided,
+    )
     return System(
         archive.place if variant is None else f"{archive.place}#{structure}",
         components,
@@ -129,7 +131,7 @@ def read_ssp(
         extras.events,
         extras.faults,
         extras.initialisation,
-        (*_unused(archive, structure, root, used), *said, *notes.lines(), *decided),
+        all_notes,
         extras.roles,
         extras.presets,
         extras.diverging,
@@ -143,6 +145,26 @@ def read_ssp(
         limits=extras.limits,
         verdict=extras.verdict,
     )
+
+
+def _driven_by(stimuli: Stimuli | None, inputs: Mapping[str, SystemInput]) -> set[Port]:
+    """The inputs of components that stimuli drive, some of them by inputs of the system."""
+    driven: set[Port] = set()
+    for column in stimuli.columns if stimuli else ():
+        system_input = inputs.get(str(column))
+        if system_input:
+            driven |= {way.port for way in system_input.ways}
+        else:
+            driven.add(column)
+    return driven
+
+
+def _renamed_components(names: Mapping[Path, str]) -> Iterator[str]:
+    """Yield a note on each component that has another name in the system than in the archive."""
+    for path, name in names.items():
+        archive_name = ".".join(path)
+        if archive_name != name:
+            yield f"component {archive_name} is called {name} here"
 
 
 def component_names(file: str, parts: Iterable[Path]) -> dict[Path, str]:
@@ -175,16 +197,16 @@ def _sized(
     """The parts with their arrays taken apart, of as many elements as the archive's values say."""
     if not any(v.shape for part in parts.values() for v in part.interface.variables):
         return dict(parts)
-    before = deepcopy(notes.places)
-    sizes = read_settings(Network(systems, parts), "structuralParameter")
-    notes.places = before  # without those on values of elements that are not there yet
+    places = deepcopy(notes.places)
+    sizes = read_start_values(Network(systems, parts), "structuralParameter")
+    notes.places = places  # without those on values of elements that are not there yet
     return {
         at: replace(part, interface=expanded(part.interface, sizes.get(at, {})))
         for at, part in parts.items()
     }
 
 
-def _called(file: str, name: str, part: Part, beside: Beside) -> Called:
+def _named_component(file: str, name: str, part: Part, beside: Beside) -> NamedComponent:
     """The component of a part, under the names and in the units that the system has for it."""
     declared = part.interface
     in_system_names = renamed(declared, beside.rename, f"{file}: {name}: rename")
@@ -198,48 +220,56 @@ def _called(file: str, name: str, part: Part, beside: Beside) -> Called:
         for fmu_name, variable in zip(system_names, in_system_units.variables, strict=True)
     )
     interface = replace(declared, variables=variables, units=in_system_units.units)
-    return Called(name, system_names, units, beside, replace(part, interface=interface))
+    return NamedComponent(name, system_names, units, beside, replace(part, interface=interface))
 
 
 def _units(part: Part) -> dict[str, str]:
     """The units that connectors name for variables that have none in the FMU, if they are known."""
     units = {}
-    for c in part.element.connectors.values():
-        v = part.interface.by_name.get(c.name)
-        meant = known_unit(c.unit.name) if c.unit else None
-        if c.unit and meant and v and v.kind == "Real" and v.unit is None and same(c.unit, meant):
-            units[c.name] = c.unit.name
+    for connector in part.element.connectors.values():
+        variable = part.interface.by_name.get(connector.name)
+        unit = connector.unit
+        if unit is None or variable is None or variable.kind != "Real" or variable.unit is not None:
+            continue
+        unit_of_name = known_unit(unit.name)
+        if unit_of_name and same(unit, unit_of_name):
+            units[connector.name] = unit.name
     return units
 
 
-def _connections(network: Network, called: Mapping[Path, Called]) -> Iterator[Connection]:
+def _connections(
+    network: Network, components: Mapping[Path, NamedComponent]
+) -> Iterator[Connection]:
     """The connections, in the order of the connections that reach the inputs."""
     for target in network.into:
         if target.path not in network.parts or network.output(target) is None:
             continue
         hops = network.trace(target)
         _, carried = network.follow(hops)
-        first, last = hops[0].source, called[target.path]
-        source = Port(called[first.path].name, called[first.path].names[first.name])
-        sink = Port(last.name, last.names[last.part.interface.main_name(target.name)])
+        output = hops[0].source
+        giver, taker = components[output.path], components[target.path]
+        source_port = Port(giver.name, giver.names[output.name])
+        input_name = taker.part.interface.main_name(target.name)
+        target_port = Port(taker.name, taker.names[input_name])
         if network.decided_by_units(hops, carried):
-            yield Connection(source, sink)
+            yield Connection(source_port, target_port)
         else:
-            yield Connection(source, sink, carried.factor, carried.offset)
+            yield Connection(source_port, target_port, carried.factor, carried.offset)
 
 
 def _components(
     file: str,
     network: Network,
-    called: Mapping[Path, Called],
-    sourced: Collection[Port],
+    named_components: Mapping[Path, NamedComponent],
+    driven: Collection[Port],
     notes: list[str],
 ) -> Iterator[Component]:
-    """The components with the archive's values, and start values of inputs not among sourced."""
-    settings = read_settings(network)
-    for path, (name, names, units, beside, part) in called.items():
-        set_here = part.interface.by_main_names(settings.get(path, {}), f"{file}: {name}.".__add__)
-        values = {names[own]: value for own, value in set_here.items()}
+    """The components with the archive's values, and start values of inputs that nothing drives."""
+    start_values = read_start_values(network)
+    for path, (name, names, units, beside, part) in named_components.items():
+        own_values = start_values.get(path, {})
+        by_main_names = part.interface.by_main_names(own_values, f"{file}: {name}.".__add__)
+        values = {names[fmu_name]: value for fmu_name, value in by_main_names.items()}
         solver = beside.solver
         if part.element.exchange and "CoSimulation" in part.interface.kinds:
             solver = solver or Solver()
@@ -257,7 +287,7 @@ def _components(
         starts: dict[str, Value] = {}
         for variable in component.interface.of("input"):
             port, start = Port(name, variable.name), variable.start
-            has_value = port in sourced or variable.name in values
+            has_value = port in driven or variable.name in values
             if variable.supported and not variable.element and not has_value and start is not None:
                 place = f"{file}: start value of {port}"
                 starts[variable.name] = parse_value(
@@ -301,12 +331,13 @@ def _shortest_step(file: str, parts: Iterable[Part], span_ns: Time, notes: list[
     for step in declared:
         step_ns = step_of(step) if 0.0 < step * NANOSECONDS <= span_ns else 0
         if step_ns and span_ns % step_ns == 0 and math.isclose(in_seconds(step_ns), step):
-            named = f"step = {written(step_ns)} s"
-            notes.append(f"{named}, the smallest that its FMUs name; SSP has none")
+            notes.append(
+                f"step = {written(step_ns)} s, the smallest that its FMUs name; SSP has none"
+            )
             return step_ns
-    listed = choices(f"{step:g} s" for step in declared)
+    steps = choices(f"{step:g} s" for step in declared)
     raise InputError(
-        f"{file}: names no step, as SSP has none, and of those of its FMUs ({listed}) none "
+        f"{file}: names no step, as SSP has none, and of those of its FMUs ({steps}) none "
         f"divides the stop of {in_seconds(span_ns):g} s; give one: --set experiment.step=..."
     )
 
@@ -318,8 +349,8 @@ def _unused(archive: Archive, structure: str, root: Any, used: Collection[str]) 
     """
     for name in archive.structures:
         if name != structure:
-            chosen = f"--set experiment.variant={name.removesuffix(SSD)}"
-            yield f"variant {name} is not used, {structure} is; {chosen} takes it"
+            option = f"--set experiment.variant={name.removesuffix(SSD)}"
+            yield f"variant {name} is not used, {structure} is; {option} takes it"
     types = Counter(annotation.get("type") for annotation in root.iter(qualified("ssc:Annotation")))
     for kind in sorted(set(types) - set(used)):
         yield f"annotations of type {kind!r} are not used ({types[kind]})"

@@ -124,10 +124,10 @@ class Network:
                     f"{place}: the unit at {hop.source} is not clear, {unit.name} or "
                     f"{target.name}; give that connector a unit"
                 )
-            factor, offset = _after(factor, offset, change(place, unit, target))
+            factor, offset = _composed(factor, offset, change(place, unit, target))
         transformation = hop.transformation
         if transformation is not None:
-            factor, offset = _after(factor, offset, transformation)
+            factor, offset = _composed(factor, offset, transformation)
         settled = target is not None or (carried.settled and transformation is None)
         return Carried(target or unit, factor, offset, settled)
 
@@ -198,6 +198,6 @@ def _check_connectors(part: Part) -> None:
             )
 
 
-def _after(factor: float, offset: float, step: tuple[float, float]) -> tuple[float, float]:
-    """First factor and offset, then the step; exactly the same where one of them does nothing."""
-    return step[0] * factor, step[0] * offset + step[1]
+def _composed(factor: float, offset: float, conversion: tuple[float, float]) -> tuple[float, float]:
+    """First factor and offset, then the conversion; exact where one of the two does nothing."""
+    return conversion[0] * factor, conversion[0] * offset + conversion[1]

@@ -42,20 +42,20 @@ _READERS: Mapping[str, Callable[[str], Value]] = {
 class Parameter:
     """A value of a set with its SSP type; place says where it is from, in the document of origin.
 
-    named is the name of its unit in the set; unit is what it is in at a connector or variable.
+    unit_name is the name of its unit in the set; unit is what it is in at a connector or variable.
     """
 
     place: str
     origin: Origin
     type: str
     value: Value
-    named: str | None
+    unit_name: str | None
     unit: Unit | None = None
     settled: bool = True
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class BoundValue:
     """A parameter for what is called name at the binding's system or component; place says so.
 
     With suppress its unit is not converted. transformation is its element, or None.
@@ -68,13 +68,13 @@ class Given:
     transformation: Any = None
 
 
-def read_settings(network: Network, causality: str = "") -> dict[Path, dict[str, Value]]:
+def read_start_values(network: Network, causality: str = "") -> dict[Path, dict[str, Value]]:
     """The value that holds for each variable that is given one; of one causality, if that is named.
 
     By the path of the component and the FMU's name of the variable.
     """
     values: dict[Path, dict[str, Value]] = {}
-    for end, parameter in _settled(network):
+    for end, parameter in _values_that_hold(network):
         variable = network.parts[end.path].interface.by_name.get(end.name)
         if causality and (variable is None or variable.causality != causality):
             continue
@@ -82,7 +82,7 @@ def read_settings(network: Network, causality: str = "") -> dict[Path, dict[str,
             text = f"{end} {variable.unsettable}; not used"
             parameter.origin.notes.add(parameter.place, text)
             continue
-        value, source = _value(network, end, parameter), network.output(end)
+        value, source = _checked_value(network, end, parameter), network.output(end)
         if source:
             text = f"{end} is connected to {source}; not used"
             parameter.origin.notes.add(parameter.place, text)
@@ -91,21 +91,21 @@ def read_settings(network: Network, causality: str = "") -> dict[Path, dict[str,
     return values
 
 
-def _settled(network: Network) -> Iterator[tuple[Node, Parameter]]:
+def _values_that_hold(network: Network) -> Iterator[tuple[Node, Parameter]]:
     """Yield the variables that are given a value, and the one that holds."""
-    given: dict[Node, Parameter] = {}
+    parameters: dict[Node, Parameter] = {}
     for element, origin, binding in _bindings(network):
         place = f"{at(origin.place, binding)}: {element.name!r}"
-        for entry in _given(origin, place, binding):
+        for entry in _bound_values(origin, place, binding):
             nodes = list(_nodes(network, element, entry.name))
             for node in nodes:
-                given[node] = _adapted(network, node, entry)
+                parameters[node] = _in_unit_of_node(network, node, entry)
             if not nodes:
                 origin.notes.add(entry.place, "nothing of that name to give it to; not used")
-    for node in dict.fromkeys((*given, *network.into)):
-        ways = (node, *(hop.source for hop in network.trace(node)))
-        if node.path in network.parts and not given.keys().isdisjoint(ways):
-            yield node, _arriving(network, node, given)
+    for node in dict.fromkeys((*parameters, *network.into)):
+        sources = (node, *(hop.source for hop in network.trace(node)))
+        if node.path in network.parts and not parameters.keys().isdisjoint(sources):
+            yield node, _value_at(network, node, parameters)
 
 
 def _bindings(network: Network) -> Iterator[tuple[Element, Origin, Any]]:
@@ -117,45 +117,50 @@ def _bindings(network: Network) -> Iterator[tuple[Element, Origin, Any]]:
             yield element, origin, binding
 
 
-def _given(origin: Origin, place: str, binding: Any) -> Iterator[Given]:
+def _bound_values(origin: Origin, place: str, binding: Any) -> Iterator[BoundValue]:
+    """Yield the values of a binding, of a set with a mapping those that are mapped."""
     holder = child(binding, "ssd:ParameterValues")
-    parameters = _set(*origin.inner(place, binding, "ssv", holder), binding.get("prefix", ""))
+    parameters = _parameter_set(
+        *origin.inner(place, binding, "ssv", holder), binding.get("prefix", "")
+    )
     mapping = child(binding, "ssd:ParameterMapping")
     if mapping is None:
         for name, parameter in parameters.items():
-            yield Given(parameter.place, name, parameter)
+            yield BoundValue(parameter.place, name, parameter)
         return
     inner, root = origin.inner(place, mapping, "ssm", mapping)
     unmapped = dict(parameters)
     targets: set[str] = set()
     for element in children(root, "ssm:MappingEntry"):
         source, target = element.get("source"), element.get("target")
-        where = f"{at(inner.place, element)}: mapping '{source} -> {target}'"
+        entry_place = f"{at(inner.place, element)}: mapping '{source} -> {target}'"
         unmapped.pop(source, None)
         if source not in parameters:
-            origin.notes.add(where, f"no parameter {source!r}; not used")
+            origin.notes.add(entry_place, f"no parameter {source!r}; not used")
             continue
         if target in targets:
-            raise InputError(f"{where}: {target!r} has two sources; must have one")
+            raise InputError(f"{entry_place}: {target!r} has two sources; must have one")
         targets.add(target)
         suppress = is_true(element, "suppressUnitConversion")
-        yield Given(where, target, parameters[source], suppress, transformation(element))
+        yield BoundValue(entry_place, target, parameters[source], suppress, transformation(element))
     for parameter in unmapped.values():
         origin.notes.add(parameter.place, "not in the mapping; not used")
 
 
-def _set(origin: Origin, root: Any, prefix: str) -> dict[str, Parameter]:
+def _parameter_set(origin: Origin, root: Any, prefix: str) -> dict[str, Parameter]:
+    """The parameters of a set by their names, with the prefix of its binding."""
     parameters: dict[str, Parameter] = {}
     for element in children(root, "ssv:Parameters", "ssv:Parameter"):
         name = element.get("name")
-        where = f"{at(origin.place, element)}: parameter {name!r}"
-        kind, text = short(element[0].tag).removeprefix("ssv:"), element[0].get("value")
-        known(f"{where}: type", kind, _READERS, " is not supported")
-        named = origin.unit_name(element[0])
-        parameter = Parameter(where, origin, kind, _READERS[kind](text), named)
-        before = parameters.setdefault(prefix + name, parameter)
-        if (before.value, before.named) != (parameter.value, parameter.named):
-            raise InputError(f"{where}: there are two; must be one")
+        place = f"{at(origin.place, element)}: parameter {name!r}"
+        typed_value = element[0]
+        kind = short(typed_value.tag).removeprefix("ssv:")
+        known(f"{place}: type", kind, _READERS, " is not supported")
+        value = _READERS[kind](typed_value.get("value"))
+        parameter = Parameter(place, origin, kind, value, origin.unit_name(typed_value))
+        first = parameters.setdefault(prefix + name, parameter)
+        if (first.value, first.unit_name) != (parameter.value, parameter.unit_name):
+            raise InputError(f"{place}: there are two; must be one")
     return parameters
 
 
@@ -173,87 +178,94 @@ def _nodes(network: Network, element: Element, name: str) -> Iterator[Node]:
             yield from _nodes(network, inner, name[dot + 1 :])
 
 
-def _arriving(network: Network, node: Node, given: Mapping[Node, Parameter]) -> Parameter:
+def _value_at(network: Network, node: Node, parameters: Mapping[Node, Parameter]) -> Parameter:
     """The value that holds at a node: of what it is connected to, else its own."""
     hops = network.trace(node)
-    start = next((k for k, hop in enumerate(hops) if hop.source in given), None)
+    start = next((k for k, hop in enumerate(hops) if hop.source in parameters), None)
     if start is None:
-        return given[node]
-    parameter = given[hops[start].source]
+        return parameters[node]
+    parameter = parameters[hops[start].source]
     for hop in hops[start:]:
-        beaten = given.get(hop.target)
-        if beaten is not None:
-            text = (
-                f"{hop.target} has the value of {hop.source} by a connection, which goes before it"
+        overridden = parameters.get(hop.target)
+        if overridden is not None:
+            overridden.origin.notes.add(
+                overridden.place,
+                f"{hop.target} has the value of {hop.source} by a connection, which goes before "
+                "it; not used",
             )
-            beaten.origin.notes.add(beaten.place, f"{text}; not used")
-        parameter = _passed(network, hop, parameter)
+        parameter = _after_hop(network, hop, parameter)
     return parameter
 
 
-def _passed(network: Network, hop: Hop, given: Parameter) -> Parameter:
+def _after_hop(network: Network, hop: Hop, parameter: Parameter) -> Parameter:
     """The parameter after one more hop."""
-    if given.type in ("Real", "Integer"):
-        carried = network.carry(hop, Carried(given.unit, settled=given.settled))
-        value, (unit, factor, offset, settled) = given.value, carried
+    if parameter.type in ("Real", "Integer"):
+        start = Carried(parameter.unit, settled=parameter.settled)
+        unit, factor, offset, settled = network.carry(hop, start)
+        value = parameter.value
         if (factor, offset) != (1.0, 0.0):
             value = factor * float(value) + offset
-        given = replace(given, value=value, unit=unit, settled=settled)
-    elif hop.transformation:
-        raise InputError(f"{hop.place}: transforms a {given.type}; must be Real")
-    return given
+        return replace(parameter, value=value, unit=unit, settled=settled)
+    if hop.transformation:
+        raise InputError(f"{hop.place}: transforms a {parameter.type}; must be Real")
+    return parameter
 
 
-def _adapted(network: Network, node: Node, given: Given) -> Parameter:
+def _in_unit_of_node(network: Network, node: Node, bound: BoundValue) -> Parameter:
     """The parameter in the unit of the node, transformed as on a connection, or by a table."""
-    own = None if given.suppress else _own_unit(network, node, given.parameter)
-    parameter, change, factors = replace(given.parameter, unit=own), given.transformation, None
-    if change is not None and short(change.tag) != "ssc:LinearTransformation":
-        parameter = _mapped(parameter, change)
-    elif change is not None:
-        factors = linear(change)
+    unit = None if bound.suppress else _unit_for_node(network, node, bound.parameter)
+    parameter = replace(bound.parameter, unit=unit)
+    element, factors = bound.transformation, None
+    if element is not None and short(element.tag) != "ssc:LinearTransformation":
+        parameter = _by_table(parameter, element)
+    elif element is not None:
+        factors = linear(element)
         parameter = replace(parameter, type=parameter.type.replace("Integer", "Real"))
-    return _passed(network, Hop(parameter.place, node, node, factors, given.suppress), parameter)
+    return _after_hop(network, Hop(parameter.place, node, node, factors, bound.suppress), parameter)
 
 
-def _own_unit(network: Network, node: Node, parameter: Parameter) -> Unit | None:
+def _unit_for_node(network: Network, node: Node, parameter: Parameter) -> Unit | None:
     """The unit of a value for a node; None where it is that of the node, or has no meaning there.
 
     A unit of the name that the FMU gives it is the FMU's, however the set defines it.
     """
-    name, origin, place = parameter.named, parameter.origin, parameter.place
-    unit, wanted = network.unit(node), network.unit_name(node)
+    name, origin, place = parameter.unit_name, parameter.origin, parameter.place
+    unit, unit_name = network.unit(node), network.unit_name(node)
     defined = origin.units.get(name or "")
-    if name and node.path in network.parts and name == wanted:
+    if name and node.path in network.parts and name == unit_name:
         if defined and unit and not same(defined, unit):
             origin.notes.add(place, OTHERWISE.format(name))
         if defined:
             return unit
-    if name and not defined and node.path in network.parts and wanted is None:
+    if name and not defined and node.path in network.parts and unit_name is None:
         text = f"unit {name!r} is not defined, and {node} has none; taken as it is"
         origin.notes.add(place, text)
         return None
-    return origin.unit(place, name, wanted)
+    return origin.unit(place, name, unit_name)
 
 
-def _mapped(given: Parameter, element: Any) -> Parameter:
+def _by_table(parameter: Parameter, element: Any) -> Parameter:
+    """The parameter with the value that a mapping transformation has for its value."""
     table = short(element.tag)
     kind = table.removeprefix("ssc:").removesuffix("MappingTransformation")
-    if given.type != kind:
-        raise InputError(f"{given.place}: {given.type} has {table}; must be {kind}")
+    if parameter.type != kind:
+        raise InputError(f"{parameter.place}: {parameter.type} has {table}; must be {kind}")
     read, entries = _READERS[kind], children(element, "ssc:MapEntry")
     targets = {read(entry.get("source")): read(entry.get("target")) for entry in entries}
-    if given.value not in targets:
-        valid = choices(map(repr, targets))
-        raise InputError(f"{given.place}: {given.value!r} is not in its {table}; valid: {valid}")
-    return replace(given, value=targets[given.value])
+    if parameter.value not in targets:
+        place, valid = parameter.place, choices(map(repr, targets))
+        raise InputError(f"{place}: {parameter.value!r} is not in its {table}; valid: {valid}")
+    return replace(parameter, value=targets[parameter.value])
 
 
-def _value(network: Network, node: Node, given: Parameter) -> Value:
-    part = network.parts[node.path]
-    variable = part.interface.by_name[node.name]
-    fits = given.type == variable.kind or (given.type, variable.kind) == ("Integer", "Real")
-    if not fits and not (given.type == "Enumeration" and variable.items):
-        said = f"{given.place}: {given.type}; {node} is {variable.kind}, must be the same"
-        raise InputError(said)
-    return parse_value(part.interface, given.place, node.name, given.value)
+def _checked_value(network: Network, node: Node, parameter: Parameter) -> Value:
+    """The value of a parameter, checked as one of a variable."""
+    interface = network.parts[node.path].interface
+    variable = interface.by_name[node.name]
+    is_number = (parameter.type, variable.kind) == ("Integer", "Real")
+    is_item = parameter.type == "Enumeration" and variable.items
+    if parameter.type != variable.kind and not is_number and not is_item:
+        raise InputError(
+            f"{parameter.place}: {parameter.type}; {node} is {variable.kind}, must be the same"
+        )
+    return parse_value(interface, parameter.place, node.name, parameter.value)

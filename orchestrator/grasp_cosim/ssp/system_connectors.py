@@ -19,14 +19,14 @@ from .network import Carried, Network
 _TIME = "time"
 """The name of the first column of a recording."""
 
-Called = Callable[[Node], Port]
+PortOf = Callable[[Node], Port]
 """The name in the system of a variable of a component."""
 
 
-def system_outputs(network: Network, called: Called) -> dict[str, SystemOutput]:
+def system_outputs(network: Network, port_of: PortOf) -> dict[str, SystemOutput]:
     """The outputs of the systems that come from an output of a component, by name."""
     outputs: dict[str, SystemOutput] = {}
-    for name, node, place in _named(network, called, ("output",)):
+    for name, node, place in _system_connectors(network, port_of, ("output",)):
         notes = network.systems[node.path].origin.notes
         source = network.output(node)
         if source is None:
@@ -41,29 +41,29 @@ def system_outputs(network: Network, called: Called) -> dict[str, SystemOutput]:
         except InputError as error:
             notes.add(place, f"{name} is not recorded: {error}")
             continue
-        start_unit = unit_of(network.parts[source.path].interface, network.variable(source))
+        source_unit = unit_of(network.parts[source.path].interface, network.variable(source))
         unit = carried.unit if carried.settled else None
         outputs[name] = SystemOutput(
-            _way(called(source), hops, start_unit, unit, carried), unit, kind
+            _way_along(port_of(source), hops, source_unit, unit, carried), unit, kind
         )
     return outputs
 
 
-def system_inputs(network: Network, called: Called) -> dict[str, SystemInput]:
+def system_inputs(network: Network, port_of: PortOf) -> dict[str, SystemInput]:
     """The inputs and parameters of the systems that lead to a component, by name."""
-    behind: dict[Node, list[tuple[Node, list[Hop]]]] = {}
+    targets_of: dict[Node, list[tuple[Node, list[Hop]]]] = {}
     for target in network.into:
         if target.path in network.parts:
             hops = network.trace(target)
-            behind.setdefault(hops[0].source, []).append((target, hops))
+            targets_of.setdefault(hops[0].source, []).append((target, hops))
     inputs: dict[str, SystemInput] = {}
-    for name, node, place in _named(network, called, ("input", "parameter")):
+    for name, node, place in _system_connectors(network, port_of, ("input", "parameter")):
         notes = network.systems[node.path].origin.notes
         if node in network.into:
             continue
         unit = network.unit(node)
         ways: list[Way] = []
-        for target, hops in behind.get(node, []):
+        for target, hops in targets_of.get(node, []):
             variable = network.variable(target)
             if variable.causality not in SETTABLE or not variable.supported:
                 notes.add(place, f"{name} leads to {target}, which cannot be set; not passed on")
@@ -75,8 +75,8 @@ def system_inputs(network: Network, called: Called) -> dict[str, SystemInput]:
             except InputError as error:
                 notes.add(place, f"{name} is not passed on: {error}")
                 continue
-            end_unit = unit_of(network.parts[target.path].interface, variable)
-            ways.append(_way(called(target), hops, unit, end_unit, carried))
+            target_unit = unit_of(network.parts[target.path].interface, variable)
+            ways.append(_way_along(port_of(target), hops, unit, target_unit, carried))
         if ways:
             inputs[name] = SystemInput(tuple(ways), unit)
         else:
@@ -84,7 +84,7 @@ def system_inputs(network: Network, called: Called) -> dict[str, SystemInput]:
     return inputs
 
 
-def _way(
+def _way_along(
     port: Port, hops: list[Hop], start: Unit | None, end: Unit | None, carried: Carried
 ) -> Way:
     """The way along the hops; without numbers where the units at its two ends say all about it."""
@@ -95,22 +95,22 @@ def _way(
     return Way(port, carried.factor, carried.offset)
 
 
-def _named(
-    network: Network, called: Called, kinds: tuple[str, ...]
+def _system_connectors(
+    network: Network, port_of: PortOf, kinds: tuple[str, ...]
 ) -> Iterator[tuple[str, Node, str]]:
     """Yield the connectors of systems of these kinds, by the names that they have in the run.
 
     One that has the name of something else is left out, which is said.
     """
     taken = {
-        str(called(Node(path, variable.name)))
+        str(port_of(Node(path, variable.name)))
         for path, part in network.parts.items()
         for variable in part.interface.variables
     }
     for path, system in network.systems.items():
         for connector in system.connectors.values():
-            inside = "_".join(path).replace(".", "_")
-            name = f"{inside}.{connector.name}" if path else connector.name
+            system_name = "_".join(path).replace(".", "_")
+            name = f"{system_name}.{connector.name}" if path else connector.name
             if connector.kind not in kinds:
                 continue
             if name in taken or name.lower() == _TIME:

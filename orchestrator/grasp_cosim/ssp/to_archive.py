@@ -87,9 +87,9 @@ def _notes(system: System) -> Iterable[str]:
             f"SSP has no form for the scheme, {system.scheme}: it is in an annotation that other "
             "tools do not read; most step all components at once, as jacobi does"
         )
-    own = [c.name for c in system.components if c.step_ns is not None]
-    if own:
-        yield f"only OSP reads the steps of {', '.join(own)}"
+    with_own_step = [c.name for c in system.components if c.step_ns is not None]
+    if with_own_step:
+        yield f"only OSP reads the steps of {', '.join(with_own_step)}"
     for component in system.components:
         if obstacle := of_binary(component.interface):
             yield f"{component.name}: {component.interface.called} {obstacle.reason}"
@@ -103,9 +103,9 @@ def _notes(system: System) -> Iterable[str]:
                 port = Port(component.name, variable.name)
                 yield f"{port} is of type {variable.nature}: it has no connector"
     special = ((system.events, "event"), (system.faults, "fault"), (system.limits, "limit"))
-    for parts, what in special:
+    for parts, noun in special:
         if parts:
-            yield f"only in the annotation: {counted(len(parts), what)}"
+            yield f"only in the annotation: {counted(len(parts), noun)}"
     if system.input:
         yield f"only in the annotation: what {system.input.file} drives"
 
@@ -113,22 +113,22 @@ def _notes(system: System) -> Iterable[str]:
 def _fmu_entry(fmu: Path, entries: dict[str, bytes]) -> str:
     """The entry of an FMU, added where there is none with its content yet."""
     data = fmu.read_bytes()
-    for name, known in entries.items():
-        if known == data:
+    for name, content in entries.items():
+        if content == data:
             return name
     return _added(entries, _plain(fmu.stem), ".fmu", data)
 
 
 def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
     """The entry of the values of a component, under the names of its FMU."""
-    interface, own = component.interface, _own_names(component)
+    interface, fmu_names = component.interface, _fmu_names(component)
     units = _units([component])
     root = new("ssv:ParameterSet", version=VERSION, name=SET, generationTool=_TOOL)
     parameters = add(root, "ssv:Parameters")
     used: dict[str, Unit] = {}
     for name, value in component.values.items():
         variable = interface.by_name[name]
-        element = add(parameters, "ssv:Parameter", name=own[name])
+        element = add(parameters, "ssv:Parameter", name=fmu_names[name])
         labels = [label for label, number in variable.items.items() if number == value]
         if labels:
             add(element, "ssv:Enumeration", value=labels[0])
@@ -167,7 +167,7 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
         _write_component(elements, component, sources[name], bindings.get(name), units)
     if system.connections or system.inputs or system.outputs:
         connections, changes = add(top, "ssd:Connections"), transforms(system)
-        names = {c.name: _own_names(c) for c in system.components}
+        names = {c.name: _fmu_names(c) for c in system.components}
         for c in system.connections:
             _write_connection(connections, c, changes[c.target], names)
         _write_ways(connections, system, names)
@@ -194,7 +194,9 @@ def _write_component(
         if variable.items:
             continue  # an enumeration: its items are in the FMU, so that the type may be left out
         unit = _unit(component, variable, units)
-        add(connector, f"ssc:{variable.kind}", **({"unit": unit.name} if unit else {}))
+        element_of_type = add(connector, f"ssc:{variable.kind}")
+        if unit:
+            element_of_type.set("unit", unit.name)
     if values:
         add(add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", source=values)
     if component.step_ns is not None:
@@ -206,8 +208,8 @@ def _connected(component: Component) -> list[Variable]:
 
     A parameter needs none to be set; libcosim refuses one whose type, an enumeration, it ignores.
     """
-    own = {**component.rename, **_own_names(component)}
-    units = {own[name]: unit for name, unit in component.units.items()}
+    fmu_names = {**component.rename, **_fmu_names(component)}
+    units = {fmu_names[name]: unit for name, unit in component.units.items()}
     declared = in_units(component.sized(read_interface(component.fmu)), units)
     variables = declared.of(*_CAUSALITIES)
     return [v for v in variables if v.supported and not (v.items and v.causality == "parameter")]
@@ -241,12 +243,12 @@ def _write_outside(top: Any, system: System, units: Mapping[str, Unit]) -> None:
         return
     connectors = add(top, "ssd:Connectors")
     for name, system_input in system.inputs.items():
-        behind = [_variable(system, way.port) for way in system_input.ways]
-        parameters = all(variable.causality == "parameter" for variable in behind)
-        kind = "parameter" if parameters else "input"
+        variables = [_variable(system, way.port) for way in system_input.ways]
+        are_parameters = all(variable.causality == "parameter" for variable in variables)
+        kind = "parameter" if are_parameters else "input"
         connector = add(connectors, "ssd:Connector", name=name, kind=kind)
-        if not behind[0].items:
-            _write_type(connector, behind[0].kind, system_input.unit, units)
+        if not variables[0].items:
+            _write_type(connector, variables[0].kind, system_input.unit, units)
     for name, tap in system.once(taps).items():
         connector = add(connectors, "ssd:Connector", name=name, kind="output")
         if not _variable(system, tap.source).items:
@@ -255,8 +257,9 @@ def _write_outside(top: Any, system: System, units: Mapping[str, Unit]) -> None:
 
 def _write_type(connector: Any, kind: str, unit: Unit | None, units: Mapping[str, Unit]) -> None:
     """The type of a connector, with its unit where its name means that in the archive."""
-    named = kind == "Real" and unit is not None and same(unit, units[unit.name])
-    add(connector, f"ssc:{kind}", **({"unit": unit.name} if named and unit else {}))
+    element = add(connector, f"ssc:{kind}")
+    if kind == "Real" and unit is not None and same(unit, units[unit.name]):
+        element.set("unit", unit.name)
 
 
 def _write_ways(connections: Any, system: System, names: Mapping[str, Mapping[str, str]]) -> None:
@@ -285,11 +288,11 @@ def _variable(system: System, port: Port) -> Variable:
     return system.component(port.component, str(port)).interface.by_name[port.variable]
 
 
-def _own_names(component: Component) -> dict[str, str]:
+def _fmu_names(component: Component) -> dict[str, str]:
     """The FMU's names of the variables by those of the system, of elements of arrays, too."""
     declared = component.sized(read_interface(component.fmu)).variables
     pairs = zip(component.interface.variables, declared, strict=True)
-    return {new.name: own.name for new, own in pairs}
+    return {variable.name: fmu_variable.name for variable, fmu_variable in pairs}
 
 
 def _units(components: Iterable[Component]) -> dict[str, Unit]:

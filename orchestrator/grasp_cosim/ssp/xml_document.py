@@ -119,12 +119,12 @@ def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
 
     What SSP 2.0 shares with 1.0 is valid as well, and what is in another order or an empty list.
     """
-    wanted, found = etree.QName(qualified(ROOTS[form])), etree.QName(root)
-    if found.localname == wanted.localname and found.namespace != wanted.namespace:
-        notes.add(place, f"taken, although its namespace is {found.namespace!r}")
-        for element in root.iter(f"{{{found.namespace or ''}}}*"):
-            element.tag = f"{{{wanted.namespace}}}{etree.QName(element).localname}"
-    if root.tag != wanted.text:
+    expected, actual = etree.QName(qualified(ROOTS[form])), etree.QName(root)
+    if actual.localname == expected.localname and actual.namespace != expected.namespace:
+        notes.add(place, f"taken, although its namespace is {actual.namespace!r}")
+        for element in root.iter(f"{{{actual.namespace or ''}}}*"):
+            element.tag = f"{{{expected.namespace}}}{etree.QName(element).localname}"
+    if root.tag != expected.text:
         raise InputError(f"{at(place, root)}: {short(root.tag)}: must be {ROOTS[form]}")
     version = root.get("version", "").strip()
     if version == "2.0":
@@ -166,10 +166,10 @@ def as_version_1(place: str, root: Any, notes: Notes) -> None:
     connected = {e.get(end) for e in root.iter("{*}Connection") for end in ends}
     for element in list(root.iter()):
         tag, parent, refused = etree.QName(element), element.getparent(), ""
-        where, name, kind = at(place, element), element.get("name"), element.get("kind")
+        line, name, kind = at(place, element), element.get("name"), element.get("kind")
         match tag.localname:
             case "MetaData" | "Signature":
-                notes.add(where, f"{tag.localname} is not used")
+                notes.add(line, f"{tag.localname} is not used")
                 parent.remove(element)
             case "Dimension" | "Clock" if "SystemStructure" in (tag.namespace or ""):
                 refused = f"{parent.get('name')!r}: {tag.localname}"
@@ -180,7 +180,7 @@ def as_version_1(place: str, root: Any, notes: Notes) -> None:
             case "Connector" if kind in _KINDS and name in connected:
                 refused = f"connector {name!r} on a connection: kind {kind!r}"
             case "Connector" if kind in _KINDS:
-                notes.add(f"{where}: {name!r}", f"a connector of kind {kind!r} is not used")
+                notes.add(f"{line}: {name!r}", f"a connector of kind {kind!r} is not used")
                 parent.remove(element)
             case "Connection" if not {"startIndices", "endIndices"}.isdisjoint(element.keys()):
                 refused = "startIndices or endIndices"
@@ -194,7 +194,7 @@ def as_version_1(place: str, root: Any, notes: Notes) -> None:
                 parent.remove(element)
         if refused:
             raise InputError(
-                f"{where}: {refused} of SSP 2.0 not supported; must be scalar, and inputs, outputs "
+                f"{line}: {refused} of SSP 2.0 not supported; must be scalar, and inputs, outputs "
                 "or parameters"
             )
 
@@ -225,10 +225,10 @@ def to_bytes(root: Any) -> bytes:
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n")
 
 
-def new(name: str, /, more: Mapping[str, str] | None = None, **attributes: str) -> Any:
-    """A root element; the prefixes are those of the standard, and more."""
+def new(name: str, /, foreign: Mapping[str, str] | None = None, **attributes: str) -> Any:
+    """A root element, with the prefixes of the standard and those of `foreign` namespaces."""
     prefixes = {prefix: NAMESPACES[prefix] for prefix in sorted({"ssc", name.partition(":")[0]})}
-    return etree.Element(qualified(name), attributes, nsmap={**prefixes, **(more or {})})
+    return etree.Element(qualified(name), attributes, nsmap={**prefixes, **(foreign or {})})
 
 
 def add(parent: Any, name: str, /, **attributes: str) -> Any:
@@ -257,11 +257,11 @@ def read_units(file: str, parent: Any, prefix: str) -> Mapping[str, Unit]:
 
 def write_units(parent: Any, prefix: str, units: Iterable[Unit]) -> None:
     """The reverse; nothing where there are none."""
-    listed = list(units)
-    if not listed:
+    all_units = list(units)
+    if not all_units:
         return
     element = add(parent, f"{prefix}:Units")
-    for unit in listed:
+    for unit in all_units:
         exponents = zip(BASE, unit.exponents, strict=True)
         base = {name: str(exponent) for name, exponent in exponents if exponent}
         if unit.factor != 1.0:
@@ -281,13 +281,13 @@ def change(place: str, source: Unit, target: Unit) -> tuple[float, float]:
 
     Exactly (1.0, 0.0) where they mean the same; InputError where they are of different quantities.
     """
-    found = conversion(source, target)
-    if found is None:
+    to_target = conversion(source, target)
+    if to_target is None:
         raise InputError(
             f"{place}: {source.name} cannot be converted to {target.name}; "
             "units must be of the same quantity, or suppressUnitConversion set"
         )
-    return found
+    return to_target
 
 
 _TYPE_OF = {
@@ -335,8 +335,8 @@ class Origin:
         in_brackets = _BRACKETS.fullmatch(name)
         return in_brackets[1] if in_brackets else name
 
-    def unit(self, place: str, name: str | None, own: str | None) -> Unit | None:
-        """The unit of that name, None for none; own is how the FMU names it, if it does.
+    def unit(self, place: str, name: str | None, fmu_unit: str | None) -> Unit | None:
+        """The unit of that name, None for none; fmu_unit is that which the FMU names, if it does.
 
         One that the document does not define is the FMU's, or goes by its name. InputError where
         nothing says what it is.
@@ -345,14 +345,14 @@ class Origin:
             self.notes.add(place, "unit '' is taken as no unit")
         if not name or name in self.units:
             return self.units.get(name or "")
-        if own == name:
+        if fmu_unit == name:
             self.notes.add(place, f"unit {name!r} is not defined; taken as the FMU's")
             return None
-        meant = known_unit(name)
-        if meant is None:
+        unit = known_unit(name)
+        if unit is None:
             known(f"{place}: unit", name, self.units, " is not defined")
         self.notes.add(place, f"unit {name!r} is not defined; known by its name")
-        return meant
+        return unit
 
     def inner(self, place: str, entry: Any, form: str, holder: Any) -> tuple["Origin", Any]:
         """A set, mapping or dictionary: the file that `entry` names, or inline in `holder`.
@@ -360,12 +360,13 @@ class Origin:
         With what its units refer to.
         """
         kind = _TYPE_OF[form]
-        named_type = entry.get("type", f"application/x-ssp-{kind}")
-        if named_type != f"application/x-ssp-{kind}":
+        media_type = f"application/x-ssp-{kind}"
+        if entry.get("type", media_type) != media_type:
             raise InputError(
-                f"{place}: type {named_type!r} is not supported; must be application/x-ssp-{kind}"
+                f"{place}: type {entry.get('type')!r} is not supported; must be {media_type}"
             )
-        source, inline = entry.get("source"), None if holder is None else child(holder, ROOTS[form])
+        source = entry.get("source")
+        inline = None if holder is None else child(holder, ROOTS[form])
         if (source is None) == (inline is None):
             raise InputError(
                 f"{place}: {kind}: must have either a source or an inline {ROOTS[form]}"
@@ -373,18 +374,18 @@ class Origin:
         if source is None:
             root = checked(self.place, inline, form, self.notes)
             return replace(self, units={**self.units, **read_units(self.place, root, form)}), root
-        found = self._within_fmu(place) if entry.get("sourceBase") == "component" else self
-        found = replace(found, entry=found.resolve(place, source), units={})
-        root = parse(found.place, found.archive.read(found.entry), form, self.notes)
-        return replace(found, units=read_units(found.place, root, form)), root
+        base = self._within_fmu(place) if entry.get("sourceBase") == "component" else self
+        document = replace(base, entry=base.resolve(place, source), units={})
+        root = parse(document.place, document.archive.read(document.entry), form, self.notes)
+        return replace(document, units=read_units(document.place, root, form)), root
 
     def _within_fmu(self, place: str) -> "Origin":
         """The place of the files in the component's FMU."""
         if not self.fmu:
             raise InputError(f"{place}: sourceBase 'component': must be at a component with an FMU")
-        within = f"{self.archive.place}: {self.fmu}"
+        label = f"{self.archive.place}: {self.fmu}"
         path = self.archive.extract(self.fmu)
-        archive = Archive(path, self.notes, within, "modelDescription.xml")
+        archive = Archive(path, self.notes, label, "modelDescription.xml")
         return replace(self, archive=archive, entry="")
 
 
