@@ -33,11 +33,9 @@ def with_values(
     all that its elements had. With from_text a text may stand for a number, as on a command line.
     """
     old = component.interface
-    sizes, others = dict[str, Override](), dict[str, Override]()
-    for name, override in overrides.items():
-        variable = old.by_name.get(name)
-        is_size = variable is not None and variable.causality == "structuralParameter"
-        (sizes if is_size else others)[name] = override
+    sizes = {
+        name: override for name, override in overrides.items() if _is_size(old.by_name.get(name))
+    }
     for name, override in sizes.items():
         size = _parsed(component, name, override, from_text)
         component = replace(component, values={**component.values, **size})
@@ -45,12 +43,19 @@ def with_values(
     _check_remaining(component, remaining, old, sizes)
     values: dict[str, Value] = {}
     labels: dict[str, str] = {}
-    for name, override in others.items():
+    for name, override in overrides.items():
+        if name in sizes:
+            continue
         parsed = _parsed(component, name, override, from_text)
         values |= parsed
         labels |= {element: override.label_of(f"{component.name}.{element}") for element in parsed}
     new = component.interface.by_main_names(values, labels.__getitem__)
     return replace(component, values={**remaining, **new})
+
+
+def _is_size(variable: Variable | None) -> bool:
+    """True for a structural parameter, which decides on the sizes of arrays."""
+    return variable is not None and variable.causality == "structuralParameter"
 
 
 def _parsed(
@@ -91,7 +96,11 @@ def _check_remaining(
 
 
 def replaced(
-    was: Component, fmu: Path, rename: Mapping[str, str], units: Mapping[str, str], place: str
+    component: Component,
+    fmu: Path,
+    rename: Mapping[str, str],
+    units: Mapping[str, str],
+    place: str,
 ) -> Component:
     """The component with another FMU, without a look at its values; place begins its errors.
 
@@ -99,141 +108,197 @@ def replaced(
     FMU's name that the new one has, too; a unit where the FMUs declare the same one, or the new FMU
     none.
     """
-    before = was.code.interface if was.code else describe(was.fmu)
-    ours, theirs = renamed(was.sized(before), was.rename), was.sized(describe(fmu))
-    names = {
-        name: own
-        for name, own in was.rename.items()
-        if theirs.sample(own) and name not in rename and own not in rename.values()
-    } | dict(rename)
-    while taken := (names.keys() & theirs.by_name) - {*rename, *names.values()}:
-        names = {name: own for name, own in names.items() if name not in taken}
-    found = renamed(theirs, names, f"{place}rename")
-    kept = {
-        name: unit
-        for name, unit in was.units.items()
-        if (now := found.sample(name)) and now.unit in (None, getattr(ours.sample(name), "unit", 0))
+    old_fmu = component.code.interface if component.code else describe(component.fmu)
+    old = renamed(component.sized(old_fmu), component.rename)
+    new_fmu = component.sized(describe(fmu))
+    names = _remaining_names(component.rename, rename, new_fmu)
+    new = renamed(new_fmu, names, f"{place}rename")
+    remaining_units = {
+        name: unit for name, unit in component.units.items() if _keeps_unit(old, new, name)
     }
-    alike = (ours.exchange is None) == (theirs.exchange is None)
+    solved_alike = (old.exchange is None) == (new_fmu.exchange is None)
     return replace(
-        was,
+        component,
         fmu=fmu,
         native=None,
         code=None,
         rename=names,
-        units={**kept, **units},
-        solver=was.solver if alike else None,
+        units={**remaining_units, **units},
+        solver=component.solver if solved_alike else None,
     )
 
 
-def with_old_values(
-    system: Structure, was: Component, now: Component, anew: Collection[str], place: str
-) -> tuple[Component, list[str]]:
-    """A component with another FMU with its former values, in the units of that; and notes.
+def _remaining_names(
+    old: Mapping[str, str], rename: Mapping[str, str], fmu: Interface
+) -> dict[str, str]:
+    """The names of an FMU by those of the system: those of rename, and of the old ones what fits.
 
-    `anew` are variables, or arrays, that get another value. A value of a variable that the new FMU
-    lacks is left out, which a note says, as does one where the new FMU has other start values.
-    InputError where a value, or another number that the system states, has no meaning in the new
-    unit.
+    An old one does not where the FMU lacks what it names, or where it is taken.
     """
-    before, after = was.interface, now.interface
-    arrays = before.arrays
-    anew = {v for name in anew for v in (arrays[name].names if name in arrays else (name,))}
-    _check_ends(system, was, after, place)
+    names = {
+        name: fmu_name
+        for name, fmu_name in old.items()
+        if fmu.sample(fmu_name) and name not in rename and fmu_name not in rename.values()
+    }
+    names |= rename
+    while taken := (names.keys() & fmu.by_name) - {*rename, *names.values()}:
+        names = {name: fmu_name for name, fmu_name in names.items() if name not in taken}
+    return names
+
+
+def _keeps_unit(old: Interface, new: Interface, name: str) -> bool:
+    """True if a unit that the system names for a variable is that of another FMU's, too.
+
+    So it is where both FMUs declare the same one, or the new FMU none.
+    """
+    old_variable, new_variable = old.sample(name), new.sample(name)
+    if new_variable is None:
+        return False
+    if new_variable.unit is None:
+        return True
+    return old_variable is not None and old_variable.unit == new_variable.unit
+
+
+def with_old_values(
+    system: Structure,
+    old: Component,
+    new: Component,
+    overridden: Collection[str],
+    place: str,
+) -> tuple[Component, list[str]]:
+    """The new component, which has another FMU, with the values of the old one; and notes.
+
+    The values are in the units of the new FMU. Those of overridden variables or arrays are not
+    looked at: they get others. A value of a variable that the new FMU lacks is left out, which a
+    note says, as does one where the new FMU has other start values. InputError where a value, or
+    another number that the system states, has no meaning in the new unit.
+    """
+    old_fmu, new_fmu = old.interface, new.interface
+    _check_ends(system, old, new_fmu, place)
     values = {
         name: value
-        for name, value in was.values.items()
-        if name in after.by_name and after.by_name[name].settable
+        for name, value in old.values.items()
+        if name in new_fmu.by_name and new_fmu.by_name[name].settable
     }
-    kept = {name: value for name, value in values.items() if name not in anew}
-    for name in [*kept, *sorted(stated(system, was.name))]:
-        if reason := _lost(before, after, name, name in kept):
+    overridden = {
+        element
+        for name in overridden
+        for element in (old_fmu.arrays[name].names if name in old_fmu.arrays else (name,))
+    }
+    remaining = {name: value for name, value in values.items() if name not in overridden}
+    for name in [*remaining, *sorted(stated(system, old.name))]:
+        if reason := _meaningless(old_fmu, new_fmu, name, is_value=name in remaining):
             raise InputError(f"{place}: {name} {reason}")
-    notes = [
-        f"{place}: {_no_place(before, now, name)}: its value {literal(value)} is left out"
-        for name, value in was.values.items()
+    left_out = [
+        f"{place}: {_unsettable(old_fmu, new, name)}: its value {literal(value)} is left out"
+        for name, value in old.values.items()
         if name not in values
     ]
-    had = {v.name for v in before.variables if v.unit not in (None, "1")}
-    bare = [v.name for v in after.variables if v.kind == "Real" and not v.unit and v.name in had]
-    if bare:
+    _warn_of_missing_units(old, new, place)
+    values |= converted(remaining, old_fmu, new_fmu)
+    remaining = {name: values[name] for name in remaining}
+    for name, value in remaining.items():
+        _check_item(old, new, name, value, place)
+    return replace(new, values=values), [*_other_start_values(new, remaining, place), *left_out]
+
+
+def _warn_of_missing_units(old: Component, new: Component, place: str) -> None:
+    """Log which variables have a unit in the old FMU, and none in the new one."""
+    with_unit = {v.name for v in old.interface.variables if v.unit not in (None, "1")}
+    missing = [
+        v.name
+        for v in new.interface.variables
+        if v.kind == "Real" and not v.unit and v.name in with_unit
+    ]
+    if missing:
         LOGGER.error(
             "%s: %s tells no unit of %s, as %s does: taken to be in SI; `units` names others",
-            place, now.fmu.name, choices(bare, 6), was.fmu.name,
+            place, new.fmu.name, choices(missing, 6), old.fmu.name,
         )  # fmt: skip
-    values |= converted(kept, before, after)
-    for name in kept:
-        old, new = before.by_name[name].items, after.by_name[name].items
-        label, meant = (
-            next((k for k, n in items.items() if n == values[name]), None) for items in (old, new)
+
+
+def _check_item(old: Component, new: Component, name: str, value: Value, place: str) -> None:
+    """InputError where a number of an enumeration is another item of it in the new FMU."""
+    old_items = old.interface.by_name[name].items
+    new_items = new.interface.by_name[name].items
+    if not old_items or not new_items:
+        return
+    old_item = next((item for item, number in old_items.items() if number == value), None)
+    new_item = next((item for item, number in new_items.items() if number == value), None)
+    if old_item != new_item:
+        raise InputError(
+            f"{place}: {name} = {value!r} is {old_item} in {old.fmu.name} and "
+            f"{new_item or 'nothing'} in {new.fmu.name}; must be set anew, as one of "
+            f"{choices(new_items)}"
         )
-        if old and new and label != meant:
-            raise InputError(
-                f"{place}: {name} = {values[name]!r} is {label} in {was.fmu.name} and "
-                f"{meant or 'nothing'} in {now.fmu.name}; must be set anew, as one of "
-                f"{choices(new)}"
-            )
-    still_set = {name: values[name] for name in kept}
-    return replace(now, values=values), [*_other_than_own(now, still_set, place), *notes]
 
 
-def _other_than_own(now: Component, kept: Mapping[str, Value], place: str) -> Iterator[str]:
-    """A note on the values that the system sets and the new FMU has otherwise, if there are any."""
-    others = []
-    for name, value in kept.items():
-        variable = now.interface.by_name[name]
-        own = variable.start_value
-        if _is_own(variable) and own is not None and not _same(value, own):
+def _other_start_values(
+    component: Component, values: Mapping[str, Value], place: str
+) -> Iterator[str]:
+    """A note on the values of the system that its new FMU starts with otherwise, if there are."""
+    differences = []
+    for name, value in values.items():
+        variable = component.interface.by_name[name]
+        start = variable.start_value
+        if _may_start_itself(variable) and start is not None and not _are_equal(value, start):
             unit = "" if variable.unit in (None, "1") else f" {variable.unit}"
-            others.append(f"{name} = {literal(value)}{unit} (its own is {own!r}{unit})")
-    if others:
+            differences.append(f"{name} = {literal(value)}{unit} (its own is {start!r}{unit})")
+    if differences:
         yield (
-            f"{place}: the values of the system stay: {', '.join(others)}; --own-values, or "
-            f"swap(..., own_values=True), takes those of {now.fmu.name}"
+            f"{place}: the values of the system stay: {', '.join(differences)}; --own-values, or "
+            f"swap(..., own_values=True), takes those of {component.fmu.name}"
         )
 
 
-def _is_own(variable: Variable) -> bool:
+def _may_start_itself(variable: Variable) -> bool:
     """True for what an FMU may have a value of its own for: not what the system has to feed."""
     return variable.causality not in ("input", "structuralParameter")
 
 
-def _same(value: Value, own: object) -> bool:
+def _are_equal(value: Value, start: object) -> bool:
     """True for equal values, but for the rounding of a conversion."""
-    if isinstance(value, float) and isinstance(own, float):
-        return math.isclose(value, own, rel_tol=1e-12)
-    return value == own
+    if isinstance(value, float) and isinstance(start, float):
+        return math.isclose(value, start, rel_tol=1e-12)
+    return value == start
 
 
 def with_own_values(component: Component) -> Component:
     """The component with the values of its FMU, but for inputs and what decides on sizes."""
     by_name = component.interface.by_name
-    fed = {name: value for name, value in component.values.items() if not _is_own(by_name[name])}
+    fed = {
+        name: value
+        for name, value in component.values.items()
+        if not _may_start_itself(by_name[name])
+    }
     return replace(component, values=fed)
 
 
-def _no_place(before: Interface, now: Component, name: str) -> str:
-    """Why a value of the former FMU cannot be given to the new one."""
-    variable = now.interface.by_name.get(name)
+def _unsettable(old: Interface, new: Component, name: str) -> str:
+    """Why a value of a variable of the old FMU cannot be given to the new one."""
+    variable = new.interface.by_name.get(name)
     if variable is None:
-        return f"{now.fmu.name} has no {before.by_name[name].causality} {name}"
-    return f"in {now.fmu.name} {name} {variable.unsettable}"
+        return f"{new.fmu.name} has no {old.by_name[name].causality} {name}"
+    return f"in {new.fmu.name} {name} {variable.unsettable}"
 
 
-def _check_ends(system: Structure, was: Component, after: Interface, place: str) -> None:
+def _check_ends(system: Structure, old: Component, new: Interface, place: str) -> None:
     """InputError where another FMU lacks what the system connects: it may call that otherwise."""
     ends = [port for c in system.connections for port in (c.source, c.target)]
-    names = dict.fromkeys(p.variable for p in ends if p.component == was.name)
-    lacking = [n for n in names if n in was.interface.by_name and n not in after.by_name]
-    if lacking:
-        causality = was.interface.by_name[lacking[0]].causality
-        more = f", and {len(lacking) - 1} more that are connected" if lacking[1:] else ""
-        its = nearest(lacking[0], [v.name for v in after.of(causality)], after.listing)
-        raise InputError(
-            f"{place}: {after.path.name} has no {causality} {lacking[0]!r}{more}; {its}; if "
-            f"they have other names: --set 'components.{was.name}.rename.{lacking[0]}=NAME', or "
-            f"`grasp-cosim init my_system.toml --as {was.name}={quote(str(after.path))}` finds them"
-        )
+    connected = dict.fromkeys(port.variable for port in ends if port.component == old.name)
+    old_names = old.interface.by_name
+    missing = [name for name in connected if name in old_names and name not in new.by_name]
+    if not missing:
+        return
+    name = missing[0]
+    causality = old_names[name].causality
+    also = f", and {len(missing) - 1} more that are connected" if missing[1:] else ""
+    near = nearest(name, [v.name for v in new.of(causality)], new.listing)
+    raise InputError(
+        f"{place}: {new.path.name} has no {causality} {name!r}{also}; {near}; if "
+        f"they have other names: --set 'components.{old.name}.rename.{name}=NAME', or "
+        f"`grasp-cosim init my_system.toml --as {old.name}={quote(str(new.path))}` finds them"
+    )
 
 
 def stated(system: Structure, name: str) -> frozenset[str]:
@@ -245,7 +310,7 @@ def stated(system: Structure, name: str) -> frozenset[str]:
         for port in (c.source, c.target)
         if (c.factor, c.offset) != (None, None) or c.target in faulty
     ]
-    ways = [way for given in system.inputs.values() for way in given.ways]
+    ways = [way for system_input in system.inputs.values() for way in system_input.ways]
     ways += [output.way for output in system.outputs.values()]
     ports += [way.port for way in ways if way.factor is not None]
     for event in system.events:
@@ -259,30 +324,41 @@ def stated(system: Structure, name: str) -> frozenset[str]:
     return frozenset(port.variable for port in ports if port.component == name)
 
 
-def converted(values: Mapping[str, Value], before: Interface, after: Interface) -> dict[str, Value]:
+def converted(values: Mapping[str, Value], old: Interface, new: Interface) -> dict[str, Value]:
     """Values of one FMU in the units of another that has the same variables."""
     result = dict(values)
     for name, value in values.items():
-        if name in after.by_name and after.by_name[name].kind == "Real":
-            change = before.conversion(name, after)
+        if name in new.by_name and new.by_name[name].kind == "Real":
+            change = old.conversion(name, new)
             if change and change != IDENTITY:
                 result[name] = change(float(value))
     return result
 
 
-def _lost(before: Interface, after: Interface, name: str, value: bool) -> str:
-    """Why a number for a variable cannot be meant in its new unit; empty where it can."""
-    if name not in before.by_name or name not in after.by_name:
+def _meaningless(old: Interface, new: Interface, name: str, is_value: bool) -> str:
+    """Why a number for a variable means nothing in the unit of the new FMU; empty where it does.
+
+    A value is converted; a number elsewhere in the system, as of an event, is not.
+    """
+    if name not in old.by_name or name not in new.by_name:
         return ""
-    was, now = before.by_name[name], after.by_name[name]
-    unit, change = unit_of(before, was), before.conversion(name, after)
-    if was.unit and now.unit is None and now.kind == "Real" and (unit is None or not unit.si):
-        return f"has no unit in {after.path.name}, but is set in {was.unit}; must be named in units"
-    if change is None:
-        return f"is in {now.unit}, which {was.unit} cannot be converted to; must be set anew"
-    if change != IDENTITY and not value:
+    old_variable, new_variable = old.by_name[name], new.by_name[name]
+    old_unit = unit_of(old, old_variable)
+    change = old.conversion(name, new)
+    loses_unit = old_variable.unit and new_variable.unit is None and new_variable.kind == "Real"
+    if loses_unit and (old_unit is None or not old_unit.si):
         return (
-            f"is in {now.unit}, but an event, a fault or the factor of a connection, or an input "
-            f"file, is meant in {was.unit}; must be in that"
+            f"has no unit in {new.path.name}, but is set in {old_variable.unit}; must be named in "
+            "units"
+        )
+    if change is None:
+        return (
+            f"is in {new_variable.unit}, which {old_variable.unit} cannot be converted to; must be "
+            "set anew"
+        )
+    if change != IDENTITY and not is_value:
+        return (
+            f"is in {new_variable.unit}, but an event, a fault or the factor of a connection, or "
+            f"an input file, is meant in {old_variable.unit}; must be in that"
         )
     return ""
