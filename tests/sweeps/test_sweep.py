@@ -15,8 +15,8 @@ import pandas as pd
 import pytest
 from grasp_cosim import InputError, System, inspect_fmu, metric, simulate, sweep, write_ssp
 from grasp_cosim.metrics.metric import load_metrics
+from grasp_cosim.sweeps.executors import cluster
 from grasp_cosim.sweeps.finished_runs import identity_of, keep, opened, write_line
-from grasp_cosim.sweeps.places import cluster
 from grasp_cosim.sweeps.rows import grid
 from grasp_cosim.sweeps.run import Task, packed, run_packed, run_row
 from grasp_cosim.sweeps.table import Outcome

@@ -106,22 +106,22 @@ def serve(
     return 0
 
 
-def _span(option: str, given: str) -> tuple[float, float]:
+def _span(option: str, text: str) -> tuple[float, float]:
     """The shortest and the longest delay in s."""
     with suppress(ValueError):
-        low, high = (2 * [float(part) for part in given.split(":", 1)])[:2]
+        low, high = (2 * [float(part) for part in text.split(":", 1)])[:2]
         if not high < low:
             return low, high
-    raise InputError(f"{option} {given!r}: must be S or FROM:TO, in s, the longer last")
+    raise InputError(f"{option} {text!r}: must be S or FROM:TO, in s, the longer last")
 
 
 CHANCES = ("loss", "duplicate", "reorder", "corrupt")
 
 
-def _of_one_way(option: str, given: str | None, both: Conditions) -> Conditions:
+def _of_one_way(option: str, entries: str | None, both: Conditions) -> Conditions:
     """The conditions of one direction: those of both, but for what is given, like loss=0.1."""
     changed: dict[str, float] = {}
-    for entry in given.split(",") if given else ():
+    for entry in entries.split(",") if entries else ():
         key, value = pair(
             option, entry, f"like loss=0.1,delay=0.001, of {', '.join(CHANCES)}, delay"
         )
@@ -206,10 +206,11 @@ def relay(
         Relay(read_address("TO", to), network, host=host, port=port, log=note) as relay,
         interrupts(relay.stop),
     ):
-        here, there = text(relay.address), text(relay.peer)
+        own_address, peer_address = text(relay.address), text(relay.peer)
         if not is_loopback(relay.address):
-            say(f"listening beyond this machine: whoever reaches {here} reaches {there}")
-        say(f"relaying {here} -> {there}")
+            reached = f"whoever reaches {own_address} reaches {peer_address}"
+            say(f"listening beyond this machine: {reached}")
+        say(f"relaying {own_address} -> {peer_address}")
         relay.run()
     show(as_json, relay.as_json(), relay.as_text())
     return 0

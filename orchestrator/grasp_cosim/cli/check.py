@@ -96,7 +96,7 @@ def qualify(
         check_runs(candidate)
     of_system, of_component, values = _parted(settings, component)
     system = natively(chosen_system(SystemOptions(settings=of_system, **system_options)), native)
-    found = run_qualification(
+    qualification = run_qualification(
         system,
         component,
         component_of(load_system(candidate), component, system) if is_file else candidate,
@@ -109,10 +109,10 @@ def qualify(
         metrics=chosen_metrics(metric_files),
     )
     if out:
-        wrote = write_qualification(found, out)
+        wrote = write_qualification(qualification, out)
         say(f"wrote {out}" if wrote else f"no page {out}: there were no two runs")
-    show(as_json, words.qualification_json(found), words.qualification_text(found))
-    return 0 if found.qualified else NEGATIVE
+    show(as_json, words.qualification_json(qualification), words.qualification_text(qualification))
+    return 0 if qualification.qualified else NEGATIVE
 
 
 def _parted(
@@ -193,12 +193,12 @@ def compare(
     """
     if out:
         check_file(out)
-    given, metrics = read_bands(bands) if bands else None, chosen_metrics(metric_files)
+    own_bands, metrics = read_bands(bands) if bands else None, chosen_metrics(metric_files)
     with waiting(f"comparing {a} and {b}"):
-        found = compare_runs(a, b, bands=given, metrics=metrics, names=names)
+        comparison = compare_runs(a, b, bands=own_bands, metrics=metrics, names=names)
         if out:
-            write_comparison(found, out)
+            write_comparison(comparison, out)
     if out:
         say(f"wrote {out}: {out.stat().st_size / 1e6:.1f} MB")
-    show(as_json, words.as_json(found), words.as_text(found))
-    return 0 if found.alike else NEGATIVE
+    show(as_json, words.as_json(comparison), words.as_text(comparison))
+    return 0 if comparison.alike else NEGATIVE

@@ -94,8 +94,9 @@ def _commanded(arguments: list[str]) -> int:
 def _exited(_: object) -> None:
     """A run that an FMU ends by exit() would look like one that is done; we end by leave()."""
     if os.getpid() == _OWNER:  # and not a fork
-        said = "the binary of an FMU called exit(); with isolation = 'process' that ends it alone"
-        os._exit(fail(said, FAILED))
+        remedy = "with isolation = 'process' that ends it alone"
+        message = f"the binary of an FMU called exit(); {remedy}"
+        os._exit(fail(message, FAILED))
 
 
 _OWNER = os.getpid()
@@ -167,9 +168,9 @@ def keep_output_for_us() -> None:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDONLY)
-    ours = os.dup(1)
+    standard_output = os.dup(1)
     os.dup2(2, 1)
-    sys.stdout = _opened(ours, sys.stdout)
+    sys.stdout = _opened(standard_output, sys.stdout)
     sys.stderr = _opened(os.dup(2), sys.stderr)
 
 
@@ -187,6 +188,11 @@ def leave(code: int) -> NoReturn:
 
 def _opened(descriptor: int, like: Any) -> Any:
     """A text stream with the encoding of another, None where that was closed; not in ASCII."""
-    plain = like is None or lookup(like.encoding).name == "ascii"
-    how = ("utf-8", "backslashreplace") if plain else (like.encoding, like.errors)
-    return os.fdopen(descriptor, "w", 1 if like and like.line_buffering else -1, *how)
+    is_ascii = like is None or lookup(like.encoding).name == "ascii"
+    encoding, errors = ("utf-8", "backslashreplace") if is_ascii else (like.encoding, like.errors)
+    buffering = LINE_BUFFERED if like and like.line_buffering else DEFAULT_BUFFERING
+    return os.fdopen(descriptor, "w", buffering, encoding, errors)
+
+
+LINE_BUFFERED, DEFAULT_BUFFERING = 1, -1
+"""As open() has them."""

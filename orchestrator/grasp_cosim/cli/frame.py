@@ -48,10 +48,10 @@ def chosen_metrics(files: Sequence[Path]) -> tuple[Metric, ...]:
 
 def pair(option: str, text: str, form: str) -> tuple[str, str]:
     """Both sides of 'LEFT=RIGHT'; InputError, naming the form, where text is not like that."""
-    left, equals, right = text.partition("=")
-    if not (left and equals and right):
+    key, equals, value = text.partition("=")
+    if not (key and equals and value):
         raise InputError(f"{option} {text!r}: must be {form}")
-    return left, right
+    return key, value
 
 
 def check_outputs(out: Path | None, plot: bool) -> None:
@@ -75,9 +75,9 @@ def say(line: str, always: bool = False) -> None:
         write(on_one_line(line))
 
 
-def waiting(what: str) -> Progress:
+def waiting(activity: str) -> Progress:
     """A context manager for what takes a while: shows how long it has taken, not with --quiet."""
-    return Progress(what, unit="", shown=not is_quiet())
+    return Progress(activity, unit="", shown=not is_quiet())
 
 
 QUIET = "grasp_cosim.quiet"
@@ -97,10 +97,10 @@ def _set_quiet(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 def _set_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     if value:
-        ctx.with_resource(told(logging.INFO))
+        ctx.with_resource(logging_at(logging.INFO))
 
 
-class _Said(logging.Handler):
+class _LogPrinter(logging.Handler):
     """Says what is logged, with --quiet only what may make the figures wrong."""
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -108,12 +108,12 @@ class _Said(logging.Handler):
 
 
 @contextmanager
-def told(level: int) -> Iterator[None]:
+def logging_at(level: int) -> Iterator[None]:
     """Have what our modules log at this level or above said meanwhile."""
     logger = logging.getLogger("grasp_cosim")
     level_before, handlers_before = logger.level, [*logger.handlers]
-    if not any(isinstance(handler, _Said) for handler in logger.handlers):
-        logger.addHandler(_Said())
+    if not any(isinstance(handler, _LogPrinter) for handler in logger.handlers):
+        logger.addHandler(_LogPrinter())
     logger.setLevel(min(level, logger.level or level))  # --verbose may be the earlier one
     try:
         yield

@@ -11,7 +11,7 @@ import click
 
 from ..base.errors import InputError, nearest
 from ..base.scratch import sweep
-from .frame import EVERYWHERE, told
+from .frame import EVERYWHERE, logging_at
 
 SECTIONS = {
     "Simulate": {"run": "run", "sweep": "sweep", "evaluate": "paper", "identify": "paper"},
@@ -26,7 +26,7 @@ SECTIONS = {
 
 WITH_GRASP = find_spec("..grasp", __package__) is not None
 
-HOMES = {
+MODULE_OF_COMMAND = {
     command: module
     for modules in SECTIONS.values()
     for command, module in modules.items()
@@ -35,19 +35,19 @@ HOMES = {
 
 
 class Commands(click.Group):
-    """The commands by their HOMES, in SECTIONS."""
+    """The commands by their MODULE_OF_COMMAND, in SECTIONS."""
 
     def list_commands(self, _: click.Context) -> list[str]:
         """The names of all commands."""
-        return sorted(HOMES)
+        return sorted(MODULE_OF_COMMAND)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the sections of the help, in which each command is once."""
-        width = formatter.width - 6 - max(map(len, HOMES))
+        width = formatter.width - 6 - max(map(len, MODULE_OF_COMMAND))
         for title, names in SECTIONS.items():
-            found = [(n, command) for n in names if (command := self.get_command(ctx, n))]
+            commands = [(n, command) for n in names if (command := self.get_command(ctx, n))]
             with formatter.section(title):
-                formatter.write_dl([(n, c.get_short_help_str(width)) for n, c in found])
+                formatter.write_dl([(n, c.get_short_help_str(width)) for n, c in commands])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write where the pages are."""
@@ -59,16 +59,18 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command that the arguments name; UsageError with those nearest to it, where none."""
-        if args[0] not in HOMES and not args[0].startswith("-"):
-            near = nearest(args[0], sorted(HOMES), "`grasp-cosim --help`")
+        if args[0] not in MODULE_OF_COMMAND and not args[0].startswith("-"):
+            near = nearest(args[0], sorted(MODULE_OF_COMMAND), "`grasp-cosim --help`")
             ctx.fail(f"{args[0]!r}: no such command; {near}")
         return super().resolve_command(ctx, args)
 
     def get_command(self, _: click.Context, name: str) -> click.Command | None:
         """The command of that name; None where there is none."""
-        if name not in HOMES:
+        if name not in MODULE_OF_COMMAND:
             return None
-        command: click.Command = getattr(import_module(f"{__package__}.{HOMES[name]}"), name)
+        command: click.Command = getattr(
+            import_module(f"{__package__}.{MODULE_OF_COMMAND[name]}"), name
+        )
         command.params += [option for option in EVERYWHERE if option not in command.params]
         return command
 
@@ -79,10 +81,10 @@ def pages() -> Path:
     return inside if inside.is_dir() else Path(__file__).parents[3] / "docs"
 
 
-SHOWN = {"help_option_names": ["-h", "--help"], "show_default": True}
+HELP_SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
 
 
-@click.group(cls=Commands, context_settings=SHOWN)
+@click.group(cls=Commands, context_settings=HELP_SETTINGS)
 @click.version_option(package_name="grasp-cosim")
 def cli() -> None:
     """FMI co-simulation of a delicate grasp.
@@ -93,7 +95,7 @@ def cli() -> None:
         os.getcwd()  # noqa: PTH109
     except OSError as error:
         raise InputError("the current folder was removed; go to another one") from error
-    click.get_current_context().with_resource(told(logging.WARNING))
+    click.get_current_context().with_resource(logging_at(logging.WARNING))
     sweep(gettempdir())
 
 

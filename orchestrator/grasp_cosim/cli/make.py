@@ -90,13 +90,13 @@ def build(
             return 0
         if fingers is not None and block:
             raise ValueError(f"--fingers {fingers} cannot be used with {block}")
-        plan, what = None, str(block or "the FMUs")
+        plan, subject = None, str(block or "the FMUs")
         if native:
-            named = targets(target.split(",")) if target is not None else ()
-            plan = planned(named, 3 if fmi == "3" else 2)
+            platforms = targets(target.split(",")) if target is not None else ()
+            plan = planned(platforms, 3 if fmi == "3" else 2)
             notes += [plan.note] if plan.note else []
-            what = f"for {', '.join(t.tuple for t in plan.places)}"
-        with waiting(f"building {what}{FIRST if target else ''}"):
+            subject = f"for {', '.join(t.tuple for t in plan.places)}"
+        with waiting(f"building {subject}{FIRST if target else ''}"):
             built = build_chosen(block, folder, plan, fingers)
             if not native and (obstacle := of_binary(describe(built[0].path))):
                 built += build_chosen(block, folder.parent / NATIVE_FOLDER.name, planned(), fingers)
@@ -109,8 +109,8 @@ def build(
         say(note)
     report = {str(b.path): {"status": b.status} for b in built}
     lines = (f"{b.path}: {b.status}" for b in built)
-    made = {"fmus": list(report), "built": report, **({"notes": notes} if native else {})}
-    show(as_json, made, "\n".join(lines))
+    outcome = {"fmus": list(report), "built": report, **({"notes": notes} if native else {})}
+    show(as_json, outcome, "\n".join(lines))
     return 0
 
 

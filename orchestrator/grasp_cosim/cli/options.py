@@ -86,7 +86,7 @@ SWAP_OPTIONS = (
 
 def swap_options(command: Command) -> Command:
     """Other FMUs in the system of a command."""
-    return reduce(lambda made, option: option(made), reversed(SWAP_OPTIONS), command)
+    return reduce(lambda decorated, option: option(decorated), reversed(SWAP_OPTIONS), command)
 
 
 controller_option = click.option(
@@ -126,7 +126,7 @@ SYSTEM_OPTIONS = (
 
 def system_options(command: Command) -> Command:
     """How the system of a command, in its `system`, is changed."""
-    return reduce(lambda made, option: option(made), reversed(SYSTEM_OPTIONS), command)
+    return reduce(lambda decorated, option: option(decorated), reversed(SYSTEM_OPTIONS), command)
 
 
 PLACES = {
@@ -261,7 +261,7 @@ def chosen_system(options: SystemOptions) -> System:
     for note in system.notes[len(loaded.notes) :]:
         say(note)
     if options.record:
-        record = Record.listed(options.record)
+        record = Record.from_texts(options.record)
         record.check("--record", system.components, system.outputs)
         system = replace(system, record=record)
     return system.with_input(replace(stimuli, partial=False)) if stimuli else system

@@ -86,8 +86,11 @@ def identify(
     if out:
         check_folder(out)
     system = grasp_system().with_overrides(set_overrides(settings))
-    found = run_identification(log, fit=fit, system=system, progress=not is_quiet(), names=names)
-    for name, text in found.files().items() if out else ():
-        write_text(Path(out or "", name), text)
-    show(as_json, found.as_json(), found.text())
+    identification = run_identification(
+        log, fit=fit, system=system, progress=not is_quiet(), names=names
+    )
+    if out:
+        for name, text in identification.files().items():
+            write_text(out / name, text)
+    show(as_json, identification.as_json(), identification.text())
     return 0

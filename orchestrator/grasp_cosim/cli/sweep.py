@@ -9,8 +9,8 @@ import click
 from ..base.errors import InputError
 from ..base.quantity import Quantity
 from ..interface.fmi_types import Value
+from ..sweeps.executors import cluster
 from ..sweeps.pictures import draw_sweep
-from ..sweeps.places import cluster
 from ..sweeps.rows import grid, varied
 from ..sweeps.sweep import sweep as run_sweep
 from ..sweeps.table import as_json as in_json

@@ -74,8 +74,14 @@ def init(
     A plant of your own: grasp-cosim init my_plant.py --template plant
     """
     if template:
-        others = {"--as": candidates, "--fmu": fmus, "--fingers": fingers, "--angles": angles}
-        for option, value in {**others, "--tandem": tandem}.items():
+        of_systems = {
+            "--as": candidates,
+            "--fmu": fmus,
+            "--fingers": fingers,
+            "--angles": angles,
+            "--tandem": tandem,
+        }
+        for option, value in of_systems.items():
             if value:
                 raise InputError(f"{option} cannot be used with --template, which is no system")
         return _block(file, template, force, as_json)
@@ -87,31 +93,32 @@ def init(
         raise InputError(f"{file}: is there already; give another name, or --force")
     check_file(file)
     foreign = _paired("--as", candidates)
-    own = _paired("--fmu", fmus)
+    alone_fmus = _paired("--fmu", fmus)
     hand = fingers is not None or angles is not None
-    _check_together(file, foreign, alone=bool(own), hand=hand, tandem=tandem)
+    _check_together(file, foreign, alone=bool(alone_fmus), hand=hand, tandem=tandem)
     drafts: dict[str, Draft] = {}
     notes: list[str] = []
-    if own:
-        text, notes = alone({name: (fmu, shown(fmu, file.parent)) for name, fmu in own.items()})
+    if alone_fmus:
+        paths = {name: (fmu, path_from(file.parent, fmu)) for name, fmu in alone_fmus.items()}
+        text, notes = alone(paths)
     elif hand:
         text, notes = _hand(file.parent, fingers, angles)
     else:
         text, drafts = _built_in(file.parent, tandem, foreign)
     write_text(file, text)
-    left = to_do(text)
-    if not left and file.is_file():
+    unfilled = to_do(text)
+    if not unfilled and file.is_file():
         try:
             System.load(file)
         except InputError as error:
             raise InputError(f"{file}: written, but not yet a system: {error}") from error
     report = {
         "file": str(file),
-        "components": {name: _found(draft) for name, draft in drafts.items()},
-        "todo": [{"line": number, "text": line} for number, line in left.items()],
+        "components": {name: _as_json(draft) for name, draft in drafts.items()},
+        "todo": [{"line": number, "text": line} for number, line in unfilled.items()],
         "notes": notes,
     }
-    show(as_json, report, "\n    ".join(_lines(file, drafts, left)))
+    show(as_json, report, "\n    ".join(_lines(file, drafts, unfilled)))
     for note in notes if not as_json else ():
         say(note)
     return 0
@@ -162,23 +169,27 @@ def _check_together(
             "--fmu cannot be used with --as; --fmu makes a system of FMUs alone, "
             "--as puts one into the grasp"
         )
-    of = {"--fmu": alone, "--fingers and --angles": hand, "--tandem": tandem}
-    given = [option for option, is_given in of.items() if is_given]
-    if len(given) > 1:
-        systems = "each makes a system of its own; must be one of them"
-        raise InputError(f"{given[0]} cannot be used with {given[1]}; {systems}")
+    kinds = {"--fmu": alone, "--fingers and --angles": hand, "--tandem": tandem}
+    requested = [option for option, is_requested in kinds.items() if is_requested]
+    if len(requested) > 1:
+        raise InputError(
+            f"{requested[0]} cannot be used with {requested[1]}; each makes a system of its own; "
+            "must be one of them"
+        )
 
 
-def shown(fmu: Path, folder: Path) -> str:
+def path_from(folder: Path, fmu: Path) -> str:
     """The path of an FMU in a file of a folder: relative to that where it is below or beside it.
 
     So the two can be moved together; one from elsewhere has an absolute path.
     """
-    here = folder.resolve()
-    there = fmu.parent.resolve() / fmu.name
-    beside = here.parent != Path(here.anchor) and there.is_relative_to(here.parent)
-    near = beside or there.is_relative_to(here)
-    return Path(os.path.relpath(there, here) if near else there).as_posix()
+    folder = folder.resolve()
+    fmu = fmu.parent.resolve() / fmu.name
+    is_below = fmu.is_relative_to(folder)
+    is_beside = folder.parent != Path(folder.anchor) and fmu.is_relative_to(folder.parent)
+    if is_below or is_beside:
+        return Path(os.path.relpath(fmu, folder)).as_posix()
+    return fmu.as_posix()
 
 
 def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
@@ -199,10 +210,10 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
     from ..hand.system import directions_of, faint, hand_text, sized
 
     try:
-        given = None if angles is None else [real(angle) for angle in angles.split(",")]
+        degrees = None if angles is None else [real(angle) for angle in angles.split(",")]
     except ValueError:
         raise InputError(f"--angles {angles!r}: must be numbers in degrees, as 0,90,225") from None
-    directions = directions_of(fingers, given)
+    directions = directions_of(fingers, degrees)
     built(folder, sized(len(directions)))
     note = faint(directions)
     return _from_below(hand_text(directions)), [note] if note else []
@@ -224,7 +235,7 @@ def _built_in(
         built_in.component(name, f"--as {name}")
         keys = [key.partition(".") for preset in built_in.presets.values() for key in preset]
         preset = [variable for component, _, variable in keys if component == name]
-        drafts[name] = replacing(built_in, name, fmu, shown(fmu, folder), preset)
+        drafts[name] = replacing(built_in, name, fmu, path_from(folder, fmu), preset)
         text = drafts[name].put_into(text)
     return text, drafts
 
@@ -234,7 +245,7 @@ def _from_below(text: str) -> str:
     return re.sub(r'^fmu = "', f'fmu = "{FMU_FOLDER.as_posix()}/', text, flags=re.MULTILINE)
 
 
-def _found(draft: Draft) -> dict[str, Any]:
+def _as_json(draft: Draft) -> dict[str, Any]:
     """The matches, doubts and units of a component that was filled in, for JSON."""
     return {
         "found": {name: match.variable.name for name, match in draft.found.items()},
@@ -243,14 +254,14 @@ def _found(draft: Draft) -> dict[str, Any]:
     }
 
 
-def _lines(file: Path, drafts: Mapping[str, Draft], left: Mapping[int, str]) -> list[str]:
+def _lines(file: Path, drafts: Mapping[str, Draft], unfilled: Mapping[int, str]) -> list[str]:
     lines = [f"{file}: written"]
     for name, draft in drafts.items():
         doubtful = sum(bool(match.doubt) for match in draft.found.values())
         check = f", {doubtful} of them to check: CHECK" if doubtful else ""
         lines.append(f"{name}: {len(draft.found)} of the FMU's variables found{check}")
-    lines += [f"line {number}: {line}" for number, line in left.items()]
-    then = "when no TODO is left" if left else "then"
+    lines += [f"line {number}: {line}" for number, line in unfilled.items()]
+    then = "when no TODO is left" if unfilled else "then"
     return [*lines, f"{then}: grasp-cosim run {quote(str(file))}"]
 
 

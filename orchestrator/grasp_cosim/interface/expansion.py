@@ -23,40 +23,46 @@ def expanded(interface: Interface, lengths: Mapping[str, Value | None]) -> Inter
     is left as it is where it would be too many elements, or where the FMU has a variable by the
     name of one.
     """
-    given = {n: v for n, v in lengths.items() if isinstance(v, int) and v >= 0}
-    return interface.variant(("sizes", *given.items()), lambda: _expanded(interface, given))
+    known = {n: v for n, v in lengths.items() if isinstance(v, int) and v >= 0}
+    return interface.variant(("sizes", *known.items()), lambda: _expanded(interface, known))
 
 
 def parse_values(
-    interface: Interface, place: str, name: str, given: Given, text: bool = False
+    interface: Interface, place: str, name: str, value: Given, text: bool = False
 ) -> dict[str, Value]:
-    """The values by variable of what is given for a variable or for a whole array, checked.
+    """The typed values of the variables that a name stands for: a variable, or a whole array.
 
-    As of parse_value(); for an array nested lists of its shape, a list of all elements row by
-    row, or one value for all.
+    A value is as of parse_value(); for an array nested lists of its shape, a list of all elements
+    row by row, or one value for all. With text, a text may stand for these, as on a command line.
+    InputError, which begins with the place, where the value does not fit.
     """
     array: Array | None = interface.arrays.get(name)
-    given = as_quantity(given) or unwrapped(given)
+    value = as_quantity(value) or unwrapped(value)
     if array is None:
-        several = is_nested(given.value if isinstance(given, Quantity) else given)
-        if several or not isinstance(given, float | int | bool | str | Quantity):
-            raise InputError(f"{place}: {name} = {given!r}: is not an array; must be one value")
-        return {name: parse_value(interface, place, name, given, text)}
+        several = is_nested(value.value if isinstance(value, Quantity) else value)
+        if several or not isinstance(value, float | int | bool | str | Quantity):
+            raise InputError(f"{place}: {name} = {value!r}: is not an array; must be one value")
+        return {name: parse_value(interface, place, name, value, text)}
     try:
-        found: Any = from_text(given) if text and isinstance(given, str) else given
-        if isinstance(found, Quantity):
-            flat = [Quantity(v, found.unit) for v in flattened(found.value, array.shape)]
-        else:
-            flat = flattened(found, array.shape)
+        elements = _elements_of(
+            from_text(value) if text and isinstance(value, str) else value, array
+        )
     except ValueError as error:
         raise InputError(
-            f"{place}: {name} = {given!r}: {error}; must be {shape_text(array.shape)}, or "
+            f"{place}: {name} = {value!r}: {error}; must be {shape_text(array.shape)}, or "
             "a list of all elements row by row, or one value for all"
         ) from error
     return {
-        element: parse_value(interface, place, element, value, text)
-        for element, value in zip(array.names, flat, strict=True)
+        element: parse_value(interface, place, element, element_value, text)
+        for element, element_value in zip(array.names, elements, strict=True)
     }
+
+
+def _elements_of(value: Any, array: Array) -> list[Any]:
+    """The values of the elements of an array, row by row, each with the unit of all."""
+    if isinstance(value, Quantity):
+        return [Quantity(number, value.unit) for number in flattened(value.value, array.shape)]
+    return flattened(value, array.shape)
 
 
 def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:
@@ -77,15 +83,19 @@ def _expanded(interface: Interface, lengths: Mapping[str, int]) -> Interface:
             variables.append(replace(v, shape=shape) if shape != v.shape else v)
 
     @cache  # thousands of outputs depend on the same inputs
-    def named(names: Names) -> Names:
-        parts = (arrays[n].names if n in arrays else (n,) for n in names or ())
-        return None if names is None else tuple(name for part in parts for name in part)
+    def elements_of(names: Names) -> Names:
+        if names is None:
+            return None
+        elements: list[str] = []
+        for name in names:
+            elements += arrays[name].names if name in arrays else (name,)
+        return tuple(elements)
 
     variables = [
         replace(
             v,
-            dependencies=named(v.dependencies),
-            initial_dependencies=named(v.initial_dependencies),
+            dependencies=elements_of(v.dependencies),
+            initial_dependencies=elements_of(v.initial_dependencies),
         )
         for v in variables
     ]
@@ -145,15 +155,15 @@ def flattened(value: Any, shape: Sequence[int]) -> list[Any]:
     value = value.tolist() if hasattr(value, "tolist") else value
     if not is_nested(value):
         return [value] * size_of(shape)
-    found, flat = [len(value)], list(value)
+    value_shape, flat = [len(value)], list(value)
     while flat and all(map(is_nested, flat)):
         lengths = {len(part) for part in flat}
         flat = [entry for part in flat for entry in part]
         if len(lengths) > 1:
             raise ValueError("has rows of different lengths")
-        found.append(lengths.pop())
+        value_shape.append(lengths.pop())
     if any(map(is_nested, flat)):
         raise ValueError("has rows of different lengths")
-    if tuple(found) != tuple(shape) and found != [size_of(shape)]:
-        raise ValueError(f"is {shape_text(found)}")
+    if tuple(value_shape) != tuple(shape) and value_shape != [size_of(shape)]:
+        raise ValueError(f"is {shape_text(value_shape)}")
     return flat

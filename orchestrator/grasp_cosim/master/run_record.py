@@ -37,7 +37,7 @@ class RunRecord:
     ) -> None:
         """Choose the metrics. InputError, before any FMU is loaded, where they cannot be had."""
         self._system, self._every = system, every
-        self.metrics = chosen(metrics, system.metrics, system.shown, system.roles)
+        self.metrics = chosen(metrics, system.metrics, system.observed_names, system.roles)
         """The metrics of this run beside those of the system."""
         self._all_metrics = metrics_of(system.metrics, self.metrics)
         self.group_notes = check_groups(system)
@@ -45,8 +45,10 @@ class RunRecord:
         self._in_si = in_si(system, self._all_metrics)
         self._memory = MemoryListener(every, in_real_time)
         self._every_row: EveryRow | None = None
-        signals = needed(self._all_metrics, system.shown, system.roles) | of_proxies(system.shown)
-        if every > 1 or not signals <= system.kept:
+        signals = needed(self._all_metrics, system.observed_names, system.roles) | of_proxies(
+            system.observed_names
+        )
+        if every > 1 or not signals <= system.recorded_names:
             self._every_row = EveryRow(signals)
 
     def begin(

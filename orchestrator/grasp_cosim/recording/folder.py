@@ -80,7 +80,7 @@ class RunFolder:
             self._to_si = dict(of.to_si)
         else:
             conversions = in_si(of, ()).conversions
-            self._to_si = {name: c for name, c in conversions.items() if name in of.kept}
+            self._to_si = {name: c for name, c in conversions.items() if name in of.recorded_names}
         name = ARROW if form == "arrow" else SIGNALS
         kind = ArrowListener if form == "arrow" else CsvListener
         self._file: Listener = kind(folder / name, self._place / name)

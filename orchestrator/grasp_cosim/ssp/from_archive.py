@@ -153,7 +153,7 @@ def _driven_by(stimuli: Stimuli | None, inputs: Mapping[str, SystemInput]) -> se
     for column in stimuli.columns if stimuli else ():
         system_input = inputs.get(str(column))
         if system_input:
-            driven |= {way.port for way in system_input.ways}
+            driven |= {link.port for link in system_input.links}
         else:
             driven.add(column)
     return driven

@@ -11,7 +11,7 @@ from ..base.errors import InputError
 from ..base.si_units import Unit
 from ..interface.units import IDENTITY, conversion
 from ..interface.variables import SETTABLE
-from ..system.parts import Port, SystemInput, SystemOutput, Way
+from ..system.parts import Port, SystemInput, SystemOutput, Link
 from ..system.structure import unit_of
 from .elements import Hop, Node
 from .network import Carried, Network
@@ -62,7 +62,7 @@ def system_inputs(network: Network, port_of: PortOf) -> dict[str, SystemInput]:
         if node in network.into:
             continue
         unit = network.unit(node)
-        ways: list[Way] = []
+        links: list[Link] = []
         for target, hops in targets_of.get(node, []):
             variable = network.variable(target)
             if variable.causality not in SETTABLE or not variable.supported:
@@ -76,9 +76,9 @@ def system_inputs(network: Network, port_of: PortOf) -> dict[str, SystemInput]:
                 notes.add(place, f"{name} is not passed on: {error}")
                 continue
             target_unit = unit_of(network.parts[target.path].interface, variable)
-            ways.append(_way_along(port_of(target), hops, unit, target_unit, carried))
-        if ways:
-            inputs[name] = SystemInput(tuple(ways), unit)
+            links.append(_way_along(port_of(target), hops, unit, target_unit, carried))
+        if links:
+            inputs[name] = SystemInput(tuple(links), unit)
         else:
             notes.add(place, f"{name} leads to no variable of a component; cannot be given a value")
     return inputs
@@ -86,13 +86,13 @@ def system_inputs(network: Network, port_of: PortOf) -> dict[str, SystemInput]:
 
 def _way_along(
     port: Port, hops: list[Hop], start: Unit | None, end: Unit | None, carried: Carried
-) -> Way:
-    """The way along the hops; without numbers where the units at its two ends say all about it."""
+) -> Link:
+    """The link along the hops; without numbers where the units at its two ends say all about it."""
     by_units = conversion(start, end) if start and end else IDENTITY
     transformed = any(hop.suppress or hop.transformation for hop in hops)
     if not transformed and by_units == (carried.factor, carried.offset):
-        return Way(port)
-    return Way(port, carried.factor, carried.offset)
+        return Link(port)
+    return Link(port, carried.factor, carried.offset)
 
 
 def _system_connectors(

@@ -243,7 +243,7 @@ def _write_outside(top: Any, system: System, units: Mapping[str, Unit]) -> None:
         return
     connectors = add(top, "ssd:Connectors")
     for name, system_input in system.inputs.items():
-        variables = [_variable(system, way.port) for way in system_input.ways]
+        variables = [_variable(system, link.port) for link in system_input.links]
         are_parameters = all(variable.causality == "parameter" for variable in variables)
         kind = "parameter" if are_parameters else "input"
         connector = add(connectors, "ssd:Connector", name=name, kind=kind)
@@ -265,15 +265,15 @@ def _write_type(connector: Any, kind: str, unit: Unit | None, units: Mapping[str
 def _write_ways(connections: Any, system: System, names: Mapping[str, Mapping[str, str]]) -> None:
     """The connections between the connectors of the system itself and the components."""
     for name, system_input in system.inputs.items():
-        for way in system_input.ways:
-            element, connector = way.port.component, names[way.port.component][way.port.variable]
+        for link in system_input.links:
+            element, connector = link.port.component, names[link.port.component][link.port.variable]
             ends = {"startConnector": name, "endElement": element, "endConnector": connector}
             connection = add(connections, "ssd:Connection", **ends)
-            _write_change(connection, change_along(system, name, way), way.factor is not None)
+            _write_change(connection, change_along(system, name, link), link.factor is not None)
     for name, tap in system.once(taps).items():
         element, connector = tap.source.component, names[tap.source.component][tap.source.variable]
         ends = {"startElement": element, "startConnector": connector, "endConnector": name}
-        transformed = system.outputs[name].way.factor is not None
+        transformed = system.outputs[name].link.factor is not None
         _write_change(add(connections, "ssd:Connection", **ends), tap.change, transformed)
 
 

@@ -145,10 +145,11 @@ def recording(system: System, signals: Sequence[str] | str) -> tuple[System, lis
     for port, variable in requested.recorded.items():
         if variable.kind == "String":
             raise InputError(f"signals: {port} is a String; must be numbers or Booleans")
-    names = sorted(requested.kept, key=_in_order)
-    if requested.kept <= system.kept:
+    names = sorted(requested.recorded_names, key=_in_order)
+    if requested.recorded_names <= system.recorded_names:
         return system, names
-    return system.with_record(*sorted(system.kept | requested.kept, key=_in_order)), names
+    both = system.recorded_names | requested.recorded_names
+    return system.with_record(*sorted(both, key=_in_order)), names
 
 
 def times(system: System, rows: Iterable[Row], every: int) -> npt.NDArray[np.float64]:

@@ -17,8 +17,8 @@ from ..metrics.groups import chosen, metrics_of
 from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, available
 from ..system.description import System, as_system
+from .executors import on_executor, on_this_machine
 from .finished_runs import identity_of, keep, opened
-from .places import elsewhere, here
 from .rows import Row, as_rows, in_own_units, labels_of, overrides_of, unit_of
 from .run import Task
 from .seeds import seeds_of_runs
@@ -103,9 +103,9 @@ def sweep(
             done = {i: o for i, o in done.items() if o.error or recorded.store.has(i)}
         remaining = [job for job in jobs if job[0] not in done]
         if executor:
-            results = elsewhere(executor, task, remaining)
+            results = on_executor(executor, task, remaining)
         else:
-            results = here(task, remaining, workers)
+            results = on_this_machine(task, remaining, workers)
         bar = Progress("sweep", len(jobs), shown=progress, initial=len(done))
         with phase(f"sweep, {counted(len(remaining), 'run')}"), bar, closing(results):
             for outcome in results:
@@ -128,7 +128,7 @@ def _metrics(
 
     InputError where some are `needed` and there are none.
     """
-    observed = system.shown
+    observed = system.observed_names
     user_metrics = chosen(requested, system.metrics, observed, system.roles)
     all_metrics = metrics_of(system.metrics, user_metrics)
     in_si(system, all_metrics)

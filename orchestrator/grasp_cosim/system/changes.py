@@ -310,9 +310,9 @@ def stated(system: Structure, name: str) -> frozenset[str]:
         for port in (c.source, c.target)
         if (c.factor, c.offset) != (None, None) or c.target in faulty
     ]
-    ways = [way for system_input in system.inputs.values() for way in system_input.ways]
-    ways += [output.way for output in system.outputs.values()]
-    ports += [way.port for way in ways if way.factor is not None]
+    links = [link for system_input in system.inputs.values() for link in system_input.links]
+    links += [output.link for output in system.outputs.values()]
+    ports += [link.port for link in links if link.factor is not None]
     for event in system.events:
         for port in event.set:
             ports += system.elements(port)

@@ -18,7 +18,7 @@ from ..base.si_units import Unit, known_unit
 from ..interface.units import IDENTITY, Conversion, conversion, converted, no_conversion
 from ..interface.variables import SETTABLE, Variable
 from .overrides import Override
-from .parts import Port, Way
+from .parts import Link, Port
 from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of
 
@@ -41,16 +41,16 @@ def taps(system: Structure) -> dict[str, Tap]:
     """What the outputs of the system show, by their names."""
     by_name: dict[str, Tap] = {}
     for name, output in system.outputs.items():
-        source = _variable(system, name, output.way.port, ("output",))
-        unit, quantity = source.unit, _unit(system, output.way.port, source)
-        change = _change(system, name, quantity, output.unit, output.way)
+        source = _variable(system, name, output.link.port, ("output",))
+        unit, quantity = source.unit, _unit(system, output.link.port, source)
+        change = _change(system, name, quantity, output.unit, output.link)
         if output.unit is not None:
             unit, quantity = output.unit.name, output.unit
         elif change != IDENTITY:
             unit, quantity = None, None
         kind = output.kind or source.kind
         description = output.description or source.description or ""
-        by_name[name] = Tap(output.way.port, change, kind, unit, quantity, description)
+        by_name[name] = Tap(output.link.port, change, kind, unit, quantity, description)
     return by_name
 
 
@@ -63,26 +63,26 @@ def read_at(system: Structure, port: Port) -> tuple[Port, Conversion]:
     return (tap.source, tap.change) if tap else (port, IDENTITY)
 
 
-def change_along(system: Structure, name: str, way: Way) -> Conversion:
-    """What a value of an input of the system becomes along a way; InputError where it cannot go."""
-    variable = _variable(system, name, way.port, SETTABLE)
-    unit = _unit(system, way.port, variable)
-    return _change(system, name, system.inputs[name].unit, unit, way)
+def change_along(system: Structure, name: str, link: Link) -> Conversion:
+    """What a value of an input of the system becomes along a link; InputError where it cannot."""
+    variable = _variable(system, name, link.port, SETTABLE)
+    unit = _unit(system, link.port, variable)
+    return _change(system, name, system.inputs[name].unit, unit, link)
 
 
 def check_connectors(system: Structure) -> None:
     """InputError at the first input or output of the system that does not fit what is behind it."""
     system.once(taps)
     for name, system_input in system.inputs.items():
-        for way in system_input.ways:
-            change_along(system, name, way)
+        for link in system_input.links:
+            change_along(system, name, link)
 
 
 def reached(system: Structure, name: str) -> list[str]:
     """The variables that a value goes to by its name: its own, or those behind an input."""
     if name not in system.inputs:
         return [name]
-    return [str(way.port) for way in system.inputs[name].ways]
+    return [str(link.port) for link in system.inputs[name].links]
 
 
 def behind_connectors(system: Structure, overrides: Iterable[Override]) -> list[Override]:
@@ -115,8 +115,8 @@ def driven_by_connectors(system: Structure, stimuli: Stimuli) -> Stimuli:
         name, place = str(port), stimuli.place(port)
         passed_on = {port: column}
         if name in system.inputs:
-            ways = system.inputs[name].ways
-            passed_on = {way.port: _column(system, place, name, column, way) for way in ways}
+            links = system.inputs[name].links
+            passed_on = {link.port: _column(system, place, name, column, link) for link in links}
         elif not port.component:
             inputs = [
                 Port(c.name, v.name) for c in system.components for v in c.interface.of("input")
@@ -139,15 +139,15 @@ def _values(system: Structure, override: Override) -> list[Override]:
     if (quantity := as_quantity(value)) and system_input.unit:
         value = in_unit(label, quantity, system_input.unit)
     overrides: list[Override] = []
-    for way in system_input.ways:
-        change = change_along(system, override.place, way)
+    for link in system_input.links:
+        change = change_along(system, override.place, link)
         passed_on = value
         if change != IDENTITY:
             try:
                 passed_on = change(float(value))
             except (TypeError, ValueError):
                 raise InputError(f"{label} = {value!r}: must be a number") from None
-        overrides.append(Override(str(way.port), passed_on, label))
+        overrides.append(Override(str(link.port), passed_on, label))
     return overrides
 
 
@@ -159,9 +159,9 @@ def in_unit(place: str, quantity: Quantity, unit: Unit) -> float:
     return converted(quantity.value, source, unit)
 
 
-def _column(system: Structure, place: str, name: str, column: Stimulus, way: Way) -> Stimulus:
+def _column(system: Structure, place: str, name: str, column: Stimulus, link: Link) -> Stimulus:
     """The column of a variable behind an input of the system, in the variable's unit."""
-    change, unit = change_along(system, name, way), system.inputs[name].unit
+    change, unit = change_along(system, name, link), system.inputs[name].unit
     if unit is None and change == IDENTITY:
         return column
     into_unit = IDENTITY
@@ -197,18 +197,18 @@ def _unit(system: Structure, port: Port, variable: Variable) -> Unit | None:
 
 
 def _change(
-    system: Structure, name: str, start: Unit | None, end: Unit | None, way: Way
+    system: Structure, name: str, start: Unit | None, end: Unit | None, link: Link
 ) -> Conversion:
-    """The conversion along a way; InputError where units do not fit."""
-    if way.factor is not None or way.offset is not None:
-        factor = 1.0 if way.factor is None else way.factor
-        return Conversion(factor, 0.0 if way.offset is None else way.offset)
+    """The conversion along a link; InputError where units do not fit."""
+    if link.factor is not None or link.offset is not None:
+        factor = 1.0 if link.factor is None else link.factor
+        return Conversion(factor, 0.0 if link.offset is None else link.offset)
     if start is None or end is None:
         return IDENTITY
     change = conversion(start, end)
     if change is None:
         raise InputError(
             f"{system.name}: {name}: {start.name} cannot be converted to {end.name}, for "
-            f"{way.port}; must be of the same quantity"
+            f"{link.port}; must be of the same quantity"
         )
     return change

@@ -86,15 +86,17 @@ def _no_whole_number(system: Structure, component: Component, inner: Time) -> st
 
 def _settings(system: Structure, component: Component, step: Time) -> str:
     """The settings with which a component has a step, and the system still fits together."""
-    others = [c.step_ns for c in system.components if c.step_ns is not None and c is not component]
+    other_steps = [
+        c.step_ns for c in system.components if c.step_ns is not None and c is not component
+    ]
     settings: dict[str, Time] = {}
     base = system.step_ns
     if step % base:
-        base = common(step, *others)
+        base = common(step, *other_steps)
         settings["experiment.step"] = base
     if step != base or component.step_ns is not None:
         settings[f"components.{component.name}.step"] = step
-    span, unit = system.stop_ns - system.start_ns, multiple(step, *others)
+    span, unit = system.stop_ns - system.start_ns, multiple(step, *other_steps)
     if span % unit:
         settings["experiment.stop"] = system.start_ns + max(1, round(span / unit)) * unit
     return " ".join(f"--set {place}={written(time)}" for place, time in settings.items())

@@ -22,7 +22,7 @@ from .parts import Component, Connection
 from .record import Record
 from .replay import replayed
 from .scenario import check_scenario
-from .settings import made_of
+from .settings import summary
 from .stimuli import Stimuli, read_stimuli
 from .structure import Structure
 from .times import TimeInput
@@ -116,8 +116,8 @@ class System(Structure):
         if self.input and self.input.recorded is not None:
             stimuli, note = replayed(self, self.input)
             object.__setattr__(self, "input", stimuli)
-            others = tuple(n for n in self.notes if not n.startswith(f"{stimuli.file}: a recorded"))
-            object.__setattr__(self, "notes", (*others, note))
+            notes = [n for n in self.notes if not n.startswith(f"{stimuli.file}: a recorded")]
+            object.__setattr__(self, "notes", (*notes, note))
         elif self.input:
             object.__setattr__(self, "input", driven_by_connectors(self, self.input))
         for name, part in in_main_names(self).items():
@@ -144,7 +144,7 @@ class System(Structure):
         for group in self.metrics:
             check_registered(f"{self.name}: metrics: no group", "groups", group)
         if not self.as_read:  # copies keep it
-            object.__setattr__(self, "as_read", made_of(self))
+            object.__setattr__(self, "as_read", summary(self))
 
     @classmethod
     def load(
@@ -403,8 +403,8 @@ class System(Structure):
         Returns:
             The changed system, or itself where that makes no difference.
         """
-        made = replace(self, steered=True)
-        return self if made.recorded == self.recorded else made
+        steered = replace(self, steered=True)
+        return self if steered.recorded == self.recorded else steered
 
     def natively(self, native: bool | None = None) -> System:
         """A copy that runs native twins of its FMUs: the same content in C, with the same bits.
@@ -472,23 +472,23 @@ class System(Structure):
 
         So a thousand runs do not check the rest as often, nor work out what follows from it.
         """
-        self.observed, self._known  # noqa: B018 - there from now on, and shared
-        made = object.__new__(type(self))
-        vars(made).update(vars(self), components=components)
-        vars(made).pop("by_name", None)  # which has the components of self
-        return made
+        self.observed, self._results  # noqa: B018 - there from now on, and shared
+        copy = object.__new__(type(self))
+        vars(copy).update(vars(self), components=components)
+        vars(copy).pop("by_name", None)  # which has the components of self
+        return copy
 
 
-def as_system(given: Any, who: str) -> System:
+def as_system(system: Any, who: str) -> System:
     """A System as it is, or that of the path of a system file; `who` begins the error."""
-    if isinstance(given, str | Path):
-        return System.load(given)
-    if not isinstance(given, System):
+    if isinstance(system, str | Path):
+        return System.load(system)
+    if not isinstance(system, System):
         raise InputError(
-            f"{who}: {type(given).__name__} {str(given)[:40]!r}: must be a System, as "
+            f"{who}: {type(system).__name__} {str(system)[:40]!r}: must be a System, as "
             "System.load(), grasp_system() or hand_system() give it, or the path of a system file"
         )
-    return given
+    return system
 
 
 def is_archive(path: str | Path) -> bool:

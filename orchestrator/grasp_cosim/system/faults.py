@@ -57,9 +57,9 @@ class Draws:
 
     def uniforms(self, step: int) -> tuple[float, float]:
         """Return two independent numbers, uniform in (0, 1] and in [0, 1)."""
-        whole = self._purpose.copy()
-        whole.update(step.to_bytes(8, "little", signed=True))
-        digest = whole.digest()
+        generator = self._purpose.copy()
+        generator.update(step.to_bytes(8, "little", signed=True))
+        digest = generator.digest()
         first, second = (int.from_bytes(half, "little") >> 11 for half in (digest[:8], digest[8:]))
         return (first + 1) * 2.0**-53, second * 2.0**-53
 
@@ -94,43 +94,43 @@ class Remembering(ABC):
 class _Stuck(Remembering):
     """The given value, or the one of the first step in which it is asked."""
 
-    def __init__(self, given: Parameters, *_: object) -> None:
-        since = -math.inf if "value" in given else math.inf
-        self.memory = since, float(given.get("value", math.nan))
+    def __init__(self, parameters: Parameters, *_: object) -> None:
+        since = -math.inf if "value" in parameters else math.inf
+        self.memory = since, float(parameters.get("value", math.nan))
 
     def __call__(self, value: float, step: int, acts: bool) -> float:
         if not acts:
             return value
         if step <= self.memory[0]:
             self.memory = step, value
-        held: float = self.memory[1]
-        return held
+        stuck_at: float = self.memory[1]
+        return stuck_at
 
 
 class _Dropout(Remembering):
     """Hold what got through in an earlier step where a value is lost; at first there is none."""
 
-    def __init__(self, given: Parameters, draws: Draws, _: Time) -> None:
-        self._probability, self._draws = given["probability"], draws
+    def __init__(self, parameters: Parameters, draws: Draws, _: Time) -> None:
+        self._probability, self._draws = parameters["probability"], draws
         self.memory = INITIAL - 1, None, None
 
     def __call__(self, value: float, step: int, acts: bool) -> float:
-        last, held, passed = self.memory
+        last, last_passed, passed = self.memory
         if step != last:
-            held = passed
-        if held is not None and acts and self._draws.uniforms(step)[1] < self._probability:
-            value, kept = held, passed
+            last_passed = passed
+        if last_passed is not None and acts and self._draws.uniforms(step)[1] < self._probability:
+            value, next_passed = last_passed, passed
         else:
-            kept = value
-        self.memory = step, held, kept
+            next_passed = value
+        self.memory = step, last_passed, next_passed
         return value
 
 
 class _Delay(Remembering):
     """The last value passed at least so many base steps ago; the first one where there is none."""
 
-    def __init__(self, given: Parameters, _: Draws, step_ns: Time) -> None:
-        self._steps = round(given["time"] * NANOSECONDS / step_ns)
+    def __init__(self, parameters: Parameters, _: Draws, step_ns: Time) -> None:
+        self._steps = round(parameters["time"] * NANOSECONDS / step_ns)
         self.memory: deque[tuple[int, float]] = deque()
 
     def __call__(self, value: float, step: int, acts: bool) -> float:
@@ -143,8 +143,8 @@ class _Delay(Remembering):
         return history[0][1] if acts else value
 
 
-def _check_delay(place: str, given: Parameters, step_ns: Time) -> None:
-    time = given["time"]
+def _check_delay(place: str, parameters: Parameters, step_ns: Time) -> None:
+    time = parameters["time"]
     count = round(time * NANOSECONDS / step_ns)
     if abs(count * step_ns - time * NANOSECONDS) > 1e-12 * time * NANOSECONDS:
         raise InputError(
@@ -153,8 +153,8 @@ def _check_delay(place: str, given: Parameters, step_ns: Time) -> None:
         )
 
 
-def _check_saturation(place: str, given: Parameters, _: Time) -> None:
-    low, high = given.get("low"), given.get("high")
+def _check_saturation(place: str, parameters: Parameters, _: Time) -> None:
+    low, high = parameters.get("low"), parameters.get("high")
     if low is None and high is None:
         raise InputError(f"{place}: a saturation must have low, high or both")
     if low is not None and high is not None and not low < high:
@@ -166,13 +166,42 @@ def _rounded(value: float, width: float) -> float:
     return round(count) * width if math.isfinite(count) else value
 
 
-def _each(change: Callable[[float, Parameters, Draws, int], float]) -> Start:
+Change = Callable[[float, Parameters, Draws, int], float]
+"""What a fault without a memory makes of a value, at the number of a step."""
+
+
+def _without_memory(change: Change) -> Start:
     """A fault that changes each value by its parameters, random numbers and the step number."""
 
-    def start(given: Parameters, draws: Draws, _: Time) -> Act:
-        return lambda value, step, acts: change(value, given, draws, step) if acts else value
+    def start(parameters: Parameters, draws: Draws, _: Time) -> Act:
+        return lambda value, step, acts: change(value, parameters, draws, step) if acts else value
 
     return start
+
+
+def _biased(value: float, parameters: Parameters, _: Draws, __: int) -> float:
+    """The value and a constant."""
+    biased: float = value + parameters["value"]
+    return biased
+
+
+def _noisy(value: float, parameters: Parameters, draws: Draws, step: int) -> float:
+    """The value and a random number of a normal distribution."""
+    noisy: float = value + parameters["standard_deviation"] * draws.normal(step)
+    return noisy
+
+
+def _saturated(value: float, parameters: Parameters, _: Draws, __: int) -> float:
+    """The value, but no lower than low and no higher than high."""
+    saturated: float = min(
+        max(value, parameters.get("low", value)), parameters.get("high", math.inf)
+    )
+    return saturated
+
+
+def _quantised(value: float, parameters: Parameters, _: Draws, __: int) -> float:
+    """The nearest whole number of steps of quantisation."""
+    return _rounded(value, parameters["step"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,36 +218,30 @@ class FaultKind:
 
 
 FINITE = Range("a finite number")
+OPTIONAL = FINITE._replace(needed=False)
+PROBABILITY = Range("a number from 0 to 1", 0.0, 1.0)
+DEVIATION = Range("a finite number of at least 0", 0.0)
+DURATION = Range(f"a number from 0 to {LONGEST:g}", 0.0, LONGEST)
+WIDTH = Range("a finite number above 0", 0.0, above=True)
+
+STUCK = FaultKind(_Stuck, {"value": None}, discrete=True)
+DROPOUT = FaultKind(_Dropout, {"probability": PROBABILITY}, discrete=True, random=True)
+BIAS = FaultKind(_without_memory(_biased), {"value": FINITE})
+NOISE = FaultKind(_without_memory(_noisy), {"standard_deviation": DEVIATION}, random=True)
+DELAY = FaultKind(_Delay, {"time": DURATION}, discrete=True, check=_check_delay)
+SATURATION = FaultKind(
+    _without_memory(_saturated), {"low": OPTIONAL, "high": OPTIONAL}, check=_check_saturation
+)
+QUANTISATION = FaultKind(_without_memory(_quantised), {"step": WIDTH})
 
 FAULTS: Mapping[str, FaultKind] = {
-    "stuck": FaultKind(_Stuck, {"value": None}, discrete=True),
-    "dropout": FaultKind(
-        _Dropout,
-        {"probability": Range("a number from 0 to 1", 0.0, 1.0)},
-        discrete=True,
-        random=True,
-    ),
-    "bias": FaultKind(_each(lambda x, p, *_: x + p["value"]), {"value": FINITE}),
-    "noise": FaultKind(
-        _each(lambda x, p, draws, k: x + p["standard_deviation"] * draws.normal(k)),
-        {"standard_deviation": Range("a finite number of at least 0", 0.0)},
-        random=True,
-    ),
-    "delay": FaultKind(
-        _Delay,
-        {"time": Range(f"a number from 0 to {LONGEST:g}", 0.0, LONGEST)},
-        discrete=True,
-        check=_check_delay,
-    ),
-    "saturation": FaultKind(
-        _each(lambda x, p, *_: min(max(x, p.get("low", x)), p.get("high", math.inf))),
-        dict.fromkeys(("low", "high"), FINITE._replace(needed=False)),
-        check=_check_saturation,
-    ),
-    "quantisation": FaultKind(
-        _each(lambda x, p, *_: _rounded(x, p["step"])),
-        {"step": Range("a finite number above 0", 0.0, above=True)},
-    ),
+    "stuck": STUCK,
+    "dropout": DROPOUT,
+    "bias": BIAS,
+    "noise": NOISE,
+    "delay": DELAY,
+    "saturation": SATURATION,
+    "quantisation": QUANTISATION,
 }
 """The kinds of faults by name."""
 

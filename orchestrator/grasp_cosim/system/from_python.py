@@ -26,7 +26,7 @@ Part = (
 )
 """What component_from() takes, or a mapping with that as "fmu"."""
 
-KINDS = (
+MUST_OF_COMPONENT = (
     "the path of an FMU, the file of a block, NAME.py, a Component, or Python code with "
     "step(t, inputs)"
 )
@@ -70,7 +70,7 @@ def component_from(
     place: str,
     name: str,
     entry: Any,
-    others: Mapping[str, Component],
+    known_components: Mapping[str, Component],
     connections: Iterable[Connection],
 ) -> Component:
     """The component of that name: a path is that of an FMU, or of the file of a block, NAME.py.
@@ -86,34 +86,37 @@ def component_from(
         path = Path(entry)
         return Component(name, _built(place, path) if path.suffix == ".py" else path, {})
     if not is_code(entry):
-        raise InputError(f"{place} = {entry!r}: must be {KINDS}")
-    return _of_code(place, name, entry, others, [*connections])
+        raise InputError(f"{place} = {entry!r}: must be {MUST_OF_COMPONENT}")
+    return _of_code(place, name, entry, known_components, [*connections])
 
 
 def _of_code(
     place: str,
     name: str,
     code: Any,
-    others: Mapping[str, Component],
+    known_components: Mapping[str, Component],
     connections: Iterable[Connection],
 ) -> Component:
     """A component that is Python code; inputs without a connection keep their start values."""
     connected: dict[str, dict[str, End]] = {"input": {}, "output": {}}
     for c in connections:
         ends = ("input", c.target, c.source), ("output", c.source, c.target)
-        for causality, own, other in ends:
-            if own.component == name:
-                known = connected[causality].get(own.variable, End())
-                connected[causality][own.variable] = known.or_as(_end(others, other))
-    made: PythonCode = with_interface(place, code, connected)
-    free = [v for v in made.interface.of("input") if v.name not in connected["input"]]
-    values = {v.name: x for v in free if (x := v.start_value) is not None}
-    return Component(name, made.interface.path, values, code=made)  # type: ignore[arg-type]
+        for causality, port, peer in ends:
+            if port.component == name:
+                end = connected[causality].get(port.variable, End())
+                connected[causality][port.variable] = end.or_as(_end(known_components, peer))
+    python_code: PythonCode = with_interface(place, code, connected)
+    interface = python_code.interface
+    values: dict[str, Any] = {}
+    for variable in interface.of("input"):
+        if variable.name not in connected["input"] and variable.start_value is not None:
+            values[variable.name] = variable.start_value
+    return Component(name, interface.path, values, code=python_code)
 
 
-def _end(others: Mapping[str, Component], port: Port) -> End:
+def _end(known_components: Mapping[str, Component], port: Port) -> End:
     """What is known of a variable of a component with an FMU; nothing where there is none."""
-    component = others.get(port.component)
+    component = known_components.get(port.component)
     variable = component.interface.by_name.get(port.variable) if component else None
     if component is None or variable is None or not variable.is_number:
         return End()
@@ -134,9 +137,9 @@ def _built(place: str, file: Path) -> Path:
 def _connection_entry(entry: Any) -> Any:
     """A connection as a file has it, "a.y -> b.u" or a table; a pair of ports is one, too."""
     if isinstance(entry, Connection):
-        scaled = {"factor": entry.factor, "offset": entry.offset}
-        given = {key: value for key, value in scaled.items() if value is not None}
-        return {"from": str(entry.source), "to": str(entry.target), **given}
+        scale = {"factor": entry.factor, "offset": entry.offset}
+        given_scale = {key: value for key, value in scale.items() if value is not None}
+        return {"from": str(entry.source), "to": str(entry.target), **given_scale}
     if isinstance(entry, tuple | list) and len(entry) == 2:
         return {"from": str(entry[0]), "to": str(entry[1])}
     return entry

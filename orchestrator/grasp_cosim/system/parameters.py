@@ -64,14 +64,14 @@ class Parameters(Mapping[str, Parameter]):
 
 def parameters_of(system: Structure) -> Parameters:
     """The parameters of a system that can be set."""
-    found = {}
+    parameters = {}
     for component in system.components:
         for v in component.interface.variables:
             if v.causality in PARAMETERS and v.settable and v.supported:
                 value = component.values.get(v.name, v.start_value)
                 described = v.unit, v.minimum, v.maximum, v.description
-                found[f"{component.name}.{v.name}"] = Parameter(value, *described)
-    return Parameters(found)
+                parameters[f"{component.name}.{v.name}"] = Parameter(value, *described)
+    return Parameters(parameters)
 
 
 def _row(name: str, p: Parameter) -> list[str]:

@@ -55,10 +55,10 @@ def literal(value: Given) -> str:
     return repr(plain) if isinstance(plain, int | str) else f"[{', '.join(map(literal, plain))}]"
 
 
-def as_lists(given: Given) -> Any:
+def as_lists(value: Given) -> Any:
     """A value as it is, and those of an array as lists, which fit into JSON."""
-    tolist = getattr(given, "tolist", None)  # to ask for a Nested takes 6 us
-    return given if tolist is None else tolist()
+    tolist = getattr(value, "tolist", None)  # to ask for a Nested takes 6 us
+    return value if tolist is None else tolist()
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,22 +142,23 @@ class Component:
 
     def of_proxy(self, setting: str) -> Value:
         """The start value of a parameter of a proxy, by its name behind proxy."""
-        own = f"proxy.{setting}"
-        variable = self._read[0].by_name[own]
-        name = next((name for name, theirs in self.rename.items() if theirs == own), own)
+        fmu_name = f"proxy.{setting}"
+        variable = self._read[0].by_name[fmu_name]
+        system_names = {declared: name for name, declared in self.rename.items()}
+        name = system_names.get(fmu_name, fmu_name)
         value = self.values.get(name, variable.start)
         return value in (True, "true", "1") if variable.kind == "Boolean" else value or ""
 
     @property
     def is_current(self) -> bool:
         """True if its FMUs are still those that were read."""
-        return all(map(operator.is_, self._read, self._now()))
+        return all(map(operator.is_, self._read, self._declared_now()))
 
     @cached_property
     def _read(self) -> list[Interface]:
-        return self._now()
+        return self._declared_now()
 
-    def _now(self) -> list[Interface]:
+    def _declared_now(self) -> list[Interface]:
         """What the files of its FMUs declare now, or its code does."""
         if self.code:
             return [self.code.interface]
@@ -185,8 +186,11 @@ class Component:
         """The interface of an FMU, with its arrays taken apart, of the sizes that values give."""
         if interface.sized_by is None:
             return interface
-        names = {own: name for name, own in self.rename.items()}
-        lengths = {own: self.values.get(names.get(own, own)) for own in interface.sized_by}
+        names = {fmu_name: name for name, fmu_name in self.rename.items()}
+        lengths = {
+            fmu_name: self.values.get(names.get(fmu_name, fmu_name))
+            for fmu_name in interface.sized_by
+        }
         return expanded(interface, lengths)
 
 
@@ -219,22 +223,22 @@ class Connection:
     """From an output to an input: target = factor * source + offset.
 
     factor and offset are None where the units decide: the identity, or the conversion between them.
-    whole is the connection of arrays that this one is an element of, if it is one.
+    of_arrays is the connection of arrays that this one is an element of, if it is one.
     """
 
     source: Port
     target: Port
     factor: float | None = None
     offset: float | None = None
-    whole: Connection | None = field(default=None, compare=False)
+    of_arrays: Connection | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
         return f"{self.source} -> {self.target}"
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
-    """Between a connector of the system and a variable: value behind = factor * value + offset.
+class Link:
+    """From a connector of the system to a variable: value behind = factor * value + offset.
 
     factor and offset are None where the units of both ends decide, as on a Connection.
     """
@@ -246,12 +250,12 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class SystemInput:
-    """An input or parameter of the system itself: what is given to it goes all its ways.
+    """An input or parameter of the system itself: what is given to it goes along all its links.
 
-    unit is None where values are taken as they are at the end of each way.
+    unit is None where values are taken as they are at the end of each link.
     """
 
-    ways: tuple[Way, ...]
+    links: tuple[Link, ...]
     unit: Unit | None = None
 
 
@@ -262,7 +266,7 @@ class SystemOutput:
     kind is Real, Integer, Boolean or String, None for that of the component's output.
     """
 
-    way: Way
+    link: Link
     unit: Unit | None = None
     kind: str | None = None
     description: str = ""

@@ -36,9 +36,9 @@ from ..interface.variables import Variable
 CAUSALITIES = {"inputs": "input", "outputs": "output", "parameters": "parameter"}
 """The causality of what a class declares under a name."""
 
-KINDS: Mapping[type, Kind] = {bool: "Boolean", int: "Integer", float: "Real"}
+KIND_OF_TYPE: Mapping[type, Kind] = {bool: "Boolean", int: "Integer", float: "Real"}
 
-DECLARED = "a start value, a unit, or both, as in (0.1, 'm')"
+MUST_OF_VARIABLE = "a start value, a unit, or both, as in (0.1, 'm')"
 
 
 class WithStep(Protocol):
@@ -59,10 +59,10 @@ class End(NamedTuple):
     unit: Unit | None = None
     start: Value | None = None
 
-    def or_as(self, other: End) -> End:
+    def or_as(self, peer: End) -> End:
         """The same, with what another knows where it does not."""
-        found = {key: value for key, value in self._asdict().items() if value is not None}
-        return other._replace(**found)
+        known = {key: value for key, value in self._asdict().items() if value is not None}
+        return peer._replace(**known)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,8 +74,8 @@ class PythonCode:
 
     def new(self) -> Function:
         """The function that is called at each communication point, as at the start of a run."""
-        made = self.code() if isinstance(self.code, type) else deepcopy(self.code)
-        step: Function = getattr(made, "step", made)
+        instance = self.code() if isinstance(self.code, type) else deepcopy(self.code)
+        step: Function = getattr(instance, "step", instance)
         return step
 
     @property
@@ -110,21 +110,24 @@ def with_interface(place: str, code: Any, connected: Mapping[str, Mapping[str, E
     variables: list[Variable] = []
     causalities: dict[str, str] = {}
     units: dict[str, Unit] = {}
-    for what, causality in CAUSALITIES.items():
-        known = connected.get(causality, {})
-        declared = _declared(f"{place}: {what}", getattr(code, what, None))
-        for name, end in (known if declared is None else declared).items():
+    for attribute, causality in CAUSALITIES.items():
+        ends = connected.get(causality, {})
+        declared = _declared(f"{place}: {attribute}", getattr(code, attribute, None))
+        if declared is None:
+            declared = dict(ends)
+        for name, declaration in declared.items():
             if not isinstance(name, str):
-                raise InputError(f"{place}: {what}: {name!r}: must be a name, a text")
-            if (other := causalities.setdefault(name, causality)) is not causality:
+                raise InputError(f"{place}: {attribute}: {name!r}: must be a name, a text")
+            if (first := causalities.setdefault(name, causality)) is not causality:
                 raise InputError(
-                    f"{place}: {what}: {name!r} is an {other}, too; must be one of them"
+                    f"{place}: {attribute}: {name!r} is an {first}, too; must be one of them"
                 )
-            full = end.or_as(known.get(name, End()))
+            end = declaration.or_as(ends.get(name, End()))
             if causality == "parameter":
-                full = _of_attribute(full, getattr(code, name, None))
-            variables.append(_variable(name, causality, full, len(variables)))
-            units |= {full.unit.name: full.unit} if full.unit else {}
+                end = _of_attribute(end, getattr(code, name, None))
+            variables.append(_variable(name, causality, end, len(variables)))
+            if end.unit:
+                units[end.unit.name] = end.unit
     interface = Interface(
         path=Path(called),
         guid="",
@@ -159,8 +162,8 @@ def _variable(name: str, causality: str, end: End, reference: int) -> Variable:
 def _of_attribute(end: End, value: Any) -> End:
     """A parameter that starts as its attribute, if there is one; whole numbers have no unit."""
     value = unwrapped(value)
-    start = value if type(value) in KINDS else 0.0 if end.start is None else end.start
-    return End("Real" if end.unit else KINDS[type(start)], end.unit, start)
+    start = value if type(value) in KIND_OF_TYPE else 0.0 if end.start is None else end.start
+    return End("Real" if end.unit else KIND_OF_TYPE[type(start)], end.unit, start)
 
 
 def _declared(place: str, entries: Any) -> dict[str, End] | None:
@@ -170,7 +173,7 @@ def _declared(place: str, entries: Any) -> dict[str, End] | None:
     if isinstance(entries, Mapping):
         return {name: _end(f"{place}: {name!r}", entry) for name, entry in entries.items()}
     if isinstance(entries, str) or not isinstance(entries, Iterable):
-        raise InputError(f"{place} = {entries!r}: must be names, or names with {DECLARED}")
+        raise InputError(f"{place} = {entries!r}: must be names, or names with {MUST_OF_VARIABLE}")
     return {name: End() for name in entries}
 
 
@@ -180,9 +183,9 @@ def _end(place: str, entry: Any) -> End:
     start = unwrapped(start)
     if isinstance(start, str):
         start, unit = None, start
-    if (start is not None and type(start) not in KINDS) or not isinstance(unit, str | None):
-        raise InputError(f"{place} = {entry!r}: must be {DECLARED}")
-    found = None if unit is None else known_unit(unit)
-    if unit is not None and found is None:
+    if (start is not None and type(start) not in KIND_OF_TYPE) or not isinstance(unit, str | None):
+        raise InputError(f"{place} = {entry!r}: must be {MUST_OF_VARIABLE}")
+    meaning = None if unit is None else known_unit(unit)
+    if unit is not None and meaning is None:
         raise InputError(f"{place} = {entry!r}: no unit that is known; must be like 'mm', 'N.s/m'")
-    return End("Boolean" if isinstance(start, bool) else None, found, start)
+    return End("Boolean" if isinstance(start, bool) else None, meaning, start)

@@ -105,7 +105,7 @@ class Record:
         return watched
 
     @classmethod
-    def listed(cls, texts: Iterable[str]) -> Record:
+    def from_texts(cls, texts: Iterable[str]) -> Record:
         """The record of texts as on a command line, each a list with commas.
 
         A comma in brackets is part of a name: a.A[1,2].
@@ -114,7 +114,10 @@ class Record:
         for text in texts:
             depth, entry = 0, ""
             for letter in text:
-                depth += (letter in "[(") - (letter in "])")
+                if letter in "[(":
+                    depth += 1
+                elif letter in "])":
+                    depth -= 1
                 if letter == "," and depth <= 0:
                     entries.append(entry.strip())
                     entry = ""
@@ -146,15 +149,15 @@ class Record:
                 raise InputError(f"{place} {text!r} {reason}")
 
     def without_missing(
-        self, before: Sequence[Component], after: Sequence[Component], outputs: Collection[str] = ()
+        self, old: Sequence[Component], new: Sequence[Component], outputs: Collection[str] = ()
     ) -> tuple[Record, list[str]]:
         """The record of a system with other FMUs, and its entries that match nothing any more."""
-        lost = [
+        unmatched = [
             text
             for text in self.signals
-            if missing(text, after, outputs) and not missing(text, before, outputs)
+            if missing(text, new, outputs) and not missing(text, old, outputs)
         ]
-        return Record(tuple(text for text in self.signals if text not in lost)), lost
+        return Record(tuple(text for text in self.signals if text not in unmatched)), unmatched
 
     def _patterns(self) -> tuple[list[Pattern], list[Pattern]]:
         """Those that take signals in, and those that leave them out."""
@@ -173,11 +176,11 @@ def missing(
     text: str, components: Sequence[Component], outputs: Collection[str] = ()
 ) -> str | None:
     """Why a pattern records nothing, or leaves nothing out; None where it does."""
-    one = pattern(text)
+    signal = pattern(text)
     unrecordable: tuple[Component, Variable] | None = None
     for component in components:
         for v in component.interface.variables:
-            if one.takes(component, v):
+            if signal.takes(component, v):
                 if v.supported:
                     return None
                 unrecordable = unrecordable or (component, v)
@@ -187,12 +190,12 @@ def missing(
             f"is of type {v.nature}: {component.name}.{v.name} cannot be recorded; must be "
             f"{choices(SUPPORTED_KINDS)}"
         )
-    if any(one.matches([name]) for name in (*outputs, *_worked_out(components))):
+    if any(signal.matches([name]) for name in (*outputs, *_worked_out(components))):
         return None
     names = [f"{c.name}.{v.name}" for c in components for v in c.interface.variables if v.supported]
     wholes = [f"{c.name}.*" for c in components]
     see = components[0].interface.listing if len(components) == 1 else _LISTINGS
-    return f"matches no signal; {nearest(one.text, [*outputs, *wholes, *names], see)}"
+    return f"matches no signal; {nearest(signal.text, [*outputs, *wholes, *names], see)}"
 
 
 _LISTINGS = "`grasp-cosim inspect FMU`"

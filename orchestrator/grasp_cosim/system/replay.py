@@ -16,7 +16,7 @@ from .stimuli import Stimuli, Stimulus
 from .structure import Structure
 from .validity import is_drivable
 
-NAMED = 3
+MAX_NAMED = 3
 """The most columns that the note names."""
 
 
@@ -27,21 +27,19 @@ def replayed(system: Structure, stimuli: Stimuli) -> tuple[Stimuli, str]:
     """
     columns = stimuli.recorded_columns
     through = {c.target: c for c in stimuli.recorded or () if c.source in columns}
-    found: dict[Port, Stimulus] = {}
+    driven: dict[Port, Stimulus] = {}
     for port in _free(system):
         if port in columns:
-            found[port] = columns[port]
+            driven[port] = columns[port]
         elif port in through:
-            found[port] = _passed(columns[through[port].source], through[port])
-    if not found and not stimuli.partial:
+            driven[port] = _passed(columns[through[port].source], through[port])
+    if not driven and not stimuli.partial:
         raise InputError(
             f"{stimuli.file}: is a recorded run, none of whose columns can drive {system.name}; "
             "must have one of an input without a connection, or of a tunable parameter"
         )
-    note = (
-        f"{stimuli.file}: a recorded run: {choices(found, NAMED)} are driven, all else is left out"
-    )
-    return replace(stimuli, columns=found), note
+    note = f"{stimuli.file}: a recorded run: {choices(driven, MAX_NAMED)} are driven, all else is left out"
+    return replace(stimuli, columns=driven), note
 
 
 def _free(system: Structure) -> Sequence[Port]:

@@ -43,34 +43,34 @@ from .parts import (
 )
 from .structure import Structure
 from .times import Time, first_step, in_nanoseconds, in_seconds, seconds, written
-from .validity import FEW, driven
+from .validity import MAX_NAMED, driven
 
 _CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=!\s'"]+)""")
 
 
 def read_events(name: str, entries: Any) -> tuple[Event, ...]:
     """The events of a list of entries; a System checks them. InputError where one is malformed."""
-    found = []
+    events = []
     for place, entry in _entries(name, "events", entries):
         check_keys(place, entry, {"at", "when", "set"})
         values = as_table(f"{place}: set", entry.get("set"))
         check_values(f"{place}: set", values)
-        found.append(
+        events.append(
             Event(
                 {as_port(f"{place}: set", port): value for port, value in values.items()},
                 _time(place, entry, "at", zero=True),
                 _condition(place, entry),
             )
         )
-    return tuple(found)
+    return tuple(events)
 
 
 def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> tuple[Fault, ...]:
     """The faults of a list of entries on connections; as read_events()."""
-    found = []
+    faults = []
     for place, entry in _entries(name, "faults", entries):
         kind: Any = entry.get("kind")
-        found.append(
+        faults.append(
             Fault(
                 _target(place, entry.get("connection"), connections),
                 kind,
@@ -81,20 +81,20 @@ def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> t
                 _condition(place, entry),
             )
         )
-    return tuple(found)
+    return tuple(faults)
 
 
 def read_limits(name: str, entries: Any) -> tuple[Limit, ...]:
     """The limits of a list of entries; as read_events()."""
-    found = []
+    limits = []
     for place, entry in _entries(name, "limits", entries):
         check_keys(place, entry, {"when", "then"})
         condition = _condition(place, entry)
         if condition is None:
             raise InputError(f"{place}: no entry 'when'; must have one, like 'plant.gap[1] < 0.01'")
         then = choice(f"{place}: then", entry.get("then", THENS[0]), THENS)
-        found.append(Limit(condition, then))
-    return tuple(found)
+        limits.append(Limit(condition, then))
+    return tuple(limits)
 
 
 def limit_entry(limit: Limit) -> dict[str, Any]:
@@ -104,27 +104,33 @@ def limit_entry(limit: Limit) -> dict[str, Any]:
 
 def event_entry(event: Event) -> dict[str, Any]:
     """The entry that reads as this event; it fits into JSON."""
-    at = {} if event.at_ns is None else {"at": in_seconds(event.at_ns)}
-    when = {"when": str(event.when)} if event.when else {}
-    return {**at, **when, "set": {str(port): as_lists(v) for port, v in event.set.items()}}
+    entry: dict[str, Any] = {}
+    if event.at_ns is not None:
+        entry["at"] = in_seconds(event.at_ns)
+    if event.when:
+        entry["when"] = str(event.when)
+    entry["set"] = {str(port): as_lists(value) for port, value in event.set.items()}
+    return entry
 
 
 def fault_entry(fault: Fault) -> dict[str, Any]:
     """The entry that reads as this fault; it fits into JSON."""
-    return {
-        "connection": str(fault.target),
-        "kind": fault.kind,
-        **fault.parameters,
-        "from": in_seconds(fault.start_ns),
-        **({} if fault.end_ns is None else {"until": in_seconds(fault.end_ns)}),
-        **({"when": str(fault.when)} if fault.when else {}),
-        **({"seed": fault.seed} if fault.kind in RANDOM else {}),
-    }
+    entry: dict[str, Any] = {"connection": str(fault.target), "kind": fault.kind}
+    entry |= fault.parameters
+    entry["from"] = in_seconds(fault.start_ns)
+    if fault.end_ns is not None:
+        entry["until"] = in_seconds(fault.end_ns)
+    if fault.when:
+        entry["when"] = str(fault.when)
+    if fault.kind in RANDOM:
+        entry["seed"] = fault.seed
+    return entry
 
 
 def _entries_of(kind: Any) -> list[str]:
     """The entries of a fault of a kind, besides its parameters."""
-    return ["connection", "kind", "from", "until", "when", *["seed"] * (kind in RANDOM)]
+    seed = ["seed"] if kind in RANDOM else []
+    return ["connection", "kind", "from", "until", "when", *seed]
 
 
 def _entries(name: str, key: str, entries: Any) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -155,10 +161,10 @@ def _condition(place: str, entry: Mapping[str, Any]) -> Condition | None:
     text = entry.get("when")
     if text is None:
         return None
-    found = _CONDITION.fullmatch(text.strip()) if isinstance(text, str) else None
+    parts = _CONDITION.fullmatch(text.strip()) if isinstance(text, str) else None
     try:
-        port, relation, said = found.groups() if found else ("", "", "none")
-        value = _constant(said)
+        port, relation, constant = parts.groups() if parts else ("", "", "none")
+        value = _constant(constant)
     except ValueError:
         raise InputError(
             f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01', "
@@ -211,10 +217,16 @@ def check_setting(system: Structure, port: Port, value: Given, place: str) -> di
     interface = system.component(port.component, place).interface
     settable = _settable(system)
     if not settable.keys() >= {*system.elements(port)}:
-        own = [str(p) for p in settable if p.component == port.component]
-        near = nearest(port, own, interface.listing) if own else "the component has none"
-        what = "what can be set in a run is an input without a source, or a tunable parameter"
-        raise InputError(f"{place}: {_why_not(system, interface, port)}; {what}; {near}")
+        settable_ports = [str(p) for p in settable if p.component == port.component]
+        near = (
+            nearest(port, settable_ports, interface.listing)
+            if settable_ports
+            else "the component has none"
+        )
+        settable_kinds = (
+            "what can be set in a run is an input without a source, or a tunable parameter"
+        )
+        raise InputError(f"{place}: {_why_not(system, interface, port)}; {settable_kinds}; {near}")
     values = parse_values(interface, place, port.variable, value)
     return {Port(port.component, name): v for name, v in values.items()}
 
@@ -225,18 +237,18 @@ def _why_not(system: Structure, interface: Interface, port: Port) -> str:
     if v is None:
         return f"{interface.short} has no variable {port.variable!r}"
     if port.variable not in (v.name, *interface.arrays):
-        several = choices(interface.elements(port.variable), FEW)
+        several = choices(interface.elements(port.variable), MAX_NAMED)
         return f"there are {several} of it, which must be set one by one"
     elements = system.elements(port)
     if {*elements} & {*driven(system)}:
         return "is driven by a column: must have its values there, or no column"
-    before = f"must be set before the run, --set {port}=VALUE"
+    instead = f"must be set before the run, --set {port}=VALUE"
     if v.causality == "structuralParameter":
-        return f"is a structural parameter, which decides on sizes: {before}"
+        return f"is a structural parameter, which decides on sizes: {instead}"
     if v.causality in PARAMETERS:
-        return f"is a {v.variability} parameter: {before}"
+        return f"is a {v.variability} parameter: {instead}"
     if v.causality != "input":
-        return f"is the start of what the FMU calculates: {before}" if v.settable else v.unsettable
+        return f"is the start of what the FMU calculates: {instead}" if v.settable else v.unsettable
     connection = next((c for c in system.connections if c.target in elements), None)
     if connection is None:
         return f"is an input of type {v.nature}, which cannot be set"
@@ -267,9 +279,9 @@ def _check_condition(system: Structure, condition: Condition | None, place: str)
     boolean = kind == "Boolean"
     fits = isinstance(value, str) or (isinstance(value, bool) == boolean and math.isfinite(value))
     if condition.relation not in relations or not fits:
-        what = "true or false" if boolean else "a finite number"
+        constants = "true or false" if boolean else "a finite number"
         raise InputError(
-            f"{place}: {port} is {kind}; must be compared with {what}, by {choices(relations)}"
+            f"{place}: {port} is {kind}; must be compared with {constants}, by {choices(relations)}"
         )
 
 
@@ -282,23 +294,32 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
         )
     choice(f"{place}: kind", fault.kind, FAULTS)
     interface = system.component(fault.target.component, place).interface
-    kind, of = interface.by_name[fault.target.variable].kind, FAULTS[fault.kind]
+    kind, fault_kind = interface.by_name[fault.target.variable].kind, FAULTS[fault.kind]
     possible = [name for name, f in FAULTS.items() if kind == "Real" or f.discrete]
     if kind == "String" or fault.kind not in possible:
         raise InputError(
             f"{place}: kind = {fault.kind!r}: {fault.target} is {kind}; must be one of "
             f"{choices(possible if kind != 'String' else ())}"
         )
-    entries = [*of.parameters, *_entries_of(fault.kind)]
+    entries = [*fault_kind.parameters, *_entries_of(fault.kind)]
     for name in fault.parameters:
         known(f"{place}: unknown entry", name, entries, f" of {fault.kind}")
-    for name, valid in of.parameters.items():
-        at, given = f"{place}: {name}", fault.parameters.get(name)
-        if valid and (valid.needed or name in fault.parameters):
-            number(at, given, valid.low, valid.high, above=valid.above, must=valid.must)
-        elif not valid and name in fault.parameters:
-            exact(at, parse_value(interface, at, fault.target.variable, fault.parameters[name]))
-    of.check(place, fault.parameters, system.step_ns)
+    for name, valid_range in fault_kind.parameters.items():
+        label, parameter = f"{place}: {name}", fault.parameters.get(name)
+        if valid_range and (valid_range.needed or name in fault.parameters):
+            number(
+                label,
+                parameter,
+                valid_range.low,
+                valid_range.high,
+                above=valid_range.above,
+                must=valid_range.must,
+            )
+        elif not valid_range and name in fault.parameters:
+            exact(
+                label, parse_value(interface, label, fault.target.variable, fault.parameters[name])
+            )
+    fault_kind.check(place, fault.parameters, system.step_ns)
     step, start, end = system.step_ns, fault.start_ns, fault.end_ns
     since = system.start_ns
     if end is not None and first_step(start, step, since) >= first_step(end, step, since):

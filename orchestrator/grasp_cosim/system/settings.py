@@ -93,7 +93,7 @@ def start_values(system: Structure) -> dict[str, Any]:
     return {f"{c.name}.{name}": v for c in system.components for name, v in c.values.items()}
 
 
-def made_of(system: Structure) -> dict[str, Any]:
+def summary(system: Structure) -> dict[str, Any]:
     """Its FMUs by component, the values given by variable, and the experiment; times in s."""
     return {
         **{c.name: c.fmu.name for c in system.components},
@@ -108,7 +108,7 @@ def made_of(system: Structure) -> dict[str, Any]:
 
 
 def changed(system: Structure) -> dict[str, Any]:
-    """Of made_of() what is not as it was read, as types that JSON has.
+    """Of summary() what is not as it was read, as types that JSON has.
 
     A value that was not given there is compared with the one that the FMU starts with.
     """
@@ -119,6 +119,6 @@ def changed(system: Structure) -> dict[str, Any]:
     }
     return {
         key: value
-        for key, value in made_of(system).items()
+        for key, value in summary(system).items()
         if value != system.as_read.get(key, starts.get(key))
     }

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Interpolation = Literal["linear", "held"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
-FEW = 3
+MAX_NAMED = 3
 """So many columns are named in the repr() of stimuli."""
 
 
@@ -46,7 +46,7 @@ class RecordedConnections(TypedDict):
     connections: list[RecordedConnection]
 
 
-RECORDED, SETTINGS = "signals", "run.json"
+RECORDED_STEM, RUN_FILE = "signals", "run.json"
 """The stem of a file that a run records, and the file beside it that has its connections."""
 
 
@@ -109,7 +109,7 @@ class Stimuli:
     recorded_columns: Mapping[Port, Stimulus] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
-        return f"Stimuli of {self.file}, {len(self.times)} rows: {choices(self.columns, FEW)}"
+        return f"Stimuli of {self.file}, {len(self.times)} rows: {choices(self.columns, MAX_NAMED)}"
 
     def __post_init__(self) -> None:
         """ValueError where the columns could not be read from a file."""
@@ -147,8 +147,8 @@ def read_stimuli(
     path = Path(path)
     chosen: Interpolation = choice(place, interpolation, INTERPOLATIONS)
     table = read_table(path, path.name)
-    time, *others = table.columns
-    if not time.is_time() or not others:
+    time, *columns_of_ports = table.columns
+    if not time.is_time() or not columns_of_ports:
         raise InputError(
             f"{time.heading} = {time.head!r}: must be time, then component.variable, with commas, "
             "semicolons or tabs between them and points in numbers"
@@ -156,7 +156,7 @@ def read_stimuli(
     if not table.row_count:
         raise InputError(f"{path.name}: has no row below its names; must have one")
     ports: dict[Port, Column] = {}
-    for column in others:
+    for column in columns_of_ports:
         if not column.name:  # what a spreadsheet leaves behind the last one
             continue
         port = as_signal(column.heading, column.name)
@@ -185,8 +185,8 @@ def recorded_connections(path: Path) -> tuple[Connection, ...] | None:
 
     InputError where its run.json is damaged.
     """
-    settings = path.with_name(SETTINGS)
-    if path.stem != RECORDED or not settings.is_file():
+    settings = path.with_name(RUN_FILE)
+    if path.stem != RECORDED_STEM or not settings.is_file():
         return None
     content = json_in(str(settings), settings.read_bytes())
     entries = Decoder().decoded(RecordedConnections, str(settings), content)["connections"]
@@ -203,11 +203,11 @@ def recorded_connections(path: Path) -> tuple[Connection, ...] | None:
 
 def _finite_ones(ports: Mapping[Port, Column]) -> dict[Port, Stimulus]:
     """The columns that can be stimuli: a run records others as well."""
-    found = {}
+    stimuli: dict[Port, Stimulus] = {}
     for port, column in ports.items():
         with suppress(InputError):
-            found[port] = _samples(column)
-    return found
+            stimuli[port] = _samples(column)
+    return stimuli
 
 
 def _samples(column: Column) -> Stimulus:
@@ -236,9 +236,11 @@ def _times(column: Column) -> array[int]:
     """The times in ns."""
     unit, samples = column.time_unit(), array("d", column.numbers())
     _check_finite(column, samples)
-    for row, (before, time) in enumerate(pairwise(samples), 1):
-        if time < before:
-            raise InputError(f"{column.place(row)} = {time!r}: is before {before!r}; must not fall")
+    for row, (previous, time) in enumerate(pairwise(samples), 1):
+        if time < previous:
+            raise InputError(
+                f"{column.place(row)} = {time!r}: is before {previous!r}; must not fall"
+            )
     if (last := max(map(abs, samples)) * float(unit)) > LONGEST:
         raise InputError(f"{column.place(0)}: to {last:g} s; must be at most {LONGEST:g} s")
     per_unit = float(unit * NANOSECONDS)

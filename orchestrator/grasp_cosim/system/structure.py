@@ -40,9 +40,9 @@ SCHEMES: tuple[str, ...] = get_args(Scheme)
 Diverging = Literal["stop", "continue"]
 DIVERGING: tuple[str, ...] = get_args(Diverging)
 
-Made = TypeVar("Made")
+Derived = TypeVar("Derived")
 
-NAMED, FEW = 4, 2
+MAX_NAMED_COMPONENTS, MAX_NAMED_PARTS = 4, 2
 """So many components, and connections or values, are named in the repr() of a system."""
 
 
@@ -57,7 +57,7 @@ class Structure:
     input drives inputs without a connection, and tunable parameters. metrics are names of groups of
     ours. record says what is recorded. inputs and outputs are those of the system itself, which an
     archive may have, by name. limits are conditions that must not hold, and verdict is what such a
-    run, or one with a bench or in real time, may come to. as_read is settings.made_of() when it was
+    run, or one with a bench or in real time, may come to. as_read is settings.summary() when it was
     read. steered says that a session has it, which may set any input without a source.
     """
 
@@ -90,13 +90,13 @@ class Structure:
         """Its experiment, its components with their FMUs, and how many connections there are."""
         step, stop = in_seconds(self.step_ns), in_seconds(self.stop_ns)
         names = [f"{c.name} ({c.fmu.stem})" for c in self.components]
-        given = [f"{c.name}.{n} = {v}" for c in self.components for n, v in c.values.items()]
+        values = [f"{c.name}.{n} = {v}" for c in self.components for n, v in c.values.items()]
         lines = [
             f"System {self.name}",
             f"  experiment   {stop:.6g} s in steps of {1e3 * step:.6g} ms, {self.scheme}",
-            f"  components   {choices(names, NAMED)}",
-            f"  connections  {len(self.connections)}: {choices(self.connections, FEW)}",
-            f"  values       {choices(given, FEW)}",
+            f"  components   {choices(names, MAX_NAMED_COMPONENTS)}",
+            f"  connections  {len(self.connections)}: {choices(self.connections, MAX_NAMED_PARTS)}",
+            f"  values       {choices(values, MAX_NAMED_PARTS)}",
         ]
         return on_a_screen(lines)
 
@@ -169,12 +169,12 @@ class Structure:
         }
 
     @property
-    def shown(self) -> frozenset[str]:
+    def observed_names(self) -> frozenset[str]:
         """The names of all that metrics may need: what is observed, and the system's outputs."""
         return frozenset({*map(str, self.observed), *self.outputs})
 
     @property
-    def kept(self) -> frozenset[str]:
+    def recorded_names(self) -> frozenset[str]:
         """Those of them that are recorded."""
         of_system = (name for name in self.outputs if self.record.has(name))
         return frozenset({*map(str, self.recorded), *of_system})
@@ -184,7 +184,7 @@ class Structure:
         """The components by name, in their order."""
         return {component.name: component for component in self.components}
 
-    def once(self, work: Callable[[Any], Made]) -> Made:
+    def once(self, work: Callable[[Any], Derived]) -> Derived:
         """What a function makes of the system but for values of parameters, worked out once.
 
         Args:
@@ -193,13 +193,13 @@ class Structure:
         Returns:
             What the function returned the first time.
         """
-        if work not in self._known:
-            self._known[work] = work(self)
-        found: Made = self._known[work]
-        return found
+        if work not in self._results:
+            self._results[work] = work(self)
+        result: Derived = self._results[work]
+        return result
 
     @cached_property
-    def _known(self) -> dict[Callable[[Any], Any], Any]:
+    def _results(self) -> dict[Callable[[Any], Any], Any]:
         return {}
 
     def __getstate__(self) -> dict[str, Any]:

@@ -72,40 +72,40 @@ def written(time: Time) -> str:
     return short if float(short) == exact else repr(exact)
 
 
-def in_nanoseconds(place: str, given: Any, zero: bool = False, low: float = 0.0) -> Time:
+def in_nanoseconds(place: str, entry: Any, zero: bool = False, low: float = 0.0) -> Time:
     """The time that a number of s means, or a text like "1/30" or "0.1"; InputError for others.
 
     It is greater than low; with zero, it may be that.
     """
     span = f"from {low:g} to" if zero else "greater than 0, at most"
     must = f"a number {span} {LONGEST:g}"
-    given = unwrapped(given)
-    if quantity := as_quantity(given):
-        given = _of_quantity(place, quantity)
-    fraction = _fraction(given)
-    as_number = given if fraction is None else float(fraction)
-    if isinstance(given, str):
+    entry = unwrapped(entry)
+    if quantity := as_quantity(entry):
+        entry = _of_quantity(place, quantity)
+    fraction = _fraction(entry)
+    seconds_or_text = entry if fraction is None else float(fraction)
+    if isinstance(entry, str):
         must += ', or a fraction like "1/30"'
         if fraction is None:
             with suppress(ValueError):
-                as_number = real(given)
-    value = number(place, as_number, low, LONGEST, above=not zero, must=must, unit="s")
-    time = _meant(value)
+                seconds_or_text = real(entry)
+    value = number(place, seconds_or_text, low, LONGEST, above=not zero, must=must, unit="s")
+    time = _time_of_float(value)
     if fraction is not None and (time is None or time != fraction * NANOSECONDS):
         raise InputError(
-            f"{place} = {given} s: must be a whole number of nanoseconds, or a fraction with a "
+            f"{place} = {entry} s: must be a whole number of nanoseconds, or a fraction with a "
             f"denominator up to {LARGEST_DENOMINATOR}, less for long times"
         )
     if time is None:
-        near = _simple(value, NEAR * abs(value))
+        near = _near_fraction(value, NEAR * abs(value))
         like = f'; "{near}" is near' if near else ', or a fraction like "1/30"'
-        raise InputError(f"{place} = {given!r} s: must be a whole number of nanoseconds{like}")
+        raise InputError(f"{place} = {entry!r} s: must be a whole number of nanoseconds{like}")
     return time
 
 
 def nearest_time(value: float) -> Time:
     """The time that a float of s means, or the whole number of ns that is nearest to it."""
-    time = _meant(value)
+    time = _time_of_float(value)
     return round(value * NANOSECONDS) if time is None else time
 
 
@@ -114,9 +114,9 @@ def step_of(value: float) -> Time:
 
     What a float does not hold to 12 digits is taken for the fraction that is near, or rounded up.
     """
-    time = _meant(value)
-    if time is None and (near := _simple(value, NEAR * value)):
-        time = _plain(near * NANOSECONDS)
+    time = _time_of_float(value)
+    if time is None and (near := _near_fraction(value, NEAR * value)):
+        time = _as_whole(near * NANOSECONDS)
     return max(1, math.ceil(value * NANOSECONDS)) if time is None else time
 
 
@@ -128,13 +128,13 @@ def first_step(time: Time, step: Time, start: Time = 0) -> int:
 def common(*times: Time) -> Time:
     """The longest time of which all of these are whole numbers."""
     per_ns = math.lcm(*(time.denominator for time in times))
-    return _plain(Fraction(math.gcd(*(int(time * per_ns) for time in times)), per_ns))
+    return _as_whole(Fraction(math.gcd(*(int(time * per_ns) for time in times)), per_ns))
 
 
 def multiple(*times: Time) -> Time:
     """The shortest time that is a whole number of each of these."""
     per_ns = math.lcm(*(time.denominator for time in times))
-    return _plain(Fraction(math.lcm(*(int(time * per_ns) for time in times)), per_ns))
+    return _as_whole(Fraction(math.lcm(*(int(time * per_ns) for time in times)), per_ns))
 
 
 class TimeGrid(NamedTuple):
@@ -178,41 +178,41 @@ def _of_quantity(place: str, quantity: Quantity) -> float:
     return converted(quantity.value, unit, second)
 
 
-def _fraction(given: Any) -> Fraction | None:
+def _fraction(text: Any) -> Fraction | None:
     """The fraction of s that a text like "1/30" or a Fraction is; None where it is neither."""
-    if isinstance(given, Fraction):
-        return given
-    parts = _FRACTION.fullmatch(given) if isinstance(given, str) else None
+    if isinstance(text, Fraction):
+        return text
+    parts = _FRACTION.fullmatch(text) if isinstance(text, str) else None
     if parts is None or not int(parts[2]):
         return None
     return Fraction(int(parts[1]), int(parts[2]))
 
 
-def _meant(value: float) -> Time | None:
+def _time_of_float(value: float) -> Time | None:
     """The time that a float of s means; None where that is not clear.
 
     It is the whole number of ns, or else the fraction with a small denominator, whose nearest float
     it is; or else one of which it has 12 digits.
     """
-    whole = round(value * NANOSECONDS)
-    if whole / NANOSECONDS == value:
-        return whole
-    fraction = _simple(value, math.ulp(value))
+    count = round(value * NANOSECONDS)
+    if count / NANOSECONDS == value:
+        return count
+    fraction = _near_fraction(value, math.ulp(value))
     if fraction is not None and float(fraction) == value:
-        return _plain(fraction * NANOSECONDS)
-    if abs(whole / NANOSECONDS - value) <= DIGITS * abs(value):
-        return whole
-    fraction = _simple(value, DIGITS * abs(value))
-    return None if fraction is None else _plain(fraction * NANOSECONDS)
+        return _as_whole(fraction * NANOSECONDS)
+    if abs(count / NANOSECONDS - value) <= DIGITS * abs(value):
+        return count
+    fraction = _near_fraction(value, DIGITS * abs(value))
+    return None if fraction is None else _as_whole(fraction * NANOSECONDS)
 
 
-def _simple(value: float, error: float) -> Fraction | None:
+def _near_fraction(value: float, error: float) -> Fraction | None:
     """The fraction with a small denominator within an error of a value, if there is one."""
-    most = int(min(LARGEST_DENOMINATOR, max(1.0, math.sqrt(CHANCE / error))))
-    near = Fraction(value).limit_denominator(most)
+    max_denominator = int(min(LARGEST_DENOMINATOR, max(1.0, math.sqrt(CHANCE / error))))
+    near = Fraction(value).limit_denominator(max_denominator)
     return near if near and abs(near - Fraction(value)) <= error else None
 
 
-def _plain(time: Fraction) -> Time:
+def _as_whole(time: Fraction) -> Time:
     """A time as an int where it is a whole number of ns."""
     return int(time) if time.denominator == 1 else time

@@ -30,7 +30,7 @@ from .stimuli import Stimuli, Stimulus
 from .structure import Structure, unit_of
 from .times import NANOSECONDS, seconds, written
 
-FEW = 6
+MAX_NAMED = 6
 """Variables that a message names at most."""
 
 LARGEST_COUNT = 2**62
@@ -39,7 +39,7 @@ LARGEST_COUNT = 2**62
 
 def as_written(system: Structure) -> tuple[Connection, ...]:
     """The connections as they were given: of whole arrays one."""
-    return tuple(dict.fromkeys(c.whole or c for c in system.connections))
+    return tuple(dict.fromkeys(c.of_arrays or c for c in system.connections))
 
 
 def by_element(
@@ -47,37 +47,37 @@ def by_element(
 ) -> tuple[Connection, ...]:
     """The connections, between whole arrays one for each element; InputError for other shapes."""
     arrays = {c.name: c.interface.arrays for c in components}
-    made: list[Connection] = []
+    by_elements: list[Connection] = []
     for connection in connections:
         ends = (connection.source, connection.target)
-        source, target = found = [arrays.get(p.component, {}).get(p.variable) for p in ends]
+        source, target = (arrays.get(p.component, {}).get(p.variable) for p in ends)
         if source is None and target is None:
-            made.append(connection)
+            by_elements.append(connection)
             continue
         if source is None or target is None or source.shape != target.shape:
-            has = [shape_text(array.shape) if array else "no array" for array in found]
+            has = [shape_text(array.shape) if array else "no array" for array in (source, target)]
             raise InputError(
                 f"{name}: connection '{connection}': {ends[0]} is {has[0]} and {ends[1]} is "
                 f"{has[1]}; must have equal shapes, or be of elements, like u[1]"
             )
         for start, end in zip(source.names, target.names, strict=True):
             first, last = Port(ends[0].component, start), Port(ends[1].component, end)
-            made.append(replace(connection, source=first, target=last, whole=connection))
-    return tuple(made)
+            by_elements.append(replace(connection, source=first, target=last, of_arrays=connection))
+    return tuple(by_elements)
 
 
 def _end(system: Structure, port: Port, causality: str, place: str) -> tuple[Interface, Variable]:
     """The interface and the variable at an end of a connection; InputError where there is none."""
     interface = system.component(port.component, place).interface
     valid = {v.name: v for v in interface.of(causality)}
-    said = f"{place}: {port.component} has no {causality}"
-    known(said, port.variable, valid, see=interface.listing)
+    message = f"{place}: {port.component} has no {causality}"
+    known(message, port.variable, valid, see=interface.listing)
     return interface, valid[port.variable]
 
 
 def check_components(system: Structure) -> None:
     """InputError where a process cannot have an FMU twice, or a solver has no use."""
-    first: dict[Path, str] = {}
+    first_by_fmu: dict[Path, str] = {}
     for component in system.components:
         interface, fmu, name = component.interface, component.loaded, component.name
         if component.code and (component.isolation != "none" or component.rename):
@@ -87,10 +87,10 @@ def check_components(system: Structure) -> None:
             )
         once = interface.capability("canBeInstantiatedOnlyOncePerProcess") is True
         if once and component.isolation == "none":
-            other = first.setdefault(interface.path, name)
-            if other != name:
+            earlier = first_by_fmu.setdefault(interface.path, name)
+            if earlier != name:
                 raise InputError(
-                    f"{system.name}: {name} and {other} are both {interface.path.name}, which a "
+                    f"{system.name}: {name} and {earlier} are both {interface.path.name}, which a "
                     'process can have once; must have isolation = "process" but for one'
                 )
         if component.solver and fmu.exchange is None:
@@ -110,11 +110,11 @@ def _check_own_solver(place: str, fmu: Interface, solver: Solver) -> None:
             )
 
 
-def _check_categories(place: str, fmu: Interface, asked: Sequence[str]) -> None:
+def _check_categories(place: str, fmu: Interface, categories: Sequence[str]) -> None:
     """InputError at the first category of messages that an FMU does not declare."""
     if not fmu.log_categories:
         raise InputError(f"{place}: {fmu.path.name} declares no categories; must be true or false")
-    for category in asked:
+    for category in categories:
         known(f"{place}: {fmu.path.name} has no category", category, fmu.log_categories)
 
 
@@ -140,13 +140,13 @@ def check_connections(system: Structure) -> None:
         if v.supported and not v.element and v.name not in c.values and v.name not in fed[c.name]
     ]
     if missing:
-        check_stimuli(system, whole=True)
+        check_stimuli(system, all_columns=True)
         outputs = [
             Port(c.name, v.name) for c in system.components for v in c.interface.of("output")
         ]
         raise InputError(
-            f"{system.name}: no source for {choices(missing, FEW)}; must have a connection from "
-            f"one of {choices(outputs, FEW)}, or a value in the system file, "
+            f"{system.name}: no source for {choices(missing, MAX_NAMED)}; must have a connection from "
+            f"one of {choices(outputs, MAX_NAMED)}, or a value in the system file, "
             f"or --set {missing[0]}=VALUE where another FMU brings it; or drive it with --input"
         )
 
@@ -155,13 +155,13 @@ def check_arrays(system: Structure) -> None:
     """InputError where a part of an array is given, and the rest has no start for its size."""
     fed, stimuli = _fed(system), driven(system)
     for c in system.components:
-        given = {*c.values, *(p.variable for p in stimuli if p.component == c.name)}
-        for name, whole in c.interface.arrays.items():
+        valued = {*c.values, *(p.variable for p in stimuli if p.component == c.name)}
+        for name, elements in c.interface.arrays.items():
             if name in c.interface.main_names:
                 continue
-            silent = [n for n in whole.names if c.interface.by_name[n].start is None]
-            missing = [n for n in silent if n not in given and n not in fed[c.name]]
-            if missing and not given.isdisjoint(whole.names):
+            silent = [n for n in elements.names if c.interface.by_name[n].start is None]
+            missing = [n for n in silent if n not in valued and n not in fed[c.name]]
+            if missing and not valued.isdisjoint(elements.names):
                 raise InputError(
                     f"{system.name}: {c.name}.{name}: no value for {choices(missing, 6)}, "
                     "and no start value for this size; must be given, too"
@@ -170,10 +170,10 @@ def check_arrays(system: Structure) -> None:
 
 def _fed(system: Structure) -> Mapping[str, set[str]]:
     """The inputs that have a connection, or that stimuli drive, by component."""
-    found: dict[str, set[str]] = {c.name: set() for c in system.components}
+    inputs: dict[str, set[str]] = {c.name: set() for c in system.components}
     for port in (*(connection.target for connection in system.connections), *driven(system)):
-        found[port.component].add(port.variable)
-    return found
+        inputs[port.component].add(port.variable)
+    return inputs
 
 
 def connection_transform(system: Structure, connection: Connection) -> tuple[float, float]:
@@ -183,26 +183,28 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     where an end does not exist, and where values cannot be passed from one end to the other.
     """
     place = f"{system.name}: connection '{connection}'"
-    one, source = _end(system, connection.source, "output", place)
-    other, target = _end(system, connection.target, "input", place)
-    ranges = limits(source.type, one.version), limits(target.type, other.version)
+    source_fmu, source = _end(system, connection.source, "output", place)
+    target_fmu, target = _end(system, connection.target, "input", place)
+    ranges = limits(source.type, source_fmu.version), limits(target.type, target_fmu.version)
     _check_types(place, connection, (source, target), ranges)
     if connection.factor is not None or connection.offset is not None:
         return _declared(place, connection, target)
-    given, taken = source.unit, target.unit
-    if given is None or taken is None or given == taken:
+    source_unit, target_unit = source.unit, target.unit
+    if source_unit is None or target_unit is None or source_unit == target_unit:
         return 1.0, 0.0
-    start, end = one.unit(source), other.unit(target)
-    found = conversion(start, end) if start and end else None
-    if found and (source.relative == target.relative or not found.offset):
-        return found.factor, 0.0 if target.relative else found.offset
-    why = "which cannot be converted" if found is None else "and only one of them is a difference"
+    start, end = source_fmu.unit(source), target_fmu.unit(target)
+    change = conversion(start, end) if start and end else None
+    if change and (source.relative == target.relative or not change.offset):
+        return change.factor, 0.0 if target.relative else change.offset
+    why = "which cannot be converted" if change is None else "and only one of them is a difference"
     if not (start and end):
         why = "which their FMUs do not define in SI units"
     raise InputError(
-        f"{place}: {connection.source} is in {given} and {connection.target} in {taken}, {why}; "
+        f"{place}: {connection.source} is in {source_unit} and {connection.target} in "
+        f"{target_unit}, {why}; "
         f'{{ from = "{connection.source}", to = "{connection.target}", factor = ... }} '
-        f"gives the factor from {given} to {taken}, and a component's units correct a wrong one"
+        f"gives the factor from {source_unit} to {target_unit}, and a component's units correct a "
+        "wrong one"
     )
 
 
@@ -224,19 +226,19 @@ def _check_types(
                 f"{place}: {port} is of type {v.nature}, which is not supported; must be "
                 f"{choices(SUPPORTED_KINDS)}"
             )
-    (given, taken), ((least, most), (low, high)) = ends, ranges
+    (source, target), ((least, most), (low, high)) = ends, ranges
     fits, must = True, ""
-    if (given.kind, taken.kind) == ("Integer", "Real"):
-        fits = taken.type != "Float32" or -(2**24) <= least <= most <= 2**24
+    if (source.kind, target.kind) == ("Integer", "Real"):
+        fits = target.type != "Float32" or -(2**24) <= least <= most <= 2**24
         must = "Float64, which holds all its values"
-    elif given.kind != taken.kind:
+    elif source.kind != target.kind:
         fits, must = False, "both Real, Integer, Boolean or String, or from Integer to Real"
-    elif given.kind == "Integer":
+    elif source.kind == "Integer":
         fits, must = low <= least <= most <= high, f"a type that holds {least} to {most}"
     if not fits:
         raise InputError(
-            f"{place}: {connection.source} is {given.type} and {connection.target} is "
-            f"{taken.type}; must be {must}"
+            f"{place}: {connection.source} is {source.type} and {connection.target} is "
+            f"{target.type}; must be {must}"
         )
 
 
@@ -268,14 +270,14 @@ def check_steps(system: Structure) -> None:
         )
     _check_exact(system)
     for component in system.components:
-        own = step if component.step_ns is None else component.step_ns
-        place = f"{system.name}: {component.name}: step = {written(own)} s"
-        if own % step:
+        component_step = step if component.step_ns is None else component.step_ns
+        place = f"{system.name}: {component.name}: step = {written(component_step)} s"
+        if component_step % step:
             raise InputError(
                 f"{place} is not a whole multiple of the base step {written(step)} s; "
-                f"could be {written(max(1, round(own / step)) * step)} s"
+                f"could be {written(max(1, round(component_step / step)) * step)} s"
             )
-        if (stop - start) % own:
+        if (stop - start) % component_step:
             raise InputError(f"{place} does not divide {until}; must end with a whole step")
 
 
@@ -316,20 +318,20 @@ def _of_components(system: Structure) -> Iterator[str]:
             if v.clock and v.causality == "input":
                 yield f"{Port(c.name, v.name)} is a clock that ticks by time: {_of_clock(v.clock)}"
             elif not v.supported:
-                left = "keeps its start value" if v.causality == "input" else "not recorded"
-                yield f"{Port(c.name, v.name)} is of type {v.nature}: {left}"
+                outcome = "keeps its start value" if v.causality == "input" else "not recorded"
+                yield f"{Port(c.name, v.name)} is of type {v.nature}: {outcome}"
         if of_locals[c.name]:
             stand_in = counted(of_locals[c.name], "local")
             yield f"{c.name}: {c.fmu.name} has no output: recorded by default: {stand_in}"
         free: list[str] = []
-        for name, whole in c.interface.arrays.items():
-            without = [n for n in whole.names if n not in fed[c.name] and n not in c.values]
+        for name, elements in c.interface.arrays.items():
+            without = [n for n in elements.names if n not in fed[c.name] and n not in c.values]
             if name in c.interface.main_names:
                 continue
             if without and c.interface.by_name[without[0]].causality == "input":
-                free += [name] if len(without) == len(whole.names) else without
+                free += [name] if len(without) == len(elements.names) else without
         if free:
-            yield f"{c.name}: no source for {choices(free, FEW)}: kept as the FMU starts with"
+            yield f"{c.name}: no source for {choices(free, MAX_NAMED)}: kept as the FMU starts with"
     if not system.recorded:
         yield (
             f"{system.name}: nothing is recorded; must have an output or a local that is a Real, "
@@ -347,20 +349,20 @@ def _of_clock(clock: Clock) -> str:
 
 def _of_connections(system: Structure) -> Iterator[str]:
     """Remarks on connections that round values, or lack a unit at one end; and on stimuli."""
-    for named, connection in {c.whole or c: c for c in system.connections}.items():
+    for as_given, connection in {c.of_arrays or c: c for c in system.connections}.items():
         _, source = _end(system, connection.source, "output", "")
         _, target = _end(system, connection.target, "input", "")
         if target.type == "Float32" and source.type in ("Real", "Float64"):
-            yield f"{named}: from {source.type} to Float32, rounded to 7 digits"
+            yield f"{as_given}: from {source.type} to Float32, rounded to 7 digits"
         if target.kind == "Real" and connection.factor is None and connection.offset is None:
-            ends = ((named.source, source.unit), (named.target, target.unit))
+            ends = ((as_given.source, source.unit), (as_given.target, target.unit))
             missing = [port for port, unit in ends if unit is None]
             if len(missing) == 1:
                 unit = source.unit or target.unit
-                yield f"{named}: {missing[0]} has no unit, taken to be in {unit}"
+                yield f"{as_given}: {missing[0]} has no unit, taken to be in {unit}"
     if system.input:
-        listed = ", ".join(_driven_in_words(system, system.input))
-        yield f"{system.input.file} drives {listed}, each step by the values at its beginning"
+        ports = ", ".join(_driven_in_words(system, system.input))
+        yield f"{system.input.file} drives {ports}, each step by the values at its beginning"
         for port in driven(system):
             unit = system.input.columns[port].unit
             if unit is not None and _variable(system, port).unit is None:
@@ -374,13 +376,13 @@ def driven(system: Structure) -> tuple[Port, ...]:
     ports = system.input.columns
     if not system.input.partial:
         return tuple(ports)
-    there = {
+    drivable = {
         (component.name, v.name)
         for component in system.components
         for v in component.interface.of("input", "parameter")
         if is_drivable(v)
     }
-    return tuple(p for p in ports if (p.component, p.variable) in there)
+    return tuple(p for p in ports if (p.component, p.variable) in drivable)
 
 
 def driven_inputs(system: Structure) -> tuple[Port, ...]:
@@ -403,12 +405,12 @@ def _variable(system: Structure, port: Port) -> Variable:
     return system.component(port.component, str(port)).interface.by_name[port.variable]
 
 
-def check_stimuli(system: Structure, whole: bool = False) -> None:
+def check_stimuli(system: Structure, all_columns: bool = False) -> None:
     """InputError at the first column that does not fit an input or a tunable parameter, or has one
     with another source.
 
-    A value is no source: the column goes before it. whole says that all columns count, also where
-    FMUs may yet be swapped.
+    A value is no source: the column goes before it. all_columns says that all of them count, also
+    where FMUs may yet be swapped.
     """
     stimuli = system.input
     if stimuli is None:
@@ -423,7 +425,7 @@ def check_stimuli(system: Structure, whole: bool = False) -> None:
             f"{stimuli.file}: from {seconds(stimuli.times[0])} to {seconds(stimuli.times[-1])}; "
             f"must be within {seconds(longest)}, in steps of {seconds(system.step_ns)}"
         )
-    for port in stimuli.columns if whole else driven(system):
+    for port in stimuli.columns if all_columns else driven(system):
         place, column = stimuli.place(port), stimuli.columns[port]
         interface = system.component(port.component, place).interface
         drivable = [
@@ -470,12 +472,12 @@ def samples_of(system: Structure, port: Port) -> array[float]:
 def _driven_in_words(system: Structure, stimuli: Stimuli) -> Iterator[str]:
     """What stimuli drive, and whether it is interpolated between two rows."""
     ports = driven(system)
-    linear = [port for port in ports if is_linear(stimuli, _variable(system, port))]
-    if linear:
-        yield f"{choices(linear, 6)} (linear)"
-    held = [port for port in ports if not is_linear(stimuli, _variable(system, port))]
-    if held:
-        yield f"{choices(held, 6)} (held)"
+    linear_ports = [port for port in ports if is_linear(stimuli, _variable(system, port))]
+    if linear_ports:
+        yield f"{choices(linear_ports, 6)} (linear)"
+    held_ports = [port for port in ports if not is_linear(stimuli, _variable(system, port))]
+    if held_ports:
+        yield f"{choices(held_ports, 6)} (held)"
 
 
 def is_linear(stimuli: Stimuli, variable: Variable) -> bool:

@@ -57,4 +57,4 @@ def _with_gain(connection: Connection, gain: float) -> Connection:
         return connection
     factor = 1.0 if connection.factor is None else connection.factor
     offset = 0.0 if connection.offset is None else connection.offset
-    return replace(connection, factor=gain * factor, offset=gain * offset, whole=None)
+    return replace(connection, factor=gain * factor, offset=gain * offset, of_arrays=None)

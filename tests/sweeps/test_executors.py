@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from grasp_cosim import grasp_system, sweep
 from grasp_cosim.metrics.metric import metric
-from grasp_cosim.sweeps.places import in_processes, in_threads, may_be_threads, one_by_one
+from grasp_cosim.sweeps.executors import in_processes, in_threads, may_be_threads, one_by_one
 from grasp_cosim.sweeps.run import Task
 from support.marks import needs_compiler
 from support.native_systems import integrator

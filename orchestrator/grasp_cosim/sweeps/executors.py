@@ -29,30 +29,30 @@ from ..recording.memory import writing
 from .run import Job, Packed, Task, packed, run_packed, run_row, run_there
 from .table import Outcome
 
-FEW = 100
+MAX_RUNS_IN_THREADS = 100
 """Runs that threads do: about so many take as long as processes take to start."""
 
-AHEAD = 100
+MAX_PENDING = 100
 """Runs that an executor is given before others have ended."""
 
-KILLED = "KilledWorker"
+DASK_ERROR_OF_LOST_RUN = "KilledWorker"
 """The name of Dask's error where a run ended its worker, several times; the others go on."""
 
-CONNECT = 10.0
+CONNECT_TIMEOUT = 10.0
 """s, to find the scheduler and a worker of a cluster."""
 
 Outcomes = Generator[Outcome, None, None]
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
-def here(task: Task, jobs: Sequence[Job], workers: int | None) -> Outcomes:
+def on_this_machine(task: Task, jobs: Sequence[Job], workers: int | None) -> Outcomes:
     """The outcomes of this machine, in the order in which they end.
 
     InputError where processes are needed, and a metric cannot go to one.
     """
     count = min(workers or os.cpu_count() or 1, len(jobs))
-    if len(jobs) <= FEW and may_be_threads(task, jobs):
+    if len(jobs) <= MAX_RUNS_IN_THREADS and may_be_threads(task, jobs):
         return in_threads(task, jobs, count)
     check_portable(task.metrics)
     return in_processes(task, jobs, count)
@@ -73,8 +73,8 @@ def in_threads(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
     Functions of the user's are called one at a time, as they are in a process.
     """
     halting, lock = _Halting(), threading.Lock()
-    own = tuple(replace(m, function=one_by_one(m.function, lock)) for m in task.metrics)
-    run = partial(run_row, replace(task, metrics=own), listeners=(halting,))
+    serialised = tuple(replace(m, function=one_by_one(m.function, lock)) for m in task.metrics)
+    run = partial(run_row, replace(task, metrics=serialised), listeners=(halting,))
     with ThreadPoolExecutor(max(count, 1), "sweep") as pool:
         try:
             for _, outcome in _results(pool, lambda job: run(*job), jobs):
@@ -117,14 +117,14 @@ def in_processes(task: Task, jobs: Sequence[Job], count: int) -> Outcomes:
     """The outcomes of so many processes of this machine, in the order in which they end."""
     run = partial(run_packed, packed(task, with_fmus=False))
     with Crew(count) as crew, closing(crew.results(run, jobs)) as results:
-        for (index, _), found in results:
-            if isinstance(found, Lost):
-                yield Outcome(index, {}, f"the process of the run {found.end}")
+        for (index, _), outcome in results:
+            if isinstance(outcome, Lost):
+                yield Outcome(index, {}, f"the process of the run {outcome.end}")
             else:
-                yield found
+                yield outcome
 
 
-def elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
+def on_executor(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
     """The outcomes of an executor, to which the FMUs go; closing it cancels the rest.
 
     Signals come back with them. SimulationError where these cannot be written.
@@ -135,11 +135,11 @@ def elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
         # Dask: it goes to each worker once, and again if the one that has it dies
         shared = client.submit(Packed._make, shared, pure=False)
     with closing(_results(executor, run_there, jobs, shared)) as results:
-        for index, found in results:
-            if found is None:
+        for index, result in results:
+            if result is None:
                 yield Outcome(index, {}, "the worker of the run died, several times")
                 continue
-            outcome, blocks = found
+            outcome, blocks = result
             if task.signals:
                 with writing(task.signals.folder):
                     task.signals.write(index, blocks)
@@ -147,17 +147,17 @@ def elsewhere(executor: Executor, task: Task, jobs: Sequence[Job]) -> Outcomes:
 
 
 def _results(
-    executor: Executor, run: Callable[..., Found], jobs: Sequence[Job], *shared: Any
-) -> Generator[tuple[int, Found | None], None, None]:
+    executor: Executor, run: Callable[..., Result], jobs: Sequence[Job], *shared: Any
+) -> Generator[tuple[int, Result | None], None, None]:
     """What run(*shared, job) returns, by the number of the job, as they end; None of a lost one.
 
     Closing it cancels the rest.
     """
-    left = iter(jobs)
-    pending: dict[Future[Found], int] = {}
+    remaining = iter(jobs)
+    pending: dict[Future[Result], int] = {}
     try:
         while True:
-            for job in islice(left, AHEAD - len(pending)):
+            for job in islice(remaining, MAX_PENDING - len(pending)):
                 pending[executor.submit(run, *shared, job)] = job[0]
             if not pending:
                 break
@@ -165,10 +165,12 @@ def _results(
                 index, failure = pending.pop(future), future.exception()
                 if failure is None:
                     yield index, future.result()
-                elif type(failure).__name__ == KILLED:
+                elif type(failure).__name__ == DASK_ERROR_OF_LOST_RUN:
                     yield index, None
                 else:
-                    raise SimulationError(f"sweep: run {index}: {_said(failure)}") from failure
+                    raise SimulationError(
+                        f"sweep: run {index}: {_message_of(failure)}"
+                    ) from failure
     finally:
         for future in pending:
             future.cancel()
@@ -179,18 +181,20 @@ def cluster(address: str) -> Iterator[Executor]:
     """The executor of the Dask cluster whose scheduler is at an address like tcp://host:8786."""
     dask = extra_module("distributed", "it talks to Dask clusters", "dask")
     try:
-        client = dask.Client(address, timeout=CONNECT, set_as_default=False)
+        client = dask.Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise InputError(f"--scheduler {address}: {_said(error)}; must be one that runs") from error
+        raise InputError(
+            f"--scheduler {address}: {_message_of(error)}; must be one that runs"
+        ) from error
     with client:
         try:
-            client.wait_for_workers(1, timeout=CONNECT)
+            client.wait_for_workers(1, timeout=CONNECT_TIMEOUT)
         except TimeoutError as error:
             raise InputError(f"--scheduler {address}: no worker; must have at least one") from error
         executor: Executor = client.get_executor(pure=False)
         yield executor
 
 
-def _said(error: BaseException) -> str:
+def _message_of(error: BaseException) -> str:
     """The first line of an error, or its name where it has none."""
     return (str(error).splitlines() or [type(error).__name__])[0]
