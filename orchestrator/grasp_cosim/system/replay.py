@@ -38,7 +38,10 @@ def replayed(system: Structure, stimuli: Stimuli) -> tuple[Stimuli, str]:
             f"{stimuli.file}: is a recorded run, none of whose columns can drive {system.name}; "
             "must have one of an input without a connection, or of a tunable parameter"
         )
-    note = f"{stimuli.file}: a recorded run: {choices(driven, MAX_NAMED)} are driven, all else is left out"
+    note = (
+        f"{stimuli.file}: a recorded run: {choices(driven, MAX_NAMED)} are driven, all else is "
+        "left out"
+    )
     return replace(stimuli, columns=driven), note
 
 

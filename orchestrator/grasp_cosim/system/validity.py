@@ -145,8 +145,8 @@ def check_connections(system: Structure) -> None:
             Port(c.name, v.name) for c in system.components for v in c.interface.of("output")
         ]
         raise InputError(
-            f"{system.name}: no source for {choices(missing, MAX_NAMED)}; must have a connection from "
-            f"one of {choices(outputs, MAX_NAMED)}, or a value in the system file, "
+            f"{system.name}: no source for {choices(missing, MAX_NAMED)}; must have a connection "
+            f"from one of {choices(outputs, MAX_NAMED)}, or a value in the system file, "
             f"or --set {missing[0]}=VALUE where another FMU brings it; or drive it with --input"
         )
 
