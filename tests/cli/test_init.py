@@ -10,7 +10,7 @@ from subprocess import run
 import pytest
 from comparison.made import write_fmu
 from grasp_cosim import System
-from grasp_cosim.cli.systems import shown
+from grasp_cosim.cli.systems import path_from
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.inspection.template import KINDS
 from support.native_fmus import build_model, needs_gcc
@@ -197,10 +197,10 @@ def test_the_step_that_an_fmu_recommends(fmus_here, tmp_path, step, line, steps)
 def test_paths(tmp_path):
     """Relative below the folder of the file and beside it, else absolute."""
     here = tmp_path / "project/systems"
-    assert shown(here / "a.fmu", here) == "a.fmu"
-    assert shown(here / "fmus/a.fmu", here) == "fmus/a.fmu"
-    assert shown(tmp_path / "project/fmus/a.fmu", here) == "../fmus/a.fmu"
-    assert shown(tmp_path / "a.fmu", here) == str(tmp_path / "a.fmu")
+    assert path_from(here, here / "a.fmu") == "a.fmu"
+    assert path_from(here, here / "fmus/a.fmu") == "fmus/a.fmu"
+    assert path_from(here, tmp_path / "project/fmus/a.fmu") == "../fmus/a.fmu"
+    assert path_from(here, tmp_path / "a.fmu") == str(tmp_path / "a.fmu")
 
 
 def test_names_that_a_system_file_has_to_quote(fmus_here, tmp_path):

@@ -249,12 +249,12 @@ def _times(column: Column) -> array[int]:
 
 def input_entry(stimuli: Stimuli) -> dict[str, str]:
     """The stimuli for run.json: the file, the interpolation, and a hash of the samples."""
-    made_of = hashlib.sha256(array("q", stimuli.times))
+    digest = hashlib.sha256(array("q", stimuli.times))
     for port, column in stimuli.columns.items():
-        made_of.update(f"\0{port}\0{column.unit}\0{column.texts}\0".encode())
-        made_of.update(array("d", column.samples))
+        digest.update(f"\0{port}\0{column.unit}\0{column.texts}\0".encode())
+        digest.update(array("d", column.samples))
     return {
         "file": stimuli.file,
         "interpolation": stimuli.interpolation,
-        "sha256": made_of.hexdigest(),
+        "sha256": digest.hexdigest(),
     }
