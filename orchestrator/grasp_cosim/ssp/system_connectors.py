@@ -11,7 +11,7 @@ from ..base.errors import InputError
 from ..base.si_units import Unit
 from ..interface.units import IDENTITY, conversion
 from ..interface.variables import SETTABLE
-from ..system.parts import Port, SystemInput, SystemOutput, Link
+from ..system.parts import Link, Port, SystemInput, SystemOutput
 from ..system.structure import unit_of
 from .elements import Hop, Node
 from .network import Carried, Network
@@ -44,7 +44,7 @@ def system_outputs(network: Network, port_of: PortOf) -> dict[str, SystemOutput]
         source_unit = unit_of(network.parts[source.path].interface, network.variable(source))
         unit = carried.unit if carried.settled else None
         outputs[name] = SystemOutput(
-            _way_along(port_of(source), hops, source_unit, unit, carried), unit, kind
+            _link_along(port_of(source), hops, source_unit, unit, carried), unit, kind
         )
     return outputs
 
@@ -76,7 +76,7 @@ def system_inputs(network: Network, port_of: PortOf) -> dict[str, SystemInput]:
                 notes.add(place, f"{name} is not passed on: {error}")
                 continue
             target_unit = unit_of(network.parts[target.path].interface, variable)
-            links.append(_way_along(port_of(target), hops, unit, target_unit, carried))
+            links.append(_link_along(port_of(target), hops, unit, target_unit, carried))
         if links:
             inputs[name] = SystemInput(tuple(links), unit)
         else:
@@ -84,7 +84,7 @@ def system_inputs(network: Network, port_of: PortOf) -> dict[str, SystemInput]:
     return inputs
 
 
-def _way_along(
+def _link_along(
     port: Port, hops: list[Hop], start: Unit | None, end: Unit | None, carried: Carried
 ) -> Link:
     """The link along the hops; without numbers where the units at its two ends say all about it."""
