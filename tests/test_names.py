@@ -98,7 +98,7 @@ def test_no_room_has_the_name_of_a_public_name():
 @pytest.mark.parametrize("name", grasp_cosim.__all__)
 def test_a_public_name_is_one_that_its_home_has(name):
     value = getattr(grasp_cosim, name)
-    home = grasp_cosim._HOMES.get(name, "base.errors")
+    home = grasp_cosim._MODULES.get(name, "base.errors")
     assert getattr(sys.modules[f"grasp_cosim.{home}"], name) is value
 
 

@@ -68,3 +68,12 @@ def test_what_a_user_gets_has_a_type(checked):
 def test_a_name_that_is_not_there_is_found(checked):
     first, *_ = checked("import grasp_cosim\ngrasp_cosim.simulat\n")
     assert first.startswith('error: Module has no attribute "simulat"')
+
+
+@pytest.mark.slow
+def test_a_misspelt_argument_is_found_of_a_run_and_of_a_session(checked):
+    script = "from grasp_cosim import simulate\nsimulate('a.toml', stopp=1.0)\n"
+    script += "simulate.session('a.toml', until=None)\n"
+    of_run, of_session, *_ = checked(script)
+    assert of_run.startswith('error: Unexpected keyword argument "stopp"')
+    assert of_session.startswith('error: Unexpected keyword argument "until" for "Session"')

@@ -76,7 +76,7 @@ __all__ = [
     "write_ssp",
 ]
 
-_HOMES = {
+_MODULES = {
     "AnyOf": "metrics.metric",
     "Metric": "metrics.metric",
     "Quantity": "base.quantity",
@@ -101,6 +101,7 @@ _HOMES = {
     "write_report": "report.page",
     "write_ssp": "ssp.to_archive",
 }
+"""The modules of the public names, by which these are imported when they are asked for."""
 
 
 def _imported(home: str, name: str) -> object:
@@ -137,8 +138,8 @@ if not TYPE_CHECKING:  # who checks types knows the names above, and none beside
             from importlib.metadata import version
 
             value = version("grasp-cosim")
-        elif name in _HOMES:
-            value = _imported(_HOMES[name], name)
+        elif name in _MODULES:
+            value = _imported(_MODULES[name], name)
         else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         globals()[name] = value
