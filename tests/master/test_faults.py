@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from grasp_cosim.master.scenario import Window, fault_functions
+from grasp_cosim.master.fault_windows import Window, fault_functions
 from grasp_cosim.system.faults import INITIAL
 from grasp_cosim.system.parts import Fault, Port
 from hypothesis import given

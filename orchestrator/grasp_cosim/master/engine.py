@@ -100,11 +100,19 @@ class CompiledLoop:
             plan.watches,
             np.array(calls, _CALL),
         ]
-        operations, *others, values, clock, warned = (
+        operations, *addresses, values, clock, warned = (
             table.ctypes.data for table in (*tables, plan.values, plan.clock, plan.warned)
         )
-        whole = operations, len(plan.operations), *others, values, len(plan.values), clock, warned
-        words = np.array(whole, np.int64)
+        program = (
+            operations,
+            len(plan.operations),
+            *addresses,
+            values,
+            len(plan.values),
+            clock,
+            warned,
+        )
+        words = np.array(program, np.int64)
         self._kept = plan, callbacks, tables, words
         self.shared = _Shared()
         self._drives = tables[4]
@@ -163,14 +171,14 @@ def make_loop(plan: Plan, engine: Engine, steps: int | None = None) -> Loop:
     long, auto = steps is None or steps >= LONG, engine == "auto"
     if engine == "compiled" or (auto and (is_there() or (long and has_compiler()))):
         try:
-            made = CompiledLoop(plan)
+            compiled = CompiledLoop(plan)
         except InputError as error:  # of a compiler that does not work
             if not auto:
                 raise
             LOGGER.info("%s", error)
         else:
             LOGGER.info("engine: the loop in C")
-            return made
+            return compiled
     LOGGER.info("engine: the loop in Python")
     return _interpreted(plan)
 
@@ -182,10 +190,10 @@ def _interpreted(plan: Plan) -> Loop:
     watches = [memoryview(row) for row in plan.watches]
     tables = plan.operations, plan.connections, plan.casts, plan.drives, watches
     calls = [call.python for call in plan.calls]
-    over = partial(loop.run, *tables, calls, buffers, values, clock, warned)
+    run_plan = partial(loop.run, *tables, calls, buffers, values, clock, warned)
 
-    def run(rows: Any, *where: int, row: int = 0) -> tuple[int, int, int]:
-        return over(memoryview(rows[row:].reshape(-1)), *where)
+    def run(rows: Any, *bounds: int, row: int = 0) -> tuple[int, int, int]:
+        return run_plan(memoryview(rows[row:].reshape(-1)), *bounds)
 
     return run
 
@@ -197,11 +205,11 @@ def _file() -> tuple[Path, ScratchFolder | None]:
     With a folder that ends with this process, in which it is where nothing can be kept.
     """
     try:
-        if kept := cache.kept(_job().kept_as):
-            return kept, None
+        if kept_library := cache.kept(_job().kept_as):
+            return kept_library, None
         scratch = ScratchFolder()
-        (made,) = compile_all([_job()], Path(scratch.name))
-        return made, scratch
+        (library,) = compile_all([_job()], Path(scratch.name))
+        return library, scratch
     except (ValueError, CompilerError) as error:
         raise InputError(f"engine compiled: {error}; {REMEDY}") from error
 
@@ -214,13 +222,13 @@ def library(locked: bool) -> ctypes.CDLL:
     """
     path, _ = _file()
     try:
-        found: ctypes.CDLL = (ctypes.PyDLL if locked else ctypes.CDLL)(str(path))
+        loaded: ctypes.CDLL = (ctypes.PyDLL if locked else ctypes.CDLL)(str(path))
     except OSError as error:
         raise InputError(f"{path}: the compiled loop does not load: {error}; {REMEDY}") from error
-    found.run.restype = ctypes.c_int64
-    whole, place = ctypes.c_int64, ctypes.c_void_p
-    found.run.argtypes = [place, place, *[whole] * 8, place]
-    return found
+    loaded.run.restype = ctypes.c_int64
+    integer, pointer = ctypes.c_int64, ctypes.c_void_p
+    loaded.run.argtypes = [pointer, pointer, *[integer] * 8, pointer]
+    return loaded
 
 
 def is_there() -> bool:
@@ -244,14 +252,14 @@ def _job() -> Job:
 
 def _constants() -> list[str]:
     """The numbers that the source shares with the other modules, as macros of a compiler."""
-    where = {
+    names_of = {
         loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE WATCH CALL STEP TOO_LONG EXACT WORST FULL "
         "HALTED OVERRUN WATCHED STALLED",
         shapes: "TRANSFER_2 TRANSFER_3 STEP_2 STEP_3 CLOCK PACE",
         timing: "ARRIVED LATE DUE BEGIN",
     }
     shared = {
-        **{n: getattr(module, n) for module, names in where.items() for n in names.split()},
+        **{n: getattr(module, n) for module, names in names_of.items() for n in names.split()},
         "EARLY": EARLY,
         "EVENT": EVENT,
         "DUE": DUE,

@@ -79,8 +79,8 @@ def in_conditions(system: System) -> frozenset[Port]:
     """The signals that conditions of events, faults and limits name, and the states of proxies."""
     conditions = [*(e.when for e in system.events), *(f.when for f in system.faults)]
     conditions += [limit.when for limit in system.limits]
-    named = {read_at(system, c.port)[0] for c in conditions if c is not None}
-    return frozenset(named | {*system.once(states_of_proxies)})
+    signals = {read_at(system, c.port)[0] for c in conditions if c is not None}
+    return frozenset(signals | {*system.once(states_of_proxies)})
 
 
 def states_of_proxies(system: System) -> tuple[Port, ...]:
@@ -88,7 +88,10 @@ def states_of_proxies(system: System) -> tuple[Port, ...]:
     ports = []
     for component in system.components:
         names = {v.name for v in component.loaded.of("output")}
-        name = next((n for n, own in component.rename.items() if own == PROXY_STATE), PROXY_STATE)
+        name = next(
+            (n for n, name_in_fmu in component.rename.items() if name_in_fmu == PROXY_STATE),
+            PROXY_STATE,
+        )
         if name in names:
             ports.append(Port(component.name, name))
     return tuple(ports)

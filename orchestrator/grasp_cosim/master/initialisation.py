@@ -27,7 +27,7 @@ from ..system.description import System
 from ..system.faults import INITIAL
 from ..system.parts import Connection, Initialisation, Port
 from ..system.validity import transforms
-from .scenario import of_kind
+from .drives import of_kind
 
 Floats = npt.NDArray[np.float64]
 
@@ -63,10 +63,10 @@ def order_ports(system: System) -> Order:
     proxies = {component.name for component in system.components if component.is_proxy}
     inputs = {connection.target for connection in system.connections}
     measured: list[Port] = []
-    while found := _measured_in_loops(graph, inputs, proxies):
-        for port in found:
+    while outputs := _measured_in_loops(graph, inputs, proxies):
+        for port in outputs:
             graph[port] = []
-        measured += found
+        measured += outputs
     loops = cut_loops(graph, inputs)
     return Order(tuple(TopologicalSorter(graph).static_order()), loops, measured)
 
@@ -316,14 +316,17 @@ class Propagation:
         arriving = [self._arriving(self._connections[port]) for port in self._cuts]
         return np.array(arriving, np.float64)
 
-    def _pass_on(self, given: Mapping[Port, Value], again: bool = False) -> None:
+    def _pass_on(self, values_at_cuts: Mapping[Port, Value], again: bool = False) -> None:
         """Pass all on, with values given for inputs; `again`, what was measured is held."""
         for (component, arriving), group in groupby(self._ports, self._end):
             instance, ports = self._instances[component], list(group)
             variables = [self._variable(port) for port in ports]
             if arriving:
                 values = [
-                    given[p] if p in given else self._arriving(self._connections[p]) for p in ports
+                    values_at_cuts[p]
+                    if p in values_at_cuts
+                    else self._arriving(self._connections[p])
+                    for p in ports
                 ]
                 instance.set(variables, values)
             elif again and component in self._proxies:
@@ -356,29 +359,30 @@ class Propagation:
         Outputs that nothing is connected to may change each time they are read, like the time of
         day.
         """
-        given = {port: self.values[port] for port in self._cuts}
+        values_at_cuts = {port: self.values[port] for port in self._cuts}
         sources = {connection.source for connection in self._connections.values()}
-        found: list[Port] = []
+        undeclared: list[Port] = []
         for _ in range(len(self._ports) + 1):
-            before = dict(self.values)
-            self._pass_on(given, again=True)
-            moved = [
+            previous = dict(self.values)
+            self._pass_on(values_at_cuts, again=True)
+            changed = [
                 port
                 for port, value in self.values.items()
-                if port not in self._connections and value != before[port] and value == value
+                if port not in self._connections and value != previous[port] and value == value
             ]
-            if not moved:
+            if not changed:
                 return [
                     f"{port} changed at t = 0 with an input that it does not declare to depend on; "
                     "values were passed on again"
-                    for port in dict.fromkeys(found)
+                    for port in dict.fromkeys(undeclared)
                 ]
-            found.append(moved[0])  # the others may follow from it
-        if sources.isdisjoint(moved):
-            return [f"{port} changes each time it is read" for port in moved]
+            undeclared.append(changed[0])  # the others may follow from it
+        if sources.isdisjoint(changed):
+            return [f"{port} changes each time it is read" for port in changed]
         raise InputError(
             f"{self.system.name}: the values at t = 0 do not settle, a loop through "
-            f"{choices(dict.fromkeys(found))} that the FMUs' dependencies do not show; {ADVICE}"
+            f"{choices(dict.fromkeys(undeclared))} that the FMUs' dependencies do not show; "
+            f"{ADVICE}"
         )
 
     def _variable(self, port: Port) -> Variable:
@@ -388,6 +392,6 @@ class Propagation:
         return self._variable(port).kind
 
 
-def _same(value: Value, other: Value) -> bool:
+def _same(first: Value, second: Value) -> bool:
     """True for equal values, and for two that are both not a number."""
-    return value == other or (value != value and other != other)
+    return first == second or (first != first and second != second)

@@ -72,36 +72,36 @@ def run(
         clock[1] = k
         clock[2] = (grid_start + (k + 1) * grid_step) / counts
         while operation < size:
-            what, begin, end, period, phase = operations[operation]
+            kind, begin, end, period, phase = operations[operation]
             if k % period == phase:
-                if what >= CALL:
-                    if what == STEP:
+                if kind >= CALL:
+                    if kind == STEP:
                         clock[0] = (grid_start + (k + 1 - period) * grid_step) / counts
                     status = calls[begin]()
                     if status:
                         if status > WORST:
                             return k, operation, status
                         note_warning(warned, begin, clock[0])
-                elif what == COPY:
+                elif kind == COPY:
                     for source, target, _, _ in connections[begin:end]:
                         values[target] = values[source]
-                elif what == SCALE:
+                elif kind == SCALE:
                     for source, target, factor, offset in connections[begin:end]:
                         values[target] = factor * values[source] + offset
-                elif what == STORE:
+                elif kind == STORE:
                     for buffer, index, slot in casts[begin:end]:
                         store(buffers[buffer], index, values[slot])
-                elif what == DRIVE:
+                elif kind == DRIVE:
                     time = grid_start + (k - phase) * grid_step
                     for drive in drives[begin:end]:
                         values[drive.slot] = drive.at(time)
-                elif what == WATCH:
+                elif kind == WATCH:
                     if holds(watches[begin], values):
                         return k, operation, WATCHED
                 else:
                     for buffer, index, slot in casts[begin:end]:
                         value = float(buffers[buffer][index])
-                        if what == LOAD_LONG and (value >= EXACT or value <= -EXACT):
+                        if kind == LOAD_LONG and (value >= EXACT or value <= -EXACT):
                             return k, operation, TOO_LONG
                         values[slot] = value
             operation += 1

@@ -24,12 +24,14 @@ from ..system.description import System
 from ..system.parts import Port
 from ..system.times import NANOSECONDS, in_seconds, seconds
 from . import loop
+from .drives import drives_of
 from .end import RunEnd
 from .engine import CompiledLoop, Engine, make_loop
 from .exchanged import exchanged
+from .fault_windows import NO_CUTS, Cut
 from .plan import Planner
 from .rows import RowBuffer
-from .scenario import NO_CUTS, Cut, Scenario, drives_of
+from .scenario import Scenario
 from .start import Starter
 from .step_completion import TO_BE_FINISHED, finish_step, with_failures_beside
 from .watches import Watches

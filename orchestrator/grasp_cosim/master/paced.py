@@ -20,8 +20,8 @@ from ..system.parts import Port
 from ..system.times import seconds
 from . import loop
 from .engine import Aside, CompiledLoop, Engine
+from .fault_windows import NO_CUTS, Cut
 from .master import CHUNK, LONG, Master, RowReceiver
-from .scenario import NO_CUTS, Cut
 
 MAX_ROWS_ASIDE = 1 << 15
 """The most steps between two times that rows are handed on, where another thread does it."""
@@ -59,8 +59,8 @@ class PacedMaster(Master):
     @property
     def _alone(self) -> CompiledLoop | None:
         """The loop, if it needs nothing of Python's until it ends."""
-        made = self._loop
-        return made if isinstance(made, CompiledLoop) and made.alone else None
+        compiled = self._loop
+        return compiled if isinstance(compiled, CompiledLoop) and compiled.alone else None
 
     @property
     def runs_alone(self) -> bool:

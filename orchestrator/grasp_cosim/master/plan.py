@@ -23,9 +23,10 @@ from ..system.description import System
 from ..system.parts import Connection, Port
 from ..system.times import in_seconds
 from ..system.validity import transforms
+from .drives import Drive
 from .exchanged import exchanged, used
 from .loop import CALL, COPY, DRIVE, HELD, LOAD, LOAD_LONG, RAISED, SCALE, STEP, STORE, WATCH
-from .scenario import Drive, Scenario
+from .scenario import Scenario
 
 LONG = 8
 """Bytes of a whole number that a float64 may not hold exactly."""
@@ -122,8 +123,8 @@ class Planner:
                 self._stamp()
         for i in range(len(self.watches)):
             self._operation(WATCH, i, i + 1, 1, 0)
-        waits, *others = self.made.calls
-        if self.pacer is not None and all(c.native and not c.keeps_lock for c in others):
+        waits, *other_calls = self.made.calls
+        if self.pacer is not None and all(c.native and not c.keeps_lock for c in other_calls):
             native = self.pacer.native(self.system.total_steps)
             self.made.calls[0] = Call(waits.python, native)
         return self.made

@@ -32,12 +32,12 @@ from ..system.parts import Component, Port, Realtime, as_signal
 from ..system.times import TimeInput, in_seconds
 from ..twins.twins import needed_twins
 from .engine import Engine
+from .fault_windows import NO_CUTS, Cut
 from .master import Master
 from .paced import PacedMaster
 from .process_guard import guarded_process, leaves_process_alone, same_folder
 from .run_log import RunLog
 from .run_record import RunRecord
-from .scenario import NO_CUTS, Cut
 
 LOGGER = logging.getLogger(__name__)
 """Gets what the operating system does not permit, and at the level INFO what a run does."""

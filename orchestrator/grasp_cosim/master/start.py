@@ -18,9 +18,10 @@ from ..system.description import System
 from ..system.faults import INITIAL
 from ..system.parts import Component, Port
 from ..system.times import in_seconds
+from .drives import Drive, driven_at, stored
 from .exchanged import exchanged, used
 from .initialisation import Propagation
-from .scenario import Drive, Scenario, driven_at, stored
+from .scenario import Scenario
 
 
 @dataclass

@@ -71,14 +71,16 @@ class Watches:
         row = self.table[i]
         value = float(row[loop.FACTOR] * values[int(row[loop.SLOT])] + row[loop.OFFSET])
         self._first[i] = step, value
-        shown = f"{value:.6g}{f' {watch.unit}' if watch.unit else ''}"
+        value_text = f"{value:.6g}{f' {watch.unit}' if watch.unit else ''}"
         time = seconds(self._system.time_ns(step))
-        self.log.append(f"t = {time}: limits[{watch.number}]: {watch.limit.when}: it is {shown}")
+        self.log.append(
+            f"t = {time}: limits[{watch.number}]: {watch.limit.when}: it is {value_text}"
+        )
         if watch.limit.then == "warn":
             return None
         return (
             f"{self._system.name}: limits[{watch.number}]: {watch.limit.when} at t = {time}, it is "
-            f"{shown}: the run was aborted"
+            f"{value_text}: the run was aborted"
         )
 
     def saved(self) -> tuple[Any, ...]:
@@ -102,6 +104,9 @@ class Watches:
         for i, (step, value) in sorted(self._first.items()):
             limit = self.entries[i].limit
             assert limit is not None  # noqa: S101 - as in note()
-            first, held = in_seconds(self._system.time_ns(step)), int(self.table[i][loop.HELD])
-            found.append(Trip(str(limit.when), limit.then, first, value, held))
+            first, steps_held = (
+                in_seconds(self._system.time_ns(step)),
+                int(self.table[i][loop.HELD]),
+            )
+            found.append(Trip(str(limit.when), limit.then, first, value, steps_held))
         return tuple(found)
