@@ -115,6 +115,43 @@ def test_blocks_of_any_size_give_the_same_bits(rows, cuts, period):
     assert np.concatenate(parts).tobytes() == whole.tobytes()
 
 
+def _by_the_formula(rows, bond, transforms):
+    """The energies of the module's first lines, one row after the other."""
+    of_force, of_seen = (transforms.get(port, (1.0, 0.0)) for port in (HELD, SEEN))
+    force = rows[:, COLUMN[FORCE]] * of_force[0] + of_force[1]
+    seen = (rows[:, COLUMN[SEEN]] - of_seen[1]) / of_seen[0]
+    position, held = rows[:, COLUMN[POSITION]], rows[:, COLUMN[HELD]]
+    energies, answered = [0.0], 0
+    for k in range(1, len(rows)):
+        change = held[k] * (position[k] - position[k - 1])
+        if k % bond.period == 0:
+            change -= 0.5 * (force[k] + force[answered]) * (seen[k] - seen[answered])
+            answered = k
+        energies.append(energies[-1] + bond.scale * change)
+    return np.array(energies)
+
+
+@pytest.mark.parametrize("period", [1, 2, 3, 7])
+@pytest.mark.parametrize("block", [1, 4, 5, 40])
+@pytest.mark.parametrize("transforms", [{}, {HELD: (3.0, -0.5), SEEN: (10.0, 0.25)}])
+def test_blocks_of_any_size_follow_the_formula(period, block, transforms):
+    """Also where the ends of the source's steps are anywhere in a block, and after a way back."""
+    rows = np.random.default_rng(period).standard_normal((40, 4))
+    bond = replace(BOND, period=period, scale=1e-3)
+    energy = ExchangeEnergy([bond], COLUMN, transforms)
+    expected = _by_the_formula(rows, bond, transforms)
+    start = energy.saved()
+    for _ in range(2):
+        blocks = [energy(rows[first : first + block])[:, 0] for first in range(0, 40, block)]
+        assert np.concatenate(blocks) == pytest.approx(expected, rel=1e-12, abs=1e-15)
+        energy.restore(start)
+    middle = energy(rows[:block]), energy.saved()
+    energy(rows[::-1])
+    energy.restore(middle[1])
+    after = energy(rows[block : 2 * block])[:, 0]
+    assert after == pytest.approx(expected[block : 2 * block], rel=1e-12, abs=1e-15)
+
+
 def test_the_grasp_has_a_bond_per_finger(grasp):
     found = bonds(grasp)
     assert found == tuple(
