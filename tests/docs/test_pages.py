@@ -14,7 +14,7 @@ from grasp_cosim import System, cli, grasp_system, linearise, simulate
 from grasp_cosim.base.registry import names
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.relay import Relay
-from grasp_cosim.hil.served import Server
+from grasp_cosim.hil.server import Server
 from grasp_cosim.master.engine import has_compiler
 from grasp_cosim.ssp.to_archive import write_ssp
 from support.marks import needs_compiler, slow

@@ -34,7 +34,7 @@ from grasp_cosim.fmu_export.native.bench_header import bench_header, c_prefix
 from grasp_cosim.fmu_export.native.c_only import write_c
 from grasp_cosim.fmu_export.package import shipped_model
 from grasp_cosim.fmu_export.proxy import shared_signature
-from grasp_cosim.hil.served import MOST_LOST
+from grasp_cosim.hil.driven_fmu import MAX_LOST_STEPS
 from gripper_plant import rigid
 from support import compiled
 from support.marks import slow
@@ -612,7 +612,7 @@ def test_the_constants_of_the_protocol_and_descriptions_in_the_comments():
     signature = Signature((LinkVariable("gap", "Real", "input", "m"),))
     header = bench_header("M", signature, descriptions={"gap": "l, to the */ surface"})
     for text in (
-        f"M_HEAD_SIZE = {link.HEAD.size},", f"#define M_MOST_LOST {float(MOST_LOST)} ",
+        f"M_HEAD_SIZE = {link.HEAD.size},", f"#define M_MOST_LOST {float(MAX_LOST_STEPS)} ",
         f"INT64_C({ALIVE})", "M_LARGEST_REASON = 256 ",
         "double gap;                              /* gap, m: l, to the * / surface */",
     ):  # fmt: skip

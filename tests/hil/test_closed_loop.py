@@ -6,7 +6,7 @@ from itertools import count
 import numpy as np
 import pytest
 from grasp_cosim import simulate
-from grasp_cosim.hil.relay import DIRECTIONS, Conditions, Network
+from grasp_cosim.hil.network_conditions import DIRECTIONS, Conditions, Network
 from grasp_cosim.hil.served import Service
 from support.marks import slow
 from support.proxies import ANY_PORT, build_proxy, relaying, serving, wait_until

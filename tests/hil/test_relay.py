@@ -20,18 +20,10 @@ import numpy as np
 import pytest
 from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.hil import relay as module
-from grasp_cosim.hil.relay import (
-    DIRECTIONS,
-    MOST_CLIENTS,
-    Conditions,
-    Counters,
-    Entry,
-    Network,
-    Outage,
-    Relay,
-    Traffic,
-)
+from grasp_cosim.hil import traffic as traffic_module
+from grasp_cosim.hil.network_conditions import DIRECTIONS, Conditions, Network, Outage, damaged
+from grasp_cosim.hil.relay import MAX_CLIENTS, Relay
+from grasp_cosim.hil.traffic import Counters, Entry, Traffic
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
@@ -126,7 +118,7 @@ def expected(net, arriving, most):
 @given(networks, arrivals, st.sampled_from((1, 2, 5, 1000)))
 def test_what_is_sent_on_logged_and_counted_is_what_the_fates_say(net, arriving, most):
     """In the order of due times, of those due at once the first to arrive first."""
-    with patch.object(module, "MOST_HELD", most):
+    with patch.object(traffic_module, "MAX_HELD", most):
         sent, log, counters = relayed(net, arriving)
     assert (sent, log) == expected(net, arriving, most)
     for direction, c in counters.items():
@@ -162,7 +154,7 @@ def test_a_datagram_that_is_corrupted_has_another_bit():
     """Always the same one for the same seed."""
     net = Network({"request": Conditions(corrupt=0.4), "reply": Conditions()}, seed=2)
     data = bytes(range(20))
-    traffic, through = module.Traffic(net), []
+    traffic, through = Traffic(net), []
     for number in range(1, 201):
         traffic.receive("request", data, lambda d: through.append(d) or True, number)
         traffic.receive("reply", data, lambda d: d == data, number)
@@ -172,7 +164,7 @@ def test_a_datagram_that_is_corrupted_has_another_bit():
     assert traffic.counters["request"].corrupted == sum(bits > 0 for bits in wrong) > 60
     assert len({*wrong}) > 40
     assert (traffic.counters["reply"].corrupted, traffic.counters["reply"].unsent) == (0, 0)
-    again = [module.damaged(data, net.damage("request", n)) for n in range(1, 201)]
+    again = [damaged(data, net.damage("request", n)) for n in range(1, 201)]
     assert again == through
 
 
@@ -334,14 +326,14 @@ def test_a_peer_that_is_away_and_comes_back():
 def test_clients_get_their_own_replies_and_the_one_silent_for_longest_is_forgotten():
     """The peer can tell them apart: one who comes back after many others is another to it."""
     with echoing() as (peer, heard), relaying(peer) as relay, client() as one:
-        for number in range(MOST_CLIENTS + 1):
+        for number in range(MAX_CLIENTS + 1):
             with client() as other:
                 for mine, data in ((other, b"%d" % number), (one, b"one")):
                     mine.sendto(data, relay.address)
                     assert mine.recv(100) == data
-        assert len(relay._clients) == MOST_CLIENTS
+        assert len(relay._clients) == MAX_CLIENTS
     ports = {data: {port for port, own in heard if own == data} for _, data in heard}
-    assert len(ports) == MOST_CLIENTS + 2
+    assert len(ports) == MAX_CLIENTS + 2
     assert {len(found) for found in ports.values()} == {1}
 
 

@@ -12,8 +12,10 @@ from grasp_cosim import cli
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.fmu_export.link import STEP as STEP_REQUEST
 from grasp_cosim.fmu_export.link import TOO_LONG
+from grasp_cosim.hil.driven_fmu import DrivenFmu
 from grasp_cosim.hil.proxy_of_fmu import exchanged, link_signature
-from grasp_cosim.hil.served import BACKLOG, DrivenFmu, ServedFmu, Server, Service
+from grasp_cosim.hil.served import MAX_BACKLOG_NS, ServedFmu, Service
+from grasp_cosim.hil.server import Server
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.values import parse_value
 from support import native_fmus
@@ -178,7 +180,7 @@ def test_its_own_clock_keeps_to_thirty_steps_a_second(sensor, clocked):
 
 
 def test_by_its_own_clock_the_model_moves_between_requests(plant, clocked):
-    it = clocked(plant, Service(watchdog_ns=10 * BACKLOG))
+    it = clocked(plant, Service(watchdog_ns=10 * MAX_BACKLOG_NS))
     it.proxy.begin(1, starts(plant))
     it.wait(500.0)  # it does not start before the first step
     first = it.proxy.step(0.0, STEP, pushed(plant))
@@ -189,7 +191,7 @@ def test_by_its_own_clock_the_model_moves_between_requests(plant, clocked):
     moved = later[0] - first[0]  # x = F t^2 / 2m
     assert moved == pytest.approx(-0.5 * 1.0 / 0.5 * 0.02**2, rel=1e-9)
     assert (it.served.counters()["own_steps"], it.served.counters()["skipped"]) == (20, 0)
-    it.now += BACKLOG + 10 * MS  # held up for longer than it makes up for
+    it.now += MAX_BACKLOG_NS + 10 * MS  # held up for longer than it makes up for
     it.served.look(it.now)
     it.served.look(it.now)
     assert (it.served.counters()["own_steps"], it.served.counters()["skipped"]) == (22, 1008)

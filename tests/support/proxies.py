@@ -26,7 +26,8 @@ from grasp_cosim.fmu_export.link import (
 )
 from grasp_cosim.hil.proxy_of_fmu import exchanged
 from grasp_cosim.hil.relay import Relay
-from grasp_cosim.hil.served import ServedFmu, Server
+from grasp_cosim.hil.served import ServedFmu
+from grasp_cosim.hil.server import Server
 
 Ask = Callable[[bytes], bytes | None]
 """Hands a datagram over; the answer, if there is one."""

@@ -8,10 +8,12 @@ import click
 
 from ..base.errors import InputError
 from ..base.interruption import interrupts
+from ..hil.network_conditions import WORDS, Conditions, Network, Outage
 from ..hil.proxy_of_fmu import LONGEST_SILENCE, exchanged, shared_key
 from ..hil.rehearsal import MEANINGS, Rehearsed
-from ..hil.relay import WORDS, Conditions, Network, Outage, Relay, csv_log
-from ..hil.served import DEFAULT_ADDRESS, ServedFmu, Server, Service
+from ..hil.relay import Relay, csv_log
+from ..hil.served import ServedFmu, Service
+from ..hil.server import DEFAULT_ADDRESS, Server
 from ..hil.sockets import is_loopback, read_address, text
 from ..system.times import in_nanoseconds
 from .frame import INTERRUPTED, PATH, fail, json_option, pair, say, show

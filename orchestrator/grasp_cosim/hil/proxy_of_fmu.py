@@ -39,10 +39,13 @@ if TYPE_CHECKING:
 LONGEST_SILENCE = ALIVE / NANOSECONDS
 """s after which another proxy may take over a session."""
 
-WIDE = ("UInt32", "Int64", "UInt64")
+WIDE_TYPES = ("UInt32", "Int64", "UInt64")
 """Integer types that an Integer of FMI 2.0 does not hold."""
 
 TEXT = "a text, as the link has none"
+
+VALUE_BYTES = 8
+"""Bytes of a value in a datagram."""
 
 
 def exchanged(fmu: Path) -> Interface:
@@ -56,13 +59,13 @@ def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
 
     InputError where an input or output cannot be exchanged.
     """
-    taken: list[LinkVariable] = []
+    exchanged_variables: list[LinkVariable] = []
     left_out: dict[str, list[str]] = {}
     for v in interface.of(*ORDER, "structuralParameter"):
         reason = _obstacle(v)
         if reason is None:
             # no other kind and causality is left
-            taken.append(LinkVariable(v.name, v.kind, v.causality, v.unit))  # type: ignore[arg-type]
+            exchanged_variables.append(LinkVariable(v.name, v.kind, v.causality, v.unit))  # type: ignore[arg-type]
         elif v.causality in ("input", "output") and reason != TEXT:
             raise InputError(
                 f"{interface.path}: {v.causality} {v.name} is {reason}, which a proxy cannot "
@@ -73,7 +76,7 @@ def link_signature(interface: Interface) -> tuple[Signature, list[str]]:
     file = interface.path.name
     notes = [f"{file}: {', '.join(v)}: {reason}: left out" for reason, v in left_out.items()]
     try:
-        signature = Signature(tuple(taken))
+        signature = Signature(tuple(exchanged_variables))
         check_size(signature)
     except ValueError as error:
         raise InputError(f"{interface.path}: {error}") from error
@@ -108,26 +111,27 @@ def shared_key(path: Path, say: Callable[[str], None]) -> bytes:
         key = read_key(path)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
-    if said := exposed(path):
-        say(said)
+    if warning := exposed(path):
+        say(warning)
     return key
 
 
 def _obstacle(v: Variable) -> str | None:
+    """Why a variable cannot be exchanged; None where it can."""
     if v.causality == "structuralParameter":
         return "structural"
     if not v.supported:
         return f"of type {v.nature}"
     if v.kind == "String":
         return TEXT
-    if v.type in WIDE:
+    if v.type in WIDE_TYPES:
         return f"of type {v.type}"
     if v.kind == "Real" and v.start is not None and not isfinite(float(v.start)):
         return f"{v.start} at the start"
     return None
 
 
-KINDS: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool}
+PYTHON_TYPES: Mapping[str, type[Value]] = {"Real": float, "Integer": int, "Boolean": bool}
 
 
 def write_proxy(
@@ -150,42 +154,51 @@ def write_proxy(
     from ..base.c_compilers import CompilerError  # here, as below, what takes time to load
     from ..fmu_export.build import planned
     from ..fmu_export.description import Description, Experiment
-    from ..fmu_export.native.targets import targets as found
+    from ..fmu_export.native.targets import targets as targets_named
     from ..fmu_export.proxy import build_proxy
 
     _check_other(fmu, out)
     interface = exchanged(fmu)
     signature, notes = link_signature(interface)
-    known = {v.name for v in signature.request}
+    request_names = {v.name for v in signature.request}
     times = (None if v is None else float(v) for v in interface.experiment.values())
     original = Description(
         interface.path.name,
         "",
-        [_variable(interface, interface.by_name[v.name], known) for v in signature.variables],
+        [
+            _variable(interface, interface.by_name[v.name], request_names)
+            for v in signature.variables
+        ],
         interface.units,
         interface.can_vary_step,
         experiment=Experiment(*times),
     )
     try:
-        plan = planned(found(targets), fmi)
+        plan = planned(targets_named(targets), fmi)
         with during(f"building for {', '.join(t.tuple for t in plan.places)}"):
             built = build_proxy(out, original, plan, settings, limits or {})
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
     except CompilerError as error:
         raise SimulationError(str(error)) from error
-    return built, [*notes, *_large(signature), *([plan.note] if plan.note else [])]
+    notes += _large(signature)
+    if plan.note:
+        notes.append(plan.note)
+    return built, notes
 
 
 def _large(signature: Signature) -> list[str]:
     """A note where a datagram of the session is taken apart on its way."""
     sizes = {"STEP": len(signature.request), "answer": len(signature.answer)}
-    return [
-        f"each {name} has {size} bytes, over {LARGEST_HANDSHAKE}: networks take it apart, and some "
-        "drop the parts"
-        for name, count in sizes.items()
-        if (size := HEAD.size + 8 * count + TAG_SIZE) > LARGEST_HANDSHAKE
-    ]
+    notes = []
+    for name, count in sizes.items():
+        size = HEAD.size + VALUE_BYTES * count + TAG_SIZE
+        if size > LARGEST_HANDSHAKE:
+            notes.append(
+                f"each {name} has {size} bytes, over {LARGEST_HANDSHAKE}: networks take it apart, "
+                "and some drop the parts"
+            )
+    return notes
 
 
 def write_peer_header(
@@ -203,10 +216,11 @@ def write_peer_header(
     interface = exchanged(fmu)
     signature, notes = link_signature(interface)
     starts = {v.name: _start(interface.by_name[v.name]) for v in signature.request}
-    known = {name: start for name, start in starts.items() if start is not None}
-    said = {v.name: v.description or "" for v in interface.variables}
+    declared = {name: start for name, start in starts.items() if start is not None}
+    texts = {v.name: v.description or "" for v in interface.variables}
+    header = (interface.identifier, signature, declared, texts, limits, name)
     try:
-        write_text(out, bench_header(interface.identifier, signature, known, said, limits, name))
+        write_text(out, bench_header(*header))
     except ValueError as error:
         raise InputError(f"proxy: {error}") from error
     return notes
@@ -219,7 +233,7 @@ def _check_other(fmu: Path, out: Path) -> None:
     check_file(out)
 
 
-def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariable:
+def _variable(interface: Interface, v: Variable, request_names: set[str]) -> ProxyVariable:
     """The variable in the proxy: an output follows inputs and parameters at the start only."""
     from ..fmu_export.contract import Enumeration
     from ..fmu_export.contract import Variable as ProxyVariable
@@ -229,11 +243,13 @@ def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariab
     if v.causality == "output":
         declared = v.dependencies if v.initial_dependencies is None else v.initial_dependencies
         inputs = {i.name for i in interface.of("input")}
-        sources = known if declared is None else (known - inputs) | (known & set(declared))
+        sources = request_names
+        if declared is not None:
+            sources = (request_names - inputs) | (request_names & set(declared))
         initially = tuple(u.name for u in interface.variables if u.name in sources)
     return ProxyVariable(
         v.name,
-        KINDS[v.kind],
+        PYTHON_TYPES[v.kind],
         v.causality,  # type: ignore[arg-type]  # one of the three that are exchanged
         v.unit or "",
         _start(v),
@@ -250,7 +266,7 @@ def _variable(interface: Interface, v: Variable, known: set[str]) -> ProxyVariab
 def _start(v: Variable) -> Value | None:
     """Its start value; inputs and parameters have one in any case."""
     if v.start is None:
-        return None if v.causality == "output" else KINDS[v.kind]()
+        return None if v.causality == "output" else PYTHON_TYPES[v.kind]()
     if v.kind == "Boolean":
         return v.start in ("true", "1")
-    return KINDS[v.kind](v.start)
+    return PYTHON_TYPES[v.kind](v.start)

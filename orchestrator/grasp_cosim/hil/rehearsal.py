@@ -12,12 +12,12 @@ from ..base.errors import InputError, choices
 from ..system.times import NANOSECONDS
 
 Failure = Literal["kill", "stop", "mute", "deaf", "restart", "replace", "fail", "trip"]
-LONGEST = 1e6
+MAX_DELAY = 1e6
 """s until a failure, at most."""
 
 FAILURES: tuple[Failure, ...] = get_args(Failure)
-IN_SESSION: tuple[Failure, ...] = ("fail", "trip")
-"""Those of what is under way."""
+FAILURES_OF_A_SESSION: tuple[Failure, ...] = ("fail", "trip")
+"""Those that need a session to happen in."""
 
 MEANINGS = (
     "kill: the process ends at once; stop: it stands still; mute: it answers no more; deaf: it "
@@ -36,18 +36,19 @@ class Rehearsed:
     @classmethod
     def read(cls, text: str) -> Rehearsed:
         """The failure that a text says, like mute@0.9; InputError where it says none."""
-        found = re.fullmatch(r"(\w+)@([0-9.]+)", text)
-        known = next((f for f in FAILURES if found and f == found[1]), None)
+        name, _, seconds = text.partition("@")
+        failure = next((failure for failure in FAILURES if failure == name), None)
         try:
-            at = float(found[2]) if found else math.nan
+            at = float(seconds) if re.fullmatch(r"[0-9.]+", seconds) else math.nan
         except ValueError:
             at = math.nan
-        if known is None or not at <= LONGEST:
+        if failure is None or not at <= MAX_DELAY:
             must = (
-                f"must be WHAT@S, of {choices(FAILURES)}, up to {LONGEST:g} s after the first step"
+                f"must be WHAT@S, of {choices(FAILURES)}, up to {MAX_DELAY:g} s after the first "
+                "step"
             )
             raise InputError(f"--fault {text!r}: {must}")
-        return cls(known, at)
+        return cls(failure, at)
 
 
 class Rehearsal:
@@ -58,21 +59,26 @@ class Rehearsal:
         self._at: int | None = None
         self.happened: Failure | None = None
 
-    def note_step(self, now: int) -> None:
+    def note_step(self, now_ns: int) -> None:
         """Take note of a step: the first one starts the clock."""
         if self._rehearsed and self._at is None:
-            self._at = now + round(self._rehearsed.at * NANOSECONDS)
+            self._at = now_ns + round(self._rehearsed.at * NANOSECONDS)
 
     def due(self, in_session: bool) -> int | None:
         """Return when it happens; None where that is not known, or it has, or has to wait."""
-        waits = self._rehearsed and self._rehearsed.failure in IN_SESSION and not in_session
-        return None if self.happened or waits else self._at
+        return None if self.happened or self._waits(in_session) else self._at
 
-    def happens(self, now: int, in_session: bool) -> Failure | None:
+    def _waits(self, in_session: bool) -> bool:
+        """True where the failure needs a session, and there is none."""
+        if self._rehearsed is None or in_session:
+            return False
+        return self._rehearsed.failure in FAILURES_OF_A_SESSION
+
+    def happens(self, now_ns: int, in_session: bool) -> Failure | None:
         """Return the failure that happens now, once; some need a session to happen in."""
-        if self._rehearsed is None or self.happened or self._at is None or now < self._at:
+        if self._rehearsed is None or self.happened or self._at is None or now_ns < self._at:
             return None
-        if self._rehearsed.failure in IN_SESSION and not in_session:
+        if self._waits(in_session):
             return None
         self.happened = self._rehearsed.failure
         return self.happened
@@ -80,4 +86,8 @@ class Rehearsal:
 
 def end_at_once() -> None:
     """End this process as SIGKILL does: nothing is said to anybody."""
-    os._exit(137)
+    os._exit(KILLED)
+
+
+KILLED = 128 + 9
+"""The exit code of a shell for a process that SIGKILL has ended."""

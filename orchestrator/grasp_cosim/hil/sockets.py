@@ -19,10 +19,10 @@ from ..system.times import NANOSECONDS
 Address = tuple[str, int]
 """Address, in numbers, and port."""
 
-LARGEST = 65_536
+MAX_DATAGRAM = 65_536
 """Bytes to take of a datagram; no UDP datagram has as many."""
 
-NOT_HERE = "cannot listen there: {}; must be an address of this machine and a free port, or 0"
+NOT_LOCAL = "cannot listen there: {}; must be an address of this machine and a free port, or 0"
 
 
 class EventLoop:
@@ -43,9 +43,9 @@ class EventLoop:
             self._handlers: dict[socket.socket, Callable[[], Any]] = {}
             self._wake, woken = (stack.enter_context(end) for end in socket.socketpair())
             self._wake.setblocking(False)
-            self.register(woken, lambda: woken.recv(LARGEST))
-            made = _socket(socket.socket.bind, resolved(*address), NOT_HERE)
-            self.port_socket = stack.enter_context(made)
+            self.register(woken, lambda: woken.recv(MAX_DATAGRAM))
+            bound = _socket(socket.socket.bind, resolved(*address), NOT_LOCAL)
+            self.port_socket = stack.enter_context(bound)
             self.address: Address = _address(self.port_socket.getsockname())
             self._stack = stack.pop_all()
 
@@ -84,7 +84,7 @@ class EventLoop:
 def received(readable: socket.socket) -> tuple[bytes, Address] | None:
     """Return a datagram and its sender; None where what made the socket readable was none."""
     try:
-        data, source = readable.recvfrom(LARGEST)
+        data, source = readable.recvfrom(MAX_DATAGRAM)
     except (BlockingIOError, ConnectionError):  # a broken datagram; nobody took an earlier one
         return None
     return data, _address(source)
@@ -96,18 +96,21 @@ def connected(peer: Address) -> socket.socket:
 
 
 def _socket(
-    attach: Callable[[socket.socket, Address], None], address: Address, wrong: str
+    attach: Callable[[socket.socket, Address], None], address: Address, message: str
 ) -> socket.socket:
-    """Return a socket that does not block, attached to `address`; `wrong` is said if it cannot."""
+    """Return a socket that does not block, attached to `address`; InputError if it cannot be.
+
+    The `message` has a place for the reason.
+    """
     family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
-    made = socket.socket(family, socket.SOCK_DGRAM)
+    new_socket = socket.socket(family, socket.SOCK_DGRAM)
     try:
-        attach(made, address)
+        attach(new_socket, address)
     except OSError as error:
-        made.close()
-        raise InputError(f"{text(address)}: {wrong.format(error.strerror)}") from error
-    made.setblocking(False)
-    return made
+        new_socket.close()
+        raise InputError(f"{text(address)}: {message.format(error.strerror)}") from error
+    new_socket.setblocking(False)
+    return new_socket
 
 
 def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
@@ -117,37 +120,38 @@ def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
     """
     if not lowest_port <= port <= 65_535:
         raise InputError(f"{text((host, port))}: port must be from {lowest_port} to 65535")
-    plain = host[1:-1] if host.startswith("[") and host.endswith("]") else host
+    name = host[1:-1] if host.startswith("[") and host.endswith("]") else host
     try:
-        if not plain:
+        if not name:
             raise OSError("no name")
-        found = socket.getaddrinfo(plain, port, socket.AF_UNSPEC, socket.SOCK_DGRAM)
+        candidates = socket.getaddrinfo(name, port, socket.AF_UNSPEC, socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:
         raise InputError(
             f"{text((host, port))}: no such host; must be an address or a name that has one"
         ) from error
-    chosen = next((f for f in found if f[0] == socket.AF_INET), found[0])
-    return _address(chosen[4])[0], port
+    of_ipv4 = (entry for entry in candidates if entry[0] == socket.AF_INET)
+    *_, socket_address = next(of_ipv4, candidates[0])
+    return _address(socket_address)[0], port
 
 
-def _address(found: tuple[Any, ...]) -> Address:
+def _address(socket_address: tuple[Any, ...]) -> Address:
     """The address as the system tells it: of one on this link with the number of the interface."""
-    host, port, *more = found
-    scope = more[1] if len(more) > 1 else 0
-    plain = str(host).partition("%")[0]
-    return (f"{plain}%{scope}" if scope else plain), int(port)
+    host, port, *of_ipv6 = socket_address
+    scope = of_ipv6[1] if len(of_ipv6) > 1 else 0  # behind the flow information
+    number = str(host).partition("%")[0]
+    return (f"{number}%{scope}" if scope else number), int(port)
 
 
-def read_address(place: str, given: str) -> Address:
+def read_address(place: str, address: str) -> Address:
     """The address that a text says, HOST:PORT, [ADDRESS]:PORT, or PORT of this machine.
 
     place says whose. InputError where it is none.
     """
-    found = re.fullmatch(r"(?:(\[[^][]+\]|[^:]+):)?([0-9]{1,5})", given)
-    if not found:
+    match = re.fullmatch(r"(?:(\[[^][]+\]|[^:]+):)?([0-9]{1,5})", address)
+    if not match:
         must = "must be HOST:PORT, as in 127.0.0.1:5501 or [::1]:5501, or PORT"
-        raise InputError(f"{place} {given!r}: {must}")
-    return found[1] or "127.0.0.1", int(found[2])
+        raise InputError(f"{place} {address!r}: {must}")
+    return match[1] or "127.0.0.1", int(match[2])
 
 
 def text(address: Address) -> str:
