@@ -74,6 +74,6 @@ def test_a_name_that_is_not_there_is_found(checked):
 def test_a_misspelt_argument_is_found_of_a_run_and_of_a_session(checked):
     script = "from grasp_cosim import simulate\nsimulate('a.toml', stopp=1.0)\n"
     script += "simulate.session('a.toml', until=None)\n"
-    of_run, of_session, *_ = checked(script)
+    of_run, of_session, *_ = [line for line in checked(script) if line.startswith("error")]
     assert of_run.startswith('error: Unexpected keyword argument "stopp"')
     assert of_session.startswith('error: Unexpected keyword argument "until" for "Session"')
