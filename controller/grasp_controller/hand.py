@@ -20,10 +20,8 @@ from . import contact_force as layer_1
 from . import impact_reduction as layer_2
 from . import impedance
 from . import simultaneous_contact as layer_3
+from .hand_size import FINGERS
 from .impedance import Motion
-
-FINGERS = 3
-"""N; a build for another number of fingers changes this line alone."""
 
 if TYPE_CHECKING:
     Each = tuple[float, ...]

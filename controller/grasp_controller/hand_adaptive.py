@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from block_variables import Output
 
 from . import hand, holding, reflectance_ratio
-from .hand import FINGERS, Each
+from .hand import Each
 from .hand import Inputs as Inputs
+from .hand_size import FINGERS
 from .reflectance_ratio import Line
 
 if TYPE_CHECKING:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from . import contact, fingers, hand_fingers, rigid
 from .fingers import Side
 from .friction import NONE
-from .hand_fingers import FINGERS, Each
+from .hand_fingers import Each
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
+from .hand_size import FINGERS
 
 LONGEST_STEP = fingers.LONGEST_STEP
 

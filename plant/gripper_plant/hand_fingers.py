@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Input, Output, Parameter, check
 
-FINGERS = 3
-"""N; a build for another number of fingers changes this line alone."""
+from .hand_size import FINGERS
 
 FACING = 0.1
 """Cosine of a prism's turn below which its faces do not look to the rays any more."""

@@ -17,9 +17,10 @@ from . import contact_laws, fingers, hand_fingers
 from .box import GRAVITY
 from .contact_laws import HuntCrossley, KelvinVoigt
 from .friction import NONE, move
-from .hand_fingers import FAR, FINGERS, Each, Normal, Pose, Rays, Touches
+from .hand_fingers import FAR, Each, Normal, Pose, Rays, Touches
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
+from .hand_size import FINGERS
 from .movable import ITERATIONS
 
 LONGEST_STEP = fingers.LONGEST_STEP

@@ -1,7 +1,7 @@
 """The FMUs that come with this package: a line for each, the only place that knows their blocks.
 
-Those of a hand have three fingers. For another number of them a block is made once more, from a
-source that differs in one line: HandPlant5 is HandPlant with five fingers.
+Those of a hand have three fingers. Another number of them is a parameter of the build, of which the
+module HAND_SIZE is made: HandPlant5 is HandPlant with five fingers.
 """
 
 import re
@@ -9,17 +9,18 @@ import sys
 import threading
 from collections.abc import Mapping
 from importlib import import_module
-from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 
 class Shipped(NamedTuple):
-    """What an FMU is, the module of its block, and the one that says for how many fingers."""
+    """What an FMU is, the module of its block, and whether there is one for each size of a hand."""
 
     summary: str
     module: str
-    size: str = ""
+    of_hand: bool = False
 
 
 SHIPPED: Mapping[str, Shipped] = {
@@ -49,22 +50,22 @@ SHIPPED: Mapping[str, Shipped] = {
     "HandController": Shipped(
         "Multiple impedance control of a hand whose fingers close along rays from its wrist",
         "grasp_controller.hand",
-        "grasp_controller.hand",
+        of_hand=True,
     ),
     "HandControllerAdaptive": Shipped(
         "Multiple impedance control of a hand whose faces may differ in colour",
         "grasp_controller.hand_adaptive",
-        "grasp_controller.hand",
+        of_hand=True,
     ),
     "HandPlant": Shipped(
         "Hand of several fingers and a rigid, fixed object, a prism or a disc",
         "gripper_plant.hand",
-        "gripper_plant.hand_fingers",
+        of_hand=True,
     ),
     "HandPlantMovable": Shipped(
         "Hand of several fingers and an object on a floor, which slides and turns",
         "gripper_plant.hand_movable",
-        "gripper_plant.hand_fingers",
+        of_hand=True,
     ),
     "ProximitySensor": Shipped(
         "Optical proximity sensor of the reflected-light-intensity type, one channel",
@@ -86,7 +87,9 @@ FEWEST, MOST = 2, 8
 HANDS = f"one of a hand with a number of fingers from {FEWEST} to {MOST} behind it"
 """Names that are valid besides those of SHIPPED."""
 
-_FINGERS = re.compile(rb"^FINGERS = \d+$", re.MULTILINE)
+HAND_SIZE = "hand_size"
+"""The module that says for how many fingers the blocks of a package are: FINGERS."""
+
 _NAME = re.compile(rf"(Hand\w*?)([{FEWEST}-{MOST}])")
 
 _making = threading.Lock()
@@ -99,7 +102,7 @@ def of_fingers(fingers: int) -> list[str]:
     """
     if not FEWEST <= fingers <= MOST:
         raise ValueError(f"{fingers} fingers: must be from {FEWEST} to {MOST}")
-    return [f"{name}{fingers}" for name, shipped in SHIPPED.items() if shipped.size]
+    return [f"{name}{fingers}" for name, shipped in SHIPPED.items() if shipped.of_hand]
 
 
 def found(name: str) -> tuple[Shipped, int | None]:
@@ -117,7 +120,7 @@ def together(name: str) -> tuple[str, ...] | None:
         return None
     if fingers:
         return tuple(of_fingers(fingers))
-    return tuple(other for other, s in SHIPPED.items() if bool(s.size) == bool(shipped.size))
+    return tuple(other for other, s in SHIPPED.items() if s.of_hand == shipped.of_hand)
 
 
 def block_of(name: str) -> Any:
@@ -127,44 +130,35 @@ def block_of(name: str) -> Any:
 
 
 def sized_source(name: str) -> dict[str, bytes]:
-    """Return the module that differs where a number of fingers is asked for, by its path."""
+    """Return the module HAND_SIZE where a number of fingers is asked for, by its path."""
     shipped, fingers = found(name)
-    path = f"{shipped.size.replace('.', '/')}.py"
-    return {path: _sized(shipped.size, fingers)} if fingers else {}
-
-
-def _sized(module: str, fingers: int) -> bytes:
-    return _FINGERS.sub(b"FINGERS = %d" % fingers, Path(_origin(module)).read_bytes())
+    package = shipped.module.partition(".")[0]
+    return {f"{package}/{HAND_SIZE}.py": b"FINGERS = %d\n" % fingers} if fingers else {}
 
 
 def _of_size(shipped: Shipped, fingers: int) -> Any:
-    """The block from its package imported once more, under a name with the number of fingers."""
+    """Return a block of a hand with so many fingers.
+
+    The types of its arrays are made when its modules are imported, and one process may have hands
+    of several sizes. So each size is a package of its own, made of the same files with another
+    module HAND_SIZE.
+    """
     package, _, module = shipped.module.partition(".")
-    alias = f"{package}_of_{fingers}"
+    sized_package = f"{package}_of_{fingers}"
     with _making:
-        if alias not in sys.modules:
-            _load(package, alias)
-            size = shipped.size.removeprefix(package)
-            _load(shipped.size, f"{alias}{size}", _sized(shipped.size, fingers))
-    return import_module(f"{alias}.{module}")
-
-
-def _load(module: str, alias: str, source: bytes | None = None) -> None:
-    """Run a module, or a source in its place, as one of another name."""
-    origin = _origin(module)
-    below = [str(Path(origin).parent)] if "." not in module else None
-    spec = spec_from_file_location(alias, origin, submodule_search_locations=below)
-    assert spec is not None  # noqa: S101 - the module was found
-    sys.modules[alias] = made = module_from_spec(spec)
-    text = source or Path(origin).read_bytes()
-    exec(compile(text, origin, "exec"), vars(made))  # noqa: S102 - our own
-
-
-def _origin(module: str) -> str:
-    spec = find_spec(module)
-    if spec is None or spec.origin is None:
-        raise ImportError(f"{module}: no such module; must be installed")
-    return spec.origin
+        if sized_package not in sys.modules:
+            hand_size = ModuleType(f"{sized_package}.{HAND_SIZE}")
+            vars(hand_size).update(FINGERS=fingers)
+            sys.modules[hand_size.__name__] = hand_size
+            folder = package_folder(package)
+            spec = spec_from_file_location(
+                sized_package, folder / "__init__.py", submodule_search_locations=[str(folder)]
+            )
+            assert spec is not None  # noqa: S101 - of a file that is there
+            assert spec.loader is not None  # noqa: S101
+            sys.modules[sized_package] = module_from_spec(spec)
+            spec.loader.exec_module(sys.modules[sized_package])
+    return import_module(f"{sized_package}.{module}")
 
 
 def package_folder(package: str) -> Path:
