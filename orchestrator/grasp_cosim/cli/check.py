@@ -1,6 +1,7 @@
 """The commands that check: qualify an FMU for a place, compare and report runs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from ..interface.read import check_runs
 from ..recording.log_names import LogNames
 from ..report.page import write_report
 from ..system.description import FILES
-from ..system.overrides import SECTIONS
+from ..system.overrides import SECTIONS, Override
 from .frame import (
     NEGATIVE,
     PATH,
@@ -25,7 +26,6 @@ from .frame import (
     is_quiet,
     json_option,
     metrics_option,
-    pair,
     say,
     show,
     waiting,
@@ -33,13 +33,13 @@ from .frame import (
 from .options import (
     SystemOptions,
     chosen_system,
+    each_once,
     load_system,
     many_runs_option,
     map_option,
     natively,
     preset_option,
     set_option,
-    set_overrides,
     step_option,
     stop_option,
 )
@@ -75,7 +75,7 @@ def qualify(
     metric_files: tuple[Path, ...],
     out: Path | None,
     as_json: bool,
-    settings: tuple[str, ...],
+    overrides: Sequence[Override],
     **system_options: Any,
 ) -> int:
     """Find out whether CANDIDATE may take the place of a component.
@@ -94,15 +94,15 @@ def qualify(
     is_file = candidate.suffix.lower() in FILES
     if not is_file:
         check_runs(candidate)
-    of_system, of_component, values = _parted(settings, component)
-    system = natively(chosen_system(SystemOptions(settings=of_system, **system_options)), native)
+    of_system, of_component, values = _parted(overrides, component)
+    system = natively(chosen_system(SystemOptions(overrides=of_system, **system_options)), native)
     qualification = run_qualification(
         system,
         component,
         component_of(load_system(candidate), component, system) if is_file else candidate,
         rename=of_component["rename"],
         units=of_component["units"],
-        values={override.place: override.value for override in set_overrides(values)},
+        values={override.place: override.value for override in each_once(values)},
         bands=read_bands(bands) if bands else None,
         isolation=of_component["isolation"].get("", "process"),
         progress=not is_quiet(),
@@ -116,21 +116,22 @@ def qualify(
 
 
 def _parted(
-    settings: Sequence[str], component: str
-) -> tuple[list[str], dict[str, dict[str, Any]], list[str]]:
-    """The settings of the system, those of the candidate by entry, and values of variables."""
-    of_system: list[str] = []
-    of_component: dict[str, dict[str, Any]] = {name: {} for name in OF_CANDIDATE}
-    values: list[str] = []
-    for text in settings:
-        place, value = pair("--set", text, "PLACE=VALUE")
-        section, name, kind, key = (*place.split(".", 3), "", "", "")[:4]
-        if section == "components" and name == component and kind in OF_CANDIDATE:
-            of_component[kind][key] = value
-        elif section == "components" and kind == "values":
-            values.append(f"{name}.{key}={value}")
+    overrides: Iterable[Override], component: str
+) -> tuple[list[Override], dict[str, dict[str, Any]], list[Override]]:
+    """The overrides of the system, entries of the candidate by name, and values of variables."""
+    of_system: list[Override] = []
+    of_component: dict[str, dict[str, Any]] = {entry: {} for entry in OF_CANDIDATE}
+    values: list[Override] = []
+    for override in overrides:
+        section, name, entry, key = (*override.place.split(".", 3), "", "", "")[:4]
+        if section == "components" and name == component and entry in OF_CANDIDATE:
+            of_component[entry][key] = override.value
+        elif section == "components" and entry == "values":
+            values.append(replace(override, place=f"{name}.{key}"))
+        elif section in SECTIONS:
+            of_system.append(override)
         else:
-            (of_system if section in SECTIONS else values).append(text)
+            values.append(override)
     return of_system, of_component, values
 
 

@@ -42,10 +42,30 @@ def natively(system: System, native: bool | None) -> System:
         return system.natively(native)
 
 
+def set_overrides(texts: Iterable[str]) -> list[Override]:
+    """The overrides that texts of --set are, PLACE=VALUE; InputError where two have one place."""
+    pairs = (pair("--set", text, "PLACE=VALUE") for text in texts)
+    return each_once(Override(place, value, "--set {place}") for place, value in pairs)
+
+
+def each_once(overrides: Iterable[Override]) -> list[Override]:
+    """The overrides; InputError where two have one place."""
+    by_place: dict[str, Override] = {}
+    for override in overrides:
+        if first := by_place.get(override.place):
+            raise InputError(
+                f"{override.label}: {override.place} is given by {first.label}, too; must be given "
+                "once"
+            )
+        by_place[override.place] = override
+    return [*by_place.values()]
+
+
 set_option = click.option(
     "--set",
-    "settings",
+    "overrides",
     multiple=True,
+    callback=lambda _, __, texts: set_overrides(texts),
     metavar="PLACE=VALUE",
     help="Change a value of the system file, by its place there: plant.object_width=0.06, in the "
     "unit of the variable, or 'plant.object_width=60 mm'; experiment.scheme=jacobi, "
@@ -145,7 +165,7 @@ TIMES = ("experiment.start", "experiment.step", "experiment.stop")
 class SystemOptions:
     """What the options of a command say of its system, by the names that click gives them.
 
-    settings are the texts of --set, swaps those of --swap, record those of --record. fitted is the
+    overrides are those of --set, swaps the texts of --swap, record those of --record. fitted is the
     file of --values. input is the table that drives inputs. Times are texts, in s.
     """
 
@@ -153,7 +173,7 @@ class SystemOptions:
     controller: str | None = None
     presets: Sequence[str] = ()
     case: int | None = None
-    settings: Sequence[str] = ()
+    overrides: Sequence[Override] = ()
     step: str | None = None
     stop: str | None = None
     scheme: str | None = None
@@ -169,12 +189,6 @@ class SystemOptions:
         return self.presets if self.case is None else (*self.presets, f"case_{self.case}")
 
 
-def set_overrides(texts: Iterable[str]) -> list[Override]:
-    """The overrides that texts of --set are, PLACE=VALUE; InputError where two have one place."""
-    pairs = (pair("--set", text, "PLACE=VALUE") for text in texts)
-    return _each_once(Override(place, value, "--set {place}") for place, value in pairs)
-
-
 def overrides_of(options: SystemOptions) -> list[Override]:
     """The overrides that options are: those of places with an option of their own, swaps, --set.
 
@@ -188,20 +202,7 @@ def overrides_of(options: SystemOptions) -> list[Override]:
     for text in options.swaps:
         name, fmu = pair("--swap", text, "COMPONENT=FMU")
         overrides.append(Override(f"components.{name}.fmu", fmu, f"--swap {name}"))
-    return _each_once([*overrides, *set_overrides(options.settings)])
-
-
-def _each_once(overrides: Iterable[Override]) -> list[Override]:
-    """The overrides; InputError where two have one place."""
-    by_place: dict[str, Override] = {}
-    for override in overrides:
-        if first := by_place.get(override.place):
-            raise InputError(
-                f"{override.label}: {override.place} is given by {first.label}, too; must be given "
-                "once"
-            )
-        by_place[override.place] = override
-    return [*by_place.values()]
+    return each_once([*overrides, *options.overrides])
 
 
 def load_system(

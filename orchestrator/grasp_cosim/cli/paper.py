@@ -1,5 +1,6 @@
 """The commands that repeat the paper: evaluate its tables, identify its friction."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -11,8 +12,9 @@ from ..grasp.published.evaluation import evaluate as run_evaluation
 from ..grasp.published.evaluation import verdict
 from ..grasp.system import grasp_system
 from ..recording.log_names import LogNames
+from ..system.overrides import Override
 from .frame import NEGATIVE, PATH, is_quiet, json_option, show
-from .options import controller_option, many_runs_option, map_option, set_option, set_overrides
+from .options import controller_option, many_runs_option, map_option, set_option
 
 
 @click.command()
@@ -67,7 +69,7 @@ def identify(
     log: Path | None,
     fit: tuple[str, ...],
     names: LogNames,
-    settings: tuple[str, ...],
+    overrides: Sequence[Override],
     out: Path | None,
     as_json: bool,
 ) -> int:
@@ -85,7 +87,7 @@ def identify(
     """
     if out:
         check_folder(out)
-    system = grasp_system().with_overrides(set_overrides(settings))
+    system = grasp_system().with_overrides(overrides)
     identification = run_identification(
         log, fit=fit, system=system, progress=not is_quiet(), names=names
     )

@@ -101,9 +101,10 @@ def run(
     if form != "csv" and not out:
         raise InputError(f"--format {form}: needs --out, the folder for signals.{form}")
     options = SystemOptions(**system_options)
-    for text in options.settings:
-        if text.startswith("realtime.") and not realtime:
-            raise InputError(f"--set {text}: does nothing without --realtime")
+    for override in options.overrides:
+        if override.place.startswith("realtime.") and not realtime:
+            text = f"{override.label}={override.value}"
+            raise InputError(f"{text}: does nothing without --realtime")
     system, metrics = chosen_system(options), chosen_metrics(metric_files)
     if mdf:
         check_mdf()

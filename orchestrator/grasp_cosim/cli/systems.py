@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -16,6 +16,7 @@ from ..inspection.draft import Draft, alone, replacing
 from ..inspection.template import KINDS, test_of, texts
 from ..interface.read import read_interface
 from ..system.description import System
+from ..system.overrides import Override
 from ..system.toml import to_do
 from .frame import PATH, json_option, pair, say, show
 from .options import SystemOptions, chosen_system, set_option
@@ -270,7 +271,7 @@ def _lines(file: Path, drafts: Mapping[str, Draft], unfilled: Mapping[int, str])
 @click.option("-o", "--out", type=PATH, required=True, help="Archive to write, an .ssp.")
 @set_option
 @json_option
-def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool) -> int:
+def ssp(system: Path | None, out: Path, overrides: Sequence[Override], as_json: bool) -> int:
     """Write SYSTEM as an SSP 1.0 archive.
 
     SYSTEM is a .toml or .ssp file, by default the built-in grasp. An .ssp without a step gets one
@@ -281,7 +282,7 @@ def ssp(system: Path | None, out: Path, settings: tuple[str, ...], as_json: bool
     """
     from ..ssp.to_archive import write_ssp  # only here: its libraries take time to load
 
-    chosen = chosen_system(SystemOptions(system=system, settings=settings))
+    chosen = chosen_system(SystemOptions(system=system, overrides=overrides))
     check_file(out)
     written = write_ssp(chosen, out)
     report = {

@@ -37,6 +37,8 @@ def parse_values(
     InputError, which begins with the place, where the value does not fit.
     """
     array: Array | None = interface.arrays.get(name)
+    if array is None and isinstance(value, str):
+        return {name: parse_value(interface, place, name, value, text)}
     value = as_quantity(value) or unwrapped(value)
     if array is None:
         several = is_nested(value.value if isinstance(value, Quantity) else value)

@@ -24,7 +24,7 @@ from ..system.connectors import read_at
 from ..system.description import System
 from ..system.names import main_port
 from ..system.parts import Condition, Event, Port, literal
-from ..system.scenario import check_setting
+from ..system.scenario import parse_set_values
 from ..system.times import first_step, seconds
 from .drives import Tuning, of_kind, stored, tunings_of
 from .exchanged import exchanged, sourced
@@ -241,7 +241,7 @@ class Scenario:
         component, _, variable = name.partition(".")
         interfaces = {n: instance.interface for n, instance in self._instances.items()}
         port = main_port(interfaces, Port(component, variable))
-        check_setting(self._system, port, value, f"set: {name}")
+        parse_set_values(self._system, port, value, f"set: {name}")
         self._settable[name] = port
         v = interfaces[port.component].by_name.get(port.variable)
         if v and v.type in DOUBLES and not v.element and port not in self._passed:

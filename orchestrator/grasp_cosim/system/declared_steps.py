@@ -44,7 +44,7 @@ def of_declared_steps(system: Structure) -> Iterator[str]:
                     f"{component.name}: {component.fmu.name} recommends steps of "
                     f"{written(recommended)} s, and is asked for {written(step)} s, which is no "
                     "whole number of them; one would be: "
-                    f"{_settings(system, component, _nearest_multiple(step, recommended))}"
+                    f"{_overrides(system, component, _nearest_multiple(step, recommended))}"
                 )
         elif step != recommended:
             yield (
@@ -52,7 +52,7 @@ def of_declared_steps(system: Structure) -> Iterator[str]:
                 f"{written(recommended)} s, and declares that it cannot vary them "
                 f"(canHandleVariableCommunicationStepSize = false); it is asked for "
                 f"{written(step)} s: if it takes its own all the same, its time is wrong, and "
-                f"nothing shows it; with its own: {_settings(system, component, recommended)}"
+                f"nothing shows it; with its own: {_overrides(system, component, recommended)}"
             )
 
 
@@ -80,23 +80,23 @@ def _no_whole_number(system: Structure, component: Component, inner: Time) -> st
     return (
         f"{component.name}: {component.fmu.name} takes steps of {written(inner)} s inside "
         f"(fixedInternalStepSize), and {written(step)} s is no whole number of them; "
-        f"one would be: {_settings(system, component, fitting)}"
+        f"one would be: {_overrides(system, component, fitting)}"
     )
 
 
-def _settings(system: Structure, component: Component, step: Time) -> str:
-    """The settings with which a component has a step, and the system still fits together."""
+def _overrides(system: Structure, component: Component, step: Time) -> str:
+    """The overrides with which a component has a step, and the system still fits together."""
     other_steps = [
         c.step_ns for c in system.components if c.step_ns is not None and c is not component
     ]
-    settings: dict[str, Time] = {}
+    overrides: dict[str, Time] = {}
     base = system.step_ns
     if step % base:
         base = common(step, *other_steps)
-        settings["experiment.step"] = base
+        overrides["experiment.step"] = base
     if step != base or component.step_ns is not None:
-        settings[f"components.{component.name}.step"] = step
+        overrides[f"components.{component.name}.step"] = step
     span, unit = system.stop_ns - system.start_ns, multiple(step, *other_steps)
     if span % unit:
-        settings["experiment.stop"] = system.start_ns + max(1, round(span / unit)) * unit
-    return " ".join(f"--set {place}={written(time)}" for place, time in settings.items())
+        overrides["experiment.stop"] = system.start_ns + max(1, round(span / unit)) * unit
+    return " ".join(f"--set {place}={written(time)}" for place, time in overrides.items())

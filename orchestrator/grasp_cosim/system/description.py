@@ -373,7 +373,8 @@ class System(Structure):
         Raises:
             InputError: The table cannot be read, or names what it cannot drive.
         """
-        return replace(self, input=_stimuli(input))
+        stimuli = _stimuli(input)
+        return self if stimuli is self.input else replace(self, input=stimuli)
 
     def with_record(self, *signals: str) -> System:
         """A copy that records other signals.

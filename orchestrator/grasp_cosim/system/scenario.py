@@ -189,7 +189,7 @@ def check_scenario(system: Structure) -> None:
             raise InputError(f"{place}: set is empty; valid: {choices(_settable(system))}")
         _check_condition(system, event.when, place)
         for port, value in event.set.items():
-            check_setting(system, port, value, f"{place}: set.{port}")
+            parse_set_values(system, port, value, f"{place}: set.{port}")
     for i, limit in enumerate(system.limits):
         _check_condition(system, limit.when, f"{system.name}: limits[{i}]")
     for i, fault in enumerate(system.faults):
@@ -209,7 +209,7 @@ def _settable(system: Structure) -> dict[Port, Variable]:
     }
 
 
-def check_setting(system: Structure, port: Port, value: Given, place: str) -> dict[Port, Value]:
+def parse_set_values(system: Structure, port: Port, value: Given, place: str) -> dict[Port, Value]:
     """The value that is set at a port in the run, of a whole array those of its elements.
 
     InputError where it cannot be set then.
