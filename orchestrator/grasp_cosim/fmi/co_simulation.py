@@ -162,7 +162,7 @@ class FmuInstance(LoadedInstance):
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         bound, address = self._stepping(clock, step, ctypes.c_int(1))
         native = Native(STEP_2, address, self._slave.component, step=step)
-        return Call(bound, native, self._python)
+        return self._loop_call(bound, native)
 
     def _wants_the_end(self) -> bool:
         return bool(self._status(self._slave.getBooleanStatus, fmi2Terminated))
@@ -199,6 +199,7 @@ class SharedInstance(FmuInstance):
         self._folder = None  # stays, with the library
         slave = copy(_libraries[self._key][0])
         slave.instanceName, slave.messages = self.name, self._messages
+        slave.trace = self._trace
         return slave
 
     @property
@@ -254,13 +255,14 @@ class Fmi3Instance(LoadedInstance):
         interface: Interface,
         tolerance: float | None = None,
         logging: Logging = False,
+        trace: Path | None = None,
     ) -> None:
         """As LoadedInstance."""
         self._flags = np.zeros(3, np.bool_)
         self._last = np.zeros(1)
         self._limit = np.full(1, np.inf)
         """A step that does not end before this time, in s, has an event that is known already."""
-        super().__init__(name, interface, tolerance, logging)
+        super().__init__(name, interface, tolerance, logging, trace)
 
     def _forget(self) -> None:
         """As LoadedInstance."""
@@ -313,7 +315,7 @@ class Fmi3Instance(LoadedInstance):
         flags, last, until = (a.ctypes.data for a in (self._flags, self._last, self._limit))
         component = self._slave.component
         native = Native(STEP_3, address, component, step=step, flags=flags, last=last, limit=until)
-        return Call(advance, native, self._python)
+        return self._loop_call(advance, native)
 
     def _places(self) -> list[ctypes.c_void_p]:
         """Where DoStep puts its flags and the time that it came to."""

@@ -11,6 +11,7 @@ bound to a clock arrives with its ticks.
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -42,12 +43,13 @@ class EventInstance(Fmi3Instance):
         interface: Interface,
         tolerance: float | None = None,
         logging: Logging = False,
+        trace: Path | None = None,
     ) -> None:
         """As LoadedInstance."""
         self._inputs_at_events: list[_PartOfInputs] = []
         self._step = 0.0
         """The communication step in s."""
-        super().__init__(name, interface, tolerance, logging)
+        super().__init__(name, interface, tolerance, logging, trace)
 
     def _forget(self) -> None:
         """As Fmi3Instance."""

@@ -33,6 +33,7 @@ from ..interface.interface import Interface
 from ..interface.obstacles import of_binary, of_loading, this_machine
 from ..interface.variables import Element, Variable
 from ..system.parts import Logging
+from .call_trace import CallTrace
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, WARNING, Inputs
 from .messages import SEVERE, Messages
 from .numbers import state_numbers, take_numbers
@@ -71,6 +72,9 @@ class Lenient:
     messages: Messages
     """Gets a warning that a call returns without having logged why."""
 
+    trace: CallTrace | None = None
+    """Gets each call; None where that is not asked for."""
+
     def __dir__(self) -> Iterable[str]:
         """FMPy loads the functions by these names."""
         names = super().__dir__()
@@ -81,7 +85,8 @@ class Lenient:
         if function not in self._functions:  # type: ignore[attr-defined]
             raise MissingFunctionError(function)
         before = self.messages.count
-        answer = super()._call(function, *arguments)  # type: ignore[misc]
+        call = partial(super()._call, function)  # type: ignore[misc]
+        answer = self.trace.call(function, call, arguments) if self.trace else call(*arguments)
         has_status = self._functions[function].restype is ctypes.c_int  # type: ignore[attr-defined]
         if has_status and answer == WARNING:
             self.messages.returned(function, before)
@@ -110,11 +115,12 @@ class LoadedInstance(ABC):
         interface: Interface,
         tolerance: float | None = None,
         logging: Logging = False,
+        trace: Path | None = None,
     ) -> None:
         """Extract and instantiate; InputError where the FMU does not load.
 
         The FMU is told the relative `tolerance`, unless that is None. `logging` is what it is to
-        log beside warnings and errors.
+        log beside warnings and errors, `trace` the file to which its calls are appended.
         """
         self.name = name
         self.interface = interface
@@ -133,6 +139,7 @@ class LoadedInstance(ABC):
         self._slave: Any = None
         self._kept_states: States | None = None
         self._forget()
+        self._trace = CallTrace(name, trace, self.SLAVE, self._time) if trace else None
         if obstacle := of_binary(interface):
             raise InputError(f"{name}: {interface.called} {obstacle}")
         try:
@@ -157,7 +164,7 @@ class LoadedInstance(ABC):
             modelIdentifier=self._identifier,
             instanceName=self.name,
         )
-        slave.messages = self._messages
+        slave.messages, slave.trace = self._messages, self._trace
         names = [f"fmi{self._major}{name}" for name in self.NEEDS]
         missing = [name for name in names if not hasattr(slave.dll, name)]
         if missing:
@@ -293,6 +300,8 @@ class LoadedInstance(ABC):
             if resources in sys.path:  # pythonfmu puts it there and leaves it
                 sys.path.remove(resources)
             self._folder.cleanup()
+        if self._trace:
+            self._trace.close()
 
     @property
     def _may_be_called(self) -> bool:
@@ -370,7 +379,11 @@ class LoadedInstance(ABC):
         )
         instance, first = self._slave.component, ctypes.addressof(references)
         native = Native(shape, address, instance, first, count, place, values=size)
-        return Call(bound, native, self._python)
+        return self._loop_call(bound, native)
+
+    def _loop_call(self, call: Callable[[], int], native: Native) -> Call:
+        """The call for the loop: as Python makes it where it is traced, else also natively."""
+        return Call(call) if self._trace else Call(call, native, self._python)
 
     def _suffix(self, fmi_type: str) -> str:
         """The end of the names of the functions that set and get an FMI type."""
@@ -531,10 +544,11 @@ class LoadedInstance(ABC):
         return error
 
     def _function(self, name: str, *arguments: Any) -> tuple[Callable[[], int], int]:
-        """The bound function for Python, and its address."""
+        """The bound function for Python, and its address, 0 where its calls are traced."""
         function = self._symbol(name, _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION)
         bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
-        return bound, ctypes.cast(function, ctypes.c_void_p).value or 0
+        address = 0 if self._trace else ctypes.cast(function, ctypes.c_void_p).value
+        return bound, address or 0
 
     def _bound(self, name: str, *kinds: Any) -> Callable[..., int]:
         """A function of the FMU, for its instance, by the types of its arguments."""
@@ -546,7 +560,8 @@ class LoadedInstance(ABC):
         full = f"fmi{self._major}{name}"
         if not hasattr(self._slave.dll, full):
             raise self._incomplete(MissingFunctionError(full))
-        return prototype((full, self._slave.dll))
+        function = prototype((full, self._slave.dll))
+        return self._trace.traced(full, function) if self._trace else function
 
     def _stepping(
         self, clock: npt.NDArray[np.float64], step: float, *arguments: Any

@@ -48,14 +48,19 @@ class ModelInstance(LoadedInstance):
     """The method of FMPy's class that updates the discrete states once: Update of events.py."""
 
     def __init__(
-        self, name: str, interface: Interface, chosen: Solver, logging: Logging = False
+        self,
+        name: str,
+        interface: Interface,
+        chosen: Solver,
+        logging: Logging = False,
+        trace: Path | None = None,
     ) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
         self._chosen = chosen
         self._solver: Cvode | None = None
         self._connected: list[ConnectedInputs] = []
         self._step = 0.0
-        super().__init__(name, interface, chosen.relative_tolerance, logging)
+        super().__init__(name, interface, chosen.relative_tolerance, logging, trace)
 
     def _forget(self) -> None:
         """As LoadedInstance."""
@@ -348,7 +353,12 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
     )
 
     def __init__(
-        self, name: str, interface: Interface, chosen: Solver, logging: Logging = False
+        self,
+        name: str,
+        interface: Interface,
+        chosen: Solver,
+        logging: Logging = False,
+        trace: Path | None = None,
     ) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
         if clocked := [v.name for v in interface.of("input") if v.clocks]:
@@ -356,7 +366,7 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
                 f"{name}: {interface.called}: {choices(clocked, 1)} is an input of a clock; must "
                 "run by co-simulation, as model exchange has no such inputs here"
             )
-        super().__init__(name, interface, chosen, logging)
+        super().__init__(name, interface, chosen, logging, trace)
 
     def _instantiate(self, folder: Path) -> FMU3Model:
         model = self._opened(folder)

@@ -28,6 +28,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from itertools import count
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -87,14 +88,19 @@ def load(component: Component) -> Instance:
     if component.code:
         return CodeInstance(name, component.code)
     if component.isolation == "process":
-        return ProcessInstance(name, interface, component.solver, component.logging)
+        solver, logging = component.solver, component.logging
+        return ProcessInstance(name, interface, solver, logging, component.trace)
     if component.native and interface.version == "2.0":
-        return SharedInstance(name, interface, logging=component.logging)
-    return load_here(name, interface, component.solver, component.logging)
+        return SharedInstance(name, interface, logging=component.logging, trace=component.trace)
+    return load_here(name, interface, component.solver, component.logging, component.trace)
 
 
 def load_here(
-    name: str, interface: Interface, solver: Solver | None = None, logging: Logging = False
+    name: str,
+    interface: Interface,
+    solver: Solver | None = None,
+    logging: Logging = False,
+    trace: Path | None = None,
 ) -> Instance:
     """The instance of an FMU in this process.
 
@@ -109,8 +115,9 @@ def load_here(
         if interface.event_mode:
             from .event_mode import EventInstance  # only here: few FMUs have it
 
-            return EventInstance(name, interface, tolerance, logging)
-        return (Fmi3Instance if three else FmuInstance)(name, interface, tolerance, logging)
+            return EventInstance(name, interface, tolerance, logging, trace)
+        kind = Fmi3Instance if three else FmuInstance
+        return kind(name, interface, tolerance, logging, trace)
     try:
         from .model_exchange import Fmi2Model, Fmi3Model  # loads the solver's libraries
     except OSError as error:
@@ -118,7 +125,8 @@ def load_here(
             f"{name}: {interface.path.name} is for model exchange, and FMPy has no CVode for "
             f"this machine: {error}; must be a co-simulation FMU"
         ) from error
-    return (Fmi3Model if three else Fmi2Model)(name, interface, solver or Solver(), logging)
+    model = Fmi3Model if three else Fmi2Model
+    return model(name, interface, solver or Solver(), logging, trace)
 
 
 class _SharedMemory:
@@ -179,6 +187,7 @@ class ProcessInstance:
         interface: Interface,
         solver: Solver | None = None,
         logging: Logging = False,
+        trace: Path | None = None,
     ) -> None:
         """Start the process and instantiate; InputError where the FMU does not load."""
         self.name = name
@@ -222,7 +231,7 @@ class ProcessInstance:
         self._reader = threading.Thread(target=self._read_output, daemon=True)
         self._reader.start()
         try:
-            self._prepare("load", name, interface, solver, logging)
+            self._prepare("load", name, interface, solver, logging, trace)
         except BaseException:
             self._end()
             raise

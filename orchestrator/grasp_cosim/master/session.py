@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from ..base.errors import InputError, SimulationError, nearest
 from ..base.progress import phase
 from ..exchange.listener import Listener
+from ..fmi.call_trace import begin_trace
 from ..fmi.instance import Instance
 from ..fmi.process import load
 from ..interface.units import IDENTITY
@@ -173,6 +174,9 @@ class Session:
         """Load the FMUs, initialise them and hand on the row of t = 0; the stack undoes it all."""
         self._instances: list[Instance] = []
         self._stack.callback(self._close_instances)
+        for component in self.system.components:
+            if component.trace:
+                begin_trace(component.name, component.trace)
         with phase(f"loading {len(self.system.components)} FMUs"):
             self._load_instances()
         rows_to, renew = self._record.receive, self._renew_instances

@@ -78,6 +78,11 @@ def sweep(
         KeyboardInterrupt: Ctrl-C.
     """
     system = as_system(system, "sweep")
+    for component in system.components:
+        if component.trace:
+            raise InputError(
+                f"sweep: components.{component.name}.trace: is a file of one run; must be left out"
+            )
     place = f"--table {rows}" if isinstance(rows, str | Path) else "sweep"
     bare_rows = in_own_units(system, as_rows(rows, alike=seed is not None), place)
     whole("every", every, 1, must="a whole number, at least 1")

@@ -177,7 +177,7 @@ def _with_names(
 
 
 def _with_entries(component: Component, overrides: ComponentOverrides) -> Component:
-    """The component with another step, isolation or logging, or other options of its solver."""
+    """The component with another step, isolation, logging or trace, or other solver options."""
     if step := overrides.entries.get("step"):
         component = replace(component, step_ns=in_nanoseconds(step.label, step.value))
     if isolation := overrides.entries.get("isolation"):
@@ -185,6 +185,10 @@ def _with_entries(component: Component, overrides: ComponentOverrides) -> Compon
         component = replace(component, isolation=chosen)
     if logging := overrides.entries.get("logging"):
         component = replace(component, logging=_logging(logging))
+    if trace := overrides.entries.get("trace"):
+        must = "the path of a file, as a string"
+        file = Path(text(trace.label, trace.value, must))
+        component = replace(component, trace=file.absolute())
     tolerances = overrides.tables.get("solver")
     if tolerances is not None:  # an empty table asks for the default solver
         place = f"components.{component.name}.solver"

@@ -40,7 +40,10 @@ ENTRIES_OF_SECTIONS: Mapping[str, Sequence[str]] = {
 
 TABLES_OF_NAMES = ("rename", "units")
 TABLES_OF_COMPONENT = ("values", *TABLES_OF_NAMES, "solver")
-ENTRIES_OF_COMPONENT = ("fmu", "step", "isolation", "logging", *TABLES_OF_COMPONENT)
+ENTRIES_OF_COMPONENT = (
+    *("fmu", "step", "isolation", "logging", "trace"),
+    *TABLES_OF_COMPONENT,
+)
 """The entries of a component, of which some are tables."""
 
 PLACE = "{place}"

@@ -95,7 +95,8 @@ class Component:
     variables that the FMU declares without one, or wrongly. native is the FMU that runs in the
     place of fmu, its twin with the same bits. With a solver the equations of an FMU that is for
     model exchange, too, are integrated here, though it may have a co-simulation of its own. With
-    code there is no FMU: fmu is what that is called.
+    code there is no FMU: fmu is what that is called. trace is the file that each call of the FMU is
+    written to.
     """
 
     name: str
@@ -109,6 +110,7 @@ class Component:
     solver: Solver | None = None
     logging: Logging = False
     code: PythonCode | None = None
+    trace: Path | None = None
 
     @property
     def integrated(self) -> Solver | None:

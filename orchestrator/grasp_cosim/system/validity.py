@@ -78,6 +78,7 @@ def _end(system: Structure, port: Port, causality: str, place: str) -> tuple[Int
 def check_components(system: Structure) -> None:
     """InputError where a process cannot have an FMU twice, or a solver has no use."""
     first_by_fmu: dict[Path, str] = {}
+    traced: dict[Path, str] = {}
     for component in system.components:
         interface, fmu, name = component.interface, component.loaded, component.name
         if component.code and (component.isolation != "none" or component.rename):
@@ -85,6 +86,8 @@ def check_components(system: Structure) -> None:
                 f"{system.name}: {name}: is Python code of this process; must be without isolation "
                 "and rename"
             )
+        if component.trace:
+            _check_trace(f"{system.name}: {name}: trace", component, component.trace, traced)
         once = interface.capability("canBeInstantiatedOnlyOncePerProcess") is True
         if once and component.isolation == "none":
             earlier = first_by_fmu.setdefault(interface.path, name)
@@ -97,6 +100,15 @@ def check_components(system: Structure) -> None:
             _check_own_solver(f"{system.name}: {name}: solver", fmu, component.solver)
         if not isinstance(component.logging, bool):
             _check_categories(f"{system.name}: {name}: logging", fmu, component.logging)
+
+
+def _check_trace(place: str, component: Component, path: Path, traced: dict[Path, str]) -> None:
+    """InputError where a component has no calls to trace, or another one is traced to its file."""
+    if component.code:
+        raise InputError(f"{place}: is Python code, without calls of FMI; must be left out")
+    first = traced.setdefault(path, component.name)
+    if first != component.name:
+        raise InputError(f"{place}: {path} is that of {first}; must be another file")
 
 
 def _check_own_solver(place: str, fmu: Interface, solver: Solver) -> None:
