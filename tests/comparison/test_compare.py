@@ -9,7 +9,7 @@ from grasp_cosim import InputError, metric, simulate
 from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.side import differences, read_side
-from grasp_cosim.comparison.words import as_json, as_text, verdict
+from grasp_cosim.comparison.summary import as_json, as_text, verdict
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.interface.units import Conversion
 from report.runs import component, grasp_run, rounded, write_run

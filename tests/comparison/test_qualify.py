@@ -10,9 +10,9 @@ from conftest import alter
 from grasp_cosim import InputError, SimulationError, System
 from grasp_cosim.comparison.bands import Bands, Given, read_bands
 from grasp_cosim.comparison.qualify import qualify
-from grasp_cosim.comparison.words import qualification_json as as_json
-from grasp_cosim.comparison.words import qualification_text as as_text
-from grasp_cosim.comparison.words import reason
+from grasp_cosim.comparison.summary import qualification_json as as_json
+from grasp_cosim.comparison.summary import qualification_text as as_text
+from grasp_cosim.comparison.summary import reason
 from support.marks import slow
 from support.native_fmus import build, needs_gcc
 

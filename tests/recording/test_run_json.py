@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from grasp_cosim import InputError, Realtime, metric, simulate
 from grasp_cosim.comparison.compare import compare
-from grasp_cosim.comparison.page import write_comparison
+from grasp_cosim.comparison.comparison_page import write_comparison
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report import terminal

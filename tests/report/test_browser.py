@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from grasp_cosim.comparison.compare import compare
-from grasp_cosim.comparison.page import comparison_html
+from grasp_cosim.comparison.comparison_page import comparison_html
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report.page import page_html
 from report.javascript import in_browser

@@ -11,7 +11,7 @@ import pytest
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.comparison.bands import Bands, Given
 from grasp_cosim.comparison.compare import compare
-from grasp_cosim.comparison.page import comparison_html
+from grasp_cosim.comparison.comparison_page import comparison_html
 from grasp_cosim.metrics.metric import Metric
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report.page import Scene, Zoom, page_html, write_report

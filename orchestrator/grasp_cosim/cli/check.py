@@ -8,10 +8,10 @@ from typing import Any
 import click
 
 from ..base.files import check_file
-from ..comparison import words
+from ..comparison import summary
 from ..comparison.bands import read_bands
 from ..comparison.compare import compare as compare_runs
-from ..comparison.page import write_comparison, write_qualification
+from ..comparison.comparison_page import write_comparison, write_qualification
 from ..comparison.qualify import component_of
 from ..comparison.qualify import qualify as run_qualification
 from ..interface.read import check_runs
@@ -111,7 +111,11 @@ def qualify(
     if out:
         wrote = write_qualification(qualification, out)
         say(f"wrote {out}" if wrote else f"no page {out}: there were no two runs")
-    show(as_json, words.qualification_json(qualification), words.qualification_text(qualification))
+    show(
+        as_json,
+        summary.qualification_json(qualification),
+        summary.qualification_text(qualification),
+    )
     return 0 if qualification.qualified else NEGATIVE
 
 
@@ -201,5 +205,5 @@ def compare(
             write_comparison(comparison, out)
     if out:
         say(f"wrote {out}: {out.stat().st_size / 1e6:.1f} MB")
-    show(as_json, words.as_json(comparison), words.as_text(comparison))
+    show(as_json, summary.as_json(comparison), summary.as_text(comparison))
     return 0 if comparison.alike else NEGATIVE

@@ -61,9 +61,9 @@ class Given:
 
     def band(self, scale: float, derived: Band) -> Band:
         """The band it makes where relative is of scale; what it does not give stays derived."""
-        given = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
+        stated_width = (self.absolute or 0.0) + (self.relative * scale if self.relative else 0.0)
         time = derived.time if self.time is None else self.time
-        return Band(given if self.wide else derived.width, time, "given")
+        return Band(stated_width if self.wide else derived.width, time, "given")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +114,8 @@ class Bands:
         for kind, entries, names in kinds:
             for pattern in entries:
                 if not any(_fits(pattern, name) for name in names):
-                    said = f"{self.place}: [{kind}]: nothing is called {pattern!r}"
-                    raise InputError(f"{said}; {nearest(pattern, names)}")
+                    place = f"{self.place}: [{kind}]: nothing is called {pattern!r}"
+                    raise InputError(f"{place}; {nearest(pattern, names)}")
 
 
 def read_bands(path: str | Path) -> Bands:
@@ -138,8 +138,8 @@ def read_bands(path: str | Path) -> Bands:
     valid = {"signals": ("absolute", "relative", "time"), "metrics": ("absolute", "relative")}
     for key in table:
         known(f"{path}: unknown entry", key, valid)
-    found = (_entries(f"{path}: [{key}]", table.get(key, {}), of) for key, of in valid.items())
-    return Bands(str(path), *found)
+    tables = (_entries(f"{path}: [{key}]", table.get(key, {}), of) for key, of in valid.items())
+    return Bands(str(path), *tables)
 
 
 class QualificationBands(TypedDict):
@@ -181,32 +181,34 @@ def plain(name: str) -> str:
 
 def signal_band(
     reference: Curve,
-    again: Iterable[Curve],
+    repetitions: Iterable[Curve],
     nominal: float | None,
     time: float,
-    given: Given | None = None,
+    stated: Given | None = None,
 ) -> Band:
     """The band of a signal from its reference and from the same run with other numerics.
 
     time in s is the shift allowed unless given says otherwise, nominal the declared nominal value;
     None stands for 1, as in FMI. A held curve (Booleans, integers) has the derived width 0.
     """
-    apart = [float(deviation(reference, other, time).values.max()) for other in again]
-    apart = [distance for distance in apart if distance < SMALL * FAR]
+    distances = [
+        float(deviation(reference, repetition, time).values.max()) for repetition in repetitions
+    ]
+    distances = [distance for distance in distances if distance < SMALL * FAR]
     low, high = reference.range
-    width, span = BOTH * max(apart, default=0.0), high - low
+    width, span = BOTH * max(distances, default=0.0), high - low
     if not reference.held:
         size = max(abs(low), abs(high), 1.0 if nominal is None else abs(nominal))
         width = max(SHARE * span, SMALL * size, width)
     derived = Band(width, time, "derived")
-    return given.band(span, derived) if given else derived
+    return stated.band(span, derived) if stated else derived
 
 
 def metric_band(
     value: float | None,
-    again: Iterable[float | None],
+    repetitions: Iterable[float | None],
     least: float,
-    given: Given | None = None,
+    stated: Given | None = None,
 ) -> Band:
     """The band of a metric from its value and those of the same run with other numerics.
 
@@ -215,10 +217,14 @@ def metric_band(
     never comes.
     """
     size = abs(value or 0.0)
-    apart = [abs(other - value) for other in again if other is not None and value is not None]
-    width = max(least, SHARE * size, SMALL, BOTH * max(apart, default=0.0))
+    distances = [
+        abs(repetition - value)
+        for repetition in repetitions
+        if repetition is not None and value is not None
+    ]
+    width = max(least, SHARE * size, SMALL, BOTH * max(distances, default=0.0))
     derived = Band(width, 0.0, "derived")
-    return given.band(size, derived) if given else derived
+    return stated.band(size, derived) if stated else derived
 
 
 def _fits(pattern: str, name: str) -> bool:
@@ -229,18 +235,22 @@ def _fits(pattern: str, name: str) -> bool:
 def _entries(place: str, table: Any, valid: Sequence[str]) -> dict[str, Given]:
     if not isinstance(table, dict):
         raise InputError(f"{place}: {table!r}: must be a table")
-    found = {}
+    entry_of = {}
     for pattern, entry in table.items():
-        at = f"{place}: {pattern!r}"
+        entry_place = f"{place}: {pattern!r}"
         if not isinstance(entry, dict) or not entry:
-            raise InputError(f"{at} = {entry!r}: must be a table with one of {choices(valid)}")
+            raise InputError(
+                f"{entry_place} = {entry!r}: must be a table with one of {choices(valid)}"
+            )
         for key, value in entry.items():
-            known(f"{at}: unknown entry", key, valid)
-            more = ", inf where it is not judged" if key == "absolute" else ""
-            if not (more and value == inf):
-                number(f"{at}: {key}", value, 0.0, must=f"a number of at least 0{more}")
-        found[pattern] = Given(**{key: float(value) for key, value in entry.items()})
-    return found
+            known(f"{entry_place}: unknown entry", key, valid)
+            infinite = ", inf where it is not judged" if key == "absolute" else ""
+            if not (infinite and value == inf):
+                number(
+                    f"{entry_place}: {key}", value, 0.0, must=f"a number of at least 0{infinite}"
+                )
+        entry_of[pattern] = Given(**{key: float(value) for key, value in entry.items()})
+    return entry_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import inf
 from pathlib import Path
-
-import numpy as np
 
 from ..base.errors import InputError, choices
 from ..interface.units import Conversion
@@ -18,17 +15,16 @@ from ..recording.log_names import AS_THEY_ARE, LogNames
 from ..recording.result import Result
 from ..system.description import FILES, System
 from ..system.times import in_seconds, nearest_time
-from .bands import SHARE, Band, Bands, Compared, metric_band, plain, signal_band
+from .bands import SHARE, Bands
+from .judge import Judge, Values, common_curves
 from .offset import fit_offset, shifted
 from .outcome import ComparisonData
 from .side import Side, differences, read_side, side_of
-from .tube import ROUNDING, deviation
-from .words import short_text
+from .summary import short_text
+from .tube import ROUNDING
 
 FEWEST_STEPS = 2
 """The least shift in time a derived band allows, in steps: one for the step, one for the scheme."""
-
-Values = Mapping[str, float | None]
 
 
 class Comparison(ComparisonData):
@@ -45,7 +41,7 @@ class Comparison(ComparisonData):
 
     def _repr_html_(self) -> str:
         """The same, as notebooks show it."""
-        from .page import short_html  # only here: pages take long to import
+        from .comparison_page import short_html  # only here: pages take long to import
 
         return short_html(self)
 
@@ -79,99 +75,74 @@ def compare(
     """
     first, second = (_recorded(run, called, names) for run, called in ((a, "A"), (b, "B")))
     first, second = first or _ran(a, second), second or _ran(b, first)
-    first, second, said = _on_one_clock(first, second, names)
+    first, second, clock_notes = _on_one_clock(first, second, names)
     first, second = first.like(second), second.like(first)
     begin, end = _overlap(first, second)
-    ours, theirs = first.part(begin, end), second.part(begin, end)
-    changes, given = _changes(ours, theirs), bands or Bands()
-    asked, other = (_asked(side, part, metrics) for side, part in ((first, ours), (second, theirs)))
-    values = ours.measured(asked), theirs.measured(other)
-    given.check({**ours.signals, **theirs.signals}, values[0])
-    shift = max(SHARE * (end - begin), FEWEST_STEPS * max(ours.interval, theirs.interval))
-    again = ours.every_second()
+    first_part, second_part = first.part(begin, end), second.part(begin, end)
+    changes, stated = _changes(first_part, second_part), bands or Bands()
+    first_metrics = _metrics_of(first, first_part, metrics)
+    second_metrics = _metrics_of(second, second_part, metrics)
+    values = first_part.measured(first_metrics), second_part.measured(second_metrics)
+    stated.check({**first_part.signals, **second_part.signals}, values[0])
+    interval = max(first_part.interval, second_part.interval)
+    shift = max(SHARE * (end - begin), FEWEST_STEPS * interval)
     runs = (first.result, second.result) if first.result and second.result else None
-    required = [m.name for m in other] if runs else []
-    changed = theirs.converted(changes)
-    found = judge(ours, changed, values, asked, again, given, shift, required=required)
+    required = [m.name for m in second_metrics] if runs else []
+    repetitions = first_part.every_second()
+    judge = Judge(first_part, repetitions, stated, shift, required=required)
+    comparison = compared_by(judge, second_part.converted(changes), values, first_metrics)
     return replace(
-        found,
+        comparison,
         a=first,
         b=second,
         begin=begin,
         end=end,
-        only=_only(ours.signals, theirs.signals),
+        only=_only(first_part.signals, second_part.signals),
         differences=differences(*runs) if runs else (),
-        notes=(*said, *_notes(first, second, begin, end, changes)),
+        notes=(*clock_notes, *_notes(first, second, begin, end, changes)),
     )
 
 
-def judge(
-    a: Side,
-    b: Side,
+def compared_by(
+    judge: Judge,
+    candidate: Side,
     values: tuple[Values, Values],
-    asked: tuple[Metric, ...],
-    again: Sequence[Side],
-    bands: Bands,
-    shift: float,
-    nominals: Mapping[str, float | None] | None = None,
-    required: Collection[str] = (),
+    definitions: tuple[Metric, ...],
 ) -> Comparison:
-    """Compare two runs, both in the units of a, up to the end of the one that ends first.
+    """Compare two runs, both in the units of the reference, up to the end that comes first.
 
-    `values` are the metrics `asked` of each, `again` is the run of a with other numerics, `shift`
-    the one in time in s which a derived band allows, `nominals` are the declared nominal values.
-    A metric that is `required` and not optional is out where only one has it, and so is a signal
-    that is a finite number in one of them only.
+    Args:
+        judge: It has the reference and the bands.
+        candidate: The other run.
+        values: The values of the metrics of the two.
+        definitions: These metrics.
     """
-    ours, theirs, runs = a.curves(), b.curves(), [run.curves() for run in again]
-    ours = {name: curve for name, curve in ours.items() if name in theirs}
-    theirs = {n: c._replace(held=c.held or ours[n].held) for n, c in theirs.items() if n in ours}
-    signals = []
-    for name, reference in ours.items():
-        other, nominal = theirs[name].until(float(reference.time[-1])), (nominals or {}).get(name)
-        gaps, other_gaps = reference.until(float(other.time[-1])).gaps, other.gaps
-        reference, other = reference.without_gaps(), other.without_gaps()
-        if not len(reference.time) and not len(other.time):
-            continue
-        unit, stated = a.units[name], bands.of_signal(name)
-        if not np.array_equal(gaps, other_gaps):
-            exact = Band(0.0, shift, "derived")
-            band = stated.band(0.0, exact) if stated else exact
-            time = float(np.setxor1d(gaps, other_gaps)[0])
-            signals.append(Compared(name, unit, band, inf, None, None, time))
-            continue
-        numerics = [c for run in runs if len((c := run[name].without_gaps()).time)]
-        band = signal_band(reference, numerics, nominal, shift, stated)
-        apart = deviation(reference.until(float(other.time[-1])), other, band.time)
-        worst = apart.values.argmax()
-        time, distance, was, now = (float(column[worst]) for column in apart)
-        low, high = reference.range
-        signals.append(Compared(name, unit, band, distance, was, now, time, high - low))
-    metrics, own, measured = [], values[0], [run.measured(asked) for run in again]
-    by_name = {m.name: m for m in asked}
-    for name in dict.fromkeys((*own, *values[1])):
-        metric, value, found = by_name.get(plain(name)), own.get(name), values[1].get(name)
-        if metric is None or value is found is None:
-            continue
-        judged = metric.name in required and not metric.optional
-        if not judged and (name not in own or name not in values[1]):
-            continue
-        least = shift if metric.unit == "s" else SHARE if metric.unit == "1" else 0.0
-        band = metric_band(value, (m.get(name) for m in measured), least, bands.of_metric(name))
-        distance = inf if value is None or found is None else abs(found - value)
-        metrics.append(Compared(name, metric.unit, band, distance, value, found))
+    reference = judge.reference
+    curves, candidate_curves = common_curves(reference, candidate)
+    measured, candidate_measured = values
+    signals = judge.signals(curves, candidate_curves)
+    metrics = judge.metrics(measured, candidate_measured, definitions)
+    signals.sort(key=lambda signal: -signal.ratio)
+    metrics.sort(key=lambda metric: -metric.ratio)
+    absent = [
+        name
+        for name, value in measured.items()
+        if value is None and candidate_measured.get(name) is None
+    ]
+    begin = float(max(reference.time[0], candidate.time[0]))
+    end = float(min(reference.time[-1], candidate.time[-1]))
     return Comparison(
-        a,
-        b,
-        float(max(a.time[0], b.time[0])),
-        float(min(a.time[-1], b.time[-1])),
-        tuple(sorted(signals, key=lambda c: -c.ratio)),
-        tuple(sorted(metrics, key=lambda c: -c.ratio)),
-        (ours, theirs),
-        asked,
-        tuple(name for name, v in own.items() if v is values[1].get(name) is None),
-        _only(a.signals, b.signals),
-        _only(own, values[1]),
+        reference,
+        candidate,
+        begin,
+        end,
+        tuple(signals),
+        tuple(metrics),
+        (curves, candidate_curves),
+        definitions,
+        tuple(absent),
+        _only(reference.signals, candidate.signals),
+        _only(measured, candidate_measured),
     )
 
 
@@ -188,9 +159,9 @@ def _on_one_clock(a: Side, b: Side, names: LogNames) -> tuple[Side, Side, list[s
     alike = log.like(run)
     changes = {name: run.change(name, alike) for name in alike.signals if name in run.signals}
     offset = fit_offset(alike.converted(changes), run)
-    said = f"the clock of {log.name} is off: {offset:.6g} s were added to its times"
+    note = f"the clock of {log.name} is off: {offset:.6g} s were added to its times"
     moved = shifted(log, offset)
-    return (moved, b, [said]) if log is a else (a, moved, [said])
+    return (moved, b, [note]) if log is a else (a, moved, [note])
 
 
 def _recorded(run: Result | str | Path, called: str, names: LogNames) -> Side | None:
@@ -200,11 +171,11 @@ def _recorded(run: Result | str | Path, called: str, names: LogNames) -> Side | 
     return None if Path(run).suffix.lower() in FILES else read_side(Path(run), names)
 
 
-def _ran(system: Result | str | Path, other: Side | None) -> Side:
+def _ran(system: Result | str | Path, counterpart: Side | None) -> Side:
     """The run of a system file, no longer than the other run."""
     loaded = System.load(str(system)).natively()
-    if other:
-        span = nearest_time(float(other.time[-1])) - loaded.start_ns
+    if counterpart:
+        span = nearest_time(float(counterpart.time[-1])) - loaded.start_ns
         stop = min(loaded.stop_ns, loaded.time_ns(max(int(span // loaded.step_ns), 1)))
         loaded = loaded.with_experiment(stop=in_seconds(stop))
     return side_of(simulate(loaded), str(system))
@@ -225,29 +196,29 @@ def _overlap(a: Side, b: Side) -> tuple[float, float]:
 
 def _changes(a: Side, b: Side) -> dict[str, Conversion | None]:
     """The conversion of each signal that both have to the unit of a; None where there is none."""
-    for side, other in ((a, b), (b, a)):
+    for side, counterpart in ((a, b), (b, a)):
         for name in (*side.signals, *side.texts):
-            if name in other.signals:
-                side.check_shared(name, other)
-    found = {name: a.change(name, b) for name in a.signals if name in b.signals}
-    if not any(found.values()):
+            if name in counterpart.signals:
+                side.check_shared(name, counterpart)
+    changes = {name: a.change(name, b) for name in a.signals if name in b.signals}
+    if not any(changes.values()):
         names = [f"{side.name} has {choices(side.signals, 3)}" for side in (a, b)]
         raise InputError(f"{'; '.join(names)}: must have a signal of one name and quantity")
-    return found
+    return changes
 
 
-def _asked(side: Side, part: Side, more: Sequence[Metric]) -> tuple[Metric, ...]:
+def _metrics_of(side: Side, part: Side, extra: Sequence[Metric]) -> tuple[Metric, ...]:
     """The metrics of a side, those of its own file as they were recorded if all of it counts."""
-    taken, whole = {m.name for m in more}, len(side.time) == len(part.time)
-    recorded = side.result.more_metrics if side.result and whole else ()
-    own = [m for m in recorded if m.name not in taken]
-    return tuple(m for m in metrics_of(side.groups, [*more, *own]) if not m.reason)
+    taken, is_whole = {m.name for m in extra}, len(side.time) == len(part.time)
+    recorded = side.result.more_metrics if side.result and is_whole else ()
+    recorded_besides = [m for m in recorded if m.name not in taken]
+    return tuple(m for m in metrics_of(side.groups, [*extra, *recorded_besides]) if not m.reason)
 
 
 def _only(
-    ours: Collection[str], theirs: Collection[str]
+    first: Collection[str], second: Collection[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return tuple(n for n in ours if n not in theirs), tuple(n for n in theirs if n not in ours)
+    return tuple(n for n in first if n not in second), tuple(n for n in second if n not in first)
 
 
 def _notes(

@@ -89,40 +89,44 @@ def use_of(system: System, name: str) -> Use:
     """Return the use that the system makes of the component of that name."""
     component = system.component(name, system.name)
 
-    def own(ports: Iterable[Port]) -> frozenset[str]:
+    def variables_of(ports: Iterable[Port]) -> frozenset[str]:
         return frozenset(p.variable for p in ports if p.component == name)
 
     return Use(
         name,
-        own(port for c in system.connections for port in (c.source, c.target)),
+        variables_of(port for c in system.connections for port in (c.source, c.target)),
         component.values,
         stated(system, name),
-        own(p for event in system.events for port in event.set for p in system.elements(port)),
+        variables_of(
+            p for event in system.events for port in event.set for p in system.elements(port)
+        ),
         in_seconds(system.step_of(component)),
     )
 
 
 def interface_differences(
-    original: Interface, candidate: Interface, use: Use, given: Mapping[str, Value]
+    original: Interface, candidate: Interface, use: Use, values_of_new: Mapping[str, Value]
 ) -> list[Difference]:
     """All differences, in the order of the original's variables, then those of capabilities.
 
     Both are under the system's names. given are values, in the candidate's unit, for variables
     that only the candidate has.
     """
-    found: list[Difference] = []
+    differences: list[Difference] = []
     for old in original.of(*COMPARED):
         if new := candidate.by_name.get(old.name):
-            found += _changed(old, new, use, original.conversion(old.name, candidate))
+            differences += _changed(old, new, use, original.conversion(old.name, candidate))
         else:
-            found.append(_missing(old, use, candidate))
-    ours = original.by_name
-    found += [_extra(v, use, given) for v in candidate.of(*COMPARED) if v.name not in ours]
-    found += capability_differences(original, candidate, use.step)
+            differences.append(_missing(old, use, candidate))
+    old_by_name = original.by_name
+    differences += [
+        _extra(v, use, values_of_new) for v in candidate.of(*COMPARED) if v.name not in old_by_name
+    ]
+    differences += capability_differences(original, candidate, use.step)
     for new in candidate.of("output"):
-        if (old_one := ours.get(new.name)) and old_one.causality == "output":
-            found += _feedthrough(old_one, new, original, candidate, use)
-    return found
+        if (old_one := old_by_name.get(new.name)) and old_one.causality == "output":
+            differences += _feedthrough(old_one, new, original, candidate, use)
+    return differences
 
 
 def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
@@ -144,11 +148,11 @@ def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
     return Difference(severity, "missing", name, text)
 
 
-def _extra(new: Variable, use: Use, given: Mapping[str, Value]) -> Difference:
+def _extra(new: Variable, use: Use, values_of_new: Mapping[str, Value]) -> Difference:
     name, text = new.name, f"new {new.causality}"
     if new.causality == "input" and not new.supported:
         text = "new input that keeps its start value"
-    elif new.causality == "input" and name not in given:
+    elif new.causality == "input" and name not in values_of_new:
         text = f"new input without a source; give it a value: --set '{use.component}.{name}=VALUE'"
         return Difference("blocks", "extra", name, text)
     return Difference("notes", "extra", name, text)
@@ -161,8 +165,12 @@ def _changed(
     name = old.name
     serious: Severity = "blocks" if use.uses(name) else "warns"
     if (old.kind, old.shape) != (new.kind, new.shape):
-        was, now = (f"{v.type}{f' of {list(v.shape)}' if v.shape else ''}" for v in (old, new))
-        yield Difference(serious, "type", name, f"is {now}, must be {was}", was, now)
+        old_type, new_type = (
+            f"{v.type}{f' of {list(v.shape)}' if v.shape else ''}" for v in (old, new)
+        )
+        yield Difference(
+            serious, "type", name, f"is {new_type}, must be {old_type}", old_type, new_type
+        )
         return
     if new.type == "Float32" != old.type:
         text = "is Float32: 7 digits instead of 16"
@@ -191,52 +199,55 @@ def _changed(
     both = old.settable and new.settable and name not in use.values
     if both and not _same(first, start, change):
         units = [f" {v.unit}" if v.unit else "" for v in (new, old)]
-        text = f"starts with {_shown(start)}{units[0]} instead of {_shown(first)}{units[1]}"
+        text = f"starts with {_in_words(start)}{units[0]} instead of {_in_words(first)}{units[1]}"
         severity = "notes" if name in use.connected else "warns"
         yield Difference(severity, "start", name, text, first, start)
 
 
 def _causality(old: Variable, new: Variable, use: Use) -> tuple[Severity, str]:
-    name, was, now = old.name, old.causality, new.causality
-    lonely = now == "input" and name not in use.connected and name not in use.values
+    name, old_causality, new_causality = old.name, old.causality, new.causality
+    lonely = new_causality == "input" and name not in use.connected and name not in use.values
     value_only = old.settable and new.settable and name not in use.connected
     severity: Severity = "blocks" if lonely or (use.uses(name) and not value_only) else "warns"
-    more = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
-    return severity, f"is {_a(now)}, must be {_a(was)}{more}"
+    remedy = f", or have a value: --set '{use.component}.{name}=VALUE'" if lonely else ""
+    return severity, f"is {_a(new_causality)}, must be {_a(old_causality)}{remedy}"
 
 
 def _unit(
     old: Variable, new: Variable, use: Use, change: Conversion | None
 ) -> tuple[Severity, str]:
-    name, was, now = old.name, old.unit, new.unit
+    name, old_unit, new_unit = old.name, old.unit, new.unit
     if change is None:
         serious: Severity = "blocks" if use.uses(name) else "warns"
-        return serious, f"is in {now}, which cannot be converted to {was}"
-    said = f"unit {now or 'not declared'} instead of {was or 'not declared'}"
-    if was is None or now is None:
-        return "notes" if {was, now} == {None, "1"} else "warns", f"{said}: taken as the same"
+        return serious, f"is in {new_unit}, which cannot be converted to {old_unit}"
+    text = f"unit {new_unit or 'not declared'} instead of {old_unit or 'not declared'}"
+    if old_unit is None or new_unit is None:
+        return "notes" if {old_unit, new_unit} == {
+            None,
+            "1",
+        } else "warns", f"{text}: taken as the same"
     if change == IDENTITY:
-        return "notes", f"{said}, which is the same"
+        return "notes", f"{text}, which is the same"
     if name in use.stated:
         place = "an event, a fault or the factor of a connection"
-        return "blocks", f"is in {now}, but {place} is meant in {was}"
+        return "blocks", f"is in {new_unit}, but {place} is meant in {old_unit}"
     if name in use.values:
         value = float(use.values[name])
-        return "warns", f"{said}: {value:.9g} {was} becomes {change(value):.9g} {now}"
-    return "warns", f"{said}: converted"
+        return "warns", f"{text}: {value:.9g} {old_unit} becomes {change(value):.9g} {new_unit}"
+    return "warns", f"{text}: converted"
 
 
 def _range(old: Variable, new: Variable, use: Use, change: Conversion) -> Iterator[Difference]:
     """Of what the original takes or gives, that which the candidate does not declare valid."""
-    unit, was, now = f" {new.unit}" if new.unit else "", change(old.low), change(old.high)
+    unit, old_low, old_high = f" {new.unit}" if new.unit else "", change(old.low), change(old.high)
     declared = [old.minimum, old.maximum], [new.minimum, new.maximum]
     value = change(float(use.values[old.name])) if old.name in use.values else new.low
     valid = f"{new.low:g} to {new.high:g}{unit}"
     if not new.low <= value <= new.high:
         text = f"value {value:.9g}{unit} is set in the system; must be {valid}"
         yield Difference("blocks", "range", old.name, text, *declared)
-    elif _less(was, new.low) or _less(new.high, now):
-        text = f"takes {valid} instead of {was:g} to {now:g}{unit}"
+    elif _less(old_low, new.low) or _less(new.high, old_high):
+        text = f"takes {valid} instead of {old_low:g} to {old_high:g}{unit}"
         severity: Severity = "notes" if old.causality == "output" else "warns"
         yield Difference(severity, "range", old.name, text, *declared)
 
@@ -249,14 +260,16 @@ def capability_differences(
     if versions[0] != versions[1]:
         text = f"FMI {versions[1]} instead of {versions[0]}"
         yield Difference("notes", "capability", "fmiVersion", text, *versions)
-    was, now = ([FMU_KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate))
+    old_kinds, new_kinds = (
+        [FMU_KINDS[kind] for kind in fmu.kinds] for fmu in (original, candidate)
+    )
     if not {"CoSimulation", "ModelExchange"} & set(candidate.kinds):
-        text = f"is for {choices(now)}; must be for co-simulation or model exchange"
-        yield Difference("blocks", "capability", "kind", text, was, now)
+        text = f"is for {choices(new_kinds)}; must be for co-simulation or model exchange"
+        yield Difference("blocks", "capability", "kind", text, old_kinds, new_kinds)
         return
     if "CoSimulation" in original.kinds and "CoSimulation" not in candidate.kinds:
         text = "is for model exchange, and is integrated by CVode here"
-        yield Difference("notes", "capability", "kind", text, was, now)
+        yield Difference("notes", "capability", "kind", text, old_kinds, new_kinds)
     for flag, (severity, lost, text) in RESTRICTIONS.items():
         had, has = bool(original.capability(flag)), bool(candidate.capability(flag))
         if had != has and had == lost:
@@ -266,7 +279,7 @@ def capability_differences(
     if "CoSimulation" in candidate.kinds and able[0] and not able[1]:
         default = candidate.experiment.get("step_size")
         same = isclose(as_float(default, step), step, rel_tol=SAME)
-        text = f"steps of one size only: {step:g} s here, its default is {_shown(default)} s"
+        text = f"steps of one size only: {step:g} s here, its default is {_in_words(default)} s"
         yield Difference("notes" if same else "warns", "capability", flag, text, True, False)
 
 
@@ -274,15 +287,17 @@ def _less(a: float, b: float) -> bool:
     return a < b and not isclose(a, b, rel_tol=SAME)
 
 
-def _same(was: Any, now: Any, change: Conversion | None) -> bool:
-    if isinstance(was, list) and isinstance(now, list):
-        return len(was) == len(now) and all(map(_same, was, now, [change] * len(was)))
-    if change is None or not is_number(was) or not is_number(now):
-        return bool(was == now)
-    return isclose(change(float(was)), float(now), rel_tol=SAME)
+def _same(old_value: Any, new_value: Any, change: Conversion | None) -> bool:
+    if isinstance(old_value, list) and isinstance(new_value, list):
+        return len(old_value) == len(new_value) and all(
+            map(_same, old_value, new_value, [change] * len(old_value))
+        )
+    if change is None or not is_number(old_value) or not is_number(new_value):
+        return bool(old_value == new_value)
+    return isclose(change(float(old_value)), float(new_value), rel_tol=SAME)
 
 
-def _shown(value: Any) -> str:
+def _in_words(value: Any) -> str:
     return "none" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
@@ -297,8 +312,10 @@ def _feedthrough(
 
     What is connected may so be part of an algebraic loop, which is solved or refused in the run.
     """
-    before, now = _needs(old, original), _needs(new, candidate)
-    added, gone = ([i for i in a if i not in b] for a, b in ((now, before), (before, now)))
+    old_needs, new_needs = _needs(old, original), _needs(new, candidate)
+    added, gone = (
+        [i for i in a if i not in b] for a, b in ((new_needs, old_needs), (old_needs, new_needs))
+    )
     severity: Severity = "notes"
     if added:
         text = f"depends directly on {choices(added)}"

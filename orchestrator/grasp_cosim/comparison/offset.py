@@ -40,8 +40,8 @@ def fit_offset(log: Side, run: Side) -> float:
         )
     span = max(np.ptp(log.time), np.ptp(run.time))
     step = max(span / POINTS, min(log.interval, run.interval))
-    each = [_correlation(log.time, a, run.time, b, step) for a, b in pairs]
-    scores = np.mean(each, axis=0)
+    coefficients = [_correlation(log.time, a, run.time, b, step) for a, b in pairs]
+    scores = np.mean(coefficients, axis=0)
     best = int(np.argmax(scores))
     if scores[best] < LEAST:
         raise InputError(
@@ -64,16 +64,16 @@ def _correlation(t: Floats, x: Floats, s: Floats, y: Floats, step: float) -> Flo
 
     a = np.interp(np.arange(t[0], t[-1] + 0.5 * step, step), t, x)
     b = np.interp(np.arange(s[0], s[-1] + 0.5 * step, step), s, y)
-    one, other = np.ones_like(a), np.ones_like(b)
+    ones_a, ones_b = np.ones_like(a), np.ones_like(b)
 
     def over(u: Floats, v: Floats) -> Floats:
         return np.asarray(correlate(v, u, "full", "fft"))
 
-    n = np.maximum(over(one, other), 1.0)
-    mean_a, mean_b = over(a, other) / n, over(one, b) / n
+    n = np.maximum(over(ones_a, ones_b), 1.0)
+    mean_a, mean_b = over(a, ones_b) / n, over(ones_a, b) / n
     covariance = over(a, b) / n - mean_a * mean_b
-    variance_a = over(a * a, other) / n - mean_a**2
-    variance_b = over(one, b * b) / n - mean_b**2
+    variance_a = over(a * a, ones_b) / n - mean_a**2
+    variance_b = over(ones_a, b * b) / n - mean_b**2
     least = 1e-6 * a.var() * b.var()
     product = variance_a * variance_b
     enough = (n > min(len(a), len(b)) / 3) & (product > least)
@@ -95,8 +95,8 @@ def _refined(
         return total
 
     near = WIDTH * step
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         distance, bounds=(coarse - near, coarse + near), method="bounded",
         options={"xatol": 1e-4 * step},
     )  # fmt: skip
-    return float(found.x)
+    return float(minimum.x)

@@ -11,11 +11,8 @@ from ..metrics.metric import Metric
 from ..system.description import System
 from .bands import Compared
 from .interface_difference import Difference as InterfaceDifference
+from .judge import Curves
 from .side import Difference, Side
-from .tube import Curve
-
-Curves = Mapping[str, Curve]
-"""Signals as they were compared, by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -39,7 +36,7 @@ class ComparisonData:
     """The metrics that both have, in the same order."""
     curves: tuple[Curves, Curves]
     """By name the signals of a and those of b that were compared."""
-    asked: tuple[Metric, ...]
+    metric_definitions: tuple[Metric, ...]
     """The metrics that were worked out."""
     absent: tuple[str, ...]
     """The names of metrics of which neither run has a value."""

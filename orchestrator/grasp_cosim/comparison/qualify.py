@@ -18,7 +18,8 @@ from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..interface.read import describe
 from ..interface.renaming import in_units, renamed
-from ..interface.units import conversion
+from ..interface.units import Conversion, conversion
+from ..interface.variables import Variable
 from ..master.simulation import simulate
 from ..metrics.groups import metrics_of
 from ..metrics.in_si import in_si
@@ -32,16 +33,17 @@ from ..system.structure import SCHEMES, unit_of
 from ..system.times import NANOSECONDS, in_seconds
 from ..system.validity import connection_transform, transforms
 from .bands import SHARE, Bands, plain
-from .compare import FEWEST_STEPS, judge
+from .compare import FEWEST_STEPS, compared_by
 from .interface_difference import (
     SEVERITIES,
     Difference,
     interface_differences,
     use_of,
 )
+from .judge import Judge
 from .outcome import QualificationData, Swap
 from .side import Side, differences, side_of
-from .words import short_qualification
+from .summary import short_qualification
 
 END = Metric(
     "end_of_run", lambda run: float(run.time[-1]), "s", "where an FMU asked for the end, else stop"
@@ -63,7 +65,9 @@ class Qualification(QualificationData):
 
     def _repr_html_(self) -> str:
         """The same, as notebooks show it."""
-        from .page import short_qualification_html  # only here: pages take long to import
+        from .comparison_page import (
+            short_qualification_html,  # only here: pages take long to import
+        )
 
         return short_qualification_html(self)
 
@@ -112,50 +116,72 @@ def qualify(
     """
     choice("isolation", isolation, ISOLATIONS)
     system = as_system(system, "qualify")
-    new = candidate if isinstance(candidate, Component) else Path(candidate)
-    swap = prepare_swap(system, component, new, rename or {}, values or {}, isolation, units)
+    fmu = candidate if isinstance(candidate, Component) else Path(candidate)
+    swap = prepare_swap(system, component, fmu, rename or {}, values or {}, isolation, units)
     if swap.swapped is None:
         return Qualification(swap)
-    asked = tuple(m for m in metrics_of(system.metrics, metrics) if not m.reason)
-    try:
-        more = in_si(swap.swapped, asked).conversions
-    except InputError as error:
-        how = "of the candidate: --set components.NAME.units.VARIABLE=UNIT"
-        raise InputError(f"{error}; {how}") from error
+    definitions = tuple(m for m in metrics_of(system.metrics, metrics) if not m.reason)
+    to_si = _conversions_of_candidate(swap.swapped, definitions)
     run = simulate(swap.system, progress=progress and "original")
-    ours = side_of(run, swap.original.name)
-    ours = replace(ours, to_si={n: c for n, c in more.items() if n not in run} | dict(run.to_si))
-    given = bands or Bands()
-    given.check(ours.signals, (*ours.measured(asked), END.name))
-    result, failure = _tried(swap.swapped, progress)
+    original = side_of(run, swap.original.name)
+    missing = {name: change for name, change in to_si.items() if name not in run}
+    original = replace(original, to_si={**missing, **run.to_si})
+    stated = bands or Bands()
+    stated.check(original.signals, (*original.measured(definitions), END.name))
+    result, failure = _candidate_run(swap.swapped, progress)
     if result is None:
         return Qualification(swap, failure=failure)
-    early = any(r.ended_at is not None for r in (run, result))
-    asked = () if failure else (*asked, END) if early else asked
-    own = ours.measured(asked)
-    again: list[Side] = []
-    numerics: list[str] = []
-    there = [given.of_metric(name) for name, value in own.items() if value is not None]
-    if not all(entry and entry.wide for entry in (*map(given.of_signal, ours.signals), *there)):
-        again, numerics = _other_numerics(swap.system, ours, progress)
-    theirs = side_of(result, swap.candidate.name).converted(swap.back)
-    both = own, replace(ours, time=theirs.time, signals=theirs.signals).measured(asked)
+    if failure:
+        definitions = ()
+    elif run.ended_at is not None or result.ended_at is not None:
+        definitions = (*definitions, END)
+    measured = original.measured(definitions)
+    repetitions, numerics = _repetitions(swap.system, original, measured, stated, progress)
+    new = side_of(result, swap.candidate.name).converted(swap.back)
+    measured_of_new = replace(original, time=new.time, signals=new.signals).measured(definitions)
     span_ns, step_ns = swap.system.stop_ns - swap.system.start_ns, swap.system.step_ns
     shift = max(SHARE * span_ns, float(FEWEST_STEPS * step_ns)) / NANOSECONDS
-    required = {*map(plain, own)}
-    found = judge(ours, theirs, both, asked, again, given, shift, swap.nominals, required)
-    texts = [f"{name} is a String: not compared" for name in ours.texts]
-    found = replace(
-        found,
+    judge = Judge(
+        original, repetitions, stated, shift, swap.nominals, required={*map(plain, measured)}
+    )
+    texts = [f"{name} is a String: not compared" for name in original.texts]
+    comparison = replace(
+        compared_by(judge, new, (measured, measured_of_new), definitions),
         differences=differences(run, result),
         notes=(*(line for line in result.log if line not in run.log), *texts),
         numerics=tuple(numerics),
         names=("original", "candidate"),
     )
-    return Qualification(swap, found, failure)
+    return Qualification(swap, comparison, failure)
 
 
-def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
+def _conversions_of_candidate(
+    swapped: System, definitions: Sequence[Metric]
+) -> Mapping[str, Conversion]:
+    """How the signals that the metrics need are converted to SI; InputError where that fails."""
+    try:
+        return in_si(swapped, definitions).conversions
+    except InputError as error:
+        remedy = "of the candidate: --set components.NAME.units.VARIABLE=UNIT"
+        raise InputError(f"{error}; {remedy}") from error
+
+
+def _repetitions(
+    system: System,
+    original: Side,
+    measured: Mapping[str, float | None],
+    stated: Bands,
+    progress: bool,
+) -> tuple[list[Side], list[str]]:
+    """Runs of the original with other numerics, and which; none where no band is derived."""
+    of_metrics = [stated.of_metric(name) for name, value in measured.items() if value is not None]
+    entries = (*map(stated.of_signal, original.signals), *of_metrics)
+    if all(entry and entry.wide for entry in entries):
+        return [], []
+    return _other_numerics(system, original, progress)
+
+
+def _candidate_run(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
     """The candidate's run as far as it got, and why it did not get to the end."""
     try:
         return simulate(swapped, progress=progress and "candidate"), None
@@ -168,15 +194,15 @@ def _tried(swapped: System, progress: bool) -> tuple[Result | None, str | None]:
 def _other_numerics(system: System, original: Side, progress: bool) -> tuple[list[Side], list[str]]:
     """The original thinned, with twice the step, in the other scheme, if it runs so; in words."""
     runs = original.every_second()
-    said = ["every second sample"]
-    for name, other in _variants(system):
+    numerics = ["every second sample"]
+    for name, variant in _variants(system):
         try:
-            run = simulate(other, progress=progress and f"original, {name}")
+            run = simulate(variant, progress=progress and f"original, {name}")
             runs.append(side_of(run, name))
-            said.append(name)
+            numerics.append(name)
         except (InputError, SimulationError) as error:
-            said.append(f"not {name}: {error}")
-    return runs, said
+            numerics.append(f"not {name}: {error}")
+    return runs, numerics
 
 
 def _variants(system: System) -> Iterator[tuple[str, System]]:
@@ -200,43 +226,38 @@ def prepare_swap(
 ) -> Swap:
     """The swap that qualify() describes; InputError where its arguments are wrong."""
     place = system.component(component, f"--as {component}")
-    ours = place.interface
-    was = candidate if isinstance(candidate, Component) else replace(place, values={})
-    fmu = was.fmu if isinstance(candidate, Component) else candidate
-    now = replaced(was, fmu, rename, units or {}, "")
-    theirs = renamed(now.sized(describe(fmu)), now.rename, "rename")
-    theirs = in_units(theirs, now.units, "units")
-    _check_renamed(rename, ours, theirs)
-    names = (*theirs.by_name, *(n for n in theirs.arrays if n not in ours.arrays))
-    extra = {f"{component}.{name}": name for name in names if name not in ours.by_name}
-    own = {n: v for n, v in now.values.items() if n not in ours.by_name}
-    own |= {extra[key]: value for key, value in values.items() if key in extra}
-    common = {key: value for key, value in values.items() if key not in extra}
+    original = place.interface
+    former = candidate if isinstance(candidate, Component) else replace(place, values={})
+    fmu = former.fmu if isinstance(candidate, Component) else candidate
+    new = replaced(former, fmu, rename, units or {}, "")
+    interface = renamed(new.sized(describe(fmu)), new.rename, "rename")
+    interface = in_units(interface, new.units, "units")
+    _check_renamed(rename, original, interface)
+    common, extra = _divided(values, component, original, interface)
+    extra = {n: v for n, v in new.values.items() if n not in original.by_name} | extra
     system = system.with_overrides(as_overrides(common, "--set {place}"))
     system = replace(system, record=system.record.with_outputs(system.components))
     use = use_of(system, component)
-    differences = interface_differences(ours, theirs, use, own)
+    differences = interface_differences(original, interface, use, extra)
     swapped = None
     if not any(d.severity == "blocks" for d in differences):
-        given = {n: v for n, v in use.values.items() if n in theirs.by_name}
-        given = converted(given, ours, theirs) | dict(now.values)
-        for name, value in own.items():
+        used = {n: v for n, v in use.values.items() if n in interface.by_name}
+        new_values = converted(used, original, interface) | dict(new.values)
+        for name, value in extra.items():
             text = f"--set {component}.{name}"
-            given |= parse_values(theirs, text, name, value, text=True)
-        place = replace(now, name=component, values=given, isolation=isolation)
+            new_values |= parse_values(interface, text, name, value, text=True)
+        new = replace(new, name=component, values=new_values, isolation=isolation)
         try:
-            parts = tuple(place if c.name == component else c for c in system.components)
-            record, _ = system.record.without_missing(system.components, parts)
-            swapped = replace(system, components=parts, record=record)
+            swapped = _with_component(system, new)
         except InputError as error:
             differences.append(Difference("blocks", "system", component, str(error)))
     differences.sort(key=lambda d: SEVERITIES.index(d.severity))
-    back = {}
-    for v in (v for port, v in system.recorded.items() if port.component == component):
-        if new := theirs.by_name.get(v.name):
-            start, end = unit_of(theirs, new), unit_of(ours, v)
-            both = conversion(start, end) if start and end else theirs.conversion(v.name, ours)
-            back[f"{component}.{v.name}"] = both
+    recorded = [v for port, v in system.recorded.items() if port.component == component]
+    back = {
+        f"{component}.{v.name}": _conversion_back(v, interface, original)
+        for v in recorded
+        if v.name in interface.by_name
+    }
     nominals = {
         str(port): v.magnitude if isinstance(v.magnitude, float) else None
         for port, v in system.recorded.items()
@@ -244,34 +265,70 @@ def prepare_swap(
     return Swap(system, component, fmu, tuple(differences), swapped, back, nominals)
 
 
-def component_of(found: System, name: str, system: System) -> Component:
+def _divided(
+    values: Mapping[str, Value], component: str, original: Interface, candidate: Interface
+) -> tuple[dict[str, Value], dict[str, Value]]:
+    """Start values for both systems, and those of variables that only the candidate has."""
+    arrays = [name for name in candidate.arrays if name not in original.arrays]
+    new_names = [n for n in (*candidate.by_name, *arrays) if n not in original.by_name]
+    name_at = {f"{component}.{name}": name for name in new_names}
+    common = {place: value for place, value in values.items() if place not in name_at}
+    extra = {name_at[place]: value for place, value in values.items() if place in name_at}
+    return common, extra
+
+
+def _with_component(system: System, new: Component) -> System:
+    """The system with another component of that name, without what it can no longer record."""
+    components = tuple(new if c.name == new.name else c for c in system.components)
+    record, _ = system.record.without_missing(system.components, components)
+    return replace(system, components=components, record=record)
+
+
+def _conversion_back(
+    variable: Variable, candidate: Interface, original: Interface
+) -> Conversion | None:
+    """How a signal of the candidate is converted to the unit of the original."""
+    unit = unit_of(candidate, candidate.by_name[variable.name])
+    former_unit = unit_of(original, variable)
+    if unit and former_unit:
+        return conversion(unit, former_unit)
+    return candidate.conversion(variable.name, original)
+
+
+def component_of(origin: System, name: str, system: System) -> Component:
     """The component of that name in another system, as a candidate for the one in `system`.
 
     It runs on the connections of `system`. InputError where one of its own passes on other values
     than the same one does there, as by a factor: what the component puts out would be misread.
     """
-    component = found.component(name, found.name)
+    component = origin.component(name, origin.name)
     connected = {port for c in system.connections for port in (c.source, c.target)}
-    there = {(c.source, c.target): c for c in system.connections}
-    passed = transforms(found)
-    for c in found.connections:
+    connection_here = {(c.source, c.target): c for c in system.connections}
+    passed = transforms(origin)
+    for c in origin.connections:
         if not any(port.component == name and port in connected for port in (c.source, c.target)):
             continue
-        here = there.get((c.source, c.target), Connection(c.source, c.target))
-        factor, offset = connection_transform(found, here)
-        own = passed[c.target]
-        if not (isclose(own[0], factor) and isclose(own[1], offset)):
+        own_connection = connection_here.get((c.source, c.target), Connection(c.source, c.target))
+        factor, offset = connection_transform(origin, own_connection)
+        values_there = passed[c.target]
+        if not (isclose(values_there[0], factor) and isclose(values_there[1], offset)):
             raise InputError(
-                f"{found.name}: {c}: has factor = {own[0]:g}, offset = {own[1]:g}, which the "
-                f"connections of {system.name}, on which the candidate runs, do not have; must be "
-                f"units of its component instead, in [components.{name}] or --set"
+                f"{origin.name}: {c}: has factor = {values_there[0]:g}, offset = "
+                f"{values_there[1]:g}, which the connections of {system.name}, on which the "
+                "candidate runs, do not have; must be units of its component instead, in "
+                f"[components.{name}] or --set"
             )
     return component
 
 
-def _check_renamed(rename: Mapping[str, str], ours: Interface, theirs: Interface) -> None:
+def _check_renamed(rename: Mapping[str, str], original: Interface, candidate: Interface) -> None:
     """InputError where the candidate's variables get names that the original does not have."""
     for new, name in rename.items():
-        for called in theirs.elements(new):
+        for called in candidate.elements(new):
             entry = f"rename: {new!r} = {name!r}"
-            known(f"{entry}: the original has no variable", called, ours.by_name, see=ours.listing)
+            known(
+                f"{entry}: the original has no variable",
+                called,
+                original.by_name,
+                see=original.listing,
+            )

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
+from warnings import warn
 
 import numpy as np
 import numpy.typing as npt
@@ -70,30 +71,32 @@ class Side:
 
     def every_second(self) -> list[Side]:
         """The rows of even numbers, and those of odd ones; each with the ends."""
-        kept = np.zeros((2, len(self.time)), bool)
-        kept[0, ::2] = kept[1, 1::2] = kept[:, 0] = kept[:, -1] = True
-        return [self._rows(rows) for rows in kept]
+        is_kept = np.zeros((2, len(self.time)), bool)
+        is_kept[0, ::2] = is_kept[1, 1::2] = is_kept[:, 0] = is_kept[:, -1] = True
+        return [self._rows(rows) for rows in is_kept]
 
-    def _rows(self, kept: Any) -> Side:
-        signals = {name: column[kept] for name, column in self.signals.items()}
-        return replace(self, time=self.time[kept], signals=signals)
+    def _rows(self, chosen: Any) -> Side:
+        signals = {name: column[chosen] for name, column in self.signals.items()}
+        return replace(self, time=self.time[chosen], signals=signals)
 
     def converted(self, changes: Mapping[str, Conversion | None]) -> Side:
         """With other values of signals, without those whose conversion is None."""
-        found = {n: changes.get(n, IDENTITY) for n in self.signals}
+        conversions = {n: changes.get(n, IDENTITY) for n in self.signals}
         signals = {
             n: self.signals[n] if c == IDENTITY else c(self.signals[n])
-            for n, c in found.items()
+            for n, c in conversions.items()
             if c
         }
         return replace(self, signals=signals)
 
-    def check_shared(self, name: str, other: Side) -> None:
+    def check_shared(self, name: str, counterpart: Side) -> None:
         """InputError where a signal that the other has as numbers is none of finite ones here."""
         if name in self.texts:
             if self.log is not None:
                 self.log[name]  # which says what is no number, by its line
-            raise InputError(f"{self.name}: {name}: has texts; must be numbers, as in {other.name}")
+            raise InputError(
+                f"{self.name}: {name}: has texts; must be numbers, as in {counterpart.name}"
+            )
         if self.log is None:
             return
         wrong = np.flatnonzero(~np.isfinite(self.signals[name]))
@@ -113,38 +116,50 @@ class Side:
             for name, column in self.signals.items()
         }
 
-    def measured(self, asked: Iterable[Metric]) -> dict[str, float | None]:
+    def measured(self, metrics: Iterable[Metric]) -> dict[str, float | None]:
         """The metrics as single values by names like time_to_contact[1]; true is 1 and false 0."""
         signals = Signals(self.time, self.signals, self.roles, self.to_si, self.values)
-        found = measure(signals, asked).flat()
-        return {name: None if v is None else float(v) for name, v in found.items()}
+        values = measure(signals, metrics).flat()
+        return {name: None if v is None else float(v) for name, v in values.items()}
 
-    def like(self, other: Side) -> Side:
+    def like(self, reference: Side) -> Side:
         """A log from elsewhere as one of the other's system: with its roles, its types where they
         fit, and its units where the log tells of none.
         """
         if self.result:
             return self
-        silent = {name for name in other.units if name in self.units and not self.units[name]}
-        same = {n for n in other.units if n in silent or self.units.get(n) == other.units[n]}
+        silent = {name for name in reference.units if name in self.units and not self.units[name]}
+        units = {**self.units, **{name: reference.units[name] for name in silent}}
+        to_si = {
+            **self.to_si,
+            **{
+                name: change
+                for name, change in reference.to_si.items()
+                if units.get(name) == reference.units.get(name)
+            },
+        }
+        typed = {
+            name: _typed(column, reference.signals.get(name))
+            for name, column in self.signals.items()
+        }
         return replace(
             self,
-            signals={n: _typed(c, other.signals.get(n)) for n, c in self.signals.items()},
-            units={**self.units, **{name: other.units[name] for name in silent}},
-            to_si={**self.to_si, **{n: c for n, c in other.to_si.items() if n in same}},
-            roles=other.roles,
-            values=other.values,
-            groups=other.groups,
-            silent=tuple(n for n in self.signals if n in silent),
+            signals=typed,
+            units=units,
+            to_si=to_si,
+            roles=reference.roles,
+            values=reference.values,
+            groups=reference.groups,
+            silent=tuple(name for name in self.signals if name in silent),
         )
 
-    def change(self, name: str, other: Side) -> Conversion | None:
+    def change(self, name: str, reference: Side) -> Conversion | None:
         """The conversion of a signal from the other's unit to ours; None where there is none."""
-        ours, theirs = self.units[name], other.units[name]
-        if ours == theirs or not ours or not theirs:
+        own_unit, reference_unit = self.units[name], reference.units[name]
+        if own_unit == reference_unit or not own_unit or not reference_unit:
             return IDENTITY
-        known = known_unit(theirs), known_unit(ours)
-        return conversion(known[0], known[1]) if known[0] and known[1] else None
+        si_units = known_unit(reference_unit), known_unit(own_unit)
+        return conversion(si_units[0], si_units[1]) if si_units[0] and si_units[1] else None
 
 
 def side_of(run: Result, called: str) -> Side:
@@ -164,13 +179,13 @@ def read_side(path: Path, names: LogNames = AS_THEY_ARE) -> Side:
     one_of_its = path.name in (SIGNALS, ARROW, SETTINGS) and path.with_name(SETTINGS).is_file()
     if path.is_dir() or one_of_its:
         return side_of(load_run(path), str(path))
-    what = f"a folder that `run --out` wrote, or a {choices(LOGS)} file"
+    valid = f"a folder that `run --out` wrote, or a {choices(LOGS)} file"
     if not path.is_file():
-        raise InputError(f"{path}: no such run; must be {what}")
+        raise InputError(f"{path}: no such run; must be {valid}")
     if path.suffix.lower() in LOGS:
         return _of_log(read_log(path, names))
     check_nature(path, "run")
-    raise InputError(f"{path}: must be {what} of signals")
+    raise InputError(f"{path}: must be {valid} of signals")
 
 
 def _of_log(log: Log) -> Side:
@@ -180,8 +195,8 @@ def _of_log(log: Log) -> Side:
     readable = [name for name in log if log.readable(name)]
     texts = [name for name in log if name not in readable]
     units = {name: log.units[name] for name in readable}
-    known = {name: known_unit(unit or "1") for name, unit in units.items()}
-    to_si = {n: Conversion(u.factor, u.offset) for n, u in known.items() if u and not u.si}
+    si_unit_of = {name: known_unit(unit or "1") for name, unit in units.items()}
+    to_si = {n: Conversion(u.factor, u.offset) for n, u in si_unit_of.items() if u and not u.si}
     signals = {name: log[name] for name in readable}
     return Side(str(log.path), log.time, signals, units, to_si, texts, log=log)
 
@@ -195,22 +210,28 @@ def _typed(column: npt.NDArray[Any], like: npt.NDArray[Any] | None) -> npt.NDArr
 class Difference(NamedTuple):
     """A setting that differs between two runs, and its value in each of them, in words."""
 
-    what: str
+    setting: str
     a: str
     b: str
+
+    @property
+    def what(self) -> str:
+        """The setting, by its former name, which is gone in the next version."""
+        warn("Difference.what is now Difference.setting", DeprecationWarning, stacklevel=2)
+        return self.setting
 
 
 def differences(a: Result, b: Result) -> tuple[Difference, ...]:
     """Where the settings of two runs, the FMUs and the versions differ."""
     first, second = dict(_facts(a)), dict(_facts(b))
     values = {name for run in (a, b) for name in given_values(run.settings)}
-    found = []
-    for what in dict.fromkeys((*first, *second)):
-        lacking = AS_IT_STARTS if what in values else NONE
-        pair = first.get(what, lacking), second.get(what, lacking)
-        if pair[0] != pair[1]:
-            found.append(Difference(what, *pair))
-    return tuple(found)
+    different = []
+    for setting in dict.fromkeys((*first, *second)):
+        absent = AS_IT_STARTS if setting in values else NONE
+        in_a, in_b = first.get(setting, absent), second.get(setting, absent)
+        if in_a != in_b:
+            different.append(Difference(setting, in_a, in_b))
+    return tuple(different)
 
 
 def _facts(run: Result) -> Iterator[tuple[str, str]]:
@@ -244,8 +265,8 @@ def _facts(run: Result) -> Iterator[tuple[str, str]]:
     yield from _nested("version of ", run.origin.get("versions", {}))
 
 
-def _nested(what: str, entries: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    yield from ((f"{what}{key}", _words(value)) for key, value in entries.items())
+def _nested(prefix: str, entries: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield from ((f"{prefix}{key}", _words(value)) for key, value in entries.items())
 
 
 def _words(value: Any) -> str:

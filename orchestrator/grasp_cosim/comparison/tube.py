@@ -34,8 +34,8 @@ class Curve(NamedTuple):
         """The values at other times; before the first and after the last sample those of it."""
         if not self.held:
             return np.interp(time, self.time, self.values)
-        before = np.searchsorted(self.time, time + ROUNDING, side="right") - 1
-        return self.values[np.clip(before, 0, None)]
+        last_sample = np.searchsorted(self.time, time + ROUNDING, side="right") - 1
+        return self.values[np.clip(last_sample, 0, None)]
 
     @property
     def gaps(self) -> Array:
@@ -55,12 +55,12 @@ class Curve(NamedTuple):
     def continued(self, shift: float) -> "Curve":
         """The curve and how it goes on for a shift in s; a held one stays."""
         end, last = self.time[-1], self.values[-1]
-        before = (self.time < end) & (self.time >= end - shift - ROUNDING)
-        if self.held or not before.any():
+        mirrored = (self.time < end) & (self.time >= end - shift - ROUNDING)
+        if self.held or not mirrored.any():
             return self
         return Curve(
-            np.concatenate([self.time, 2.0 * end - self.time[before][::-1]]),
-            np.concatenate([self.values, 2.0 * last - self.values[before][::-1]]),
+            np.concatenate([self.time, 2.0 * end - self.time[mirrored][::-1]]),
+            np.concatenate([self.values, 2.0 * last - self.values[mirrored][::-1]]),
         )
 
 
@@ -96,17 +96,20 @@ def deviation(reference: Curve, candidate: Curve, shift: float) -> Deviation:
     0 where the one is, but for a shift of up to shift in s, the other. Symmetric.
     """
     time = np.union1d(reference.time, candidate.time)
-    ours, theirs = reference.at(time), candidate.at(time)
-    around_ours, around_theirs = (tube(c, time, shift) for c in (reference, candidate))
-    near_theirs = np.clip(theirs, *around_ours)
-    near_ours = np.clip(ours, *around_theirs)
-    theirs_out, ours_out = np.abs(theirs - near_theirs), np.abs(ours - near_ours)
-    first = theirs_out >= ours_out
+    reference_values, candidate_values = reference.at(time), candidate.at(time)
+    around_reference, around_candidate = (tube(c, time, shift) for c in (reference, candidate))
+    nearest_candidate = np.clip(candidate_values, *around_reference)
+    nearest_reference = np.clip(reference_values, *around_candidate)
+    candidate_outside, reference_outside = (
+        np.abs(candidate_values - nearest_candidate),
+        np.abs(reference_values - nearest_reference),
+    )
+    candidate_is_further = candidate_outside >= reference_outside
     return Deviation(
         time,
-        np.where(first, theirs_out, ours_out),
-        np.where(first, near_theirs, ours),
-        np.where(first, theirs, near_ours),
+        np.where(candidate_is_further, candidate_outside, reference_outside),
+        np.where(candidate_is_further, nearest_candidate, reference_values),
+        np.where(candidate_is_further, candidate_values, nearest_reference),
     )
 
 
@@ -119,8 +122,8 @@ def _least(values: Array, first: npt.NDArray[np.intp], last: npt.NDArray[np.intp
     length = last - first
     least, span = values, 1
     while len(result):
-        here = (span <= length) & (length < 2 * span)
-        result[here] = np.minimum(least[first[here]], least[last[here] - span])
+        covered = (span <= length) & (length < 2 * span)
+        result[covered] = np.minimum(least[first[covered]], least[last[covered] - span])
         if not (length >= 2 * span).any():
             break
         least = np.minimum(least[:-span], least[span:])

@@ -17,10 +17,10 @@ from .outcome import ComparisonData, QualificationData
 ROWS = 8
 """The most signals, metrics or differences of one severity that the text lists."""
 
-FEW = 3
+FEW_ROWS = 3
 """How many it lists where all of them are inside, or just notes."""
 
-MOST = 12
+MAX_LINES = 12
 """So many differences of the settings, or notes, at most are in the text."""
 
 WIDE = 0.1
@@ -39,7 +39,7 @@ def as_text(c: ComparisonData) -> str:
     sides = zip(c.names, (c.a, c.b), strict=True)
     parts = [[verdict(c), *(f"{name}: {side.name}" for name, side in sides)]]
     if c.differences:
-        rows = _cut([f"  {d.what}: {d.a} | {d.b}" for d in c.differences], MOST, "  ")
+        rows = _cut([f"  {d.setting}: {d.a} | {d.b}" for d in c.differences], MAX_LINES, "  ")
         parts.append([f"the runs differ in ({' | '.join(c.names)}):", *rows])
     elif c.a.result and c.b.result:
         parts.append(["the settings of the runs are the same"])
@@ -62,12 +62,18 @@ def short_qualification(q: QualificationData) -> str:
 
 def short_lines(c: ComparisonData) -> list[str]:
     """A few of the signals and metrics, the worst first."""
-    return [f"  {line}" for kind, found in kinds(c) for line in _table(kind, found, c.names, FEW)]
+    return [
+        f"  {line}"
+        for kind, compared in kinds(c)
+        for line in _table(kind, compared, c.names, FEW_ROWS)
+    ]
 
 
 def kinds(c: ComparisonData) -> list[tuple[str, Sequence[Compared]]]:
     """The signals and the metrics that were compared, as far as there are any."""
-    return [(k, found) for k, found in (("signal", c.signals), ("metric", c.metrics)) if found]
+    return [
+        (k, compared) for k, compared in (("signal", c.signals), ("metric", c.metrics)) if compared
+    ]
 
 
 def notes(c: ComparisonData) -> list[str]:
@@ -79,29 +85,41 @@ def notes(c: ComparisonData) -> list[str]:
         if names
     ]
     compared = (*c.signals, *c.metrics)
-    given = sum(m.band.source == "given" for m in compared)
-    derived = f"{len(compared) - given} derived from {c.names[0]} ({'; '.join(c.numerics)})"
-    bands = f"{given} given, {derived}" if given < len(compared) else f"all {given} given"
+    stated_count = sum(m.band.source == "given" for m in compared)
+    derived = f"{len(compared) - stated_count} derived from {c.names[0]} ({'; '.join(c.numerics)})"
+    bands = (
+        f"{stated_count} given, {derived}"
+        if stated_count < len(compared)
+        else f"all {stated_count} given"
+    )
     wide = [s.name for s in c.signals if s.span and WIDE * s.span < s.band.width < inf]
-    said = [f"bands that are wide for the range of their signals: {', '.join(wide)}"]
-    return [f"bands: {bands}", *(said if wide else []), *only, *c.notes]
+    wide_note = [f"bands that are wide for the range of their signals: {', '.join(wide)}"]
+    return [f"bands: {bands}", *(wide_note if wide else []), *only, *c.notes]
 
 
 def as_json(c: ComparisonData) -> dict[str, Any]:
     """All of it, ready for JSON; a number that is infinite, or does not exist, is null."""
-    return {
+    differences = [{"what": d.setting, "a": d.a, "b": d.b} for d in c.differences]
+    only_a, only_b = (
+        {"signals": list(signals), "metrics": list(metrics)}
+        for signals, metrics in zip(c.only, c.only_metrics, strict=True)
+    )
+    summary = {
         "alike": c.alike,
         "verdict": verdict(c),
         "a": c.a.name,
         "b": c.b.name,
         "begin": c.begin,
         "end": c.end,
-        "differences": [d._asdict() for d in c.differences],
+        "differences": differences,
+    }
+    return {
+        **summary,
         "signals": [_json(s, "a", "b") for s in c.signals],
         "metrics": [_json(m, "a", "b") for m in c.metrics],
         "no_value": list(c.absent),
-        "only_a": {"signals": list(c.only[0]), "metrics": list(c.only_metrics[0])},
-        "only_b": {"signals": list(c.only[1]), "metrics": list(c.only_metrics[1])},
+        "only_a": only_a,
+        "only_b": only_b,
         "notes": [*absent_lines(c), *notes(c)],
         "units": {"begin": "s", "end": "s", "band_time": "s", "time": "s"},
     }
@@ -113,7 +131,7 @@ def qualification_text(q: QualificationData) -> str:
     last = [f"whether this machine loads it: grasp-cosim inspect --load {q.swap.candidate}"]
     parts += [*([] if c is None else _tables(c)), difference_lines(q.swap.differences)]
     if c is not None:
-        last = _cut(notes(c), MOST)
+        last = _cut(notes(c), MAX_LINES)
     return _joined([*parts, last if c is not None or q.failure else []])
 
 
@@ -134,28 +152,39 @@ def qualification_json(q: QualificationData) -> dict[str, Any]:
     `bands` are those that were used: `qualify --bands` takes the file.
     """
     system, c = q.swap.system, q.comparison
-    return {
+    summary = {
         "qualified": q.qualified,
         "reason": reason(q),
         "component": q.swap.component,
         "original": str(q.swap.original),
         "candidate": str(q.swap.candidate),
+    }
+    experiment = {
         "system": system.name,
         "step": in_seconds(system.step_ns),
         "stop": in_seconds(system.stop_ns),
         "scheme": system.scheme,
-        "failure": q.failure,
-        "differences": [asdict(d) for d in q.swap.differences],
-        "signals": [_json(s, "original", "candidate") for s in q.signals],
-        "metrics": [_json(m, "original", "candidate") for m in q.metrics],
+    }
+    runs = ("original", "candidate")
+    compared = {
+        "signals": [_json(s, *runs) for s in q.signals],
+        "metrics": [_json(m, *runs) for m in q.metrics],
         "no_value": [] if c is None else list(c.absent),
         "uncompared": [] if c is None else list(c.only[0]),
         "numerics": [] if c is None else list(c.numerics),
         "log": [] if c is None else list(c.notes),
-        "bands": {
-            "signals": {s.name: _band(s) | {"time": s.band.time} for s in q.signals},
-            "metrics": {m.name: _band(m) for m in q.metrics},
-        },
+    }
+    bands = {
+        "signals": {s.name: _band(s) | {"time": s.band.time} for s in q.signals},
+        "metrics": {m.name: _band(m) for m in q.metrics},
+    }
+    return {
+        **summary,
+        **experiment,
+        "failure": q.failure,
+        "differences": [asdict(d) for d in q.swap.differences],
+        **compared,
+        "bands": bands,
         "units": {"step": "s", "stop": "s", "band_time": "s", "time": "s"},
     }
 
@@ -163,7 +192,7 @@ def qualification_json(q: QualificationData) -> dict[str, Any]:
 def reason(q: QualificationData) -> str:
     """Why the verdict is what it is, in one line."""
     if q.blocks:
-        names = choices((d.variable for d in q.blocks), FEW)
+        names = choices((d.variable for d in q.blocks), FEW_ROWS)
         return f"not run, the interface does not fit: {names}"
     if q.failure:
         return f"the candidate failed: {q.failure}"
@@ -176,22 +205,22 @@ def difference_lines(differences: Sequence[Difference]) -> list[str]:
     """What the candidate declares otherwise, the worst first."""
     if not differences:
         return ["interface: no difference"]
-    found = {s: [d for d in differences if d.severity == s] for s in SEVERITIES}
-    lines = ["interface: " + ", ".join(f"{len(of)} {s}" for s, of in found.items() if of)]
-    for severity, of in found.items():
+    by_severity = {s: [d for d in differences if d.severity == s] for s in SEVERITIES}
+    lines = ["interface: " + ", ".join(f"{len(of)} {s}" for s, of in by_severity.items() if of)]
+    for severity, of in by_severity.items():
         rows = [f"  {severity:6}  {d.kind:11}  {d.variable}: {d.text}" for d in of]
-        lines += _cut(rows, FEW if severity == "notes" else ROWS, f"  {severity:6}  ")
+        lines += _cut(rows, FEW_ROWS if severity == "notes" else ROWS, f"  {severity:6}  ")
     return lines
 
 
 def counts(c: ComparisonData) -> str:
     """How many are out of band: "2 of 30 signals and 1 of 12 metrics out of band"."""
-    found = [
-        f"{sum(not one.inside for one in compared)} of {len(compared)} {name}"
+    shares = [
+        f"{sum(not comparison.inside for comparison in compared)} of {len(compared)} {name}"
         for name, compared in (("signals", c.signals), ("metrics", c.metrics))
         if compared
     ]
-    return f"{' and '.join(found)} out of band"
+    return f"{' and '.join(shares)} out of band"
 
 
 def absent_lines(c: ComparisonData) -> list[str]:
@@ -199,20 +228,23 @@ def absent_lines(c: ComparisonData) -> list[str]:
     if not c.absent:
         return []
     names = {plain(name) for name in c.absent}
-    means = [m.none for m in c.asked if m.none and m.name in names]
-    said = f"{', '.join(dict.fromkeys(means))} until t = {c.end:g} s: " if means else ""
+    means = [m.none for m in c.metric_definitions if m.none and m.name in names]
+    meaning = f"{', '.join(dict.fromkeys(means))} until t = {c.end:g} s: " if means else ""
     until = "" if means else f" until t = {c.end:g} s"
     line = f"{len(c.absent)} metrics have no value in either run{until}: {choices(c.absent, 6)}"
-    return [said + line]
+    return [meaning + line]
 
 
 def _joined(parts: Iterable[Sequence[str]]) -> str:
     return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
-def _cut(lines: Sequence[str], most: int, indent: str = "") -> list[str]:
-    left = len(lines) - most
-    return [*lines[:most], *([f"{indent}{left} more; --json has all"] if left > 0 else [])]
+def _cut(lines: Sequence[str], max_rows: int, indent: str = "") -> list[str]:
+    remaining = len(lines) - max_rows
+    return [
+        *lines[:max_rows],
+        *([f"{indent}{remaining} more; --json has all"] if remaining > 0 else []),
+    ]
 
 
 def _tables(c: ComparisonData) -> list[list[str]]:
@@ -231,18 +263,20 @@ def cells(name: str, compared: Sequence[Compared], runs: tuple[str, str]) -> lis
     return rows
 
 
-def _table(name: str, compared: Sequence[Compared], runs: tuple[str, str], most: int) -> list[str]:
+def _table(
+    name: str, compared: Sequence[Compared], runs: tuple[str, str], max_rows: int
+) -> list[str]:
     """The lines of a table of signals or metrics: what is out of band, the worst first and at
-    `most` so many, else some that are inside; `runs` are the heads of their values.
+    `max_rows` so many, else some that are inside; `runs` are the heads of their values.
     """
     outside = [c for c in compared if not c.inside]
-    shown = outside[:most] or compared[:FEW]
-    lines = columns(cells(name, shown, runs), {1, 4})
-    if left := len(compared) - len(shown):
-        beyond = len(outside) - len(shown)
-        more = f"{beyond} more out of band, " if beyond > 0 else ""
-        inside = len(compared) - len(outside) if outside else left
-        lines.append(f"{'':8}{more}{inside} more inside")
+    listed_rows = outside[:max_rows] or compared[:FEW_ROWS]
+    lines = columns(cells(name, listed_rows, runs), {1, 4})
+    if remaining := len(compared) - len(listed_rows):
+        beyond = len(outside) - len(listed_rows)
+        more_outside = f"{beyond} more out of band, " if beyond > 0 else ""
+        inside = len(compared) - len(outside) if outside else remaining
+        lines.append(f"{'':8}{more_outside}{inside} more inside")
     return lines
 
 

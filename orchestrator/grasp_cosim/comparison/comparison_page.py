@@ -32,8 +32,7 @@ from ..report.tables import (
 from .bands import Compared, plain
 from .outcome import ComparisonData, QualificationData
 from .side import Side
-from .tube import deviation, tube
-from .words import (
+from .summary import (
     ROWS,
     absent_lines,
     cells,
@@ -44,6 +43,7 @@ from .words import (
     reason,
     verdict,
 )
+from .tube import deviation, tube
 
 AT_FIRST = 4
 """So many of the worst signals are shown first."""
@@ -68,9 +68,9 @@ def write_qualification(q: QualificationData, path: Path) -> bool:
     if c is None or not c.signals:
         path.unlink(missing_ok=True)
         return False
-    said = [*difference_lines(q.swap.differences), *notes(c)]
+    remarks = [*difference_lines(q.swap.differences), *notes(c)]
     text = f"{qualification_verdict(q)}: {reason(q)}"
-    write_text(path, _html(c, LIMIT, text, q.qualified, said))
+    write_text(path, _html(c, LIMIT, text, q.qualified, remarks))
     return True
 
 
@@ -95,14 +95,18 @@ def short_qualification_html(q: QualificationData) -> str:
 
 def _worst(c: ComparisonData) -> str:
     """Tables of the signals and the metrics that are furthest out of their bands."""
-    return "".join(text_table(cells(kind, found[:ROWS], c.names)) for kind, found in kinds(c))
+    return "".join(text_table(cells(kind, compared[:ROWS], c.names)) for kind, compared in kinds(c))
 
 
-def _html(c: ComparisonData, limit: int, said: str, good: bool, remarks: Sequence[str]) -> str:
-    """Return the page as text, with what is `said` at its top, and remarks on the runs."""
+def _html(
+    c: ComparisonData, limit: int, headline: str, is_good: bool, remarks: Sequence[str]
+) -> str:
+    """Return the page as text, with the headline at its top, and remarks on the runs."""
     time = np.union1d(*(run.part(c.begin, c.end).time for run in (c.a, c.b)))
-    shown = fit(time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit)
-    ids = {key: f"column{k}" for k, key in enumerate(shown.signals)}
+    embedded = fit(
+        time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit
+    )
+    ids = {key: f"column{k}" for k, key in enumerate(embedded.signals)}
     scene = c.a.result.view.scene(c.a.result) if c.a.result else None
     units = {s.name: s.unit for s in sorted(c.signals, key=lambda s: [*c.curves[0]].index(s.name))}
     texts = c.a.result.descriptions if c.a.result else {}
@@ -110,7 +114,7 @@ def _html(c: ComparisonData, limit: int, said: str, good: bool, remarks: Sequenc
         f"{c.names[0]} solid and pale, {c.names[1]} dashed over it; the tube is the band around "
         f"{c.names[0]}. {grouped(len(time))} rows of {counted(len(c.signals), 'signal')}."
     )
-    if thinned := shown.rows_per_pair:
+    if thinned := embedded.rows_per_pair:
         exact += f" Of each {thinned} rows this page keeps the lowest and the highest value."
     digits = partial(number, digits=4)
     signals = table(_heads(c), [_compared(c, s, s.name, s.unit, digits) for s in c.signals])
@@ -123,10 +127,13 @@ def _html(c: ComparisonData, limit: int, said: str, good: bool, remarks: Sequenc
     titles = [str((s.result and s.result.origin.get("title")) or s.name) for s in (c.a, c.b)]
     return document(
         Caption(" and ".join(titles), about(None)),
-        f'<span class="{"" if good else "warn"}">{escape(said)}</span>',
+        f'<span class="{"" if is_good else "warn"}">{escape(headline)}</span>',
         sections,
-        _state(c, shown, ids, scene, texts),
-        data_html(shown.time, {ids[key]: values for key, values in shown.signals.items()}),
+        _state(c, embedded, ids, scene, texts),
+        data_html(
+            embedded.time,
+            {ids[key]: values for key, values in embedded.signals.items()},
+        ),
         [scripts("save", "pairs")],
         scene.style if scene else "",
     )
@@ -148,34 +155,40 @@ def _drawn(
 
 
 def _state(
-    c: ComparisonData, shown: Shown, ids: Mapping[str, str], scene: Scene | None,
+    c: ComparisonData, embedded: Shown, ids: Mapping[str, str], scene: Scene | None,
     texts: Mapping[str, str],
 ) -> dict[str, Any]:  # fmt: skip
     """Return the data for the scripts, without the values of the signals."""
     logs = [run.result.log for run in (c.a, c.b) if run.result]
-    first = [name for name in (scene.shown if scene else ()) if name in c.curves[0]]
+    in_scene = [name for name in (scene.shown if scene else ()) if name in c.curves[0]]
     worst = [s.name for s in c.signals[:AT_FIRST]]
     return {
-        "rows": len(shown.time),
+        "rows": len(embedded.time),
         "names": list(c.names),
-        "signals": [
-            {
-                "name": s.name,
-                "unit": s.unit,
-                "steps": c.curves[0][s.name].held,
-                "text": texts.get(s.name, ""),
-                "id": ids[f"{s.name} a"],
-                "texts": None,
-                "pair": {k: ids.get(f"{s.name} {k}") for k in ("b", "low", "high", "apart")},
-                "width": s.band.width if isfinite(s.band.width) else None,
-            }
-            for s in c.signals
-        ],
-        "shown": list(dict.fromkeys([*first, *worst])),
+        "signals": [_signal_state(c, s, ids, texts) for s in c.signals],
+        "shown": list(dict.fromkeys([*in_scene, *worst])),
         **looks(scene),
         "about": about(None),
         "marks": [{"t": t, "color": "--fault"} for log in logs for t in moments(log)],
         "scene": None,
+    }
+
+
+def _signal_state(
+    c: ComparisonData, s: Compared, ids: Mapping[str, str], texts: Mapping[str, str]
+) -> dict[str, Any]:
+    """What the scripts are told of a signal; `ids` are those of its columns."""
+    pair = {key: ids.get(f"{s.name} {key}") for key in ("b", "low", "high", "apart")}
+    width = s.band.width if isfinite(s.band.width) else None
+    return {
+        "name": s.name,
+        "unit": s.unit,
+        "steps": c.curves[0][s.name].held,
+        "text": texts.get(s.name, ""),
+        "id": ids[f"{s.name} a"],
+        "texts": None,
+        "pair": pair,
+        "width": width,
     }
 
 
@@ -184,9 +197,9 @@ def _runs(c: ComparisonData, remarks: Sequence[str]) -> str:
     sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *c.names))
     about = [_about(side) for side in sides]
     always = ("from", "what", "changed", "run")
-    there = [key for key in (*always, "date", "command") if any(key in of for of in about)]
-    rows = [_row(key, [of.get(key, "") for of in about]) for key in there]
-    differ = [_row(d.what, [escape(d.a), escape(d.b)]) for d in c.differences]
+    has_text = [key for key in (*always, "date", "command") if any(key in of for of in about)]
+    rows = [_row(key, [of.get(key, "") for of in about]) for key in has_text]
+    differ = [_row(d.setting, [escape(d.a), escape(d.b)]) for d in c.differences]
     settings = f"<h3>The settings differ in</h3>{table(heads, differ)}" if differ else ""
     if c.a.result and c.b.result and not differ:
         settings = "<p>The settings of the two runs are the same.</p>"
@@ -194,12 +207,12 @@ def _runs(c: ComparisonData, remarks: Sequence[str]) -> str:
 
 
 def _about(side: Side) -> dict[str, str]:
-    """What is said of a run, by heads, as HTML."""
+    """What a run is, by heads, as HTML."""
     run = side.result
     if run is None:
         span = " to ".join(number(float(side.time[row])) for row in (0, -1))
-        said = f"{grouped(len(side.time))} rows, {span} s"
-        return {"from": escape(side.name), "what": "", "changed": "", "run": said}
+        length = f"{grouped(len(side.time))} rows, {span} s"
+        return {"from": escape(side.name), "what": "", "changed": "", "run": length}
     changed = changes(run.settings["changed"]) if "changed" in run.settings else ""
     return {
         "from": escape(side.name),
@@ -210,21 +223,21 @@ def _about(side: Side) -> dict[str, str]:
     }
 
 
-def _row(what: str, cells: Iterable[str]) -> str:
+def _row(head: str, cells: Iterable[str]) -> str:
     """A row of cells that are HTML already."""
-    return f"<td>{escape(what)}</td>" + "".join(f'<td class="w">{cell}</td>' for cell in cells)
+    return f"<td>{escape(head)}</td>" + "".join(f'<td class="w">{cell}</td>' for cell in cells)
 
 
 def _metrics(c: ComparisonData) -> str:
     """The metrics, in the order in which they are worked out."""
     rows = []
-    for metric in c.asked:
+    for metric in c.metric_definitions:
         for m in sorted(c.metrics, key=lambda m: m.name):
             if plain(m.name) == metric.name:
-                known, entry = m.name in metric.columns, m.name.removeprefix(metric.name)
-                title = metric.column_title(m.name) if known else f"{metric.title}{entry}"
-                shown = partial(scaled, factor=metric.factor)
-                rows.append(_compared(c, m, title, metric.display_unit, shown))
+                has_column, entry = m.name in metric.columns, m.name.removeprefix(metric.name)
+                title = metric.column_title(m.name) if has_column else f"{metric.title}{entry}"
+                in_display_unit = partial(scaled, factor=metric.factor)
+                rows.append(_compared(c, m, title, metric.display_unit, in_display_unit))
     return table(_heads(c), rows) if rows else "<p>There are no metrics that both have.</p>"
 
 
@@ -234,21 +247,29 @@ def _heads(c: ComparisonData) -> str:
 
 
 def _compared(
-    c: ComparisonData, one: Compared, title: str, unit: str | None, shown: Callable[[Any], str]
+    c: ComparisonData,
+    compared: Compared,
+    title: str,
+    unit: str | None,
+    formatted: Callable[[Any], str],
 ) -> str:
     """A row: how many widths of its band it is off; a button goes to the worst moment."""
-    said, at = "inside", ""
-    if not isfinite(one.deviation):
-        said = "one has none"
-    elif not one.inside:
-        said = f"{one.ratio:.3g} × band" if isfinite(one.ratio) else "differ"
-    if one.time is not None:
-        begin, end = (one.time + by * (AROUND * (c.end - c.begin) or 1e-3) for by in (-1.0, 1.0))
-        at = (
-            f'<button type="button" data-show="{escape(one.name)}" data-from="{begin!r}" '
-            f'data-to="{end!r}">{number(one.time)} s</button>'
+    state, at = "inside", ""
+    if not isfinite(compared.deviation):
+        state = "one has none"
+    elif not compared.inside:
+        state = f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "differ"
+    if compared.time is not None:
+        begin, end = (
+            compared.time + by * (AROUND * (c.end - c.begin) or 1e-3) for by in (-1.0, 1.0)
         )
-    values = map(shown, (one.deviation, one.band.width, one.original, one.candidate))
+        at = (
+            f'<button type="button" data-show="{escape(compared.name)}" data-from="{begin!r}" '
+            f'data-to="{end!r}">{number(compared.time)} s</button>'
+        )
+    values = map(
+        formatted, (compared.deviation, compared.band.width, compared.original, compared.candidate)
+    )
     cells = "".join(f'<td class="n">{cell}</td>' for cell in (at, *map(escape, values)))
-    warn, of_unit = "" if one.inside else " warn", f" in {escape(unit)}" if unit else ""
-    return f'<td>{escape(title)}{of_unit}</td><td class="n{warn}">{said}</td>{cells}'
+    warn, of_unit = "" if compared.inside else " warn", f" in {escape(unit)}" if unit else ""
+    return f'<td>{escape(title)}{of_unit}</td><td class="n{warn}">{state}</td>{cells}'
