@@ -12,7 +12,7 @@ from grasp_cosim.cli import main
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.inspection.inspection import inspect_fmu
 from grasp_cosim.inspection.loading import examine, unpack
-from grasp_cosim.interface import model_description, read
+from grasp_cosim.interface import attributes, model_description
 from grasp_cosim.interface.read import describe, read_interface
 from grasp_cosim.ssp.to_archive import write_ssp
 from hypothesis import HealthCheck, given
@@ -114,7 +114,7 @@ REFUSED = [
     ),
     (
         declared(variable(f'name="{"x" * 2001}" valueReference="1"')),
-        f"2001 characters; must have at most {read.MAX_NAME_LENGTH}",
+        f"2001 characters; must have at most {attributes.MAX_NAME_LENGTH}",
     ),
     (declared_3(*SAME), "variables 'a' and 'b' have the valueReference 7 both; must be unique"),
 ]

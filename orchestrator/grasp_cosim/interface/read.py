@@ -4,7 +4,6 @@ What it reads is checked. A number that only a master needs may be wrong: that i
 read_interface() refuses the FMU, but describe() does not.
 """
 
-import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,11 +14,19 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from ..base.checks import integer, real
 from ..base.collector import without_collector
 from ..base.errors import InputError
 from ..base.files import check_fmu_file
-from ..base.si_units import BASE, Unit, known_unit
+from ..base.si_units import Unit, known_unit
+from .attributes import (
+    base_unit,
+    check_identifier,
+    decimal_in,
+    printable_name,
+    real_in,
+    references_in,
+    whole_in,
+)
 from .fmi_types import FMI_1_AND_2_TYPES, FMI_3_TYPES, Value, kind_of, limits, typed
 from .interface import Interface, ModelExchange
 from .model_description import read_document, unreadable
@@ -27,10 +34,6 @@ from .obstacles import capabilities_of, kinds_of, of_binary, of_kind, platform_o
 from .variables import PARAMETERS, SETTABLE, Clock, Enumeration, Variable
 
 NUMERIC = ("Real", "Integer")
-CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
-"""Characters that end a line of a message or table, or move the cursor of a terminal."""
-MAX_NAME_LENGTH = 2000
-"""Characters; those of the largest FMUs have some hundreds."""
 MAX_DEPENDENCIES = 5_000_000
 """In all: of 2,000 outputs on 2,000 inputs, and some."""
 MAX_EVENT_INDICATORS = 1_000_000
@@ -105,7 +108,7 @@ def _read(path: Path) -> Interface:
         first_kind = root if reader.major == "1" else next(iter(kinds.values()), root)
         identifier = first_kind.get("modelIdentifier", "")
         with reader.tolerated():
-            _check_identifier(identifier)
+            check_identifier(identifier)
         exchange = reader.exchange(kinds)
         experiment = reader.experiment()
     except ValueError as error:
@@ -159,9 +162,9 @@ class _Reader:
             raise ValueError("no ModelVariables")
         self.elements = [element for element in parent if element.get("name") is not None]
         for element in self.elements:
-            _printable("variable", _name(element))
+            printable_name("variable", _name(element))
         self.references = [
-            _whole(f"variable {_name(e)!r}: valueReference", e.get("valueReference"), 2**32 - 1)
+            whole_in(f"variable {_name(e)!r}: valueReference", e.get("valueReference"), 2**32 - 1)
             for e in self.elements
         ]
         self.type_elements = [self.with_type(e) for e in self.elements]
@@ -190,7 +193,7 @@ class _Reader:
         element = self.root.find("DefaultExperiment")
         attributes = {} if element is None else element.attrib
         with self.tolerated():
-            _real("DefaultExperiment: stepSize", attributes.get("stepSize", "0"))
+            real_in("DefaultExperiment: stepSize", attributes.get("stepSize", "0"))
         return {key: typed("Real", attributes.get(name)) for key, name in EXPERIMENT.items()}
 
     def check_references(self) -> None:
@@ -241,10 +244,10 @@ class _Reader:
         """A declared type as an enumeration; the items of FMI 1.0 are counted."""
         items = []
         for count, item in enumerate(declared.iterfind("Item"), 1):
-            label = _printable(f"type {name!r}: item", item.get("name", ""))
+            label = printable_name(f"type {name!r}: item", item.get("name", ""))
             text = str(count) if self.major == "1" else item.get("value")
             with self.tolerated():
-                items.append((label, _whole(f"type {name!r}: item {label!r}", text)))
+                items.append((label, whole_in(f"type {name!r}: item {label!r}", text)))
         return Enumeration(name, tuple(items))
 
     def units(self) -> dict[str, Unit]:
@@ -255,7 +258,7 @@ class _Reader:
         """
         units = {}
         for element in self.root.iterfind("UnitDefinitions/Unit"):
-            name = _printable("unit", element.get("name", ""))
+            name = printable_name("unit", element.get("name", ""))
             base = element.find("BaseUnit")
             if base is None:
                 continue
@@ -298,7 +301,7 @@ class _Reader:
             for alias in element.iterfind("Alias") if len(element) else ():
                 yield replace(
                     v,
-                    name=_printable("variable", _name(alias)),
+                    name=printable_name("variable", _name(alias)),
                     description=alias.get("description") or v.description,
                     display_unit=alias.get("displayUnit") or v.display_unit,
                     alias=True,
@@ -315,7 +318,7 @@ class _Reader:
         def name_of(place: str, text: str | None) -> str:
             if text in self.names:
                 return self.names[text]
-            element = self.places.get(_whole(place, text))
+            element = self.places.get(whole_in(place, text))
             if element is None:
                 raise ValueError(f"{place} = {text!r}: must be the {key} of a variable")
             return _name(element)
@@ -391,7 +394,7 @@ class _Reader:
             self.enumerations.get(type_name) if type_element.tag == "Enumeration" else None
         )
         clock = self.clock(place, attributes) if kind == "Clock" else None
-        clocks = _references(place, attributes["clocks"]) if "clocks" in attributes else ()
+        clocks = references_in(place, attributes["clocks"]) if "clocks" in attributes else ()
         return Variable(
             name,
             kind,
@@ -424,18 +427,18 @@ class _Reader:
         interval, shift, resolution = None, Fraction(0), 0
         with self.tolerated():
             if "resolution" in attributes:
-                resolution = _whole(f"{place}: resolution", attributes["resolution"])
+                resolution = whole_in(f"{place}: resolution", attributes["resolution"])
             if resolution and "intervalCounter" in attributes:
-                counter = _whole(f"{place}: intervalCounter", attributes["intervalCounter"])
+                counter = whole_in(f"{place}: intervalCounter", attributes["intervalCounter"])
                 interval = Fraction(counter, resolution)
             elif "intervalDecimal" in attributes:
-                interval = _decimal(f"{place}: intervalDecimal", attributes["intervalDecimal"])
+                interval = decimal_in(f"{place}: intervalDecimal", attributes["intervalDecimal"])
             if resolution and "shiftCounter" in attributes:
                 shift = Fraction(
-                    _whole(f"{place}: shiftCounter", attributes["shiftCounter"]), resolution
+                    whole_in(f"{place}: shiftCounter", attributes["shiftCounter"]), resolution
                 )
             elif "shiftDecimal" in attributes:
-                shift = _decimal(f"{place}: shiftDecimal", attributes["shiftDecimal"])
+                shift = decimal_in(f"{place}: shiftDecimal", attributes["shiftDecimal"])
             if interval is not None and interval <= 0:
                 raise ValueError(f"{place}: interval = {float(interval):g} s: must be above 0")
             if shift < 0:
@@ -451,7 +454,7 @@ class _Reader:
         for key, value in zip(BOUNDS, values, strict=True):
             if isinstance(value, str):
                 with self.tolerated():
-                    _real(f"{place}: {key}", value)
+                    real_in(f"{place}: {key}", value)
         return values
 
     def initial(self, element: Element, causality: str, variability: str) -> str | None:
@@ -474,10 +477,10 @@ class _Reader:
     def check_start(self, place: str, fmi_type: str, text: str) -> None:
         """ValueError where a start value is no number of its type."""
         if kind_of(fmi_type) == "Real":
-            _real(place, text)
+            real_in(place, text)
             return
         low, high = limits(fmi_type, self.major)
-        if not low <= _whole(place, text) <= high:
+        if not low <= whole_in(place, text) <= high:
             raise ValueError(f"{place} = {text}: must be from {low} to {high}, as {fmi_type} is")
 
     def nature(self, element: Element, kind: str) -> tuple[str, str]:
@@ -501,9 +504,9 @@ class _Reader:
         element, indicators = kinds["ModelExchange"], 0
         identifier = element.get("modelIdentifier", "")
         with self.tolerated():
-            _check_identifier(identifier)
+            check_identifier(identifier)
             key = "numberOfEventIndicators"
-            indicators = _whole(key, self.root.get(key, "0"), MAX_EVENT_INDICATORS)
+            indicators = whole_in(key, self.root.get(key, "0"), MAX_EVENT_INDICATORS)
         states = len(self.root.findall("ModelStructure/Derivatives/Unknown"))
         if self.major == "3":
             is_needed = element.get("needsCompletedIntegratorStep") in ("true", "1")
@@ -516,79 +519,12 @@ class _Reader:
         place = f"{place}: Dimension"
         text, name = element.get("start"), None
         if text is None:
-            key = _whole(f"{place}: valueReference", element.get("valueReference"))
+            key = whole_in(f"{place}: valueReference", element.get("valueReference"))
             holder = self.places.get(key)
             if holder is not None:
                 text, name = holder.get("start"), _name(holder)
-        return _whole(place, text, 2**64 - 1), name
-
-
-def base_unit(name: str, base: Mapping[str, str]) -> Unit:
-    """The unit of the attributes of a BaseUnit of FMI or SSP; ValueError where it is none."""
-    place = f"unit {name!r}"
-    exponents = tuple(_whole(f"{place}: {key}", base.get(key, "0")) for key in BASE)
-    factor = _real(f"{place}: factor", base.get("factor", "1"))
-    offset = _real(f"{place}: offset", base.get("offset", "0"))
-    if not factor or not math.isfinite(factor) or not math.isfinite(offset):
-        raise ValueError(
-            f"{place}: factor = {factor:g}, offset = {offset:g}: must be finite, and the factor "
-            "other than 0"
-        )
-    return Unit(name, exponents, factor, offset)
-
-
-def _check_identifier(identifier: str) -> None:
-    """ValueError where it could not be the name of a file in a folder of the FMU."""
-    if not identifier or CONTROL.search(identifier) or re.search(r"[/\\:]|^\.", identifier):
-        raise ValueError(f"modelIdentifier = {identifier!r}: must be the name of its binary")
+        return whole_in(place, text, 2**64 - 1), name
 
 
 def _name(element: Element) -> str:
     return element.get("name", "")
-
-
-def _printable(noun: str, name: str) -> str:
-    """The name; ValueError where it is very long or holds a control character."""
-    if len(name) > MAX_NAME_LENGTH:
-        raise ValueError(
-            f"{noun} {name[:40]!r}...: {len(name)} characters; must have at most {MAX_NAME_LENGTH}"
-        )
-    if CONTROL.search(name):
-        raise ValueError(f"{noun} {name!r}: must have no control characters")
-    return name
-
-
-def _real(place: str, text: str) -> float:
-    try:
-        return real(text)
-    except ValueError:
-        raise ValueError(f"{place} = {text!r}: must be a number") from None
-
-
-def _references(place: str, clocks: str) -> tuple[int, ...]:
-    """The value references of the clocks that a variable is of."""
-    return tuple(_whole(f"{place}: clocks", text) for text in clocks.split())
-
-
-def _decimal(place: str, text: str) -> Fraction:
-    """The number that a text is, exactly."""
-    _real(place, text)
-    try:
-        return Fraction(text.strip())
-    except ValueError:
-        raise ValueError(f"{place} = {text!r}: must be a finite number") from None
-
-
-def _whole(place: str, text: str | None, high: int | None = None) -> int:
-    """The whole number in a text, from 0 to high where that is given."""
-    if text is not None:
-        try:
-            number = integer(text)
-        except ValueError:
-            pass
-        else:
-            if high is None or 0 <= number <= high:
-                return number
-    must = "a whole number" if high is None else f"a whole number from 0 to {high}"
-    quoted = "missing" if text is None else repr(text)
-    raise ValueError(f"{place} = {quoted}: must be {must}")

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -145,14 +146,16 @@ def _values_entry(component: Component, entries: dict[str, bytes]) -> str:
 
 def _added(entries: dict[str, bytes], stem: str, suffix: str, data: bytes) -> str:
     """Add data under the first free name like stem, stem_2, ..."""
-    count = 1
-    while (name := f"{RESOURCES}{stem}{f'_{count}' if count > 1 else ''}{suffix}") in entries:
-        count += 1
+    name = f"{RESOURCES}{stem}{suffix}"
+    numbers = count(2)
+    while name in entries:
+        name = f"{RESOURCES}{stem}_{next(numbers)}{suffix}"
     entries[name] = data
     return name
 
 
 def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str, str]) -> Any:
+    """The document of a system, with the entries of the FMUs and values of its components."""
     name = re.sub(r"\W|^(?=\d)", "_", Path(system.name).stem, flags=re.ASCII)  # as OMSimulator asks
     attributes = {"version": VERSION, "name": name, "generationTool": _TOOL}
     root = new("ssd:SystemStructureDescription", PREFIXES, **attributes)
@@ -166,17 +169,22 @@ def _structure(system: System, sources: Mapping[str, str], bindings: Mapping[str
         name = component.name
         _write_component(elements, component, sources[name], bindings.get(name), units)
     if system.connections or system.inputs or system.outputs:
-        connections, changes = add(top, "ssd:Connections"), transforms(system)
-        names = {c.name: _fmu_names(c) for c in system.components}
-        for c in system.connections:
-            _write_connection(connections, c, changes[c.target], names)
-        _write_ways(connections, system, names)
-    for_oms = add(top, "ssd:Annotations")
+        connections = add(top, "ssd:Connections")
+        changes = transforms(system)
+        names = {component.name: _fmu_names(component) for component in system.components}
+        for connection in system.connections:
+            _write_connection(connections, connection, changes[connection.target], names)
+        _write_links(connections, system, names)
+    system_annotations = add(top, "ssd:Annotations")
     write_units(root, "ssd", units.values())
-    start, stop = (repr(in_seconds(t)) for t in (system.start_ns, system.stop_ns))
-    experiment = add(root, "ssd:DefaultExperiment", startTime=start, stopTime=stop)
+    experiment = add(
+        root,
+        "ssd:DefaultExperiment",
+        startTime=repr(in_seconds(system.start_ns)),
+        stopTime=repr(in_seconds(system.stop_ns)),
+    )
     annotations = add(experiment, "ssd:Annotations")
-    write_steps(annotations, for_oms, system.step_ns)
+    write_steps(annotations, system_annotations, system.step_ns)
     write_extras(annotations, extras_of(system))
     return root
 
@@ -212,7 +220,12 @@ def _connected(component: Component) -> list[Variable]:
     units = {fmu_names[name]: unit for name, unit in component.units.items()}
     declared = in_units(component.sized(read_interface(component.fmu)), units)
     variables = declared.of(*_CAUSALITIES)
-    return [v for v in variables if v.supported and not (v.items and v.causality == "parameter")]
+    connected = []
+    for variable in variables:
+        is_enumerated_parameter = variable.items and variable.causality == "parameter"
+        if variable.supported and not is_enumerated_parameter:
+            connected.append(variable)
+    return connected
 
 
 def _write_connection(
@@ -221,12 +234,17 @@ def _write_connection(
     change: tuple[float, float],
     names: Mapping[str, Mapping[str, str]],
 ) -> None:
-    ends = {}
-    for side, port in (("start", connection.source), ("end", connection.target)):
-        ends[f"{side}Element"] = port.component
-        ends[f"{side}Connector"] = names[port.component][port.variable]
+    source, target = connection.source, connection.target
+    element = add(
+        connections,
+        "ssd:Connection",
+        startElement=source.component,
+        startConnector=names[source.component][source.variable],
+        endElement=target.component,
+        endConnector=names[target.component][target.variable],
+    )
     transformed = connection.factor is not None or connection.offset is not None
-    _write_change(add(connections, "ssd:Connection", **ends), change, transformed)
+    _write_change(element, change, transformed)
 
 
 def _write_change(element: Any, change: tuple[float, float], transformed: bool) -> None:
@@ -262,19 +280,30 @@ def _write_type(connector: Any, kind: str, unit: Unit | None, units: Mapping[str
         element.set("unit", unit.name)
 
 
-def _write_ways(connections: Any, system: System, names: Mapping[str, Mapping[str, str]]) -> None:
+def _write_links(connections: Any, system: System, names: Mapping[str, Mapping[str, str]]) -> None:
     """The connections between the connectors of the system itself and the components."""
     for name, system_input in system.inputs.items():
         for link in system_input.links:
-            element, connector = link.port.component, names[link.port.component][link.port.variable]
-            ends = {"startConnector": name, "endElement": element, "endConnector": connector}
-            connection = add(connections, "ssd:Connection", **ends)
-            _write_change(connection, change_along(system, name, link), link.factor is not None)
+            component = link.port.component
+            connection = add(
+                connections,
+                "ssd:Connection",
+                startConnector=name,
+                endElement=component,
+                endConnector=names[component][link.port.variable],
+            )
+            change = change_along(system, name, link)
+            _write_change(connection, change, link.factor is not None)
     for name, tap in system.once(taps).items():
-        element, connector = tap.source.component, names[tap.source.component][tap.source.variable]
-        ends = {"startElement": element, "startConnector": connector, "endConnector": name}
-        transformed = system.outputs[name].link.factor is not None
-        _write_change(add(connections, "ssd:Connection", **ends), tap.change, transformed)
+        component = tap.source.component
+        connection = add(
+            connections,
+            "ssd:Connection",
+            startElement=component,
+            startConnector=names[component][tap.source.variable],
+            endConnector=name,
+        )
+        _write_change(connection, tap.change, system.outputs[name].link.factor is not None)
 
 
 def _outside_units(system: System) -> Iterable[Unit]:
@@ -285,6 +314,7 @@ def _outside_units(system: System) -> Iterable[Unit]:
 
 
 def _variable(system: System, port: Port) -> Variable:
+    """The variable of a port of a component."""
     return system.component(port.component, str(port)).interface.by_name[port.variable]
 
 
@@ -312,6 +342,7 @@ def _unit(component: Component, variable: Variable, units: Mapping[str, Unit]) -
 
 
 def _text(place: str, variable: Variable, value: Value) -> str:
+    """A value as SSP writes it; InputError for a whole number that has no form there."""
     if variable.kind == "Real":
         return repr(float(value))
     if variable.kind == "Integer" and not -(2**31) <= int(value) < 2**31:

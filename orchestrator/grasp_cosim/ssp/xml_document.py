@@ -19,7 +19,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from ..base.checks import known
 from ..base.errors import InputError
 from ..base.si_units import BASE, Unit, known_unit
-from ..interface.read import base_unit
+from ..interface.attributes import base_unit
 from ..interface.units import conversion
 from .archive import Archive, Notes
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import cycle
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,15 @@ if TYPE_CHECKING:
 MAX_PANELS = 12
 """Panels of a picture at most."""
 
+MARGIN, PANEL_WIDTH, PANEL_HEIGHT = 0.8, 4.6, 3.2
+"""Inches."""
+
+POINT_SIZE = 16
+"""Square points of a run that is shown as a point."""
+
+NO_VALUE = "#dddddd"
+"""The colour of cells without a value."""
+
 MAX_LINEAR_DECADES = 1.5
 """A metric above 0 that spans more has a logarithmic scale of colours."""
 
@@ -35,8 +45,9 @@ def draw_sweep(
     With a `path` the figure is written there in the format of its suffix. InputError without
     matplotlib, or where there is nothing to draw.
     """
-    metrics = [m for m in table.measured if any(c in table.metrics for c in m.columns)]
-    metrics = [m for m in metrics if m.name in of] if of else metrics[:MAX_PANELS]
+    with_values = [m for m in table.measured if not set(m.columns).isdisjoint(table.metrics)]
+    requested = [metric for metric in with_values if metric.name in of]
+    metrics = requested if of else with_values[:MAX_PANELS]
     numbers = [name for name in table.varied if len(set(table[name])) > 1]
     if not metrics:
         raise InputError(f"{path or 'sweep'}: nothing to draw; no run has a metric")
@@ -54,10 +65,17 @@ def _curves(table: Table, over: str, metrics: Sequence[Metric]) -> Figure:
     figure, panels = _grid(len(metrics))
     order = np.argsort(table[over], kind="stable")
     for axes, metric in zip(panels, metrics, strict=True):
-        for column, style, color in zip(metric.columns, cycle(STYLES), cycle(COLORS), strict=False):
+        looks = zip(metric.columns, cycle(STYLES), cycle(COLORS), strict=False)
+        for column, style, color in looks:
             title, factor, _ = table.shown(column)
-            values = factor * table[column][order]
-            axes.plot(table[over][order], values, style, color=color, marker=".", label=title)
+            axes.plot(
+                table[over][order],
+                factor * table[column][order],
+                style,
+                color=color,
+                marker=".",
+                label=title,
+            )
         finish(axes, _label(table, metric.name), legend=len(metric.columns) > 1)
         axes.set_xlabel(_label(table, over))
     return figure
@@ -65,15 +83,15 @@ def _curves(table: Table, over: str, metrics: Sequence[Metric]) -> Figure:
 
 def _each_column(table: Table, numbers: Sequence[str], metrics: Sequence[Metric]) -> Figure:
     """A panel for each column of the metrics: a map over two numbers, else a histogram."""
-    columns = [c for m in metrics for c in m.columns if c in table.metrics][:MAX_PANELS]
+    columns = [column for metric in metrics for column in metric.columns]
+    columns = [column for column in columns if column in table.metrics][:MAX_PANELS]
     figure, panels = _grid(len(columns))
     for axes, column in zip(panels, columns, strict=True):
-        values = table.shown(column)[1] * table[column]
+        _, factor, _ = table.shown(column)
+        values = factor * table[column]
         if len(numbers) == 2:
-            drawn = _map(axes, table, numbers[0], numbers[1], values)
-            axes.set_xlabel(_label(table, numbers[0]))
-            axes.set_ylabel(_label(table, numbers[1]))
-            figure.colorbar(drawn, ax=axes, label=_label(table, column))
+            colors = _map(axes, table, numbers, values)
+            figure.colorbar(colors, ax=axes, label=_label(table, column))
         else:
             axes.hist(values[np.isfinite(values)], bins="auto", color=BLUE)
             finish(axes, "runs", legend=False)
@@ -81,16 +99,20 @@ def _each_column(table: Table, numbers: Sequence[str], metrics: Sequence[Metric]
     return figure
 
 
-def _map(axes: Axes, table: Table, x: str, y: str, values: Any) -> Any:
-    """Cells where the runs are a grid, else points."""
+def _map(axes: Axes, table: Table, numbers: Sequence[str], values: Any) -> Any:
+    """Values over two numbers as colours: of cells where the runs are a grid, else of points."""
+    x_name, y_name = numbers
+    axes.set_xlabel(_label(table, x_name))
+    axes.set_ylabel(_label(table, y_name))
+    x, y = table[x_name], table[y_name]
     norm = _norm(values)
-    across, along = np.unique(table[x]), np.unique(table[y])
-    if len(across) * len(along) != len(table):
-        return axes.scatter(table[x], table[y], c=values, norm=norm, s=16)
-    order = np.lexsort((table[x], table[y]))
-    cells = values[order].reshape(len(along), len(across))
-    axes.set_facecolor("#dddddd")  # of cells without a value
-    return axes.pcolormesh(across, along, cells, norm=norm, shading="nearest", rasterized=True)
+    x_values, y_values = np.unique(x), np.unique(y)
+    if len(x_values) * len(y_values) != len(table):
+        return axes.scatter(x, y, c=values, norm=norm, s=POINT_SIZE)
+    order = np.lexsort((x, y))
+    cells = values[order].reshape(len(y_values), len(x_values))
+    axes.set_facecolor(NO_VALUE)
+    return axes.pcolormesh(x_values, y_values, cells, norm=norm, shading="nearest", rasterized=True)
 
 
 def _norm(values: Any) -> Any:
@@ -101,21 +123,23 @@ def _norm(values: Any) -> Any:
     if not len(finite):
         return Normalize(0.0, 1.0)
     low, high = finite.min(), finite.max()
-    is_wide = 0.0 < low < high * 10.0**-MAX_LINEAR_DECADES
-    return LogNorm(low, high) if is_wide else Normalize(low, high)
+    if 0.0 < low < high * 10.0**-MAX_LINEAR_DECADES:
+        return LogNorm(low, high)
+    return Normalize(low, high)
 
 
 def _grid(count: int) -> tuple[Figure, list[Axes]]:
     """A figure with so many panels, two beside each other."""
-    across = 1 if count == 1 else 2
-    along = -(-count // across)
-    figure = new_figure(0.8 + 4.6 * across, 3.2 * along)
-    panels = list(figure.subplots(along, across, squeeze=False).flat)
+    columns = 1 if count == 1 else 2
+    rows = ceil(count / columns)
+    figure = new_figure(MARGIN + PANEL_WIDTH * columns, PANEL_HEIGHT * rows)
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     for axes in panels[count:]:
         axes.set_axis_off()
     return figure, panels[:count]
 
 
 def _label(table: Table, column: str) -> str:
+    """The title of a column with the unit in which its values are drawn."""
     title, _, unit = table.shown(column)
     return f"{title} in {unit}" if unit else title

@@ -152,12 +152,16 @@ def recording(system: System, signals: Sequence[str] | str) -> tuple[System, lis
     return system.with_record(*sorted(both, key=_in_order)), names
 
 
-def times(system: System, rows: Iterable[Row], every: int) -> npt.NDArray[np.float64]:
+def times(system: System, rows: Sequence[Row], every: int) -> npt.NDArray[np.float64]:
     """Each n-th communication point of the longest run in s; InputError where steps differ."""
-    for place in (place for row in rows for place in row if place in TIMES and place != STOP):
-        raise InputError(f"signals: the rows vary {place}; must be one for all, as the time is")
-    ends = {row.get(STOP) for row in rows}
-    longest = max(_until(system, end).total_steps for end in ends)
+    for row in rows:
+        for place in row:
+            if place in TIMES and place != STOP:
+                raise InputError(
+                    f"signals: the rows vary {place}; must be one for all, as the time is"
+                )
+    stops = {row.get(STOP) for row in rows}
+    longest = max(_until(system, stop).total_steps for stop in stops)
     steps = np.arange(0, longest + 1, every)
     return Experiment.of(settings(system)).times(steps)
 
@@ -217,7 +221,8 @@ def _grouped(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 def _in_order(name: str) -> list[Any]:
     """A key by which x[2] comes before x[10]."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+    parts = re.split(r"(\d+)", name)
+    return [int(part) if part.isdigit() else part for part in parts]
 
 
 # ------------------------------------------------------------------------- what Zarr says of it
@@ -274,13 +279,12 @@ def _joined(identity: Mapping[str, str]) -> str:
 
 def _numbers(rows: Sequence[Row]) -> dict[str, list[float]]:
     """The columns of rows that are numbers, NaN where a row leaves its place."""
-    places = dict.fromkeys(place for row in rows for place in row)
-    columns = {place: [row.get(place, np.nan) for row in rows] for place in places}
-    return {p: list(map(float, c)) for p, c in columns.items() if not any(map(_is_text, c))}
-
-
-def _is_text(value: object) -> bool:
-    return not isinstance(value, int | float)
+    numbers = {}
+    for place in dict.fromkeys(place for row in rows for place in row):
+        column = [row.get(place, np.nan) for row in rows]
+        if all(isinstance(value, int | float) for value in column):
+            numbers[place] = [float(value) for value in column]
+    return numbers
 
 
 def _write_coordinates(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,8 +99,11 @@ class Table:
         if name not in self.columns:
             advice = nearest(name, [*self.varied, *self.metrics])
             raise InputError(f"{name!r}: no such column of the sweep; {advice}")
-        values = self.columns[name]
-        return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
+        numbers = [
+            np.nan if value is None or isinstance(value, str) else float(value)
+            for value in self.columns[name]
+        ]
+        return np.array(numbers)
 
     def __repr__(self) -> str:
         """How many runs there are, what varied, what failed, and a line for each metric."""
@@ -135,10 +139,11 @@ class Table:
         Returns:
             Its title, the factor that its values are shown by, and their unit then.
         """
-        metric = next((m for m in self.measured if column in (m.name, *m.columns)), None)
-        if metric:
-            title = metric.column_title(column) if column in metric.columns else metric.title
-            return title, metric.factor, metric.display_unit
+        for metric in self.measured:
+            if column in metric.columns:
+                return metric.column_title(column), metric.factor, metric.display_unit
+            if column == metric.name:
+                return metric.title, metric.factor, metric.display_unit
         unit = self.units.get(column)
         return column, 1.0, "" if unit in (None, "1") else str(unit)
 
@@ -222,10 +227,12 @@ class Table:
 def _numbers_or_texts(column: Sequence[Any]) -> npt.NDArray[Any]:
     """A column as numbers, NaN where there is none, or as texts, "" where there is none."""
     if any(isinstance(value, str) for value in column):
-        return np.array(["" if value is None else str(value) for value in column])
+        texts = ["" if value is None else str(value) for value in column]
+        return np.array(texts)
     if all(isinstance(value, int) for value in column):  # and Booleans
         return np.array(column)
-    return np.array([np.nan if value is None else float(value) for value in column])
+    numbers = [np.nan if value is None else float(value) for value in column]
+    return np.array(numbers)
 
 
 def _add_metric(data: xr.Dataset, table: Table, metric: Metric) -> None:
@@ -254,7 +261,8 @@ def _add_signals(data: xr.Dataset, recorded: Recorded) -> None:
             data.coords[array.dimension] = [*range(1, len(array.signals) + 1)]
         attributes = {"units": array.unit, "long_name": array.description}
         attributes = {key: text for key, text in attributes.items() if text}
-        data[name] = array.dimensions, recorded.store.column(name, len(data[RUN])), attributes
+        values = recorded.store.column(name, len(data[RUN]))
+        data[name] = array.dimensions, values, attributes
 
 
 def table_of(
@@ -272,20 +280,26 @@ def table_of(
     `seeds` of the runs are columns, and vary nothing.
     """
     varied = tuple(dict.fromkeys(place for row in rows for place in row))
-    measured = tuple(dict.fromkeys(name for o in outcomes for name in o.metrics))
+    measured = tuple(dict.fromkeys(name for outcome in outcomes for name in outcome.metrics))
+    seeded = dict.fromkeys(place for of_run in seeds for place in of_run)
+    all_units = dict(units)
     columns: dict[str, Sequence[Any]] = {"index": _index(labels, len(rows))}
-    columns |= {place: [row.get(place) for row in rows] for place in varied}
-    for place in dict.fromkeys(place for of_run in seeds for place in of_run):
+    for place in varied:
+        columns[place] = [row.get(place) for row in rows]
+    for place in seeded:
         columns[place] = [
             row.get(place, of_run.get(place)) for row, of_run in zip(rows, seeds, strict=True)
         ]
-    columns |= {name: [o.metrics.get(name) for o in outcomes] for name in measured}
-    if any(o.ended_at is not None for o in outcomes):
-        columns[ENDED_AT] = [o.ended_at for o in outcomes]
-        units = {**units, ENDED_AT: "s"}
-    columns["error"] = [o.error for o in outcomes]
-    unit_of_metric = {m.name: m.unit for m in metrics}
-    all_units = {**units, **{n: unit_of_metric.get(n.partition("[")[0]) for n in measured}}
+    for name in measured:
+        columns[name] = [outcome.metrics.get(name) for outcome in outcomes]
+    ends = [outcome.ended_at for outcome in outcomes]
+    if any(end is not None for end in ends):
+        columns[ENDED_AT] = ends
+        all_units[ENDED_AT] = "s"
+    columns["error"] = [outcome.error for outcome in outcomes]
+    unit_of_metric = {metric.name: metric.unit for metric in metrics}
+    for name in measured:
+        all_units[name] = unit_of_metric.get(name.partition("[")[0])
     return Table(columns, varied, measured, all_units, tuple(metrics), labels, signals)
 
 
@@ -307,7 +321,8 @@ def convergence(table: Table) -> Mapping[str, Convergence]:
     steps = table[STEP][rising].tolist()
     study = {}
     for name in table.metrics:
-        results = [None if np.isnan(v) else float(v) for v in table[name][rising]]
+        values = table[name][rising].tolist()
+        results = [None if isnan(value) else value for value in values]
         study[name] = convergence_of(steps, results)
     return study
 
