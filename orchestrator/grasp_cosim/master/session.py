@@ -49,7 +49,7 @@ MAX_STEPS = 2**62
 Finish = Callable[[Result, SimulationError | None], object]
 """Takes the result of a run that ended, and the error that ended it."""
 
-T = TypeVar("T")
+Returned = TypeVar("Returned")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,12 +127,7 @@ class Session:
             SimulationError: An FMU fails as it is initialised, or a limit is exceeded at the start.
         """
         system = as_system(system, "simulate").with_experiment(step, stop, scheme, diverging)
-        if steered:
-            system = system.as_steered()
-        if not all(component.is_current for component in system.components):
-            components = tuple(replace(component) for component in system.components)
-            system = replace(system, components=components)
-        system = system.with_natives(needed_twins(system))
+        system = _to_load(system.as_steered() if steered else system)
         _check_count("every", every)
         self.system = system
         self._record = RunRecord(system, metrics, every, bool(realtime))
@@ -197,6 +192,7 @@ class Session:
         self._fmus_leave_process_alone = all(map(leaves_process_alone, self.system.components))
 
     def _load_instances(self) -> None:
+        """Load the FMUs in the order of the components."""
         for component in self.system.components:
             LOGGER.info("%s", _description(component))
             self._instances.append(load(component))
@@ -320,7 +316,7 @@ class Session:
             if not self.pacer:  # which has time for the listeners
                 self._wall_time -= dispatcher.took - listeners_took
 
-    def _call_fmus(self, action: Callable[[], T]) -> T:
+    def _call_fmus(self, action: Callable[[], Returned]) -> Returned:
         """Return what an action returns that calls FMUs; whatever it raises breaks the session.
 
         Refuses a session whose FMUs must not be called.
@@ -625,6 +621,14 @@ class Session:
             peers=master.peers,
             components=self.system.components,
         )
+
+
+def _to_load(system: System) -> System:
+    """The system with its FMUs as their files are now, and native twins where only these run."""
+    if not all(component.is_current for component in system.components):
+        components = tuple(replace(component) for component in system.components)
+        system = replace(system, components=components)
+    return system.with_natives(needed_twins(system))
 
 
 def _differs_in_values_alone(system: System, running: System) -> bool:
