@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, System, grasp_system, hand_system, load_run, simulate
 from grasp_cosim.hand.system import directions_of, fmus_of
-from grasp_cosim.hand.weights import LEAST, balance_weights, imbalance
+from grasp_cosim.hand.weights import MIN_WEIGHT, balance_weights, imbalance
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -165,14 +165,14 @@ def test_they_are_the_nearest_to_1_that_balance(angles):
     e = np.exp(1j * np.radians(angles))
     assert imbalance(np.radians(angles).tolist(), found) < 1e-10
     assert np.mean(found) == pytest.approx(1.0)
-    assume(min(found) >= LEAST - 1e-9)
+    assume(min(found) >= MIN_WEIGHT - 1e-9)
     conditions = [
         {"type": "eq", "fun": lambda n: np.array([n @ e.real, n @ e.imag, n.sum() - len(e)])}
     ]
     of_scipy = minimize(
         lambda n: np.sum((n - 1.0) ** 2),
         np.ones(len(e)),
-        bounds=[(LEAST, None)] * len(e),
+        bounds=[(MIN_WEIGHT, None)] * len(e),
         constraints=conditions,
         options={"ftol": 1e-14, "maxiter": 500},
     )
@@ -196,7 +196,7 @@ def test_directions_that_cannot_hold_are_refused(angles, said):
 
 def test_where_all_cannot_have_a_quarter_the_least_has_what_it_can():
     weights = balance_weights((0.0, 170.0, 181.0))
-    assert 0.0 < min(weights) < LEAST
+    assert 0.0 < min(weights) < MIN_WEIGHT
     assert imbalance(np.radians((0.0, 170.0, 181.0)).tolist(), weights) < 1e-10
 
 

@@ -77,7 +77,7 @@ def test_on_a_full_disk_they_are_of_the_rows_which_is_said(grasp):
         session.step()
         result = session.result()
     whole = simulate(grasp, step=1e-3, every=10)
-    assert measured(result) == measured(replace(whole, known=None)) != measured(whole)
+    assert measured(result) == measured(replace(whole, of_every_step=None)) != measured(whole)
     assert result.log[-1] == (
         f"{gettempdir()}: cannot be written: File too large: the metrics are of the rows that were "
         "recorded"

@@ -20,10 +20,10 @@ OBJECT_POSITION = ("plant.object_position[1]", "plant.object_position[2]")
 OBJECT_ANGLE = "plant.object_angle"
 """Which way the object is turned, in rad."""
 
-OTHERS = ("target_position",)
+NOT_OF_A_HAND = ("target_position",)
 """Metrics of the grasp that a hand has not: each of its fingers has a target of its own."""
 
-UNBALANCED = 1e-3
+MAX_IMBALANCE = 1e-3
 """|sum n_k·e_k| from which a hand pushes its object aside, 3 mN of a usual grasp."""
 
 
@@ -78,25 +78,30 @@ def check(system: Any) -> tuple[str, ...]:
 
     Nothing is said of a plant or a controller of others, which has other parameters.
     """
-    roles = ("plant", "controller")
-    plant, controller = (resolved(f"{role}.", system.roles)[:-1] for role in roles)
-    there = {c.name: c.interface.by_name for c in system.components}
-    angles, weights = there.get(plant, {}), there.get(controller, {})
-    each = [*takewhile(lambda k: f"angle[{k}]" in angles and f"weight[{k}]" in weights, count(1))]
-    directions = [start_in_si(system, f"plant.angle[{k}]") for k in each]
-    found = [start_in_si(system, f"controller.weight[{k}]") for k in each]
-    if (left := imbalance(directions, found)) > UNBALANCED:
-        least = ", ".join(f"{n:.9g}" for n in balance_weights(np.degrees(directions).tolist()))
-        listed = ", ".join(f"{n:g}" for n in found)
+    plant = system.roles.get("plant", "plant")
+    controller = system.roles.get("controller", "controller")
+    variables = {c.name: c.interface.by_name for c in system.components}
+    of_plant, of_controller = variables.get(plant, {}), variables.get(controller, {})
+
+    def has_finger(k: int) -> bool:
+        return f"angle[{k}]" in of_plant and f"weight[{k}]" in of_controller
+
+    fingers = [*takewhile(has_finger, count(1))]
+    directions = [start_in_si(system, f"plant.angle[{k}]") for k in fingers]
+    weights = [start_in_si(system, f"controller.weight[{k}]") for k in fingers]
+    push = imbalance(directions, weights)
+    if push > MAX_IMBALANCE:
+        balanced = ", ".join(f"{n:.9g}" for n in balance_weights(np.degrees(directions).tolist()))
+        weights_text = ", ".join(f"{n:g}" for n in weights)
         raise InputError(
-            f"{system.name}: {controller}.weight = {listed}: leaves {left:.3g} of the grasp as a "
-            f"push to one side with the angles of {plant}; balanced by {least}"
+            f"{system.name}: {controller}.weight = {weights_text}: leaves {push:.3g} of the grasp "
+            f"as a push to one side with the angles of {plant}; balanced by {balanced}"
         )
     return ()
 
 
 METRICS = (
-    *(_of_hand(m) for m in OF_GRASP if not m.optional and m.name not in OTHERS),
+    *(_of_hand(m) for m in OF_GRASP if not m.optional and m.name not in NOT_OF_A_HAND),
     net_force,
     object_turn,
 )
@@ -105,6 +110,6 @@ METRICS = (
 
 def is_hand(signals: Signals) -> bool:
     """True if there are the signals of a hand and its object that a picture shows."""
-    shown = (name for one in SHOWN for name in as_of_hand(one))
-    each = [name.replace("*", str(k)) for name in shown for k in fingers_of(signals)]
-    return OBJECT_ANGLE in signals and all(name in signals for name in each)
+    signals_of_hand = [name for signal in SHOWN for name in as_of_hand(signal)]
+    needed = [name.replace("*", str(k)) for name in signals_of_hand for k in fingers_of(signals)]
+    return OBJECT_ANGLE in signals and all(name in signals for name in needed)

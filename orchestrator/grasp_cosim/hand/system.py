@@ -12,13 +12,22 @@ from ..fmu_export.build import shipped_fmus
 from ..fmu_export.shipped import FEWEST, MOST
 from ..grasp.system import with_controller
 from ..system.description import System
-from .weights import LEAST, balance_weights
+from .weights import MIN_WEIGHT, balance_weights
 
 TEMPLATE = Path(__file__).parent / "hand.toml.in"
 FILE = "hand.toml"
 
-SHIPPED = 3
+DEFAULT_FINGERS = 3
 """Fingers of the FMUs that come with the package, which have no number in their names."""
+
+CONNECTIONS = (
+    ("plant.gap[{k}]", "sensor_{k}.gap"),
+    ("plant.position[{k}]", "controller.position[{k}]"),
+    ("plant.velocity[{k}]", "controller.velocity[{k}]"),
+    ("sensor_{k}.intensity", "controller.intensity[{k}]"),
+    ("controller.force[{k}]", "plant.force[{k}]"),
+)
+"""Source and target of the connections of finger k."""
 
 ELECTRONICS = ("ambient", "noise", "adc", "filter", "median")
 """What a sensor has besides its optics."""
@@ -61,31 +70,38 @@ def hand_system(
 
 def directions_of(fingers: int | None, angles: Sequence[float] | None) -> tuple[float, ...]:
     """The directions in degrees of a hand; InputError where they do not go together, or hold."""
-    count = fingers if fingers is not None else SHIPPED if angles is None else len(angles)
-    if isinstance(count, bool) or not isinstance(count, int) or not FEWEST <= count <= MOST:
+    if fingers is not None:
+        count = fingers
+    elif angles is not None:
+        count = len(angles)
+    else:
+        count = DEFAULT_FINGERS
+    is_whole = isinstance(count, int) and not isinstance(count, bool)
+    if not is_whole or not FEWEST <= count <= MOST:
         raise InputError(f"fingers = {count!r}: must be a whole number from {FEWEST} to {MOST}")
-    if angles is not None and len(angles) != count:
+    if angles is None:
+        directions = tuple(360.0 * k / count for k in range(count))
+    elif len(angles) != count:
         raise InputError(f"angles: there are {len(angles)}; must be {count}, one for each finger")
-    found = tuple(
-        map(float, (360.0 * k / count for k in range(count)) if angles is None else angles)
-    )
-    for angle in found:
+    else:
+        directions = tuple(float(angle) for angle in angles)
+    for angle in directions:
         if not -360.0 <= angle <= 360.0:
             raise InputError(f"angles: {angle:g} degrees: must be from -360 to 360")
-    balance_weights(found)
-    return found
+    balance_weights(directions)
+    return directions
 
 
 def faint(directions: Sequence[float]) -> str:
     """What is to be said of a finger that hardly takes part, or ""."""
     weights = balance_weights(directions)
-    least = min(weights)
-    if least >= LEAST:
+    smallest = min(weights)
+    if smallest >= MIN_WEIGHT:
         return ""
-    k = weights.index(least)
+    k = weights.index(smallest)
     return (
-        f"finger {k + 1} at {directions[k]:g} degrees has a weight of {least:.3g}: it is soft, and "
-        f"touches late; with directions that are more even no weight is below {LEAST:g}"
+        f"finger {k + 1} at {directions[k]:g} degrees has a weight of {smallest:.3g}: it is soft, "
+        f"and touches late; with directions that are more even no weight is below {MIN_WEIGHT:g}"
     )
 
 
@@ -104,7 +120,7 @@ def hand_values(directions: Sequence[float]) -> dict[str, float]:
 
 def sized(fingers: int) -> int | None:
     """The number in the names of the FMUs of a hand; None where they have none."""
-    return None if fingers == SHIPPED else fingers
+    return None if fingers == DEFAULT_FINGERS else fingers
 
 
 def fmus_of(fingers: int) -> Path:
@@ -113,33 +129,47 @@ def fmus_of(fingers: int) -> Path:
 
 
 def hand_text(directions: Sequence[float]) -> str:
-    """The text of the system file of a hand, whose FMUs are beside it."""
-    each = range(1, len(directions) + 1)
-    links = [
-        *((f"plant.gap[{k}]", f"sensor_{k}.gap") for k in each),
-        *((f"plant.position[{k}]", f"controller.position[{k}]") for k in each),
-        *((f"plant.velocity[{k}]", f"controller.velocity[{k}]") for k in each),
-        *((f"sensor_{k}.intensity", f"controller.intensity[{k}]") for k in each),
-        *((f"controller.force[{k}]", f"plant.force[{k}]") for k in each),
-    ]
+    """The text of the system file of a hand, whose FMUs are beside it; directions in degrees."""
+    fingers = range(1, len(directions) + 1)
     values = hand_values(directions)
-    return Template(TEMPLATE.read_text("utf-8")).substitute(
+    template = Template(TEMPLATE.read_text("utf-8"))
+    return template.substitute(
         fingers=len(directions),
         suffix=sized(len(directions)) or "",
-        connections="\n".join(f'  "{source} -> {target}",' for source, target in links),
+        connections=_connection_lines(fingers),
         degrees=", ".join(f"{angle:g}" for angle in directions),
-        angles=_lines("plant", values),
-        weights=_lines("controller", values),
-        sensors="\n".join(f'[components.sensor_{k}]\nfmu = "ProximitySensor.fmu"\n' for k in each),
-        bench="\n".join(_electronics(k) for k in each),
+        angles=_value_lines("plant", values),
+        weights=_value_lines("controller", values),
+        sensors="\n".join(map(_sensor_table, fingers)),
+        bench="\n".join(map(_electronics_lines, fingers)),
     )
 
 
-def _lines(component: str, values: Mapping[str, float]) -> str:
-    parts = ((*key.split(".", 1), value) for key, value in values.items())
-    return "\n".join(f'"{name}" = {value!r}' for of, name, value in parts if of == component)
+def _connection_lines(fingers: Sequence[int]) -> str:
+    """The connections of all fingers, those of one quantity together."""
+    lines = []
+    for source, target in CONNECTIONS:
+        for k in fingers:
+            lines.append(f'  "{source.format(k=k)} -> {target.format(k=k)}",')
+    return "\n".join(lines)
 
 
-def _electronics(k: int) -> str:
+def _value_lines(component: str, values: Mapping[str, float]) -> str:
+    """The start values of a component, a line each."""
+    lines = []
+    for place, value in values.items():
+        name, _, variable = place.partition(".")
+        if name == component:
+            lines.append(f'"{variable}" = {value!r}')
+    return "\n".join(lines)
+
+
+def _sensor_table(k: int) -> str:
+    """The component of the sensor of finger k."""
+    return f'[components.sensor_{k}]\nfmu = "ProximitySensor.fmu"\n'
+
+
+def _electronics_lines(k: int) -> str:
+    """The values of the preset that switch on the electronics of the sensor of finger k."""
     lines = [f'"sensor_{k}.{part}.enabled" = true' for part in ELECTRONICS]
     return "\n".join([*lines, f'"sensor_{k}.noise.seed" = {k}'])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SEEN = (
+HOW_IT_IS_SEEN = (
     "The hand is seen from above; the object is drawn from face to face, where the gaps say it is"
 )
 
@@ -92,8 +92,8 @@ def _from_above(axes: Axes, run: Result) -> None:
         axes.plot([0.0, end.real], [0.0, end.imag], color="#dddddd", lw=0.8)
         ends = ([tip.real, back.real], [tip.imag, back.imag])
         axes.plot(*ends, color=COLORS[i], lw=11.0, solid_capstyle="butt")
-        said = f"{k}: {forces[i]:.2f} N"
-        axes.text(end.real, end.imag, said, ha="center", va="center", fontsize=8)
+        label = f"{k}: {forces[i]:.2f} N"
+        axes.text(end.real, end.imag, label, ha="center", va="center", fontsize=8)
         if forces[i] > 0.0:
             to = tip - 0.6 * far * np.sqrt(forces[i] / forces.max()) * e[i]
             arrow = {"arrowstyle": "-|>", "color": "#1d2023", "lw": 1.5}
@@ -111,14 +111,21 @@ def _prism(faces: Points, normals: Points, far: float) -> Points:
     """The corners of what faces through these points leave of a large square."""
     corners: Points = np.array([1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j], np.complex128) * 1.9 * far
     for face, normal in zip(faces, normals, strict=True):
-        outside = ((corners - face) * np.conj(normal)).real
-        left: list[complex] = []
-        following = np.roll(corners, -1), np.roll(outside, -1)
-        for a, va, b, vb in zip(corners, outside, *following, strict=True):
-            left += [a] if va <= 0.0 else []
-            left += [a + (b - a) * va / (va - vb)] if (va < 0.0) != (vb < 0.0) else []
-        corners = np.array(left, np.complex128)
+        corners = _cut(corners, face, normal)
     return corners
+
+
+def _cut(corners: Points, face: complex, normal: complex) -> Points:
+    """The corners of a polygon of which a face cuts off what is outside, in mm."""
+    heights = ((corners - face) * np.conj(normal)).real  # of the corners above the face
+    inside: list[complex] = []
+    edges = zip(corners, heights, np.roll(corners, -1), np.roll(heights, -1), strict=True)
+    for a, height_a, b, height_b in edges:
+        if height_a <= 0.0:
+            inside.append(a)
+        if (height_a < 0.0) != (height_b < 0.0):
+            inside.append(a + (b - a) * height_a / (height_a - height_b))
+    return np.array(inside, np.complex128)
 
 
 def hand_scene(result: Result) -> Scene | None:
@@ -127,14 +134,14 @@ def hand_scene(result: Result) -> Scene | None:
     if not is_hand(signals):
         return None
     names = ("object_position[1]", "object_position[2]", "object_angle")
-    where = [resolved(f"plant.{name}", result.roles) for name in names]
-    state = {"where": where, "angles": directions(signals), "disc": is_disc(signals)}
-    made = scene_of_fingers(result, "Hand", SEEN, where, state)
+    pose_signals = [resolved(f"plant.{name}", result.roles) for name in names]
+    state = {"where": pose_signals, "angles": directions(signals), "disc": is_disc(signals)}
+    scene = scene_of_fingers(result, "Hand", HOW_IT_IS_SEEN, pose_signals, state)
     return replace(
-        made,
-        style=made.style + _text("hand.css"),
-        scripts=f"{made.scripts}\n{_text('hand.js')}",
-        shown=[name for name in made.shown if name not in where],
+        scene,
+        style=scene.style + _text("hand.css"),
+        scripts=f"{scene.scripts}\n{_text('hand.js')}",
+        shown=[name for name in scene.shown if name not in pose_signals],
     )
 
 

@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from ..base.errors import InputError
 
-LEAST = 0.25
+MIN_WEIGHT = 0.25
 """A finger of less weight is soft, and late: its layer 1 is weak."""
 
-NOTHING = 1e-6
+NEGLIGIBLE_WEIGHT = 1e-6
 """A weight that holds nothing."""
 
 DIGITS = 12
@@ -37,12 +37,12 @@ def _balanced(angles: tuple[float, ...]) -> tuple[float, ...]:
     """balance_weights(), which several ask for on the way to one system."""
     radians = np.radians(angles)
     conditions = np.vstack([np.cos(radians), np.sin(radians), np.ones(len(angles))])
-    found = _nearest(conditions, LEAST)
-    if found is None and (least := _highest_floor(conditions)) >= NOTHING:
-        found = _nearest(conditions, least * (1.0 - 1e-9))
-    if found is None:
+    weights = _nearest(conditions, MIN_WEIGHT)
+    if weights is None and (floor := _highest_floor(conditions)) >= NEGLIGIBLE_WEIGHT:
+        weights = _nearest(conditions, floor * (1.0 - 1e-9))
+    if weights is None:
         raise InputError(_why_not(angles))
-    return tuple(round(float(n), DIGITS) for n in found)
+    return tuple(round(float(n), DIGITS) for n in weights)
 
 
 def imbalance(angles: Sequence[float], weights: Sequence[float]) -> float:
@@ -56,18 +56,18 @@ def _nearest(conditions: Floats, floor: float) -> Floats | None:
     The quadratic programme is solved by trying which weights are at the floor: at most 2^8 ways.
     """
     count = conditions.shape[1]
-    wanted = np.array([0.0, 0.0, count])
+    required = np.array([0.0, 0.0, count])
     best: tuple[float, Floats] | None = None
     for at_floor in product((False, True), repeat=count):
-        held = np.array(at_floor)
-        weights = np.where(held, floor, 1.0)
-        free = conditions[:, ~held]
-        change, *_ = np.linalg.lstsq(free, wanted - conditions @ weights, rcond=1e-9)
-        weights[~held] += change
-        far = float(np.sum((weights - 1.0) ** 2))
-        fits = np.abs(conditions @ weights - wanted).max() < 1e-9 and weights.min() > floor - 1e-9
-        if fits and (best is None or far < best[0] - 1e-12):
-            best = far, weights
+        on_floor = np.array(at_floor)
+        weights = np.where(on_floor, floor, 1.0)
+        free = conditions[:, ~on_floor]
+        change, *_ = np.linalg.lstsq(free, required - conditions @ weights, rcond=1e-9)
+        weights[~on_floor] += change
+        distance = float(np.sum((weights - 1.0) ** 2))
+        fits = np.abs(conditions @ weights - required).max() < 1e-9 and weights.min() > floor - 1e-9
+        if fits and (best is None or distance < best[0] - 1e-12):
+            best = distance, weights
     return None if best is None else best[1]
 
 
@@ -76,7 +76,7 @@ def _highest_floor(conditions: Floats) -> float:
     from scipy.optimize import linprog  # only here: it takes long to load
 
     count = conditions.shape[1]
-    found = linprog(
+    solution = linprog(
         np.append(np.zeros(count), -1.0),
         A_ub=np.hstack([-np.eye(count), np.ones((count, 1))]),
         b_ub=np.zeros(count),
@@ -84,15 +84,15 @@ def _highest_floor(conditions: Floats) -> float:
         b_eq=[0.0, 0.0, count],
         bounds=[(None, None)] * (count + 1),
     )
-    return float(found.x[-1]) if found.status == 0 else -1.0
+    return float(solution.x[-1]) if solution.status == 0 else -1.0
 
 
 def _why_not(angles: Sequence[float]) -> str:
     ordered = sorted(a % 360.0 for a in angles)
     following = [*ordered[1:], ordered[0] + 360.0]
     widest, at = max((b - a, a) for a, b in zip(ordered, following, strict=True))
-    listed = ", ".join(f"{a:g}" for a in angles)
+    angles_text = ", ".join(f"{a:g}" for a in angles)
     return (
-        f"angles {listed} degrees: there is no finger for {widest:g} degrees after {at:g}; fingers "
-        "hold nothing unless that is less than 180, or all are on one line, at both ends"
+        f"angles {angles_text} degrees: there is no finger for {widest:g} degrees after {at:g}; "
+        "fingers hold nothing unless that is less than 180, or all are on one line, at both ends"
     )

@@ -14,7 +14,7 @@ from ..metrics.in_si import in_si
 from ..metrics.metric import Function, Metric, Signals, measure, needed
 from ..recording.memory import Columns, EveryRow, MemoryListener
 from ..recording.proxies import of_proxies, proxy_figures, proxy_lines
-from ..recording.recorded_run import Known
+from ..recording.recorded_run import OfEveryStep
 from ..system.description import System
 from ..system.parts import Port
 from ..system.settings import run_settings, start_values
@@ -113,7 +113,7 @@ class RunRecord:
         names = {signal.name for signal in self.signals}
         return {name: c for name, c in self._in_si.conversions.items() if name in names}
 
-    def figures_of_every_row(self) -> Known | None:
+    def figures_of_every_row(self) -> OfEveryStep | None:
         """What is worked out of every row, where fewer rows or signals are recorded."""
         if self._every_row is None or self._every_row.lost:
             return None
@@ -121,7 +121,7 @@ class RunRecord:
         system = self._system
         conversions = self._in_si.conversions
         signals = Signals(time, columns, system.roles, conversions, start_values(system))
-        return Known(measure(signals, self._all_metrics), proxy_figures(time, columns))
+        return OfEveryStep(measure(signals, self._all_metrics), proxy_figures(time, columns))
 
     def proxy_log(self) -> list[str]:
         """Lines for the log on the proxies of the run."""

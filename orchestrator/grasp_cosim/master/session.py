@@ -614,7 +614,7 @@ class Session:
             timing=timing,
             more_metrics=record.metrics,
             to_si=record.conversions(),
-            known=record.figures_of_every_row(),
+            of_every_step=record.figures_of_every_row(),
             ended_at=self.ended_at,
             limits=master.watches.trips(),
             initialised_anew=tuple(master.renewed),

@@ -40,20 +40,20 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     expected = set()
     for metric in available(chosen, observed, system.roles)[0]:
         purpose = f"the metrics of the {metric.group}" if metric.group else metric.name
-        for need, wanted in metric.expects.items():
+        for need, expected_unit in metric.expects.items():
             name = resolved(need, system.roles)
-            if wanted is None or name not in observed:
+            if expected_unit is None or name not in observed:
                 continue
-            quantity = known_unit(wanted)
+            quantity = known_unit(expected_unit)
             if quantity is None or not quantity.si:
                 raise InputError(
-                    f"{purpose}: needs {need} in {wanted!r}; must be a unit of SI like 'm' or "
-                    "'N.s/m', as signals come in these"
+                    f"{purpose}: needs {need} in {expected_unit!r}; must be a unit of SI like 'm' "
+                    "or 'N.s/m', as signals come in these"
                 )
             expected.add(name)
             declared, unit = observed[name].unit, units.get(name)
-            fits = declared is None or (unit and unit.measures(quantity))
-            if name in units and not fits:
+            is_of_quantity = declared is None or (unit and unit.measures(quantity))
+            if name in units and not is_of_quantity:
                 undefined = "" if unit else ", which its FMU does not define in SI units"
                 component, _, variable = name.partition(".")
                 remedy = naming(component, variable)
@@ -61,14 +61,14 @@ def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
                     remedy = "its connector in the archive must name it"
                 raise InputError(
                     f"{system.name}: {name} is in {unit.name if unit else repr(declared)}"
-                    f"{undefined}; {purpose} must know its unit, one like {wanted}: "
+                    f"{undefined}; {purpose} must know its unit, one like {expected_unit}: "
                     f"{remedy}"
                 )
-    free = any(not m.expects for m in chosen)
-    silent = [n for n, v in observed.items() if v.kind == "Real" and v.unit is None]
-    read = [name for name in silent if free or name in expected]
-    others = {name: unit for name, unit in units.items() if unit and not unit.si}
+    reads_any = any(not m.expects for m in chosen)
+    without_unit = [n for n, v in observed.items() if v.kind == "Real" and v.unit is None]
+    assumed_si = [name for name in without_unit if reads_any or name in expected]
+    not_si = {name: unit for name, unit in units.items() if unit and not unit.si}
     return InSi(
-        {name: Conversion(unit.factor, unit.offset) for name, unit in others.items()},
-        (f"{choices(read, 6)}: no unit, taken to be in SI",) if read else (),
+        {name: Conversion(unit.factor, unit.offset) for name, unit in not_si.items()},
+        (f"{choices(assumed_si, 6)}: no unit, taken to be in SI",) if assumed_si else (),
     )

@@ -228,13 +228,13 @@ class Metric:
         if not self.arrays:
             return self
         sizes = (_elements(array, names, roles) for array in self.arrays)
-        there = range(1, next((size for size in sizes if size), 1) + 1)
+        elements = range(1, next((size for size in sizes if size), 1) + 1)
 
-        def each(text: str) -> list[str]:
-            return [text.replace("*", str(j)) for j in there]
+        def by_element(text: str) -> list[str]:
+            return [text.replace("*", str(j)) for j in elements]
 
-        entries = dict.fromkeys(entry for several in self.entries for entry in each(several))
-        needs, uses = expanded(self.needs, each), expanded(self.uses, each)
+        entries = dict.fromkeys(entry for several in self.entries for entry in by_element(several))
+        needs, uses = expanded(self.needs, by_element), expanded(self.uses, by_element)
         return replace(self, needs=needs, uses=uses, entries=tuple(entries))
 
     def __call__(self, signals: Signals) -> Value | Sequence[Value]:
@@ -271,26 +271,26 @@ def names_of(need: Need) -> tuple[str, ...]:
     return need.names if isinstance(need, AnyOf) else (need,)
 
 
-def expanded(needs: Needs, each: Callable[[str], Sequence[str]]) -> Needs:
+def expanded(needs: Needs, names_for: Callable[[str], Sequence[str]]) -> Needs:
     """The needs with all the names that a function gives in the place of each, in their units.
 
     Of AnyOf the first ones together are a need, and the second ones: all must have as many.
     """
     units = needs if isinstance(needs, Mapping) else dict.fromkeys(needs)
-    found: dict[Need, str | None] = {}
+    expanded_needs: dict[Need, str | None] = {}
     for need, unit in units.items():
         if isinstance(need, AnyOf):
-            alternatives = zip(*map(each, need.names), strict=True)
-            found |= {AnyOf(names): unit for names in alternatives}
+            alternatives = zip(*map(names_for, need.names), strict=True)
+            expanded_needs |= {AnyOf(names): unit for names in alternatives}
         else:
-            found |= dict.fromkeys(each(need), unit)
-    return found if isinstance(needs, Mapping) else tuple(found)
+            expanded_needs |= dict.fromkeys(names_for(need), unit)
+    return expanded_needs if isinstance(needs, Mapping) else tuple(expanded_needs)
 
 
 def _units(needs: Needs) -> dict[str, str | None]:
     """The units of signals by name, where the needs tell them."""
-    told = needs if isinstance(needs, Mapping) else {}
-    return {name: unit for need, unit in told.items() for name in names_of(need)}
+    units = needs if isinstance(needs, Mapping) else {}
+    return {name: unit for need, unit in units.items() for name in names_of(need)}
 
 
 def _elements(array: str, names: Collection[str], roles: Mapping[str, str]) -> int:
@@ -326,11 +326,11 @@ def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
         if unit and (reason := refusal(unit)):
             raise InputError(f"metric {name!r}: {reason}")
 
-    def made(function: Function) -> Metric:
+    def decorate(function: Function) -> Metric:
         first, *_ = (function.__doc__ or "").strip().splitlines() or [""]
         return Metric(name, function, **{"description": first, **more})
 
-    return made
+    return decorate
 
 
 @dataclass(frozen=True, slots=True)
@@ -355,13 +355,13 @@ class Measured:
     def flat(self) -> dict[str, Value]:
         """Single values by column, name or name[1]; InputError where a function failed."""
         self.check()
-        found: dict[str, Value] = {}
+        values: dict[str, Value] = {}
         for name, value in self.values.items():
             if isinstance(value, list):
-                found.update({f"{name}[{i}]": v for i, v in enumerate(value, start=1)})
+                values.update({f"{name}[{i}]": v for i, v in enumerate(value, start=1)})
             else:
-                found[name] = value
-        return found
+                values[name] = value
+        return values
 
 
 def check_portable(metrics: Iterable[Metric]) -> None:
@@ -371,8 +371,8 @@ def check_portable(metrics: Iterable[Metric]) -> None:
             as_bytes(m)
         except Exception as error:  # pickle has one of its own for each reason
             raise InputError(
-                f"metric {m.name!r}: cannot go to another process ({_said(error)}); must be a "
-                "function in a module or in a file of metrics, or cloudpickle be there: "
+                f"metric {m.name!r}: cannot go to another process ({_error_text(error)}); must be "
+                "a function in a module or in a file of metrics, or cloudpickle be there: "
                 f"{install_command('cloudpickle')}"
             ) from error
 
@@ -391,7 +391,7 @@ def _lines(error: BaseException, file: str) -> list[int]:
     return [frame.lineno or 0 for frame in frames if frame.filename == file]
 
 
-def _said(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())
 
@@ -403,10 +403,10 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
     or that returns something else than a Metric may have, is a line like
     "metric 'own': own.py, line 12: ValueError: ...".
     """
-    there, missing = available(metrics, signals.by_name, signals.roles)
+    permitted, missing = available(metrics, signals.by_name, signals.roles)
     values: dict[str, Any] = {}
     failures = []
-    for m in there:
+    for m in permitted:
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # a result must be finite anyway
                 value = _plain(m, m.function(signals))
@@ -416,16 +416,16 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
         except MissingSignalError as error:
             missing.append(f"no {m.name}: {error}")
         except Exception as error:  # a user's function may raise anything
-            failures.append(f"metric {m.name!r}: {_place(m.function, error)}{_said(error)}")
-    found = tuple(m for m in there if m.name in values)
-    return Measured(values, found, (*missing, *failures), tuple(failures))
+            failures.append(f"metric {m.name!r}: {_place(m.function, error)}{_error_text(error)}")
+    measured = tuple(m for m in permitted if m.name in values)
+    return Measured(values, measured, (*missing, *failures), tuple(failures))
 
 
 def available(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> tuple[list[Metric], list[str]]:
     """The metrics that signals of these `names` permit, and a line for each reason against some."""
-    judged = _judged(metrics, names, roles)
+    judged = _with_reasons(metrics, names, roles)
     lost: dict[str, list[Metric]] = {}
     for m, reason in judged:
         if reason and not m.optional:
@@ -438,21 +438,23 @@ def reasons_against(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> dict[str, str | None]:
     """Why signals of these `names` do not permit a metric, by its name; None where they do."""
-    return {m.name: reason for m, reason in _judged(metrics, names, roles)}
+    return {m.name: reason for m, reason in _with_reasons(metrics, names, roles)}
 
 
-Judged = Sequence[tuple[Metric, str | None]]
+MetricsWithReasons = Sequence[tuple[Metric, str | None]]
 """Metrics, each with the reason why it cannot be had, None where it can."""
 
 
-def _judged(metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]) -> Judged:
+def _with_reasons(
+    metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
+) -> MetricsWithReasons:
     """The metrics of as many elements as there are, and why signals of these `names` lack them."""
     sized = [m.of(names, roles) for m in metrics]
     every = [need for m in sized for need in m.needs]
     return [(m, lacking(m.needs, names, roles, every)) for m in sized]
 
 
-def _together(lost: Sequence[Metric], judged: Judged) -> str:
+def _together(lost: Sequence[Metric], judged: MetricsWithReasons) -> str:
     """The names of metrics that cannot be had for one reason, those of a group as in _in_group."""
     by_group: dict[str, list[str]] = {}
     for m in lost:
@@ -460,24 +462,24 @@ def _together(lost: Sequence[Metric], judged: Judged) -> str:
     return ", ".join(_in_group(group, names, judged) for group, names in by_group.items())
 
 
-def _in_group(group: str, lost: Sequence[str], judged: Judged) -> str:
+def _in_group(group: str, lost: Sequence[str], judged: MetricsWithReasons) -> str:
     """The names of lost metrics of a group; where they are most of it, those that are left."""
     of_group = [(m, reason) for m, reason in judged if m.group == group]
     usual = [m for m, _ in of_group if not m.optional]
     if not group or 2 * len(lost) <= len(usual):
         return ", ".join(lost)
-    left = ", ".join(m.name for m, reason in of_group if not reason)
-    return f"metrics of the {group}{' but ' if left else ''}{left}"
+    remaining = ", ".join(m.name for m, reason in of_group if not reason)
+    return f"metrics of the {group}{' but ' if remaining else ''}{remaining}"
 
 
 def needed(
     metrics: Iterable[Metric], names: Collection[str], roles: Mapping[str, str]
 ) -> frozenset[str]:
     """The signals of these `names` that the metrics may read: all, where one is of no group."""
-    there = available(metrics, names, roles)[0]
-    if not all(m.group for m in there):
+    permitted = available(metrics, names, roles)[0]
+    if not all(m.group for m in permitted):
         return frozenset(names)
-    return frozenset(resolved(name, roles) for m in there for name in m.reads) & {*names}
+    return frozenset(resolved(name, roles) for m in permitted for name in m.reads) & {*names}
 
 
 def lacking(
@@ -494,21 +496,23 @@ def lacking(
     for need in needs:
         if any(resolved(name, roles) in names for name in names_of(need)):
             continue
-        reasons = (_missed(of, names, roles, every or needs) for of in _by_role(need).values())
+        reasons = (
+            _reason_of_role(of, names, roles, every or needs) for of in _by_role(need).values()
+        )
         return " and ".join(dict.fromkeys(reasons))
     return None
 
 
 def _by_role(need: Need) -> dict[str, tuple[str, ...]]:
     """The names of a need by their first parts."""
-    found: dict[str, tuple[str, ...]] = {}
+    names: dict[str, tuple[str, ...]] = {}
     for name in names_of(need):
         role = name.partition(".")[0]
-        found[role] = (*found.get(role, ()), name)
-    return found
+        names[role] = (*names.get(role, ()), name)
+    return names
 
 
-def _missed(
+def _reason_of_role(
     alternatives: Sequence[str],
     names: Collection[str],
     roles: Mapping[str, str],
@@ -519,12 +523,14 @@ def _missed(
     component = roles.get(role, role)
     if not dot:
         return f"there is no signal {alternatives[0]}"
-    there = {name.partition(".")[0] for name in names}
-    if component in there:
-        listed = ", ".join(name.partition(".")[2] for name in alternatives)
-        return f"{component} {'has none of' if len(alternatives) > 1 else 'lacks'} {listed}"
+    components = {name.partition(".")[0] for name in names}
+    if component in components:
+        variables = ", ".join(name.partition(".")[2] for name in alternatives)
+        return f"{component} {'has none of' if len(alternatives) > 1 else 'lacks'} {variables}"
     of_role = {name for need in every for name in names_of(need) if name.startswith(f"{role}.")}
-    has = {c: sum(resolved(name, {role: c}) in names for name in of_role) for c in sorted(there)}
+    has = {
+        c: sum(resolved(name, {role: c}) in names for name in of_role) for c in sorted(components)
+    }
     best = max(has, key=has.__getitem__, default="")
     player = best if has.get(best) else "..."
     return f'no component is the {role}; name it under [roles]: {role} = "{player}"'
@@ -536,17 +542,17 @@ def resolved(name: str, roles: Mapping[str, str]) -> str:
     return f"{roles.get(role, role)}{dot}{variable}"
 
 
-def _plain(m: Metric, found: Any) -> Any:
+def _plain(m: Metric, value: Any) -> Any:
     """Return the value of a metric with Python's own numbers, in a list."""
-    plain = found.tolist() if isinstance(found, np.ndarray | np.generic) else found
+    plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
     several = isinstance(plain, list | tuple)
     values = [v.item() if isinstance(v, np.generic) else v for v in (plain if several else [plain])]
     if not all(v is None or isinstance(v, bool | int | float) for v in values):
-        raise InputError(f"returned {found!r}; must be a number, True, False, None or a list of it")
+        raise InputError(f"returned {value!r}; must be a number, True, False, None or a list of it")
     if any(isinstance(v, float) and not isfinite(v) for v in values):
         raise InputError(f"returned {plain!r}; must be finite, None where there is no value")
     if m.entries and not (several and len(values) == len(m.entries)):
-        raise InputError(f"returned {found!r}; must be a value for each of {choices(m.entries)}")
+        raise InputError(f"returned {value!r}; must be a value for each of {choices(m.entries)}")
     return values if several else values[0]
 
 
@@ -561,10 +567,10 @@ def load_metrics(path: Path) -> tuple[Metric, ...]:
         text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {reason_of(error)}; must be a Python file") from error
-    found = _run(path.name, text)
-    if not found:
+    metrics = _run(path.name, text)
+    if not metrics:
         raise InputError(f"--metrics {path}: no metric; must have functions under @metric(name)")
-    return found
+    return metrics
 
 
 def _run(name: str, text: str) -> tuple[Metric, ...]:
@@ -582,15 +588,15 @@ def _run(name: str, text: str) -> tuple[Metric, ...]:
                 raise
             lines = _lines(error, name)
             place = f"--metrics {name}{f', line {lines[-1]}' if lines else ''}"
-            raise InputError(f"{place}: {_said(error)}") from error
-    found = [value for value in vars(module).values() if isinstance(value, Metric)]
+            raise InputError(f"{place}: {_error_text(error)}") from error
+    metrics = [value for value in vars(module).values() if isinstance(value, Metric)]
     return tuple(
         replace(m, origin=(name, text))
-        for m in dict.fromkeys(found)
+        for m in dict.fromkeys(metrics)
         if getattr(m.function, "__module__", module_name) == module_name  # not one it imported
     )
 
 
-def _from_text(name: str, text: str, wanted: str) -> Metric:
+def _from_text(name: str, text: str, metric_name: str) -> Metric:
     """The metric of that name from a file's text, in another process."""
-    return next(m for m in _run(name, text) if m.name == wanted)
+    return next(m for m in _run(name, text) if m.name == metric_name)

@@ -35,14 +35,14 @@ class ArrowListener:
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Write the schema; InputError where the file cannot be written."""
         arrow = self._arrow
-        types = {kind: arrow.from_numpy_dtype(own) for kind, own in TYPES.items()}
+        types = {kind: arrow.from_numpy_dtype(dtype) for kind, dtype in TYPES.items()}
         types["String"] = arrow.string()
         self._experiment, self._signals = experiment, signals
         fields = [arrow.field("time", arrow.float64(), metadata={"unit": "s"})]
-        for s in signals:
-            about = {"unit": s.unit or "", "description": s.description}
-            kind = "Real" if s.wide else s.kind
-            fields.append(arrow.field(s.name, types[kind], metadata=about))
+        for signal in signals:
+            metadata = {"unit": signal.unit or "", "description": signal.description}
+            kind = "Real" if signal.wide else signal.kind
+            fields.append(arrow.field(signal.name, types[kind], metadata=metadata))
         self._schema = arrow.schema(fields)
         self._batch, self._since = Batch(), -LONG  # the first rows are written as they come
         with writing(self._path, InputError):
@@ -66,11 +66,11 @@ class ArrowListener:
     def _flush(self) -> None:
         steps, rows = self._batch.take()
         self._since = time.monotonic()
-        own = (
-            np.ascontiguousarray(rows[:, i] if s.wide else typed(s, rows[:, i]))
-            for i, s in enumerate(self._signals)
+        typed_columns = (
+            np.ascontiguousarray(rows[:, i] if signal.wide else typed(signal, rows[:, i]))
+            for i, signal in enumerate(self._signals)
         )
-        columns = [self._experiment.times(steps), *own]
+        columns = [self._experiment.times(steps), *typed_columns]
         with writing(self._path):
             self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
             self._file.flush()

@@ -56,8 +56,8 @@ class CsvListener:
             for i in self._whole:
                 columns[i] = [*map(int, columns[i])]
             texts = [map(repr, column) for column in columns]
-            for i, own in self._texts.items():
-                texts[i] = map(quoted, own.column(rows[piece, i - 1]))
+            for i, texts_of_signal in self._texts.items():
+                texts[i] = map(quoted, texts_of_signal.column(rows[piece, i - 1]))
             with writing(self._path):
                 self._append("\n".join(map(",".join, zip(*texts, strict=True))) + "\n")
             self._empty = False

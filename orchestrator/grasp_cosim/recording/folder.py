@@ -28,7 +28,7 @@ from ..system.parts import Component
 from .arrow import ArrowListener
 from .csv import CsvListener
 from .memory import Rows, typed, writing
-from .recorded_run import Known, RecordedRun
+from .recorded_run import OfEveryStep, RecordedRun
 
 SIGNALS, ARROW, SETTINGS = "signals.csv", "signals.arrow", "run.json"
 """The files of a run's folder, of which it has one of the former two."""
@@ -185,7 +185,7 @@ class RunFolder:
                 self._experiment.settings, self._experiment.times(steps[:1]),
                 {s.name: typed(s, column) for s, column in zip(of, columns, strict=True)},
                 {s.name: s.unit for s in of}, None, False, {s.name: s.description for s in of},
-                to_si=self._to_si, known=Known(Measured({}, (), ()), {}),
+                to_si=self._to_si, of_every_step=OfEveryStep(Measured({}, (), ()), {}),
             )  # fmt: skip
             self._write_settings(begun)
         except OSError as error:

@@ -104,7 +104,7 @@ def _finite(value: Any) -> bool:
 def _unit(place: str, unit: Any) -> str | None:
     if unit is None:
         return None
-    named = text(place, unit, "the name of a unit, like 'mm'")
-    if known_unit(named) is None:
-        raise InputError(f"{place} = {named!r}: is no known unit; must be one like 'mm'")
-    return named
+    name = text(place, unit, "the name of a unit, like 'mm'")
+    if known_unit(name) is None:
+        raise InputError(f"{place} = {name!r}: is no known unit; must be one like 'mm'")
+    return name

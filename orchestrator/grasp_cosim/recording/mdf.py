@@ -67,13 +67,13 @@ class MdfListener:
         steps, rows = self._batch.take()
         times, channels = self._experiment.times(steps), []
         for signal, column in zip(self._signals, rows.T, strict=True):
-            shown: dict[str, Any] = {}
+            value_table: dict[str, Any] = {}
             for number, text in enumerate(signal.texts.listed):
-                shown |= {f"val_{number}": number, f"text_{number}": text}
-            own = column.astype(TYPES["Real" if signal.wide else signal.kind])
+                value_table |= {f"val_{number}": number, f"text_{number}": text}
+            samples = column.astype(TYPES["Real" if signal.wide else signal.kind])
             unit = signal.unit or ""
             channels.append(
-                Channel(own, times, unit, signal.name, shown or None, signal.description)
+                Channel(samples, times, unit, signal.name, value_table or None, signal.description)
             )
         # the first version with compressed blocks; every tool of today reads it
         folder = str(self._place.parent)
@@ -107,16 +107,19 @@ def read_mdf(
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what is wrong is ours to say
     try:
         with MDF(path) as mdf:
-            channels = [c for c in mdf.iter_channels() if len(c.samples)]
+            channels = [channel for channel in mdf.iter_channels() if len(channel.samples)]
     except Exception as error:  # of a damaged file it raises whatever it stumbles over
         if limit := not_its_fault(error):
             raise InputError(f"{path}: cannot be read: {limit}") from error
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(f"{path}: is damaged, not an MDF file: {said}") from error
+        message = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"{path}: is damaged, not an MDF file: {message}") from error
     if not channels:
         raise InputError(f"{path}: no channel has samples; must be a recorded log")
-    time, found, units = channels[0].timestamps, {}, {}
-    for c in channels:
-        if c.samples.shape == time.shape and c.samples.dtype.kind in "fiub":
-            found[c.name], units[c.name] = c.samples.astype(np.float64), str(c.unit)
-    return time, found, units
+    time, columns, units = channels[0].timestamps, {}, {}
+    for channel in channels:
+        if channel.samples.shape == time.shape and channel.samples.dtype.kind in "fiub":
+            columns[channel.name], units[channel.name] = (
+                channel.samples.astype(np.float64),
+                str(channel.unit),
+            )
+    return time, columns, units

@@ -89,8 +89,8 @@ class MemoryListener:
         rows = total // self._every + 2  # t = 0, and the last one besides every n-th
         try:
             self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
-            own = self._paced and signals
-            buffer = memory(8 * len(signals) * rows) if own else None
+            in_shared_memory = self._paced and signals
+            buffer = memory(8 * len(signals) * rows) if in_shared_memory else None
             self._kept = _Kept(np.ndarray(shape, np.float64, buffer))
         except (MemoryError, ValueError, OverflowError, OSError):  # more bytes than there can be
             raise InputError(
@@ -132,8 +132,8 @@ class MemoryListener:
         self._kept.give(self._rows)
         if next_row:
             steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
-        found = zip(self._signals, table, strict=True)
-        return self._experiment.times(steps), {s.name: typed(s, c) for s, c in found}
+        by_signal = zip(self._signals, table, strict=True)
+        return self._experiment.times(steps), {s.name: typed(s, c) for s, c in by_signal}
 
 
 class EveryRow:
@@ -159,10 +159,10 @@ class EveryRow:
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Write what these rows have of the signals."""
-        left = memoryview(b"" if self.lost else rows[:, self._places].tobytes())
+        unwritten = memoryview(b"" if self.lost else rows[:, self._places].tobytes())
         try:
-            while left:
-                left = left[self._kept.of.write(left) :]
+            while unwritten:
+                unwritten = unwritten[self._kept.of.write(unwritten) :]
         except OSError as error:
             self.lost = unwritable(Path(gettempdir()), error)
             self._kept.of.truncate(0)
@@ -184,9 +184,9 @@ class EveryRow:
             return
         if self._rows < self._kept.rows:
             self._kept.of.seek(0)
-            before = self._kept.of.read(size)
+            rows = self._kept.of.read(size)
             self._open(self._rows)
-            self._kept.of.write(before)
+            self._kept.of.write(rows)
         self._kept.of.seek(size)
 
     def columns(self) -> Columns:
@@ -197,9 +197,9 @@ class EveryRow:
             if all(shape)
             else np.empty(shape)
         )
-        found = zip(self._signals, table.T, strict=True)
+        by_signal = zip(self._signals, table.T, strict=True)
         times = self._experiment.times(np.arange(self._rows))
-        return times, {s.name: typed(s, column) for s, column in found}
+        return times, {s.name: typed(s, column) for s, column in by_signal}
 
 
 def typed(signal: Signal, column: npt.NDArray[np.float64]) -> npt.NDArray[Any]:

@@ -23,7 +23,7 @@ COUNTS = (
 NEEDED = (*COUNTS, "sessions", "consecutive_missed", "round_trip_time", "age", "lead")
 """The diagnostics that figures are made of, beside the state."""
 
-LISTED, AHEAD = 5, 10
+MAX_LISTED_LOSSES, MAX_STEPS_AHEAD = 5, 10
 """The most losses that are named; steps that a peer's clock may be ahead without a word."""
 
 
@@ -56,62 +56,71 @@ def proxy_lines(time: Times, signals: Signals, step: float) -> list[str]:
     return lines
 
 
-def _figures(time: Times, signals: Signals, start: str) -> dict[str, Any]:
-    own = {key.removeprefix(start): v for key, v in signals.items() if key.startswith(start)}
-    lost = own["state"] >= LOST
-    turns = np.diff(lost.astype(np.int8), prepend=0)
-    return {
-        **{name: _counted(own[name]) for name in COUNTS},
-        # a proxy that is initialised anew, as one whose peer is back, begins at 1 again
-        "sessions": int(own["sessions"].max()) + int((turns < 0).sum()),
-        "most_in_a_row": int(own["consecutive_missed"].max()),
-        "round_trip_median": float(np.median(own["round_trip_time"])),
-        "round_trip_worst": float(own["round_trip_time"].max()),
-        "ahead": max(0.0, -float(own["age"].min())),
-        "lead": float(np.abs(own["lead"]).max()),
-        "lost": time[turns > 0].tolist(),
-        "back": time[turns < 0].tolist(),
+def _figures(time: Times, signals: Signals, prefix: str) -> dict[str, Any]:
+    """The figures of the proxy whose diagnostics have names with that prefix."""
+    diagnostics = {
+        name.removeprefix(prefix): column
+        for name, column in signals.items()
+        if name.startswith(prefix)
     }
+    figures: dict[str, Any] = {name: _total(diagnostics[name]) for name in COUNTS}
+    is_lost = diagnostics["state"] >= LOST
+    turns = np.diff(is_lost.astype(np.int8), prepend=0)  # 1 at a loss, -1 where it is back
+    # a proxy that is initialised anew, as one whose peer is back, begins at session 1 again
+    figures["sessions"] = int(diagnostics["sessions"].max()) + int((turns < 0).sum())
+    figures["most_in_a_row"] = int(diagnostics["consecutive_missed"].max())
+    figures["round_trip_median"] = float(np.median(diagnostics["round_trip_time"]))
+    figures["round_trip_worst"] = float(diagnostics["round_trip_time"].max())
+    figures["ahead"] = max(0.0, -float(diagnostics["age"].min()))
+    figures["lead"] = float(np.abs(diagnostics["lead"]).max())
+    figures["lost"] = time[turns > 0].tolist()
+    figures["back"] = time[turns < 0].tolist()
+    return figures
 
 
-def _counted(counter: npt.NDArray[Any]) -> int:
+def _total(counter: npt.NDArray[Any]) -> int:
     """What a counter came to, which begins anew with the loop."""
-    whole = counter.astype(np.int64)
-    before = np.append(0, whole[:-1])
-    return int(np.where(whole < before, whole, whole - before).sum())
+    counts = counter.astype(np.int64)
+    previous = np.append(0, counts[:-1])
+    increments = np.where(counts < previous, counts, counts - previous)
+    return int(increments.sum())
 
 
-def _lines(f: Mapping[str, Any], steps: int, step: float) -> Iterator[str]:
-    for moment in f["lost"][:LISTED]:
-        back = next((t for t in f["back"] if t > moment), None)
-        said = f"the peer was lost at t = {moment:.9g} s and "
-        if back is None:
-            yield (
-                f"{said}did not come back; its outputs were meanwhile as proxy.on_loss says, and "
-                "with proxy.resume = true it may come back"
-            )
-        else:
-            yield (
-                f"{said}came back at t = {back:.9g} s; its outputs were meanwhile as "
-                "proxy.on_loss says"
-            )
-    if f["sessions"] > 1:
+def _lines(figures: Mapping[str, Any], steps: int, step: float) -> Iterator[str]:
+    """The remarks on a proxy in a run of so many steps of `step` in s."""
+    for moment in figures["lost"][:MAX_LISTED_LOSSES]:
+        yield _loss(moment, figures["back"])
+    if figures["sessions"] > 1:
         yield (
-            f"the peer was started anew, and its model set up from the start: {f['sessions']} "
-            "sessions in this run"
+            "the peer was started anew, and its model set up from the start: "
+            f"{figures['sessions']} sessions in this run"
         )
-    if f["trips"]:
-        yield f"the peer put itself into its safe state {counted(f['trips'], 'time')}"
-    if f["limited"]:
-        yield f"{counted(f['limited'], 'command')} beyond the limits of the proxy: clamped"
-    if f["implausible"]:
-        yield f"{counted(f['implausible'], 'answer')} dropped that cannot have been measured"
-    if f["ahead"] > AHEAD * step:
+    if figures["trips"]:
+        yield f"the peer put itself into its safe state {counted(figures['trips'], 'time')}"
+    if figures["limited"]:
+        yield f"{counted(figures['limited'], 'command')} beyond the limits of the proxy: clamped"
+    if figures["implausible"]:
+        yield f"{counted(figures['implausible'], 'answer')} dropped that cannot have been measured"
+    if figures["ahead"] > MAX_STEPS_AHEAD * step:
         yield (
-            f"the peer's clock was up to {f['ahead']:.3g} s ahead of the run, which did not keep up"
+            f"the peer's clock was up to {figures['ahead']:.3g} s ahead of the run, which did not "
+            "keep up"
         )
     yield (
-        f"{f['missed']} of {steps} steps missed ({f['most_in_a_row']} in a row), {f['late']} "
-        f"answers late; round trip {1e3 * f['round_trip_median']:.3g} ms, at worst "
-        f"{1e3 * f['round_trip_worst']:.3g} ms"
+        f"{figures['missed']} of {steps} steps missed ({figures['most_in_a_row']} in a row), "
+        f"{figures['late']} answers late; "
+        f"round trip {1e3 * figures['round_trip_median']:.3g} ms, "
+        f"at worst {1e3 * figures['round_trip_worst']:.3g} ms"
     )
+
+
+def _loss(moment: float, returns: Iterable[float]) -> str:
+    """The remark on a peer that was lost at a moment; `returns` are when it was back, all in s."""
+    back = next((time for time in returns if time > moment), None)
+    lost = f"the peer was lost at t = {moment:.9g} s and "
+    if back is None:
+        return (
+            f"{lost}did not come back; its outputs were meanwhile as proxy.on_loss says, and "
+            "with proxy.resume = true it may come back"
+        )
+    return f"{lost}came back at t = {back:.9g} s; its outputs were meanwhile as proxy.on_loss says"

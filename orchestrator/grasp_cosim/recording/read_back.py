@@ -20,7 +20,7 @@ from ..metrics.metric import Measured, Metric, Signals, resolved
 from ..realtime.timing import Timing
 from .folder import ARROW, SETTINGS, SIGNALS
 from .log_names import AS_THEY_ARE, LogNames
-from .recorded_run import Known, Rejection, Trip
+from .recorded_run import OfEveryStep, Rejection, Trip
 from .result import Result
 from .run_json import MADE, MADE_BESIDE, ORIGIN, read_run_json, unreadable
 
@@ -59,9 +59,9 @@ def load_run(folder: str | Path) -> Result:
     """
     folder = run_folder(Path(folder))
     path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS
-    written = read_run_json(path)
-    entries: Mapping[str, Any] = written
-    units, types, timing = written["units"], written.get("types", {}), written.get("timing")
+    report = read_run_json(path)
+    entries: Mapping[str, Any] = report
+    units, types, timing = report["units"], report.get("types", {}), report.get("timing")
     if not units and not arrow.exists() and not signals.exists():
         raise InputError(f"{path}: this run recorded no signal; must have recorded one")
     rows = arrow if arrow.exists() else signals
@@ -85,24 +85,24 @@ def load_run(folder: str | Path) -> Result:
             for name, column in columns.items()
         },
         units=units,
-        wall_time=written["wall_time"],
-        complete=written["complete"],
-        ended_at=written.get("ended_at"),
-        descriptions=written.get("descriptions", {}),
-        rejections={name: Rejection(**r) for name, r in written["rejections"].items()},
-        log=tuple(written["log"]),
+        wall_time=report["wall_time"],
+        complete=report["complete"],
+        ended_at=report.get("ended_at"),
+        descriptions=report.get("descriptions", {}),
+        rejections={name: Rejection(**r) for name, r in report["rejections"].items()},
+        log=tuple(report["log"]),
         timing=None if timing is None else Timing.from_dict(f"{path}: timing", timing),
-        more_metrics=_as_recorded(written),
+        more_metrics=_as_recorded(report),
         origin={key: entries[key] for key in ORIGIN if key in entries},
-        to_si={name: Conversion(**c) for name, c in written.get("to_si", {}).items()},
+        to_si={name: Conversion(**c) for name, c in report.get("to_si", {}).items()},
         folder=folder,
-        limits=tuple(Trip(**trip) for trip in written.get("exceeded", ())),
-        initialised_anew=tuple(written.get("initialised_anew", ())),
-        peers=written.get("peers", {}),
+        limits=tuple(Trip(**trip) for trip in report.get("exceeded", ())),
+        initialised_anew=tuple(report.get("initialised_anew", ())),
+        peers=report.get("peers", {}),
     )
-    _check_rows(rows, read, written)
-    in_part = read.every > 1 or "record" in written
-    return _with_known(read, written) if in_part else read
+    _check_rows(rows, read, report)
+    in_part = read.every > 1 or "record" in report
+    return _with_figures_of_every_step(read, report) if in_part else read
 
 
 def _check_rows(path: Path, read: Result, written: Mapping[str, Any]) -> None:
@@ -121,7 +121,7 @@ def _check_rows(path: Path, read: Result, written: Mapping[str, Any]) -> None:
         )
 
 
-def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
+def _with_figures_of_every_step(read: Result, written: Mapping[str, Any]) -> Result:
     """A result of some rows or signals with the metrics that run.json has, which are of all."""
     metrics, measured = metrics_of(read.groups, read.more_metrics), written["measured"]
     worked_out = tuple(m for m in metrics if m.name in measured)
@@ -140,7 +140,7 @@ def _with_known(read: Result, written: Mapping[str, Any]) -> Result:
             count = counted(len(m.entries) or 1, "value")
             raise InputError(f"{place}: measured: {m.name} = {value!r}; must be {count}")
     of_all_rows = Measured(values, sized, tuple(written.get("missing_metrics", ())))
-    return replace(read, known=Known(of_all_rows, written.get("proxies", {})))
+    return replace(read, of_every_step=OfEveryStep(of_all_rows, written.get("proxies", {})))
 
 
 def _sized(m: Metric, value: Any, roles: Mapping[str, str]) -> Metric:

@@ -92,7 +92,7 @@ class Figures(dict[str, Any]):
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class OfEveryStep:
     """The metrics, and the figures of the proxies by component."""
 
     measured: Measured
@@ -138,7 +138,7 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     """The date, versions, command and title of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion] = field(default_factory=dict)
     """How those signals are converted to SI base units that are in others."""
-    known: Known | None = None
+    of_every_step: OfEveryStep | None = None
     """What was worked out of every step, where fewer rows were recorded."""
     folder: Path | None = None
     """The folder that it was read from; None of a run that was just done."""
@@ -204,8 +204,8 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     @cached_property
     def measured(self) -> Measured:
         """The metrics, their units, and why others cannot be had."""
-        if self.known:
-            return self.known.measured
+        if self.of_every_step:
+            return self.of_every_step.measured
         return measure(self.by_role, metrics_of(self.groups, self.more_metrics))
 
     @property
@@ -240,19 +240,21 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     @cached_property
     def _figures(self) -> Figures:
         """The metrics without those that fail."""
-        known, took, settings = self.known, self.wall_time, self.settings
+        every_step, wall_time, settings = self.of_every_step, self.wall_time, self.settings
         simulated = float(self.time[-1]) - settings.get("start", 0.0)
-        proxies = known.proxies if known else proxy_figures(self.time, self.signals)
-        figures = {
-            **self.measured.values,
-            "wall_time": took,
-            "real_time_factor": simulated / took if took else took,
-            "steps": self.last_step,
-            **{key: settings[key] for key in ("scheme", "step", "stop")},
-            "complete": self.complete,
-            **({} if self.ended_at is None else {"ended_at": self.ended_at}),
-        }
-        return Figures(figures | ({"proxies": proxies} if proxies else {}))
+        proxies = every_step.proxies if every_step else proxy_figures(self.time, self.signals)
+        figures = Figures(self.measured.values)
+        figures["wall_time"] = wall_time
+        figures["real_time_factor"] = simulated / wall_time if wall_time else wall_time
+        figures["steps"] = self.last_step
+        for key in ("scheme", "step", "stop"):
+            figures[key] = settings[key]
+        figures["complete"] = self.complete
+        if self.ended_at is not None:
+            figures["ended_at"] = self.ended_at
+        if proxies:
+            figures["proxies"] = proxies
+        return figures
 
     @cached_property
     def verdict(self) -> tuple[Criterion, ...]:
@@ -295,29 +297,34 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         Args:
             path: The file.
         """
-        types = {name: str(column.dtype) for name, column in self.signals.items()}
-        measured = self.measured.values
-        report = {
-            **{name: figure for name, figure in self._figures.items() if name not in measured},
-            **self.settings,
-            "measured": dict(measured),
-            "rows": len(self.time),
-            "units": dict(self.units),
-            "to_si": {name: c._asdict() for name, c in self.to_si.items()},
-            "types": {n: "str" if kind == "object" else kind for n, kind in types.items()},
-            "descriptions": dict(self.descriptions),
-            "metric_units": self.metric_units,
-            "missing_metrics": list(self.measured.missing),
-            "log": list(self.log),
-            "rejections": {name: asdict(r) for name, r in self.rejections.items()},
-            **({"timing": self.timing.as_dict()} if self.timing else {}),
-            **({"exceeded": [trip._asdict() for trip in self.limits]} if self.limits else {}),
-            **({"initialised_anew": list(self.initialised_anew)} if self.initialised_anew else {}),
-            **({"peers": {n: dict(p) for n, p in self.peers.items()}} if self.peers else {}),
-            **({"verdict": [c.as_dict() for c in self.verdict]} if self.verdict else {}),
-            **self.origin,
-        }
-        write_json(Path(path), report)
+        write_json(Path(path), self._report())
+
+    def _report(self) -> dict[str, Any]:
+        """The entries of run.json, in their order."""
+        metrics = self.measured.values
+        report = {name: value for name, value in self._figures.items() if name not in metrics}
+        report |= self.settings
+        report["measured"] = dict(metrics)
+        report["rows"] = len(self.time)
+        report["units"] = dict(self.units)
+        report["to_si"] = {name: c._asdict() for name, c in self.to_si.items()}
+        report["types"] = {name: _type_name(column) for name, column in self.signals.items()}
+        report["descriptions"] = dict(self.descriptions)
+        report["metric_units"] = self.metric_units
+        report["missing_metrics"] = list(self.measured.missing)
+        report["log"] = list(self.log)
+        report["rejections"] = {name: asdict(r) for name, r in self.rejections.items()}
+        if self.timing:
+            report["timing"] = self.timing.as_dict()
+        if self.limits:
+            report["exceeded"] = [trip._asdict() for trip in self.limits]
+        if self.initialised_anew:
+            report["initialised_anew"] = list(self.initialised_anew)
+        if self.peers:
+            report["peers"] = {name: dict(peer) for name, peer in self.peers.items()}
+        if self.verdict:
+            report["verdict"] = [criterion.as_dict() for criterion in self.verdict]
+        return report | dict(self.origin)
 
     def titled(self, title: str) -> Self:
         """The result under another title, which its pictures and pages have.
@@ -343,9 +350,9 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         Args:
             listener: Gets the recorded rows: see exchange.listener.
         """
-        said = self.descriptions
+        descriptions = self.descriptions
         signals = [
-            Signal(name, self.units[name], KINDS[column.dtype.kind], said.get(name, ""))
+            Signal(name, self.units[name], KINDS[column.dtype.kind], descriptions.get(name, ""))
             for name, column in self.items()
         ]
         with ExitStack() as stack:
@@ -359,3 +366,8 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
                     text = signal.kind == "String"
                     rows[:, i] = [*map(signal.texts.number, values)] if text else values
                 listener.block(steps, rows)
+
+
+def _type_name(column: npt.NDArray[Any]) -> str:
+    """The element type of a column as run.json names it: "str" for Strings."""
+    return "str" if column.dtype == object else str(column.dtype)

@@ -126,8 +126,8 @@ class Result(RecordedRun):
         Raises:
             InputError: The path has another suffix, or matplotlib is not installed.
         """
-        run, where = self.titled(title), None if path is None else Path(path)
-        return self.view.draw(run, where)  # type: ignore[no-any-return]
+        run, file = self.titled(title), None if path is None else Path(path)
+        return self.view.draw(run, file)  # type: ignore[no-any-return]
 
     def to_pandas(self) -> pd.DataFrame:
         """The signals as a table of pandas.
@@ -157,9 +157,9 @@ class Result(RecordedRun):
         data: xr.Dataset = module.Dataset(attrs=self._about)
         data["time"] = "time", self.time, {"units": "s", "long_name": "time"}
         for name, column in self.signals.items():
-            said = {"units": self.units.get(name), "long_name": self.descriptions.get(name)}
+            attributes = {"units": self.units.get(name), "long_name": self.descriptions.get(name)}
             # what there is none of is left out, as netCDF has it
-            data[name] = "time", column, {key: text for key, text in said.items() if text}
+            data[name] = "time", column, {key: text for key, text in attributes.items() if text}
         return data
 
     @property
@@ -170,19 +170,19 @@ class Result(RecordedRun):
     def _in_words(self) -> Iterator[str]:
         """The lines of its repr()."""
         settings, rows = self.settings, len(self.time)
-        where = f", read from {self.folder}" if self.folder else ""
-        yield f"Result of {settings['system']}{where}"
+        source = f", read from {self.folder}" if self.folder else ""
+        yield f"Result of {settings['system']}{source}"
         end = f"{self.time[-1]:.6g} s of " if rows and not self.complete else ""
-        took = f", took {self.wall_time:.3g} s" if self.wall_time else ""
+        duration = f", took {self.wall_time:.3g} s" if self.wall_time else ""
         broken = "" if self.complete else ", not complete"
         if self.ended_at is not None:
             broken = ", ended there"
         step, stop = 1e3 * settings["step"], settings["stop"]
-        how = f"in steps of {step:.6g} ms, {settings['scheme']}"
-        yield f"  run      {end}{stop:.6g} s {how}{took}{broken}"
+        scheme = f"in steps of {step:.6g} ms, {settings['scheme']}"
+        yield f"  run      {end}{stop:.6g} s {scheme}{duration}{broken}"
         yield f"  signals  {len(self)}, of {rows} rows: {choices(self, FEW)}"
-        found = (_in_words(m, self.measured.values[m.name]) for m in self.measured.metrics)
-        yield f"  metrics  {'; '.join([*found][:FEW]) or 'none'}"
+        metrics = (_in_words(m, self.measured.values[m.name]) for m in self.measured.metrics)
+        yield f"  metrics  {'; '.join([*metrics][:FEW]) or 'none'}"
         yield f"  log      {choices(self.log, 1) if self.log else 'nothing to report'}"
 
     @property

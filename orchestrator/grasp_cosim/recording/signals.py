@@ -29,7 +29,7 @@ def read_signals(path: Path, texts: Collection[str]) -> Columns:
     damaged.
     """
     table = read_table(path, torn=True)
-    first, *others = table.columns
+    first, *signal_columns = table.columns
     if first.head != "time":
         raise InputError(f'{path}: is damaged: the first column is {first.head!r}; must be "time"')
     if len({column.head for column in table.columns}) != len(table.columns):
@@ -43,7 +43,7 @@ def read_signals(path: Path, texts: Collection[str]) -> Columns:
             f"{path}: is damaged: the time must grow from row to row, to at most {LONGEST:g} s"
         )
     signals = {}
-    for column in others:
+    for column in signal_columns:
         if column.head not in texts:
             signals[column.head] = np.asarray(column.numbers())
         elif column.is_text_file:
@@ -120,7 +120,7 @@ def read_log(path: Path, names: LogNames = AS_THEY_ARE) -> Log:
             for number, (name, values) in enumerate(signals.items(), start=1)
         ]
         table = FileTable(str(path), columns, len(time))
-        return Log(path, time + (names.offset or 0.0), _named(table, columns, names))
+        return Log(path, time + (names.offset or 0.0), _columns_of_signals(table, columns, names))
     table = read_table(path)
     clocks = [table.column(names.time)] if names.file else []
     clocks = clocks or [column for column in table.columns if column.is_time()]
@@ -135,10 +135,12 @@ def read_log(path: Path, names: LogNames = AS_THEY_ARE) -> Log:
     unit, values = clock.time_unit(), np.asarray(clock.numbers(), np.float64)
     time = values * float(unit.numerator) / float(unit.denominator) + (names.offset or 0.0)
     columns = [column for column in table.columns if column is not clocks[0]]
-    return Log(path, time, _named(table, columns, names))
+    return Log(path, time, _columns_of_signals(table, columns, names))
 
 
-def _named(table: FileTable, columns: Sequence[Column], names: LogNames) -> list[Column]:
+def _columns_of_signals(
+    table: FileTable, columns: Sequence[Column], names: LogNames
+) -> list[Column]:
     """The columns by the names of signals: those of the map, then the others by their own."""
     mapped = [
         _as_signal(table.column(entry.column), signal, entry)

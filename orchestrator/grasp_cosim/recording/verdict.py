@@ -63,24 +63,24 @@ def judge(
     that the run came to its end.
     """
     limits = Acceptance(**settings.get("acceptance", {}))
-    found: list[tuple[str, str, float, str]] = []
+    criteria: list[tuple[str, str, float, str]] = []
     if proxies:
-        found += _of_proxies([*proxies.values()], max(steps, 1))
-        found.append(("initialised_anew", "times that the loop was initialised anew",
+        criteria += _of_proxies([*proxies.values()], max(steps, 1))
+        criteria.append(("initialised_anew", "times that the loop was initialised anew",
                       initialised_anew, ""))  # fmt: skip
     if timing and proxies:
         share = timing.overruns / max(timing.steps, 1)
-        found.append(("overruns", "steps that ended late", 100.0 * share, "%"))
+        criteria.append(("overruns", "steps that ended late", 100.0 * share, "%"))
     if timing:
         refused = len(timing.refused)
-        found.append(("refused", "privileges that the system refused", refused, ""))
+        criteria.append(("refused", "privileges that the system refused", refused, ""))
     if settings.get("limits"):
-        found.append(("warnings", "limits that were exceeded", exceeded, ""))
-    if found:
-        found.insert(0, ("unfinished", "runs that did not come to their end", not finished, ""))
+        criteria.append(("warnings", "limits that were exceeded", exceeded, ""))
+    if criteria:
+        criteria.insert(0, ("unfinished", "runs that did not come to their end", not finished, ""))
     return tuple(
-        Criterion(name, what, _scaled(getattr(limits, name), unit), float(measured), unit)
-        for name, what, measured, unit in found
+        Criterion(name, description, _scaled(getattr(limits, name), unit), float(measured), unit)
+        for name, description, measured, unit in criteria
     )
 
 

@@ -12,12 +12,12 @@ from ..grasp.metrics import is_grasp
 from ..grasp.presets import start_in_si
 from ..metrics.metric import Signals, metric
 
-LONGEST_LAG = 0.165
+MAX_LAG = 0.165
 """s, 2/omega + tau of a wrist that is in the middle before the grip arrives: 2 Hz, or 3 Hz with
 50 ms.
 """
 
-FOLLOWING = 100.0
+MIN_BANDWIDTH_OF_PUBLISHED_LAW = 100.0
 """Hz of a wrist from which the published law holds."""
 
 WRIST = "plant.wrist_position"
@@ -50,7 +50,7 @@ def is_tandem(signals: Signals) -> bool:
     return is_grasp(signals) and WRIST in signals
 
 
-class Known(NamedTuple):
+class WristParameters(NamedTuple):
     """What a system says of its wrist, as it is and as its law counts on it; None where it does
     not: natural frequencies in Hz, delays in s.
     """
@@ -69,43 +69,43 @@ def check(system: Any) -> tuple[str, ...]:
     names = {role: system.roles.get(role, role) for role in ("plant", "controller")}
     plant, controller = names.values()
     variables = {c.name: c.interface.by_name for c in system.components}
-    there = [
+    parameters = [
         start_in_si(system, f"{role}.{parameter}") if parameter in variables.get(name, ()) else None
         for role, name in names.items()
         for parameter in ("wrist.bandwidth", "wrist.delay")
     ]
-    known = Known(*there)
+    wrist = WristParameters(*parameters)
     published = "wrist_force" in variables.get(controller, ())
     return (
-        *_slow(controller, known),
-        *_otherwise(plant, controller, known),
-        *(_not_following(plant, known) if published else ()),
+        *_lagging(controller, wrist),
+        *_unlike_counted_on(plant, controller, wrist),
+        *(_not_following(plant, wrist) if published else ()),
     )
 
 
-def _slow(controller: str, known: Known) -> Iterator[str]:
+def _lagging(controller: str, wrist: WristParameters) -> Iterator[str]:
     """A wrist that is in the middle after the grip, as far as the law knows."""
-    bandwidth, delay = known.counted_bandwidth, known.counted_delay
+    bandwidth, delay = wrist.counted_bandwidth, wrist.counted_delay
     if bandwidth is None or delay is None:
         return
     lag = 1.0 / (pi * bandwidth) + delay
-    if lag > LONGEST_LAG:
+    if lag > MAX_LAG:
         yield (
             f"{controller}.wrist.bandwidth = {bandwidth:g} Hz, delay = {delay:g} s: the wrist "
             f"lags by {lag:.3g} s, and one finger may touch before it is in the middle; up to "
-            f"{LONGEST_LAG:g} s both touch at once"
+            f"{MAX_LAG:g} s both touch at once"
         )
 
 
-def _otherwise(plant: str, controller: str, known: Known) -> Iterator[str]:
+def _unlike_counted_on(plant: str, controller: str, wrist: WristParameters) -> Iterator[str]:
     """A wrist that is slower, or later, than the law counts on."""
-    hz, counted_hz = known.bandwidth, known.counted_bandwidth
+    hz, counted_hz = wrist.bandwidth, wrist.counted_bandwidth
     if hz is not None and counted_hz is not None and hz < counted_hz:
         yield (
             f"{plant}.wrist.bandwidth = {hz:g} Hz: the law counts on more, "
             f"{controller}.wrist.bandwidth = {counted_hz:g} Hz"
         )
-    delay, counted_delay = known.delay, known.counted_delay
+    delay, counted_delay = wrist.delay, wrist.counted_delay
     if delay is not None and counted_delay is not None and delay > counted_delay:
         yield (
             f"{plant}.wrist.delay = {delay:g} s: the law counts on less, "
@@ -113,10 +113,10 @@ def _otherwise(plant: str, controller: str, known: Known) -> Iterator[str]:
         )
 
 
-def _not_following(plant: str, known: Known) -> Iterator[str]:
+def _not_following(plant: str, wrist: WristParameters) -> Iterator[str]:
     """A wrist that is too slow for the published law."""
-    if known.bandwidth is not None and known.bandwidth < FOLLOWING:
+    if wrist.bandwidth is not None and wrist.bandwidth < MIN_BANDWIDTH_OF_PUBLISHED_LAW:
         yield (
-            f"{plant}.wrist.bandwidth = {known.bandwidth:g} Hz: the published law wants a wrist of "
-            f"{FOLLOWING:g} Hz; GraspControllerTandem is for slower ones"
+            f"{plant}.wrist.bandwidth = {wrist.bandwidth:g} Hz: the published law wants a wrist of "
+            f"{MIN_BANDWIDTH_OF_PUBLISHED_LAW:g} Hz; GraspControllerTandem is for slower ones"
         )

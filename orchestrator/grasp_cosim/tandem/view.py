@@ -18,7 +18,7 @@ from .metrics import WRIST, is_tandem
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SEEN = (
+HOW_IT_IS_SEEN = (
     "The object is drawn from face to face, where the gaps say it is; the beam that carries both "
     "fingers hangs from the wrist"
 )
@@ -37,7 +37,7 @@ def draw_tandem(run: Result, path: Path | None = None) -> Figure:
 
 def tandem_scene(result: Result) -> Scene | None:
     """The scene of a grasp, its fingers on the wrist; None where it is no gripper in tandem."""
-    scene = grasp_scene(result, SEEN) if is_tandem(result.by_role) else None
+    scene = grasp_scene(result, HOW_IT_IS_SEEN) if is_tandem(result.by_role) else None
     if scene is None:
         return None
     wrist = resolved(WRIST, result.roles)
