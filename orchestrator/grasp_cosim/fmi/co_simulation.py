@@ -28,7 +28,6 @@ import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
-    FMU2Slave,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
@@ -36,7 +35,6 @@ from fmpy.fmi2 import (
     fmi2LastSuccessfulTime,
     fmi2Terminated,
 )
-from fmpy.fmi3 import FMU3Slave
 
 from ..base.calls import STEP_2, STEP_3, Call, Native
 from ..base.scratch import ScratchFolder
@@ -44,8 +42,9 @@ from ..base.system_calls import c_library
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..system.parts import Logging
+from .fmpy_private import FMU2CoSimulation, FMU3CoSimulation, MissingFunctionError
 from .instance import DUE, EARLY, EVENT, WARNING
-from .loaded import Lenient, LoadedInstance, MissingFunctionError
+from .loaded import LoadedInstance
 from .messages import Messages
 
 _NAMED = c_void_p, c_char_p, c_int, c_char_p, c_char_p
@@ -134,20 +133,16 @@ def callbacks_for(messages: Messages) -> fmi2CallbackFunctions:
     return callbacks
 
 
-class FMU2Part(Lenient, FMU2Slave):  # type: ignore[misc]  # FMPy has no types
-    """FMPy's slave; by the beginning of its name FMPy tells the version."""
-
-
 class FmuInstance(LoadedInstance):
     """One instance of an FMI 2.0 FMU, for co-simulation."""
 
-    SLAVE = FMU2Part
+    SLAVE = FMU2CoSimulation
     NEEDS: ClassVar[Sequence[str]] = (
         *("Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode"),
         *("ExitInitializationMode", "DoStep", "Terminate"),
     )
 
-    def _instantiate(self, folder: Path) -> FMU2Slave:
+    def _instantiate(self, folder: Path) -> Any:
         slave = self._opened(folder)
         callbacks = callbacks_for(self._messages)
         slave.instantiate(callbacks=callbacks, loggingOn=self._logs_at_once)
@@ -179,7 +174,7 @@ class FmuInstance(LoadedInstance):
                 return None
 
 
-_libraries: dict[tuple[Path, int], tuple[FMU2Slave, ScratchFolder | None]] = {}
+_libraries: dict[tuple[Path, int], tuple[FMU2CoSimulation, ScratchFolder | None]] = {}
 """What SharedInstance has loaded, and from where, by path and time of change of the FMU."""
 
 
@@ -193,7 +188,7 @@ class SharedInstance(FmuInstance):
         _, folder = _libraries.get(self._key, (None, None))
         return Path(folder.name) if folder else super()._unpacked()
 
-    def _opened(self, folder: Path) -> FMU2Slave:
+    def _opened(self, folder: Path) -> FMU2CoSimulation:
         if self._key not in _libraries:
             _libraries[self._key] = super()._opened(folder), self._folder
         self._folder = None  # stays, with the library
@@ -219,31 +214,10 @@ the step ended early.
 """
 
 
-class Texts3:
-    """Mixed into FMPy's classes of FMI 3.0."""
-
-    def getString(self, references: Sequence[int]) -> list[bytes | None]:
-        """As they are: FMPy's raises at what is no UTF-8, and at NULL."""
-        count = len(references)
-        texts = (ctypes.c_char_p * count)()
-        self.fmi3GetString(  # type: ignore[attr-defined]
-            self.component,  # type: ignore[attr-defined]
-            (ctypes.c_uint * count)(*references),
-            count,
-            texts,
-            count,
-        )
-        return list(texts)
-
-
-class _Slave(Texts3, Lenient, FMU3Slave):  # type: ignore[misc]
-    pass
-
-
 class Fmi3Instance(LoadedInstance):
     """One instance of an FMI 3.0 co-simulation FMU."""
 
-    SLAVE = _Slave
+    SLAVE = FMU3CoSimulation
     NEEDS: ClassVar[Sequence[str]] = (
         *("InstantiateCoSimulation", "FreeInstance", "EnterInitializationMode"),
         *("ExitInitializationMode", "DoStep", "Terminate"),
@@ -268,7 +242,7 @@ class Fmi3Instance(LoadedInstance):
         """As LoadedInstance."""
         self._flags[:], self._last[:], self._limit[:] = False, 0.0, np.inf
 
-    def _instantiate(self, folder: Path) -> FMU3Slave:
+    def _instantiate(self, folder: Path) -> Any:
         slave = self._opened(folder)
         events = self.interface.event_mode
         slave.instantiate(

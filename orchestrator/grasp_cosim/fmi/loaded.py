@@ -7,14 +7,13 @@ that are parts of the master's vectors.
 
 import atexit
 import ctypes
-import inspect
 import logging
 import os
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import quote
@@ -34,6 +33,12 @@ from ..interface.obstacles import of_binary, of_loading, this_machine
 from ..interface.variables import Element, Variable
 from ..system.parts import Logging
 from .call_trace import CallTrace
+from .fmpy_private import (
+    FAILED_TO_INSTANTIATE,
+    MissingFunctionError,
+    library_file,
+    with_known_signatures,
+)
 from .instance import EARLY, ERROR, FATAL, OK, STATUS, WARNING, Inputs
 from .messages import SEVERE, Messages
 from .numbers import state_numbers, take_numbers
@@ -56,55 +61,15 @@ _UNUSED = ("documentation/", "sources/", "binaries/")
 LOGGER = logging.getLogger(__name__)
 """Gets what goes wrong where an FMU is terminated."""
 
-NOT_INSTANTIATED = "Failed to instantiate"
-"""So FMPy says that an FMU gave no instance."""
-
 _never_freed: list[Any] = []
 """Slaves that FMI does not let us free: what they call back must stay, too."""
-
-
-class Lenient:
-    """Mixed into FMPy's classes: the binary may lack functions, until one of these is called.
-
-    FMPy looks for all functions of the standard, and raises where one is missing.
-    """
-
-    messages: Messages
-    """Gets a warning that a call returns without having logged why."""
-
-    trace: CallTrace | None = None
-    """Gets each call; None where that is not asked for."""
-
-    def __dir__(self) -> Iterable[str]:
-        """FMPy loads the functions by these names."""
-        names = super().__dir__()
-        return [n for n in names if not n.startswith(("fmi2", "fmi3")) or hasattr(self.dll, n)]  # type: ignore[attr-defined]
-
-    def _call(self, function: str, *arguments: Any) -> Any:
-        """As FMPy's; MissingFunctionError where the binary has no such function."""
-        if function not in self._functions:  # type: ignore[attr-defined]
-            raise MissingFunctionError(function)
-        before = self.messages.count
-        call = partial(super()._call, function)  # type: ignore[misc]
-        answer = self.trace.call(function, call, arguments) if self.trace else call(*arguments)
-        has_status = self._functions[function].restype is ctypes.c_int  # type: ignore[attr-defined]
-        if has_status and answer == WARNING:
-            self.messages.returned(function, before)
-        return answer
-
-
-class MissingFunctionError(Exception):
-    """The binary of an FMU lacks functions that are needed."""
-
-    def __init__(self, *functions: str) -> None:
-        super().__init__(f"its binary lacks {', '.join(functions)}; must have what is called")
 
 
 class LoadedInstance(ABC):
     """One instance of an FMU in this process."""
 
     SLAVE: ClassVar[type]
-    """FMPy's class, made Lenient."""
+    """FMPy's class: one of fmpy_private.py."""
 
     NEEDS: ClassVar[Sequence[str]]
     """The functions without which an FMU cannot run, by their names without fmi2 or fmi3."""
@@ -158,7 +123,7 @@ class LoadedInstance(ABC):
 
         MissingFunctionError where that lacks a function that is needed.
         """
-        slave = know_signatures(self.SLAVE)(
+        slave = with_known_signatures(self.SLAVE)(
             guid=self.interface.guid,
             unzipDirectory=str(folder),
             modelIdentifier=self._identifier,
@@ -265,7 +230,7 @@ class LoadedInstance(ABC):
             self._slave = self._instantiate(folder)
         except Exception as error:  # FMPy raises plain Exception
             reason = self._reason(error)
-            if reason.startswith(NOT_INSTANTIATED):  # and the FMU logged nothing
+            if reason.startswith(FAILED_TO_INSTANTIATE):  # and the FMU logged nothing
                 reason += self._advice(ERROR)
             obstacle = of_loading(self.interface, reason)
             raise InputError(
@@ -275,7 +240,7 @@ class LoadedInstance(ABC):
         finally:
             os.chdir(here)  # where loading fails, FMPy stays in the library's folder
         if self._python:
-            _binaries_of_pythonfmu.add(self._slave.dll._name)
+            _binaries_of_pythonfmu.add(library_file(self._slave))
         self._worst = OK
         self._choose_categories()
 
@@ -632,18 +597,6 @@ def _let_go_of_python() -> None:
         for name in _binaries_of_pythonfmu:
             with suppress(OSError, AttributeError):  # it was unloaded, or is of another version
                 ctypes.PyDLL(name, mode=os.RTLD_NOLOAD).finalizePythonInterpreter()
-
-
-@cache
-def know_signatures(slave: type) -> type:
-    """The same class of FMPy, which works the signatures of its functions out at each instance.
-
-    Now they are known: 3 of the 4 ms that an instance takes.
-    """
-    for name, function in inspect.getmembers(slave, inspect.isfunction):
-        if name.startswith("fmi"):
-            function.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
-    return slave
 
 
 def _used_here(member: str) -> bool:

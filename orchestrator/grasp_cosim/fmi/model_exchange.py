@@ -15,8 +15,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from fmpy.fmi2 import FMU2Model
-from fmpy.fmi3 import FMU3Model
 
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError, choices
@@ -25,11 +23,12 @@ from ..interface.interface import Interface
 from ..interface.variables import Variable
 from ..system.parts import Logging, Solver
 from .clocks import Clocks
-from .co_simulation import Fmi3Instance, FmuInstance, Texts3
+from .co_simulation import Fmi3Instance, FmuInstance
 from .cvode import Cvode, CvodeError, Function
 from .events import DENSE, ConnectedInputs, Events
+from .fmpy_private import FMU2ModelExchange, FMU3ModelExchange
 from .instance import AT_POINT, DISCARD, EARLY, OK, WARNING
-from .loaded import Lenient, LoadedInstance
+from .loaded import LoadedInstance
 
 ROUNDED = 16
 """The smallest numbers in which a time can change, over which nothing is integrated."""
@@ -318,14 +317,10 @@ def _no_slope(slopes: int, _: int) -> int:
     return OK
 
 
-class FMU2Equations(Lenient, FMU2Model):  # type: ignore[misc]  # FMPy has no types
-    """FMPy's model; by the beginning of its name FMPy tells the version."""
-
-
 class Fmi2Model(ModelInstance, FmuInstance):
     """One instance of an FMI 2.0 FMU for model exchange."""
 
-    SLAVE = FMU2Equations
+    SLAVE = FMU2ModelExchange
     SLOPES = "GetDerivatives"
     UPDATE = "newDiscreteStates"
     NEEDS: ClassVar[Sequence[str]] = (
@@ -335,14 +330,10 @@ class Fmi2Model(ModelInstance, FmuInstance):
     )
 
 
-class _Model(Texts3, Lenient, FMU3Model):  # type: ignore[misc]  # FMPy has no types
-    pass
-
-
 class Fmi3Model(ModelInstance, Fmi3Instance):
     """One instance of an FMI 3.0 FMU for model exchange."""
 
-    SLAVE = _Model
+    SLAVE = FMU3ModelExchange
     SLOPES = "GetContinuousStateDerivatives"
     UPDATE = "updateDiscreteStates"
     NEEDS: ClassVar[Sequence[str]] = (
@@ -368,7 +359,7 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
             )
         super().__init__(name, interface, chosen, logging, trace)
 
-    def _instantiate(self, folder: Path) -> FMU3Model:
+    def _instantiate(self, folder: Path) -> Any:
         model = self._opened(folder)
         model.instantiate(loggingOn=self._logs_at_once, logMessage=self._log)
         return model
