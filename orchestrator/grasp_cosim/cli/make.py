@@ -94,7 +94,8 @@ def build(
         if native:
             platforms = targets(target.split(",")) if target is not None else ()
             plan = planned(platforms, 3 if fmi == "3" else 2)
-            notes += [plan.note] if plan.note else []
+            if plan.note:
+                notes.append(plan.note)
             subject = f"for {', '.join(t.tuple for t in plan.places)}"
         with waiting(f"building {subject}{FIRST if target else ''}"):
             built = build_chosen(block, folder, plan, fingers)

@@ -43,6 +43,12 @@ def parse_value(
     number with its unit. With `text`, a string may stand for a number or a boolean, as on a command
     line. InputError where the variable cannot be set, or not to that value.
     """
+    if type(value) in PLAIN_TYPES:  # as a system has its values, which each copy looks at again
+        variable = _settable_variable(interface, place, name, value)
+        valid = _valid_value(variable, value, interface.version)
+        if valid is None:
+            raise _unfitting(variable, place, value)
+        return valid
     value = unwrapped(value)
     variable = _settable_variable(interface, place, name, value)
     quoted = value
@@ -57,9 +63,20 @@ def parse_value(
     if text or variable.kind == "String" or not isinstance(value, str):
         valid = _valid_value(variable, value, interface.version)
     if valid is None:
-        advice = _advice(variable, quoted)
-        raise InputError(f"{place}: {name} = {quoted!r}: must be {_expected(variable)}{advice}")
+        raise _unfitting(variable, place, quoted)
     return valid
+
+
+PLAIN_TYPES = (float, int, bool)
+"""The types of Python's own numbers, which have no unit; subclasses, as of NumPy, are others."""
+
+
+def _unfitting(variable: Variable, place: str, value: Any) -> InputError:
+    """The error for a value that a variable cannot have."""
+    advice = _advice(variable, value)
+    return InputError(
+        f"{place}: {variable.name} = {value!r}: must be {_expected(variable)}{advice}"
+    )
 
 
 def _settable_variable(interface: Interface, place: str, name: str, value: Any) -> Variable:

@@ -149,7 +149,9 @@ class Component:
         system_names = {declared: name for name, declared in self.rename.items()}
         name = system_names.get(fmu_name, fmu_name)
         value = self.values.get(name, variable.start)
-        return value in (True, "true", "1") if variable.kind == "Boolean" else value or ""
+        if variable.kind == "Boolean":
+            return value in (True, "true", "1")
+        return "" if value is None else value
 
     @property
     def is_current(self) -> bool:

@@ -124,7 +124,8 @@ class Stimuli:
         """A column, and in it a row, for messages."""
         parts = []
         if not self.is_text_file:
-            parts += [] if row is None else [f"row {row + 1}"]
+            if row is not None:
+                parts.append(f"row {row + 1}")
         elif row is None:
             parts.append("line 1")
         else:

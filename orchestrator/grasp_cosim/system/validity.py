@@ -341,7 +341,8 @@ def _of_components(system: Structure) -> Iterator[str]:
             if name in c.interface.main_names:
                 continue
             if without and c.interface.by_name[without[0]].causality == "input":
-                free += [name] if len(without) == len(elements.names) else without
+                is_whole = len(without) == len(elements.names)
+                free += [name] if is_whole else without
         if free:
             yield f"{c.name}: no source for {choices(free, MAX_NAMED)}: kept as the FMU starts with"
     if not system.recorded:
