@@ -101,7 +101,10 @@ def json_in(place: str, text: str | bytes) -> Any:
 
 
 class Decoder:
-    """Decodes JSON into typed data; `texts` says which types are written as strings, and how."""
+    """Decodes JSON into typed data; `texts` says which types are written as strings, and how.
+
+    It keeps the forms of the types that it has decoded, so that one is made for many files.
+    """
 
     def __init__(self, texts: Mapping[type, Text] | None = None) -> None:
         self._texts: Mapping[Any, Text] = {Fraction: FRACTION, **(texts or {})}
@@ -119,10 +122,7 @@ class Decoder:
             raise InputError(f"{place}: {error}") from error
 
     def _decode(self, kind: Any, place: str, value: Any) -> Any:
-        form = self._form(kind)
-        if not form.fits(value):
-            raise _refused(place, value, form.must)
-        return form.decode(place, value)
+        return _decoded(self._form(kind), place, value)
 
     def _form(self, kind: Any) -> _Form:
         """The form of a type, which is worked out once."""
@@ -207,25 +207,31 @@ class Decoder:
 
     def _mapping(self, key_type: Any, value_type: Any) -> _Form:
         def decode(place: str, value: dict[str, Any]) -> dict[Any, Any]:
-            return {
-                self._decode(key_type, place, name): self._decode(
-                    value_type, f"{place}: {name}", entry
-                )
-                for name, entry in value.items()
-            }
+            keys, values = self._form(key_type), self._form(value_type)
+            content = {}
+            for name, entry in value.items():
+                key = _decoded(keys, place, name)
+                content[key] = _decoded(values, f"{place}: {name}", entry)
+            return content
 
         return _Form("a JSON object", _is_object, decode)
 
     def _list(self, container: Callable[[list[Any]], Any], entry_type: Any) -> _Form:
         def decode(place: str, value: list[Any]) -> Any:
-            return container(
-                [
-                    self._decode(entry_type, f"{place}[{number}]", entry)
-                    for number, entry in enumerate(value)
-                ]
-            )
+            form = self._form(entry_type)
+            entries = [
+                _decoded(form, f"{place}[{number}]", entry) for number, entry in enumerate(value)
+            ]
+            return container(entries)
 
         return _Form("a list", _is_list, decode)
+
+
+def _decoded(form: _Form, place: str, value: Any) -> Any:
+    """The value in its type; InputError where it does not fit."""
+    if not form.fits(value):
+        raise _refused(place, value, form.must)
+    return form.decode(place, value)
 
 
 def _scalar(kind: type) -> _Form:

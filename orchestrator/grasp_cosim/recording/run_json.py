@@ -280,6 +280,9 @@ ORIGIN = tuple(Origin.__annotations__)
 """The names of these entries."""
 
 
+_DECODER = Decoder()
+
+
 def read_run_json(path: Path) -> RunJson:
     """The object in a run.json; InputError at the first entry that is not as it must be."""
     try:
@@ -294,7 +297,7 @@ def read_run_json(path: Path) -> RunJson:
             raise InputError(
                 f"{path}: no entry {key!r}; must have one, as `grasp-cosim run --out` writes it"
             )
-    run = Decoder().decoded(RunJson, str(path), content)
+    run = _DECODER.decoded(RunJson, str(path), content)
     for number, connection in enumerate(run["connections"]):
         for end, port in (("from", connection["from"]), ("to", connection["to"])):
             component = port.partition(".")[0]

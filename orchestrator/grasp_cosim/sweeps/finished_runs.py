@@ -36,6 +36,9 @@ Head = TypedDict("Head", {"runs of": Mapping[str, str]})
 """The first line of the file: a hash of each thing that decides the results, by its name."""
 
 
+_DECODER = Decoder()
+
+
 def keep(file: FileIO, outcome: Outcome) -> None:
     """Keep the outcome of a run from now on; SimulationError where that fails."""
     try:
@@ -104,7 +107,7 @@ def _outcome(path: Path, number: int, line: bytes) -> Outcome:
     """The outcome that a line of the file of runs holds; InputError where it holds none."""
     place = f"{path}: line {number}"
     try:
-        return Decoder().decoded(Outcome, place, json_in(place, line))
+        return _DECODER.decoded(Outcome, place, json_in(place, line))
     except InputError as error:
         raise InputError(f"{place} is damaged; remove the file, or name another --out") from error
 
@@ -112,7 +115,7 @@ def _outcome(path: Path, number: int, line: bytes) -> Outcome:
 def _difference(head: bytes, identity: Mapping[str, str]) -> str:
     """What the runs that the first line of a file tells of differ in."""
     try:
-        earlier = Decoder().decoded(Head, "head", json_in("head", head))["runs of"]
+        earlier = _DECODER.decoded(Head, "head", json_in("head", head))["runs of"]
     except InputError:
         return "all that is known of them"
     names = [n for n in {**identity, **earlier} if earlier.get(n) != identity.get(n)]
