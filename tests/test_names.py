@@ -12,7 +12,13 @@ from pathlib import Path
 import grasp_cosim
 import pytest
 from grasp_cosim.base.checks import EXACT, exact, install_command, integer, packages, real
-from grasp_cosim.base.errors import FEW, MANY, InputError, SimulationError, nearest
+from grasp_cosim.base.errors import (
+    MAX_LISTED_IN_FULL,
+    MAX_LISTED_OF_MANY,
+    InputError,
+    SimulationError,
+    nearest,
+)
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -48,14 +54,16 @@ def test_the_nearest_names_are_asked_about(name, names, found):
 @pytest.mark.parametrize("name", ["zzz", "plant.zzz", "1"])
 def test_where_none_is_near_a_few_are_named_and_where_all_are(name):
     said = nearest(name, PORTS, "`inspect`")
-    few = ", ".join(PORTS[:FEW])
-    assert said == f"valid: {few}, ... ({len(PORTS) - FEW} more); `inspect` shows all"
+    few = ", ".join(PORTS[:MAX_LISTED_OF_MANY])
+    assert (
+        said == f"valid: {few}, ... ({len(PORTS) - MAX_LISTED_OF_MANY} more); `inspect` shows all"
+    )
 
 
 @pytest.mark.parametrize("see", ["", "`inspect`"])
 def test_a_short_list_is_named_whole(see):
     names = [f"component_{letter}" for letter in "abcdefgh"]
-    assert len(names) == MANY
+    assert len(names) == MAX_LISTED_IN_FULL
     assert nearest("zzz", names, see) == f"valid: {', '.join(names)}"
     assert nearest("zzz", [], see) == "valid: none"
 

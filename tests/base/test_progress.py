@@ -33,10 +33,10 @@ def at_once(monkeypatch):
 @pytest.mark.parametrize(
     ("named", "said"),
     [
-        ({"what": "map", "total": 36, "initial": 11}, "map: 11 of 36 runs"),
-        ({"what": "try", "total": 3.0, "unit": "s", "initial": 1.25}, "try: 1.25 of 3.00 s"),
-        ({"what": "identify", "unit": "grasp", "initial": 7}, "identify: 7 grasps, 00:00"),
-        ({"what": "compiling", "unit": ""}, "compiling, 00:00"),
+        ({"title": "map", "total": 36, "initial": 11}, "map: 11 of 36 runs"),
+        ({"title": "try", "total": 3.0, "unit": "s", "initial": 1.25}, "try: 1.25 of 3.00 s"),
+        ({"title": "identify", "unit": "grasp", "initial": 7}, "identify: 7 grasps, 00:00"),
+        ({"title": "compiling", "unit": ""}, "compiling, 00:00"),
     ],
 )
 def test_it_says_what_is_at_work(named, said, stream, monkeypatch):

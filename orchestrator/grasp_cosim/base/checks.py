@@ -103,9 +103,9 @@ def integer(text: str) -> int:
 
 def choice(place: str, value: Any, valid: Iterable[Any]) -> Any:
     """Return `value`, one of `valid`; InputError otherwise."""
-    listed = list(valid)
-    if isinstance(value, bool) or value not in listed:
-        raise InputError(f"{place} = {value!r}: must be one of {choices(listed)}")
+    choices_list = list(valid)
+    if isinstance(value, bool) or value not in choices_list:
+        raise InputError(f"{place} = {value!r}: must be one of {choices(choices_list)}")
     return value
 
 
@@ -116,20 +116,20 @@ def text(place: str, value: Any, must: str) -> str:
     return value
 
 
-def known(said: str, name: Any, valid: Collection[Any], after: str = "", see: str = "") -> None:
-    """InputError "SAID 'name'AFTER; did you mean ...?" where `name` is not one of `valid`.
+def known(place: str, name: Any, valid: Collection[Any], suffix: str = "", see: str = "") -> None:
+    """InputError "PLACE 'name'SUFFIX; did you mean ...?" where `name` is not one of `valid`.
 
-    `see` is where all of these are listed, as of errors.nearest.
+    `place` begins the message, `suffix` follows the name; `see` is as of errors.nearest.
     """
     if name not in valid:
-        raise InputError(f"{said} {name!r}{after}; {nearest(name, valid, see)}")
+        raise InputError(f"{place} {name!r}{suffix}; {nearest(name, valid, see)}")
 
 
 def as_table(place: str, value: Any) -> dict[str, Any]:
     """Return `value`, a table of a TOML or JSON file; InputError where it is none."""
     if not isinstance(value, dict):
-        found = "missing" if value is None else repr(value)
-        raise InputError(f"{place}: {found}; must be a table")
+        actual = "missing" if value is None else repr(value)
+        raise InputError(f"{place}: {actual}; must be a table")
     return value
 
 
@@ -181,16 +181,16 @@ def packages(extra: str) -> list[str]:
 
     of_the_extra = re.compile(rf"([^;]*[^; ]) *; extra == .{extra}.")
     declared = requires("grasp-cosim") or []
-    return [found[1] for line in declared if (found := of_the_extra.fullmatch(line))]
+    return [requirement[1] for line in declared if (requirement := of_the_extra.fullmatch(line))]
 
 
-def install_command(*what: str) -> str:
+def install_command(*requirements: str) -> str:
     """Return the command that installs packages for the Python that runs."""
-    return shlex.join([sys.executable, "-m", "pip", "install", *what])
+    return shlex.join([sys.executable, "-m", "pip", "install", *requirements])
 
 
-def toml_table(path: Path, what: str) -> dict[str, Any]:
-    """Return the content of a TOML file; `what` names it where there is none, "system file".
+def toml_table(path: Path, kind: str) -> dict[str, Any]:
+    """Return the content of a TOML file; `kind` names it where there is none, "system file".
 
     InputError where it is missing or not readable as TOML.
     """
@@ -200,10 +200,10 @@ def toml_table(path: Path, what: str) -> dict[str, Any]:
         table = tomllib.loads(text)
         repr(table)  # a hexadecimal number longer than Python writes is refused here
     except FileNotFoundError:
-        raise InputError(f"{path}: no such {what}") from None
+        raise InputError(f"{path}: no such {kind}") from None
     except (OSError, ValueError, RecursionError) as error:
-        where = re.search(r"at line (\d+)", str(error))
-        line = text.splitlines()[int(where[1]) - 1].strip() if where else ""
+        position = re.search(r"at line (\d+)", str(error))
+        line = text.splitlines()[int(position[1]) - 1].strip() if position else ""
         why = reason(error).replace("Cannot overwrite a value", "a key is given a second time")
         if line:
             why += f": {line}"

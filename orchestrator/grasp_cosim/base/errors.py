@@ -49,16 +49,16 @@ def nearest(name: object, names: Iterable[object], see: str = "") -> str:
 
     These are all names, or where `see` says where all of them are listed, the first few of many.
     """
-    listed = [*dict.fromkeys(map(str, names))]
-    if found := _alike(str(name), listed):
-        return f"did you mean {', '.join(found)}?"
-    if see and len(listed) > MANY:
-        return f"valid: {choices(listed, FEW)}; {see} shows all"
-    return f"valid: {choices(listed)}"
+    valid = [*dict.fromkeys(map(str, names))]
+    if alike := _alike(str(name), valid):
+        return f"did you mean {', '.join(alike)}?"
+    if see and len(valid) > MAX_LISTED_IN_FULL:
+        return f"valid: {choices(valid, MAX_LISTED_OF_MANY)}; {see} shows all"
+    return f"valid: {choices(valid)}"
 
 
-MANY, FEW = 8, 4
-"""Of more names than MANY, only a FEW are named where all are listed elsewhere."""
+MAX_LISTED_IN_FULL, MAX_LISTED_OF_MANY = 8, 4
+"""Of more names than the first, only the second many are named where all are listed elsewhere."""
 
 
 def _alike(name: str, names: Sequence[str]) -> list[str]:
@@ -69,28 +69,28 @@ def _alike(name: str, names: Sequence[str]) -> list[str]:
     from difflib import SequenceMatcher, get_close_matches
 
     head, dot, last = name.lower().rpartition(".")
-    if len(last) < SHORTEST:
+    if len(last) < MIN_LENGTH_TO_COMPARE:
         return []
-    mates = [known for known in names if known.lower().startswith(head + dot)]
+    mates = [candidate for candidate in names if candidate.lower().startswith(head + dot)]
     cut = len(head + dot) if mates else 0
-    lower = {known[cut:].lower(): known for known in mates or names}
+    lower = {candidate[cut:].lower(): candidate for candidate in mates or names}
     spelt = name.lower()[cut:]
     if close := get_close_matches(spelt, lower, 3):
-        ratios = {known: SequenceMatcher(None, known, spelt).ratio() for known in close}
-        least = max(ratios.values()) - ABOUT
-        return [name for known, name in lower.items() if ratios.get(known, 0.0) > least]
-    return [known for known in names if last in known.lower()][:3]
+        ratios = {candidate: SequenceMatcher(None, candidate, spelt).ratio() for candidate in close}
+        least = max(ratios.values()) - SIMILARITY_TOLERANCE
+        return [name for candidate, name in lower.items() if ratios.get(candidate, 0.0) > least]
+    return [candidate for candidate in names if last in candidate.lower()][:3]
 
 
-ABOUT = 0.05
+SIMILARITY_TOLERANCE = 0.05
 """How much less alike than the first the others may be, of 1."""
 
-SHORTEST = 3
+MIN_LENGTH_TO_COMPARE = 3
 """Letters of a name that may be misspelt; every "cm" is near to "m"."""
 
 
 def choices(names: Iterable[object], limit: int = 24) -> str:
     """The valid choices as a readable list, cut where it gets long."""
-    listed = [str(name) for name in names]
-    more = f", ... ({len(listed) - limit} more)" if len(listed) > limit else ""
-    return ", ".join(listed[:limit]) + more if listed else "none"
+    texts = [str(name) for name in names]
+    remaining = f", ... ({len(texts) - limit} more)" if len(texts) > limit else ""
+    return ", ".join(texts[:limit]) + remaining if texts else "none"

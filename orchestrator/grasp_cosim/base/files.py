@@ -98,18 +98,18 @@ _ADVICE = {
 """What to do with a file, {} for its name, or that of the folder of a run."""
 
 
-def check_nature(path: Path, wanted: str) -> None:
+def check_nature(path: Path, kind: str) -> None:
     """InputError where there is plainly something else than is wanted, a key of WANTED.
 
     It says what that is, and what to do with it. A file of an unknown content is not looked into.
     """
-    found = _nature(path)
-    archive = wanted == "system" and found == "an SSP archive" and path.suffix.lower() == ".ssp"
-    if found and found not in _TAKEN[wanted] and not archive:
-        name = path.parent if found == "a file of a run" else path
-        advice = _ADVICE.get(found, "").replace("{}", quote(str(name)))
-        said = f"must be {WANTED[wanted]}{advice and '; '}{advice}"
-        raise InputError(f"{path}: is {found}; {said}")
+    nature = _nature(path)
+    archive = kind == "system" and nature == "an SSP archive" and path.suffix.lower() == ".ssp"
+    if nature and nature not in _TAKEN[kind] and not archive:
+        name = path.parent if nature == "a file of a run" else path
+        advice = _ADVICE.get(nature, "").replace("{}", quote(str(name)))
+        message = f"must be {WANTED[kind]}{advice and '; '}{advice}"
+        raise InputError(f"{path}: is {nature}; {message}")
 
 
 def _nature(path: Path) -> str:
@@ -122,10 +122,10 @@ def _nature(path: Path) -> str:
         if zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as archive:
                 names = set(archive.namelist())
-            return next((what for file, what in _OF_AN_ARCHIVE.items() if file in names), "")
+            return next((nature for file, nature in _OF_AN_ARCHIVE.items() if file in names), "")
     suffix = path.suffix.lower()
-    told = suffix in (".toml", ".py", ".csv", ".xml") and path.is_file()
-    return f"a {suffix} file" if told else ""
+    is_plain = suffix in (".toml", ".py", ".csv", ".xml") and path.is_file()
+    return f"a {suffix} file" if is_plain else ""
 
 
 def check_fmu_file(path: Path) -> None:

@@ -43,7 +43,7 @@ def parts_of(function: Callable[..., Any]) -> dict[str, str]:
     memo: _Memo = {}
     if not isinstance(function, FunctionType):
         return {CODE: _digest(function, memo)}
-    code = _joined(_digest(part, memo) for part in _own(function))
+    code = _joined(_digest(part, memo) for part in _code_and_defaults(function))
     return {CODE: code, **{name: _digest(v, memo) for name, v in _reached(function)}}
 
 
@@ -89,13 +89,13 @@ def _made_of(value: Any) -> Iterator[str | tuple[Any]]:
         case type() | FunctionType() if _is_installed(value.__module__):
             yield f"{value.__module__}.{value.__qualname__}"
         case FunctionType():
-            yield from ((part,) for part in _own(value))
+            yield from ((part,) for part in _code_and_defaults(value))
             yield from ((part,) for item in _reached(value) for part in item)
         case type():
             yield value.__qualname__
             yield from ((base,) for base in value.__bases__)
-            own = ((n, v) for n, v in sorted(vars(value).items()) if isinstance(v, _OF_A_CLASS))
-            yield from ((part,) for n, v in own if not _is_noted(n) for part in (n, v))
+            members = ((n, v) for n, v in sorted(vars(value).items()) if isinstance(v, _OF_A_CLASS))
+            yield from ((part,) for n, v in members if not _is_noted(n) for part in (n, v))
         case MethodType():
             yield from ((value.__func__,), (value.__self__,))
         case BuiltinFunctionType():
@@ -111,7 +111,7 @@ def _made_of(value: Any) -> Iterator[str | tuple[Any]]:
             yield from _state(value)
 
 
-def _own(function: FunctionType) -> tuple[Any, ...]:
+def _code_and_defaults(function: FunctionType) -> tuple[Any, ...]:
     return function.__code__, function.__defaults__, function.__kwdefaults__
 
 
@@ -143,14 +143,14 @@ def _contents(cell: CellType) -> Iterator[tuple[Any]]:
 def _state(value: Any) -> Iterator[str | tuple[Any]]:
     """What an object says that it is made of; nothing of a lock, a file or the like."""
     try:
-        made = value.__reduce_ex__(_PROTOCOL)
+        reduced = value.__reduce_ex__(_PROTOCOL)
     except Exception:  # what it raises is up to it
         return
-    if isinstance(made, str):
-        yield made
+    if isinstance(reduced, str):
+        yield reduced
         return
-    yield from ((part,) for part in made[:3])
-    yield from ((list(items),) for items in made[3:5] if items is not None)
+    yield from ((part,) for part in reduced[:3])
+    yield from ((list(items),) for items in reduced[3:5] if items is not None)
 
 
 def _is_noted(name: str) -> bool:

@@ -90,25 +90,25 @@ def interrupts(end: Callable[[], object]) -> Iterator[threading.Event]:
 
     Nothing changes within another such context, nor in another thread than the main one.
     """
-    came = threading.Event()
-    here = threading.current_thread() is threading.main_thread()
-    ours: list[int] = [
+    interrupted = threading.Event()
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    signals: list[int] = [
         n for n in SIGNALS if signal.getsignal(n) in (_raise, signal.default_int_handler)
     ]
 
     def take(number: int, _: FrameType | None) -> None:
-        if before[number] is not _raise or _is_first(number):
+        if handlers[number] is not _raise or _is_first(number):
             restore()
-            came.set()
+            interrupted.set()
             end()
 
     def restore() -> None:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
-    before = {number: signal.signal(number, take) for number in ours if here}
+    handlers = {number: signal.signal(number, take) for number in signals if in_main_thread}
     try:
-        yield came
+        yield interrupted
     finally:
         restore()
 
@@ -150,13 +150,13 @@ def _is_first(number: int) -> bool:
 
 
 def _noting_what_is_lost(
-    writer: socket.socket, before: Callable[["sys.UnraisableHookArgs"], object]
+    writer: socket.socket, previous_hook: Callable[["sys.UnraisableHookArgs"], object]
 ) -> Callable[["sys.UnraisableHookArgs"], None]:
     """What Python calls for an exception that nothing can take; of others it calls `before`."""
 
     def note(unraisable: "sys.UnraisableHookArgs") -> None:
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):
-            before(unraisable)
+            previous_hook(unraisable)
         elif unraisable.exc_type is not _RaisedAgainError:
             _lost.set()
             writer.send(bytes([LOST]))

@@ -34,7 +34,7 @@ def in_one_piece(path: Path) -> Iterator[Path]:
     if is_stream(path):
         with (
             TemporaryDirectory(prefix="one_piece_") as folder,
-            _named(path, Path(folder, "part")) as part,
+            _temporary(path, Path(folder, "part")) as part,
         ):
             yield part
             if part.exists():
@@ -43,14 +43,14 @@ def in_one_piece(path: Path) -> Iterator[Path]:
         return
     target = Path(os.path.realpath(path))
     target.parent.mkdir(parents=True, exist_ok=True)
-    with _named(path, target.with_name(f"{target.name}.{os.getpid()}.part")) as part:
+    with _temporary(path, target.with_name(f"{target.name}.{os.getpid()}.part")) as part:
         yield part
         if part.exists():
             part.replace(target)
 
 
 @contextmanager
-def _named(path: Path, part: Path) -> Iterator[Path]:
+def _temporary(path: Path, part: Path) -> Iterator[Path]:
     """A temporary name that is not there at the end; what fails on it names path."""
     try:
         yield part

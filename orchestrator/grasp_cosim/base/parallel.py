@@ -66,16 +66,16 @@ class Crew:
         `run` is a function of a module. What it raises is raised, and ends the other jobs;
         SimulationError where a process dies or cannot start.
         """
-        found: dict[int, Run] = {}
+        results_by_index: dict[int, Run] = {}
         with closing(self.results(partial(_caught, run), enumerate(jobs))) as results:
             for (index, _), result in results:
                 if isinstance(result, Lost):
                     raise SimulationError(f"a process for the runs {result.end}")
                 if isinstance(result, _Raised):
                     raise result.error
-                found[index] = result
+                results_by_index[index] = result
                 bar.update()
-        return [found[index] for index in sorted(found)]
+        return [results_by_index[index] for index in sorted(results_by_index)]
 
     def results(
         self, run: Callable[[Job], Run], jobs: Iterable[Job]
@@ -86,12 +86,12 @@ class Crew:
         before, see deliver(), is then its result. Closing the iterator ends the jobs.
         SimulationError where a process cannot start.
         """
-        left = iter(jobs)
+        remaining = iter(jobs)
         busy: dict[_Worker, Job] = {}
         early: dict[_Worker, Any] = {}
         try:
             while True:
-                for job in islice(left, self._most - len(busy)):
+                for job in islice(remaining, self._most - len(busy)):
                     worker = self._idle.pop() if self._idle else _Worker()
                     busy[worker] = job
                     worker.give(run, job)
@@ -132,12 +132,12 @@ class _Worker:
 
     def __init__(self) -> None:
         context = get_context("spawn")
-        self.pipe, theirs = context.Pipe()
+        self.pipe, workers_end = context.Pipe()
         self._started = False
-        self.process: BaseProcess = context.Process(target=_work, args=(theirs,))
+        self.process: BaseProcess = context.Process(target=_work, args=(workers_end,))
         try:
             # signals are for us
-            with closing(theirs), _safe_path(), _no_script(), held_back(interruption.SIGNALS):
+            with closing(workers_end), _safe_path(), _no_script(), held_back(interruption.SIGNALS):
                 self.process.start()
         except BaseException:  # of a signal that came meanwhile
             _end([self])
@@ -175,13 +175,13 @@ class _Worker:
 @contextmanager
 def _safe_path() -> Iterator[None]:
     """Have processes started meanwhile not look in the current folder, as `python -c` does."""
-    before = {name: value for name, value in os.environ.items() if name == _SAFE_PATH}
+    variable_before = {name: value for name, value in os.environ.items() if name == _SAFE_PATH}
     os.environ[_SAFE_PATH] = "1"
     try:
         yield
     finally:
         del os.environ[_SAFE_PATH]
-        os.environ.update(before)
+        os.environ.update(variable_before)
 
 
 @contextmanager

@@ -45,22 +45,22 @@ def in_notebook() -> bool:
 class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
     """A context manager; update() says how much more is done, of `total` or of nobody knows what.
 
-    Named `what`: "candidate: 1.25 of 3.00 s" for the unit "s", else "map: 11 of 36 runs"; without a
-    unit nothing is counted.
+    Behind its `title` stands how far it is: "candidate: 1.25 of 3.00 s" for the unit "s", else
+    "map: 11 of 36 runs"; without a unit nothing is counted.
     """
 
     _begun = False
     _bar = "{bar:24}"
 
-    def __new__(cls, *arguments: Any, **named: Any) -> "Progress":
+    def __new__(cls, *arguments: Any, **options: Any) -> "Progress":
         """A widget in a notebook that can show one."""
-        shown = _widget() if in_notebook() and find_spec("ipywidgets") else cls
-        made: Progress = super().__new__(shown, *arguments, **named)
-        return made
+        kind = _widget() if in_notebook() and find_spec("ipywidgets") else cls
+        bar: Progress = super().__new__(kind, *arguments, **options)
+        return bar
 
     def __init__(
         self,
-        what: str,
+        title: str,
         total: float | None = None,
         *,
         shown: bool = True,
@@ -77,11 +77,11 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
         every, delay = (EVERY, EVERY) if lines else (0.1, delay)
         form = "{n:.2f} of {total:.2f} s" if unit == "s" else "{n} of {total} {unit}s"
         counted = f": {form if total else '{n} {unit}s'}" if unit else ""
-        left = ", about {remaining} left" if total else ""
+        time_left = ", about {remaining} left" if total else ""
         bar = f" {self._bar}" if total and not lines else ","
         self._over = threading.Event()
         super().__init__(
-            desc=what,
+            desc=title,
             total=total,
             unit=unit,
             initial=initial,
@@ -91,7 +91,7 @@ class Progress(tqdm):  # type: ignore[type-arg]  # subscripted, it is no class
             delay=delay,
             mininterval=every,
             miniters=0,
-            bar_format=f"{{desc}}{counted}{bar} {{elapsed}}{left}{{postfix}}",
+            bar_format=f"{{desc}}{counted}{bar} {{elapsed}}{time_left}{{postfix}}",
         )
         often = max(every, 1.0)
         self._ticker = threading.Thread(
@@ -140,8 +140,8 @@ def write(line: str) -> None:
 
 
 @contextmanager
-def phase(what: str) -> Iterator[None]:
+def phase(activity: str) -> Iterator[None]:
     """Log at its end how long a part of the work took, at the level INFO."""
     began = time.perf_counter()
     yield
-    LOGGER.info("%s: %.2f s", what, time.perf_counter() - began)
+    LOGGER.info("%s: %.2f s", activity, time.perf_counter() - began)

@@ -44,20 +44,20 @@ class Quantity:
         return f"{text.removesuffix('.0')} {self.unit}"
 
 
-def as_quantity(given: Any) -> Quantity | None:
+def as_quantity(value: Any) -> Quantity | None:
     """What a Quantity, a pair like (50, "mm") or a text like "50 mm" says; None for all else."""
-    if isinstance(given, Quantity):
-        return given
-    if isinstance(given, str):
-        return Quantity(given) if _TEXT.fullmatch(given) else None
-    is_pair = isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str)
-    return Quantity(*given) if is_pair and not isinstance(given[0], str) else None
+    if isinstance(value, Quantity):
+        return value
+    if isinstance(value, str):
+        return Quantity(value) if _TEXT.fullmatch(value) else None
+    is_pair = isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)
+    return Quantity(*value) if is_pair and not isinstance(value[0], str) else None
 
 
-def is_nested(given: Any) -> bool:
+def is_nested(value: Any) -> bool:
     """True for a list of values, which a pair like (50, "mm") is not."""
-    several = isinstance(given, Sequence) and not isinstance(given, str)
-    return several and as_quantity(given) is None
+    several = isinstance(value, Sequence) and not isinstance(value, str)
+    return several and as_quantity(value) is None
 
 
 def unwrapped(value: Any) -> Any:

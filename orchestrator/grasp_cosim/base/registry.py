@@ -92,8 +92,8 @@ def here(kind: Kind) -> Mapping[str, Any]:
 
 def names(kind: Kind) -> tuple[str, ...]:
     """All names of a kind, in alphabetical order."""
-    ours = (name for of, name in _LOADERS if of == kind)
-    return tuple(sorted({*ours, *here(kind), *_entry_points(kind)}))
+    packaged = (name for of, name in _LOADERS if of == kind)
+    return tuple(sorted({*packaged, *here(kind), *_entry_points(kind)}))
 
 
 @cache

@@ -72,8 +72,8 @@ def without_scratch(text: str) -> str:
     if PREFIX not in text:  # as nearly always
         return text
     folder = r"[\\/]".join(map(re.escape, re.split(r"[\\/]", tempfile.gettempdir())))
-    ours = rf"{folder}[\\/]({PREFIX}[^\\/\s]+[\\/])+([0-9a-f]{{64}}[\\/])?"
-    return re.sub(rf"(file:///?)?{ours}", "", text)
+    pattern = rf"{folder}[\\/]({PREFIX}[^\\/\s]+[\\/])+([0-9a-f]{{64}}[\\/])?"
+    return re.sub(rf"(file:///?)?{pattern}", "", text)
 
 
 class ScratchFolder:
@@ -82,7 +82,7 @@ class ScratchFolder:
     def __init__(self) -> None:
         """Make it, after removing those that were left behind."""
         sweep(tempfile.gettempdir())
-        self.name, lock = _made()
+        self.name, lock = _new_folder()
         self.cleanup = weakref.finalize(self, _end, self.name, lock, os.getpid())
         """Removes it; does nothing the second time."""
 
@@ -109,7 +109,7 @@ def lock_of(folder: Path) -> Lock:
     return Lock(folder.with_name(f".{folder.name}{SUFFIX}"))
 
 
-def _made() -> tuple[str, Lock]:
+def _new_folder() -> tuple[str, Lock]:
     """A new folder, and the lock that we have of it."""
     folder = Path(tempfile.gettempdir(), PREFIX + token_hex(8))
     lock = lock_of(folder)

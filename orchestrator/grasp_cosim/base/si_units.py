@@ -116,10 +116,10 @@ def known_unit(name: str) -> Unit | None:
     factors += [(text, -1) for text in _PRODUCT.split(below)] if below else []
     scale, offset, ten, exponents = 1.0, 0.0, 0, [0] * len(BASE)
     for text, sign in factors:
-        found = _symbol(text)
-        if found is None:
+        symbol = _symbol(text)
+        if symbol is None:
             return None
-        factor, shift, power_of_ten, base, power = found
+        factor, shift, power_of_ten, base, power = symbol
         scale *= factor ** (sign * power)
         ten += sign * power * power_of_ten
         offset = shift if len(factors) == 1 and power == 1 else 0.0
@@ -131,9 +131,9 @@ def known_unit(name: str) -> Unit | None:
 
 def spelt_like(name: str, defined: Iterable[str]) -> list[str]:
     """The units, of those defined or known, that differ from a name in capitals only: kN of KN."""
-    known = (f"{prefix}{symbol}" for symbol in _SI for prefix in PREFIXES)
-    found = (unit for unit in (*defined, *known, *OTHER) if unit.lower() == name.lower())
-    return [*dict.fromkeys(found)]
+    prefixed = (f"{prefix}{symbol}" for symbol in _SI for prefix in PREFIXES)
+    matches = (unit for unit in (*defined, *prefixed, *OTHER) if unit.lower() == name.lower())
+    return [*dict.fromkeys(matches)]
 
 
 def refusal(name: str) -> str:

@@ -48,9 +48,9 @@ def be_ordinary(cpus: Collection[int]) -> None:
 
 def pin(thread: int, cpu: int) -> Callable[[], object]:
     """Have a thread run on one CPU; return what puts that back. OSError, NotPossible."""
-    before = _os.sched_getaffinity(thread)
+    previous_cpus = _os.sched_getaffinity(thread)
     _os.sched_setaffinity(thread, {cpu})
-    return lambda: _os.sched_setaffinity(thread, before)
+    return lambda: _os.sched_setaffinity(thread, previous_cpus)
 
 
 def put_first(thread: int, priority: int) -> Callable[[], object]:
@@ -129,11 +129,11 @@ def _masked(signals: Iterable[int]) -> Iterator[None]:
     from multiprocessing.resource_tracker import ensure_running
 
     ensure_running()  # else the first process that is started has it run, which lifts the mask
-    before = _signal.pthread_sigmask(_signal.SIG_BLOCK, signals)
+    mask = _signal.pthread_sigmask(_signal.SIG_BLOCK, signals)
     try:
         yield
     finally:
-        _signal.pthread_sigmask(_signal.SIG_SETMASK, before)
+        _signal.pthread_sigmask(_signal.SIG_SETMASK, mask)
 
 
 def end_when_closed(lifeline: int) -> None:
@@ -156,9 +156,9 @@ def listener(pipe: Any) -> Callable[[float], object]:
     """
     if not hasattr(select, "poll"):
         return pipe.poll  # type: ignore[no-any-return]
-    found = _select.poll()
-    found.register(pipe.fileno(), _select.POLLIN)
-    return lambda seconds: found.poll(1000.0 * seconds)
+    poll = _select.poll()
+    poll.register(pipe.fileno(), _select.POLLIN)
+    return lambda seconds: poll.poll(1000.0 * seconds)
 
 
 def end_group(leader: int) -> None:

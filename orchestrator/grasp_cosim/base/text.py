@@ -57,16 +57,16 @@ def grouped(value: float, decimals: int = 0) -> str:
     return f"{value:,.{decimals}f}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
-WIDEST, LONGEST = 120, 24
+MAX_WIDTH, MAX_LINES = 120, 24
 """Characters and lines of a repr() at most, which is less than a screen."""
 
 
 def on_a_screen(lines: Sequence[str]) -> str:
     """The lines as a repr() has them: of many the first, each of them cut where it is long."""
-    left = len(lines) - LONGEST
-    more = [f"... ({counted(left, 'line')} more)"] if left > 0 else []
-    harmless = [on_one_line(line) for line in [*lines[:LONGEST], *more]]
-    return "\n".join(x if len(x) <= WIDEST else f"{x[: WIDEST - 3]}..." for x in harmless)
+    hidden = len(lines) - MAX_LINES
+    remaining = [f"... ({counted(hidden, 'line')} more)"] if hidden > 0 else []
+    harmless = [on_one_line(line) for line in [*lines[:MAX_LINES], *remaining]]
+    return "\n".join(x if len(x) <= MAX_WIDTH else f"{x[: MAX_WIDTH - 3]}..." for x in harmless)
 
 
 def columns(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
@@ -127,5 +127,5 @@ def _code(match: re.Match[str]) -> str:
 
 
 def _character(match: re.Match[str]) -> str:
-    said = match[1]
-    return chr(int(said[1:], 16)) if len(said) > 1 else _MEANT.get(said, said)
+    escaped = match[1]
+    return chr(int(escaped[1:], 16)) if len(escaped) > 1 else _MEANT.get(escaped, escaped)

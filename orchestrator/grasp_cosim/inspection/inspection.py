@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import choices
-from ..base.text import WIDEST as SCREEN
+from ..base.text import MAX_WIDTH as SCREEN
 from ..base.text import on_a_screen
 from ..interface.obstacles import FMU_KINDS, this_platform
 from ..interface.read import describe
