@@ -23,7 +23,7 @@ from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.master.master import CHUNK
 from grasp_cosim.master.paced import PacedMaster
 from grasp_cosim.master.plan import Planner
-from grasp_cosim.realtime.pacer import SOME, SPIN_NS, Pacer, permitted, privileges
+from grasp_cosim.realtime.pacer import MIN_ROWS, SPIN_NS, Pacer, permitted_share, privileges
 from grasp_cosim.recording.memory import MemoryListener
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -289,7 +289,7 @@ def test_rows_are_handed_on_while_there_is_time_to_wait(tmp_path, engine):
     run = Paced(tmp_path, {"a": {-1: 10 * MS}}, engine=engine, steps=1500)
     run.records_in(50 * MS)
     assert run.to_the_end().overruns == 0
-    assert max(b - a for a, b in pairwise([*run.handed_on, 1501])) <= SOME + 2
+    assert max(b - a for a, b in pairwise([*run.handed_on, 1501])) <= MIN_ROWS + 2
     assert run.memory.columns()[0].tolist() == [k * 100 * MS / 1e9 for k in range(1501)]
     assert run.memory.columns()[1]["a.y"] == pytest.approx(run.memory.columns()[0])
 
@@ -298,8 +298,8 @@ def test_rows_wait_where_there_is_no_time_for_them(tmp_path, engine):
     run = Paced(tmp_path, {"a": {-1: 60 * MS}}, engine=engine, steps=CHUNK + 500)
     run.records_in(50 * MS)
     timing = run.to_the_end()
-    assert run.handed_on == [1, SOME + 1, CHUNK + 1]
-    assert culprits(timing) == [(SOME - 1, "recording"), (CHUNK - 1, "recording")]
+    assert run.handed_on == [1, MIN_ROWS + 1, CHUNK + 1]
+    assert culprits(timing) == [(MIN_ROWS - 1, "recording"), (CHUNK - 1, "recording")]
     assert len(run.memory.columns()[0]) == CHUNK + 501
 
 
@@ -329,7 +329,7 @@ def test_interrupted_in_a_binary_it_keeps_what_was_handed_on(tmp_path, monkeypat
     with pytest.raises(KeyboardInterrupt):
         run.master.advance(200)
     done = run.master.steps_done
-    assert SOME <= done <= 150
+    assert MIN_ROWS <= done <= 150
     run.master.hand_on()
     assert len(run.memory.columns()[0]) == done + 1
     assert run.timing().steps <= done
@@ -418,7 +418,11 @@ class Kernel:
 def test_what_was_granted_is_put_back(monkeypatch):
     kernel = Kernel(monkeypatch)
     with privileges(ALL) as found:
-        assert found.granted == ["CPU 0", "memory locked", f"SCHED_FIFO, priority 20{permitted()}"]
+        assert found.granted == [
+            "CPU 0",
+            "memory locked",
+            f"SCHED_FIFO, priority 20{permitted_share()}",
+        ]
         assert found.refused == []
         names = [name for name, *_ in kernel.asked]
         assert names == ["setaffinity", "mlockall", "setscheduler"]

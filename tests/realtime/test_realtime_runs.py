@@ -13,6 +13,7 @@ import threading
 import pytest
 from grasp_cosim import InputError, Realtime, RunInterruptedError, SimulationError, System, simulate
 from grasp_cosim.base.calls import PACE
+from grasp_cosim.base.typed_json import Decoder
 from grasp_cosim.master import engine
 from grasp_cosim.master import paced as paced_master
 from grasp_cosim.master.engine import has_compiler
@@ -20,6 +21,7 @@ from grasp_cosim.realtime.pacer import HAS_CLOCK
 from grasp_cosim.realtime.timing import Timing
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.read_back import load_run
+from grasp_cosim.recording.run_json import TimingEntry
 from report.runs import paced
 from support.marks import engines, slow
 from support.native_fmus import TYPES, build
@@ -69,15 +71,28 @@ def test_a_session_is_paced_as_the_system_says_unless_the_call_does(grasp, engin
 
 def test_a_timing_is_plain_data_and_what_is_damaged_is_refused_in_one_line():
     timing = paced(steps=200, hiccups=12, listed=5)
-    found = json.loads(json.dumps(timing.as_dict()))
-    assert Timing.from_dict("here", found) == timing
-    for wrong in (
-        7, {**found, "overruns": 7}, {**found, "factor": "much"}, {**found, "parts": {"a": {}}},
-        {key: value for key, value in found.items() if key != "period"},
+    entry = json.loads(json.dumps(timing.as_dict()))
+    assert Timing.from_dict("here", Decoder().decoded(TimingEntry, "here", entry)) == timing
+    for damaged in (
+        7, {**entry, "overruns": 7}, {**entry, "factor": "much"}, {**entry, "parts": {"a": {}}},
+        {key: value for key, value in entry.items() if key != "period"},
     ):  # fmt: skip
-        with pytest.raises(
-            InputError, match=r"^here: is damaged \(\w+: [^\n]*\); must be what [^\n]*$"
-        ):
+        with pytest.raises(InputError, match=r"^here[^\n]*; must [^\n]*$"):
+            Decoder().decoded(TimingEntry, "here", damaged)
+    histogram = {"edges": [0.0, 1.0], "counts": [1]}
+    for damaged, reason in (
+        ({"listed": []}, "it has overruns, and does not say of which step"),
+        ({"edges": [0.0]}, "a histogram has not one edge more than counts"),
+        ({"name": "nobody"}, "there are histograms of other parts"),
+    ):
+        wrong = json.loads(json.dumps(entry))
+        if "listed" in damaged:
+            wrong["overruns"].update(damaged)
+        else:
+            name = damaged.pop("name", "step")
+            wrong["histograms"][name] = {**histogram, **damaged}
+        line = f"here: is damaged ({reason}); must be what `grasp-cosim run --realtime --out` wrote"
+        with pytest.raises(InputError, match=f"^{re.escape(line)}$"):
             Timing.from_dict("here", wrong)
 
 

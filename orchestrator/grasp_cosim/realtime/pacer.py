@@ -15,7 +15,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,7 @@ from .timing import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
 SPIN_NS = 200_000
 """Before the deadline the pacer does not sleep any more: it may be woken too late."""
 
-MOST_SPIN = 0.4
+MAX_SPIN = 0.4
 """The most of a period that it spins: Linux breaks a real-time priority off where there is hardly
 any sleep, for 40 to 50 ms in a second. At this share it never was, at 10 kHz.
 """
@@ -42,7 +42,7 @@ SLICE_NS = 50_000_000
 BREATH_NS = 500_000_000
 """At a real-time priority the longest time without a sleep, as nothing else may get to run."""
 
-SOME = 64
+MIN_ROWS = 64
 """The rows that are handed on together while it waits, if there is time for it."""
 
 NAP = 1e-4
@@ -100,9 +100,11 @@ class Pacer:
         """InputError as of Realtime.period() and Meter, where there is no such CPU, or where steps
         would be caught up with although a component is a proxy.
         """
-        last = max((os.cpu_count() or 1) - 1, *cpus(), 0)
-        if realtime.cpu is not None and realtime.cpu > last:
-            raise InputError(f"cpu = {realtime.cpu}: no such CPU here; must be from 0 to {last}")
+        processors = os.cpu_count() or 1  # None where that is not known
+        last_cpu = max(processors - 1, *cpus(), 0)
+        if realtime.cpu is not None and realtime.cpu > last_cpu:
+            message = f"no such CPU here; must be from 0 to {last_cpu}"
+            raise InputError(f"cpu = {realtime.cpu}: {message}")
         proxies = [component.name for component in system.components if component.is_proxy]
         if proxies and realtime.overrun == "catch-up":
             raise InputError(
@@ -118,10 +120,10 @@ class Pacer:
         self.halted = halted
         self.spare: Callable[[float], bool] | None = None
         """Does something that may wait within so many ns; False if there is nothing to do."""
-        self._now, self._sleep = clock or CLOCK_OF_THE_SYSTEM
+        self._clock, self._sleep = clock or CLOCK_OF_THE_SYSTEM
         self._period = period.as_integer_ratio()
         self._state = _State(
-            self._now(), 0, -1, *self._period, min(SPIN_NS, int(MOST_SPIN * period)), 0,
+            self._clock(), 0, -1, *self._period, min(SPIN_NS, int(MAX_SPIN * period)), 0,
             BREATH_NS if realtime.priority is not None else 0,
             realtime.overrun == "continue", realtime.overrun == "stop", 0, 0,
             round(realtime.tolerance * NANOSECONDS),
@@ -137,21 +139,21 @@ class Pacer:
 
     def stamp(self, i: int) -> Call:
         """The call that says when segment i of a step has ended."""
-        data, now, origin = self._values[HEAD + i :][:1], self._now, self._state.origin
+        data, clock, origin = self._values[HEAD + i :][:1], self._clock, self._state.origin
         view: Any = memoryview(data)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
         def python() -> int:
-            view[0] = now() - origin
+            view[0] = clock() - origin
             return 0
 
-        if now is not time.monotonic_ns or not HAS_CLOCK:
+        if clock is not time.monotonic_ns or not HAS_CLOCK:
             return Call(python)
         return Call(python, Native(CLOCK, 0, 0, size=origin, data=data.ctypes.data))
 
     def native(self, steps: int) -> Native | None:
         """The same as calling it, in compiled code; None where so many steps do not allow that."""
         fits = max(self._period[0] * steps, self._period[1]) < 2**62
-        if not fits or not HAS_CLOCK or self._now is not time.monotonic_ns:
+        if not fits or not HAS_CLOCK or self._clock is not time.monotonic_ns:
             return None
         state = ctypes.addressof(self._state)
         return Native(PACE, 0, state, data=self._values.ctypes.data)
@@ -168,17 +170,17 @@ class Pacer:
         if state.late > 0 and state.shifts:
             state.base, state.base_step, due = now, step, now
         if now + state.spin < due:
-            while (left := due - state.spin - now) > 0:
+            while (remaining := due - state.spin - now) > 0:
                 if self.halted():
                     raise HaltError
-                self._sleep(min(left, SLICE_NS) / 1e9)
-                now = self._now() - origin
+                self._sleep(min(remaining, SLICE_NS) / NANOSECONDS)
+                now = self._clock() - origin
             state.slept = now
         elif state.breath and now - state.slept > state.breath:
             self._sleep(NAP)
-            state.slept = now = self._now() - origin
+            state.slept = now = self._clock() - origin
         while now < due:
-            now = self._now() - origin
+            now = self._clock() - origin
         head[DUE], head[BEGIN] = due, now
 
     def finish(self, step: int, now: int | None = None) -> None:
@@ -201,31 +203,31 @@ class Pacer:
     def record(self, steps: Steps, rows: Table, hand_on: Callable[[], None]) -> None:
         """Take the rows of steps, by the numbers they lead to; handing them on is recording."""
         self._taken = int(steps[-1])
-        start = self._now()
+        start = self._clock()
         try:
             self.meter.add(steps - 1, rows)
             hand_on()
         finally:
-            self._recording = self._now() - start
+            self._recording = self._clock() - start
             self.meter.recorded(self._taken - 1, self._recording)
 
     def _use_the_wait(self, step: int) -> None:
         """Do what has to be done some time, if half as long again as last time is left for it."""
         waiting = step - self._taken
-        if self._state.base_step < 0 or (waiting < SOME and self.spare is None):
+        if self._state.base_step < 0 or (waiting < MIN_ROWS and self.spare is None):
             return
-        spare = self._due(step) - (self._now() - self._state.origin)
-        if waiting >= SOME and 2 * spare > 3 * self._recording:
+        spare = self._due(step) - (self._clock() - self._state.origin)
+        if waiting >= MIN_ROWS and 2 * spare > 3 * self._recording:
             self._hand_on(step)
         elif self.spare is not None:
-            start = self._now()
+            start = self._clock()
             if self.spare(2 * spare / 3):
-                self.meter.recorded(step - 1, self._now() - start)
+                self.meter.recorded(step - 1, self._clock() - start)
 
     def _arrive(self, step: int, now: int | None = None) -> int:
         """The time now; late is by how much the step before ended late, negative if it did not."""
         state = self._state
-        arrived: int = (self._now() if now is None else now) - state.origin
+        arrived: int = (self._clock() if now is None else now) - state.origin
         if state.base_step < 0:
             state.base, state.base_step, state.slept = arrived, step, arrived
         state.arrived, state.late = arrived, arrived - self._due(step)
@@ -255,7 +257,7 @@ no more than that, -1 for no limit.
 
 @dataclass(frozen=True)
 class Privileges:
-    """A line for each that was asked for: those that were granted, and those that were not."""
+    """A line for each privilege that was requested, of those granted and of those refused."""
 
     granted: list[str] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
@@ -263,21 +265,12 @@ class Privileges:
 
 @contextmanager
 def privileges(realtime: Realtime) -> Iterator[Privileges]:
-    """Asks for what is wanted, and keeps the garbage collector away; all is put back at the end.
+    """Ask for the privileges of a run in real time, and keep the garbage collector away.
 
-    Priority and CPU are those of the calling thread. What the kernel permits of a priority is said.
+    All is put back at the end. Priority and CPU are those of the calling thread. Of a priority the
+    line says what part of the time the kernel permits it.
     """
-    found = Privileges()
-    thread, cpu, priority = threading.get_native_id(), realtime.cpu, realtime.priority
-    asked: list[tuple[str, Callable[[], Callable[[], object]], str]] = []
-    if cpu is not None:
-        asked += [(f"CPU {cpu}", partial(pin, thread, cpu), f"must be one of {choices(cpus())}")]
-    if realtime.lock_memory:
-        asked += [("memory locked", lock_memory, LIMIT.format("CAP_IPC_LOCK", "-l, memlock"))]
-    if priority is not None:
-        first = partial(put_first, thread, priority)
-        remedy = LIMIT.format("CAP_SYS_NICE", "-r, rtprio")
-        asked += [(f"SCHED_FIFO, priority {priority}", first, remedy)]
+    answers = Privileges()
     with ExitStack() as stack:
         gc.collect()  # now, and then not before the end: it would take too long on the way
         gc.freeze()
@@ -285,19 +278,47 @@ def privileges(realtime: Realtime) -> Iterator[Privileges]:
         if gc.isenabled():
             stack.callback(gc.enable)
         gc.disable()
-        for name, ask, remedy in asked:
+        for request in _requests(realtime):
             try:
-                stack.callback(ask())
+                stack.callback(request.ask())
             except NotPossible:
-                found.refused.append(f"{name}: not possible on this operating system")
+                answers.refused.append(f"{request.name}: not possible on this operating system")
             except OSError as error:
-                found.refused.append(f"{name}: {error.strerror}; {remedy}")
+                answers.refused.append(f"{request.name}: {error.strerror}; {request.remedy}")
             else:
-                found.granted.append(name + permitted() if name.startswith("SCHED") else name)
-        yield found
+                share = permitted_share() if request.is_priority else ""
+                answers.granted.append(request.name + share)
+        yield answers
 
 
-def permitted() -> str:
+class _Request(NamedTuple):
+    """A privilege that is asked of the operating system."""
+
+    name: str
+    ask: Callable[[], Callable[[], object]]
+    """Asks for it, and returns what puts it back; OSError or NotPossible where it is refused."""
+    remedy: str
+    """What helps where it is refused."""
+    is_priority: bool = False
+
+
+def _requests(realtime: Realtime) -> Iterator[_Request]:
+    """The privileges that a run in real time wants."""
+    thread, cpu, priority = threading.get_native_id(), realtime.cpu, realtime.priority
+    if cpu is not None:
+        yield _Request(f"CPU {cpu}", partial(pin, thread, cpu), f"must be one of {choices(cpus())}")
+    if realtime.lock_memory:
+        yield _Request("memory locked", lock_memory, LIMIT.format("CAP_IPC_LOCK", "-l, memlock"))
+    if priority is not None:
+        yield _Request(
+            f"SCHED_FIFO, priority {priority}",
+            partial(put_first, thread, priority),
+            LIMIT.format("CAP_SYS_NICE", "-r, rtprio"),
+            is_priority=True,
+        )
+
+
+def permitted_share() -> str:
     """What part of the time the kernel permits a thread of a real-time priority, in words."""
     with suppress(OSError, ValueError):  # not Linux, which has no such limit
         runtime, period = (

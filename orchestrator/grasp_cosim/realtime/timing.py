@@ -50,14 +50,7 @@ class Histogram(NamedTuple):
     counts: tuple[int, ...]
 
 
-def _texts(found: Any) -> tuple[str, ...]:
-    return tuple(map(str, found))
-
-
-PLAIN: Mapping[str, Any] = {
-    "factor": float, "period": float, "overrun": str, "granted": _texts, "refused": _texts,
-    "steps": int, "real_time_factor": float,
-}  # fmt: skip
+PLAIN_FIELDS = ("factor", "period", "overrun", "steps", "real_time_factor")
 """The fields of a Timing that run.json has as they are."""
 
 SPREAD_KEYS = ("median", "p99", "p99.9", "worst", "worst_at")
@@ -90,57 +83,68 @@ class Timing:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the timing as run.json has it."""
+        overruns = {
+            "count": self.overruns,
+            "culprits": dict(self.culprits),
+            "listed": [overrun._asdict() for overrun in self.listed],
+        }
+        parts = {
+            name: dict(zip(SPREAD_KEYS, spread, strict=True)) for name, spread in self.parts.items()
+        }
+        histograms = {
+            name: {"edges": list(histogram.edges), "counts": list(histogram.counts)}
+            for name, histogram in self.histograms.items()
+        }
         return {
-            **{key: getattr(self, key) for key in PLAIN},
+            **{field: getattr(self, field) for field in PLAIN_FIELDS},
             "granted": list(self.granted),
             "refused": list(self.refused),
-            "overruns": {
-                "count": self.overruns,
-                "culprits": dict(self.culprits),
-                "listed": [o._asdict() for o in self.listed],
-            },
-            "parts": {n: dict(zip(SPREAD_KEYS, p, strict=True)) for n, p in self.parts.items()},
-            "histograms": {
-                name: {"edges": list(h.edges), "counts": list(h.counts)}
-                for name, h in self.histograms.items()
-            },
+            "overruns": overruns,
+            "parts": parts,
+            "histograms": histograms,
         }
 
     @classmethod
-    def from_dict(cls, place: str, found: Any) -> Self:
-        """Read what as_dict() gave; InputError, naming the `place`, if it is something else."""
-        try:
-            overruns, parts, bars = (found[key] for key in ("overruns", "parts", "histograms"))
-            read = cls(
-                **{key: kind(found[key]) for key, kind in PLAIN.items()},
-                overruns=int(overruns["count"]),
-                listed=tuple(
-                    Overrun(*(kind(o[key]) for key, kind in Overrun.__annotations__.items()))
-                    for o in overruns["listed"]
-                ),
-                culprits={str(name): int(n) for name, n in overruns["culprits"].items()},
-                parts={
-                    n: Spread(*(float(p[key]) for key in SPREAD_KEYS)) for n, p in parts.items()
-                },
-                histograms={
-                    n: Histogram(tuple(map(float, h["edges"])), tuple(map(int, h["counts"])))
-                    for n, h in bars.items()
-                },
-            )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise _damaged(place, f"{type(error).__name__}: {error}") from error
-        if read.overruns and not (read.listed and STEP in read.parts and read.steps):
+    def from_dict(cls, place: str, entry: Mapping[str, Any]) -> Self:
+        """The timing that as_dict() gave, as an entry of run.json that has the types it must have.
+
+        InputError, which names the `place`, where its parts do not fit each other.
+        """
+        overruns = entry["overruns"]
+        spreads = {
+            name: Spread(*(spread[key] for key in SPREAD_KEYS))
+            for name, spread in entry["parts"].items()
+        }
+        histograms = {
+            name: Histogram(tuple(histogram["edges"]), tuple(histogram["counts"]))
+            for name, histogram in entry["histograms"].items()
+        }
+        timing = cls(
+            **{field: entry[field] for field in PLAIN_FIELDS},
+            granted=tuple(entry["granted"]),
+            refused=tuple(entry["refused"]),
+            overruns=overruns["count"],
+            listed=tuple(Overrun(**overrun) for overrun in overruns["listed"]),
+            culprits=overruns["culprits"],
+            parts=spreads,
+            histograms=histograms,
+        )
+        timing._check(place)
+        return timing
+
+    def _check(self, place: str) -> None:
+        """InputError where what it has of its parts does not fit each other."""
+        if self.overruns and not (self.listed and STEP in self.parts and self.steps):
             raise _damaged(place, "it has overruns, and does not say of which step")
-        if any(len(h.edges) != len(h.counts) + 1 for h in read.histograms.values()):
+        if any(len(h.edges) != len(h.counts) + 1 for h in self.histograms.values()):
             raise _damaged(place, "a histogram has not one edge more than counts")
-        if not read.histograms.keys() <= read.parts.keys():
+        if not self.histograms.keys() <= self.parts.keys():
             raise _damaged(place, "there are histograms of other parts")
-        return read
 
 
-def _damaged(place: str, why: str) -> InputError:
+def _damaged(place: str, reason: str) -> InputError:
     return InputError(
-        f"{place}: is damaged ({why}); must be what `grasp-cosim run --realtime --out` wrote"
+        f"{place}: is damaged ({reason}); must be what `grasp-cosim run --realtime --out` wrote"
     )
 
 
@@ -150,22 +154,37 @@ ARRIVED, LATE, DUE, BEGIN = range(HEAD)
 after its deadline, when the step should begin, when it did. The ends of its segments follow.
 """
 
-LISTED = 1000
+MAX_LISTED = 1000
 """The most overruns that are listed one by one."""
 
 STEP, START = "step", "start"
 EXCHANGE, RECORDING, BETWEEN, BACKLOG = "exchange", "recording", "between", "backlog"
 RESERVED = (STEP, START, EXCHANGE, RECORDING, BETWEEN, BACKLOG)
+"""The names of parts of a step which no component can have."""
+
+EXCHANGE_OWNER = -1
+"""The owner of a segment of a step that is no component's."""
 
 QUANTILES = (0.5, 0.99, 0.999)
 """Those of a Spread."""
 
-FINE = 16
-"""Bars of a histogram to an octave."""
+BARS_PER_OCTAVE = 16
+"""Of a histogram of durations."""
 
 Steps = npt.NDArray[np.int64]
 Table = npt.NDArray[np.float64]
 """Times in ns: whole numbers, exact below 2**53."""
+
+
+class _Judged(NamedTuple):
+    """The steps of which it is known whether they ended late; times in ns."""
+
+    steps: Steps
+    rows: Table
+    late: Table
+    """By how much each ended after its deadline."""
+    parts: dict[str, Table]
+    """What each part took in each step."""
 
 
 class Meter:
@@ -180,20 +199,19 @@ class Meter:
                     f"{system.name}: component {name!r}: in real time must not be called "
                     f"{', '.join(RESERVED)}, which are other parts of a step"
                 )
-        own = range(len(components))
-        each = [owner for i in own for owner in (-1, i)]
-        self.segments = each if system.scheme == "sequential" else [-1, *own, *own]
-        """The owner of each segment of a step: a component by index, or the exchange, -1. In the
-        Jacobi scheme all components take their inputs before the first one steps."""
+        self.segments = _owners_of_segments(len(components), system.scheme)
+        """The owner of each segment of a step: a component by index, or EXCHANGE_OWNER."""
         self._system, self._realtime, self._period = system, realtime, float(period)
         self._names = (*components, EXCHANGE)
         self._culprits = {c.name: f"{c.name}'s peer" for c in system.components if c.is_proxy}
-        self._every = {name: system.period(name) for name in components}
+        self._periods = {name: system.period(name) for name in components}
         self._file = TemporaryFile(prefix="grasp_times_")  # noqa: SIM115 - open as long as this
         finalize(self, self._file.close)
         self._first = self._rows = self._overruns = self._worst = 0
-        self._after: tuple[int, int] | None = None
+        self._arrival_after: tuple[int, int] | None = None
+        """When the step after the last one would have begun, and how late."""
         self._recordings = array("q"), array("q")
+        """Numbers of steps, and what recording took after each."""
 
     def add(self, steps: Steps, rows: Table) -> None:
         """Take the rows of these steps; one counts when it is known what comes after it."""
@@ -206,7 +224,7 @@ class Meter:
 
     def end(self, arrived: int, late: int) -> None:
         """No step follows the last one; the next one would have begun then, and so late."""
-        self._after = arrived, late
+        self._arrival_after = arrived, late
         self._overruns += late > 0
 
     def recorded(self, step: int, took: int) -> None:
@@ -216,7 +234,7 @@ class Meter:
 
     def verdict(self) -> str:
         """The last overrun, in words."""
-        last = self._blame(*self._judged())[-1]
+        last = self._blame(self._judged())[-1]
         return (
             f"{self._system.name}: the step at t = {last.time:.9g} s ended {1e3 * last.late:.3g} ms"
             f" late: {last.culprit} took {1e3 * last.took:.3g} ms; "
@@ -230,10 +248,16 @@ class Meter:
 
     def timing(self, granted: Sequence[str], refused: Sequence[str]) -> Timing:
         """Return the timing so far, with the answers of the operating system."""
-        steps, _, _, parts = judged = self._judged()
-        overruns = self._blame(*judged)
-        ran = {name: self._ran(name, steps, part) for name, part in parts.items()}
-        times = {n: (part[ran[n]], steps[ran[n]]) for n, part in parts.items() if len(ran[n])}
+        judged = self._judged()
+        overruns = self._blame(judged)
+        culprits = Counter(overrun.culprit for overrun in overruns)
+        parts: dict[str, Spread] = {}
+        histograms: dict[str, Histogram] = {}
+        for name, durations in judged.parts.items():
+            happened = self._happened(name, judged.steps, durations)
+            if len(happened):
+                parts[name] = self._spread(durations[happened], judged.steps[happened])
+                histograms[name] = _histogram(durations[happened])
         return Timing(
             factor=float(self._realtime.factor),
             period=self._period / NANOSECONDS,
@@ -243,16 +267,16 @@ class Meter:
             steps=self._count,
             real_time_factor=self._real_time_factor(),
             overruns=len(overruns),
-            listed=tuple(overruns[:LISTED]),
-            culprits=dict(Counter(o.culprit for o in overruns).most_common()),
-            parts={name: self._spread(*both) for name, both in times.items()},
-            histograms={name: _bars(part) for name, (part, _) in times.items()},
+            listed=tuple(overruns[:MAX_LISTED]),
+            culprits=dict(culprits.most_common()),
+            parts=parts,
+            histograms=histograms,
         )
 
     @property
     def _count(self) -> int:
         """The number of steps of which it is known what came after them."""
-        return max(self._rows - (self._after is None), 0)
+        return max(self._rows - (self._arrival_after is None), 0)
 
     def _table(self) -> Table:
         """All rows so far, mapped from the file."""
@@ -270,77 +294,114 @@ class Meter:
         end = max(last[DUE] + self._period, last[-1])
         return float(count * self._system.step_ns) / float(end - first[DUE])
 
-    def _judged(self) -> tuple[Steps, Table, Table, dict[str, Table]]:
-        """The steps that count, their rows, by how much each was late, and what the parts took."""
-        table, count, owners = self._table(), self._count, np.array(self.segments)
-        after, rows = table[1:, :DUE], table[:count]
-        if self._after is not None:
-            after = np.vstack((after, self._after))
-        arrived, late = after[:count].T
-        at, took = (np.frombuffer(values, np.int64) for values in self._recordings)
-        known = at < self._first + count
-        recorded = np.bincount(at[known] - self._first, took[known], count).astype(float)
-        begin, end, spans = rows[:, BEGIN], rows[:, -1], np.diff(rows[:, BEGIN:])
+    def _judged(self) -> _Judged:
+        """The steps that count: it is known when the next one arrived."""
+        table, count = self._table(), self._count
+        next_arrivals = table[1:, :DUE]
+        if self._arrival_after is not None:
+            next_arrivals = np.vstack((next_arrivals, self._arrival_after))
+        arrived, late = next_arrivals[:count].T
+        rows = table[:count]
+        recording = self._recording_after(count)
+        begin, end = rows[:, BEGIN], rows[:, -1]
         parts: dict[str, Table] = {STEP: end - begin, START: begin - rows[:, DUE]}
-        for i, name in enumerate(self._names):
-            parts[name] = spans[:, owners % len(self._names) == i].sum(axis=1)
-        parts |= {BETWEEN: arrived - end - recorded, RECORDING: recorded}
-        return self._first + np.arange(count), rows, late, parts
+        segments, owners = np.diff(rows[:, BEGIN:]), np.array(self.segments)
+        for owner, name in enumerate(self._names[:-1]):
+            parts[name] = segments[:, owners == owner].sum(axis=1)
+        parts[EXCHANGE] = segments[:, owners == EXCHANGE_OWNER].sum(axis=1)
+        parts[BETWEEN] = arrived - end - recording
+        parts[RECORDING] = recording
+        return _Judged(self._first + np.arange(count), rows, late, parts)
 
-    def _blame(
-        self, steps: Steps, rows: Table, late: Table, parts: dict[str, Table]
-    ) -> list[Overrun]:
+    def _recording_after(self, count: int) -> Table:
+        """The time in ns that recording took after each of the first so many steps."""
+        steps, durations = (np.frombuffer(values, np.int64) for values in self._recordings)
+        counts = steps < self._first + count
+        places = steps[counts] - self._first
+        return np.bincount(places, durations[counts], count).astype(float)
+
+    def _blame(self, judged: _Judged) -> list[Overrun]:
         """The steps that ended late, each with the part that took longest beyond what is usual."""
-        overdue = np.flatnonzero(late > 0.0)
+        overdue = np.flatnonzero(judged.late > 0.0)
         if not len(overdue):
             return []
-        # What a part usually takes is no excuse where a step takes longer than its period anyhow,
-        # and then a backlog is no reason. A slow component takes no time in most steps.
-        usual = {BACKLOG: np.inf}
-        if np.median(parts[STEP]) <= self._period:
-            always = (name for name in self._names if self._every.get(name, 1) == 1)
-            usual = {name: np.median(parts[name]) for name in (START, *always, BETWEEN)}
-        ready = np.maximum(rows[:, DUE], rows[:, ARRIVED])
-        names = (START, BACKLOG, *self._names, BETWEEN, RECORDING)
-        suspects = parts | {START: rows[:, BEGIN] - ready, BACKLOG: ready - rows[:, DUE]}
-        spent = np.array([suspects[name][overdue] for name in names])
-        worst = (spent - [[usual.get(name, 0.0)] for name in names]).argmax(axis=0)
-        spent = spent[worst, np.arange(len(overdue))]
-        columns = (v.tolist() for v in (steps[overdue], late[overdue], worst, spent))
-        return [
-            Overrun(
-                step,
-                self._time(step),
-                by / NANOSECONDS,
-                self._culprits.get(names[i], names[i]),
-                took / NANOSECONDS,
-            )
-            for step, by, i, took in zip(*columns, strict=True)
-        ]
+        suspects = self._suspects(judged)
+        names = list(suspects)
+        usual = self._usual(judged.parts)
+        durations = np.array([suspects[name][overdue] for name in names])
+        excess = durations - np.array([[usual.get(name, 0.0)] for name in names])
+        culprits = excess.argmax(axis=0)
+        took = durations[culprits, np.arange(len(overdue))]
+        columns = (judged.steps[overdue], judged.late[overdue], culprits, took)
+        overruns: list[Overrun] = []
+        for step, late_ns, culprit, took_ns in zip(*(c.tolist() for c in columns), strict=True):
+            name = self._culprits.get(names[culprit], names[culprit])
+            late, duration = late_ns / NANOSECONDS, took_ns / NANOSECONDS
+            overruns.append(Overrun(step, self._time(step), late, name, duration))
+        return overruns
 
-    def _ran(self, name: str, steps: Steps, times: Table) -> Steps:
+    def _suspects(self, judged: _Judged) -> dict[str, Table]:
+        """What each part took that may be to blame for a late step, in ns."""
+        rows, parts = judged.rows, judged.parts
+        # A step is ready to begin when it is due, or later, when the step before has ended.
+        ready = np.maximum(rows[:, DUE], rows[:, ARRIVED])
+        return {
+            START: rows[:, BEGIN] - ready,
+            BACKLOG: ready - rows[:, DUE],
+            **{name: parts[name] for name in (*self._names, BETWEEN, RECORDING)},
+        }
+
+    def _usual(self, parts: Mapping[str, Table]) -> dict[str, float]:
+        """What parts usually take, in ns, which is no reason for a step to be late.
+
+        It is no excuse where a step takes longer than its period anyhow, and then a backlog is no
+        reason. A slow component takes no time in most steps.
+        """
+        if np.median(parts[STEP]) > self._period:
+            return {BACKLOG: np.inf}
+        in_each_step = [name for name in self._names if self._periods.get(name, 1) == 1]
+        usual = {name: float(np.median(parts[name])) for name in (START, *in_each_step, BETWEEN)}
+        return {BACKLOG: 0.0, **usual}
+
+    def _happened(self, name: str, steps: Steps, durations: Table) -> Steps:
         """The places of the steps in which a part happened: a slow component runs in some only."""
         if name == RECORDING:
-            return np.flatnonzero(times)
-        every = self._every.get(name, 1)
-        turn, last = steps % every, every - 1
+            return np.flatnonzero(durations)
+        period = self._periods.get(name, 1)
+        phase, last = steps % period, period - 1
         first = 0 if self._system.scheme == "jacobi" else last
-        return np.flatnonzero((turn == last) | (turn == first))
+        return np.flatnonzero((phase == last) | (phase == first))
 
-    def _spread(self, times: Table, steps: Steps) -> Spread:
-        worst = times.argmax()
-        found = [*np.quantile(times, QUANTILES, method="inverted_cdf"), times[worst]]
-        at = self._time(int(steps[worst]))
-        return Spread._make((*(float(t) / NANOSECONDS for t in found), at))
+    def _spread(self, durations: Table, steps: Steps) -> Spread:
+        worst = durations.argmax()
+        quantiles = np.quantile(durations, QUANTILES, method="inverted_cdf")
+        in_ns = (*quantiles.tolist(), float(durations[worst]))
+        median, p99, p999, longest = (duration / NANOSECONDS for duration in in_ns)
+        return Spread(median, p99, p999, longest, self._time(int(steps[worst])))
 
     def _time(self, step: int) -> float:
         return in_seconds(self._system.time_ns(step))
 
 
-def _bars(times: Table) -> Histogram:
+def _owners_of_segments(components: int, scheme: str) -> list[int]:
+    """The owner of each segment of a step: a component by index, or the exchange.
+
+    In the Jacobi scheme all components take their inputs before the first one steps.
+    """
+    if scheme == "jacobi":
+        return [EXCHANGE_OWNER, *range(components), *range(components)]
+    owners: list[int] = []
+    for component in range(components):
+        owners += [EXCHANGE_OWNER, component]
+    return owners
+
+
+def _histogram(durations: Table) -> Histogram:
     """A histogram by octaves; empty bars side by side are one, and there are none at the ends."""
-    bars, counts = np.unique(np.floor(FINE * np.log2(np.maximum(times, 1.0))), return_counts=True)
+    octaves = np.log2(np.maximum(durations, 1.0))
+    bars, counts = np.unique(np.floor(BARS_PER_OCTAVE * octaves), return_counts=True)
     edges = np.union1d(bars, bars + 1.0)
     heights = np.zeros(len(edges) - 1, int)
     heights[np.searchsorted(edges, bars)] = counts
-    return Histogram(tuple((2.0 ** (edges / FINE) / NANOSECONDS).tolist()), tuple(heights.tolist()))
+    edges_in_s = 2.0 ** (edges / BARS_PER_OCTAVE) / NANOSECONDS
+    return Histogram(tuple(edges_in_s.tolist()), tuple(heights.tolist()))
