@@ -44,9 +44,9 @@ def test_a_plain_force_and_position_are_a_bond_without_a_number():
 def test_a_source_that_does_not_see_the_position_has_none_seen():
     spring = block({"seen": "m", "other": "m"}, {"push": "N", "where": "m"})
     (bond,) = bonds(system_of(FINGER, spring, PUSH, "spring.where -> spring.seen"))
-    assert bond.seen is None
+    assert bond.received is None
     (bond,) = bonds(system_of(FINGER, spring, PUSH, "finger.position -> spring.other"))
-    assert bond.seen == Port("spring", "other")
+    assert bond.received == Port("spring", "other")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, simulate
 from grasp_cosim.base.si_units import Unit
-from grasp_cosim.exchange.dispatch import DECADES, FAR, Divergence, largest
+from grasp_cosim.exchange.divergence import DECADES, MAX_SCALES, Divergence, largest
 from grasp_cosim.exchange.listener import Signal
 from grasp_cosim.interface.interface import Interface
 from grasp_cosim.interface.variables import Variable
@@ -158,7 +158,7 @@ def test_what_grows_exponentially_trips_whatever_its_rate_and_frequency(
     decades = np.log10(size) + rate * K
     there = decades < 60.0
     curve = 10.0 ** decades[there] * np.cos(turn * K[there] + phase)
-    if np.abs(curve).max() < 10.0 * FAR * max(1.0, size):
+    if np.abs(curve).max() < 10.0 * MAX_SCALES * max(1.0, size):
         return  # it has not grown enough
     found = watch(curve, block=block)
     assert np.abs(curve[: found[0] + 1]).max() >= 10.0**DECADES

@@ -108,7 +108,7 @@ def test_units_of_the_source_are_those_of_the_connections():
     period=st.integers(1, 5),
 )
 def test_blocks_of_any_size_give_the_same_bits(rows, cuts, period):
-    both = [replace(BOND, period=period), replace(BOND, seen=None)]
+    both = [replace(BOND, period=period), replace(BOND, received=None)]
     whole = ExchangeEnergy(both, COLUMN)(rows)
     energy = ExchangeEnergy(both, COLUMN)
     parts = [energy(part.copy()) for part in np.split(rows, sorted(cuts))]
@@ -167,7 +167,7 @@ def test_the_grasp_has_a_bond_per_finger(grasp):
         )
         for j in (1, 2)
     )
-    ports = (p for b in found for p in (b.force, b.source, b.position, b.seen))
+    ports = (p for b in found for p in (b.force, b.source, b.position, b.received))
     signals = ExchangeEnergy(found, dict.fromkeys(ports, 0)).signals
     assert [(s.name, s.unit, s.kind) for s in signals] == [
         ("plant.exchange_energy[1]", "J", "Real"),

@@ -5,7 +5,7 @@ from math import inf, nan
 
 import pytest
 from grasp_cosim import SimulationError
-from grasp_cosim.exchange.dispatch import to_open_ends
+from grasp_cosim.exchange.divergence import to_open_ends
 from grasp_cosim.system.parts import Connection, Port
 from support.mocks import Mock, Run, make_system
 

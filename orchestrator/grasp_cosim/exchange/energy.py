@@ -35,7 +35,7 @@ class Bond:
     """A connected input force[j] of a component with an output position[j], and where each goes.
 
     index is j, None for a plain force and position. force is the input, source the output connected
-    to it, position the output. seen is the input of the source's component that is connected to
+    to it, position the output. received is the input of the source's component that is connected to
     position, None where it has none. period is the source's own step in base steps. scale is the
     energy in J of one unit of force times one of position.
     """
@@ -45,7 +45,7 @@ class Bond:
     force: Port
     source: Port
     position: Port
-    seen: Port | None
+    received: Port | None
     period: int
     scale: float
 
@@ -109,9 +109,10 @@ def _bond(
 
 def _in_si(interface: Interface, variable: Variable, quantity: str) -> float | None:
     """The SI value of one unit of a Real variable; None where it is no unit of that quantity."""
-    unit, wanted = interface.unit(variable), known_unit(quantity)
-    fits = variable.kind == "Real" and not variable.shape
-    return unit.factor if fits and unit and wanted and unit.measures(wanted) else None
+    unit, of_quantity = interface.unit(variable), known_unit(quantity)
+    if variable.kind != "Real" or variable.shape or not unit or not of_quantity:
+        return None
+    return unit.factor if unit.measures(of_quantity) else None
 
 
 class ExchangeEnergy:
@@ -169,9 +170,9 @@ class _Ledger:
     ) -> None:
         self._period, self._scale = bond.period, bond.scale
         self._mover = [column[bond.force], column[bond.position]]
-        self._answerer = [column[bond.source], column[bond.seen or bond.position]]
+        self._answerer = [column[bond.source], column[bond.received or bond.position]]
         self._of_force = transforms.get(bond.force, IDENTITY)
-        self._of_seen = transforms.get(bond.seen, IDENTITY) if bond.seen else IDENTITY
+        self._of_received = transforms.get(bond.received, IDENTITY) if bond.received else IDENTITY
         self.carried = np.empty((2, 0)), np.empty((2, 0)), np.zeros(1)
         """The last that moved, the last that answered, and the sum."""
 
@@ -179,12 +180,13 @@ class _Ledger:
         """The energy at each of the rows, which are those of the steps from first on."""
         earned = np.zeros(len(rows))
         last_moved, last_answered, sum_ = self.carried
-        held, position = moved = _joined(last_moved, rows[:, self._mover].T)
-        _add_last(earned, held[1:] * np.diff(position))
-        # A source with a step of its own answers for what it saw at the ends of that step.
+        held_force, position = moved = _joined(last_moved, rows[:, self._mover].T)
+        _add_last(earned, held_force[1:] * np.diff(position))
+        # A source with a step of its own answers for what it received at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
-        force, seen = answered = _joined(last_answered, self._in_units(rows[ends, self._answerer]))
-        _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * np.diff(seen))
+        answers = self._in_units(rows[ends, self._answerer])
+        force, received = answered = _joined(last_answered, answers)
+        _add_last(earned[ends], -0.5 * (force[1:] + force[:-1]) * np.diff(received))
         # One sum after the other from the carried total on: the same bits for any blocks.
         total = np.cumsum(np.concatenate((sum_, self._scale * earned)))
         self.carried = moved[:, -1:], answered[:, -1:], total[-1:]
@@ -192,17 +194,19 @@ class _Ledger:
 
     def _in_units(self, answered: Floats) -> Floats:
         """Force and position of the source in the units of the component that moves."""
-        if self._of_force == self._of_seen == IDENTITY:
+        if self._of_force == self._of_received == IDENTITY:
             return answered.T
-        (force, seen), (factor, offset) = answered.T, self._of_force
-        per_factor, from_offset = self._of_seen
-        return np.array((factor * force + offset, (seen - from_offset) / per_factor))
+        force, received = answered.T
+        force_factor, force_offset = self._of_force
+        position_factor, position_offset = self._of_received
+        position = (received - position_offset) / position_factor
+        return np.array((force_factor * force + force_offset, position))
 
 
-def _joined(before: Floats, after: Floats) -> Floats:
-    """Columns after others, with each row in one piece, which is fast."""
-    shape = 2, before.shape[1] + after.shape[1]
-    return np.concatenate((before, after), axis=1, out=np.empty(shape))
+def _joined(earlier: Floats, later: Floats) -> Floats:
+    """The earlier columns, then the later ones, with each row in one piece, which is fast."""
+    shape = 2, earlier.shape[1] + later.shape[1]
+    return np.concatenate((earlier, later), axis=1, out=np.empty(shape))
 
 
 def _add_last(sums: Floats, changes: Floats) -> None:

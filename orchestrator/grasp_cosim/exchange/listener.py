@@ -21,10 +21,10 @@ class Texts:
 
     def number(self, text: str) -> int:
         """The number of a text, which is listed if it is new."""
-        found = self._numbers.setdefault(text, len(self.listed))
-        if found == len(self.listed):
+        number = self._numbers.setdefault(text, len(self.listed))
+        if number == len(self.listed):
             self.listed.append(text)
-        return found
+        return number
 
     def column(self, numbers: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
         """The texts of these numbers, as an array of str objects."""

@@ -308,13 +308,13 @@ class Session:
         """
         _check_count("steps", steps)
         dispatcher = self._record.dispatcher
-        start, listeners_took = time.perf_counter(), dispatcher.took
+        start, listeners_took = time.perf_counter(), dispatcher.listener_seconds
         try:
             return self._call_fmus(partial(self.master.advance, int(steps))) > 0
         finally:
             self._wall_time += time.perf_counter() - start
             if not self.pacer:  # which has time for the listeners
-                self._wall_time -= dispatcher.took - listeners_took
+                self._wall_time -= dispatcher.listener_seconds - listeners_took
 
     def _call_fmus(self, action: Callable[[], Returned]) -> Returned:
         """Return what an action returns that calls FMUs; whatever it raises breaks the session.

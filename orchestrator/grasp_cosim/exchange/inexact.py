@@ -1,0 +1,76 @@
+"""What is recorded, and is not as the FMU has it: said once of each signal."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.checks import EXACT
+from ..interface.fmi_types import limits
+from ..system.description import System
+from ..system.parts import Port
+from ..system.times import seconds
+from .divergence import largest
+from .listener import Signal
+
+
+class InexactSignals:
+    """Looks at what is recorded besides the outputs, and says once where it is not as it was.
+
+    That is a whole number of 64 bits which a float64 does not hold exactly, since nothing goes by
+    it, or any number that is not finite.
+    """
+
+    def __init__(self, system: System, observed: Mapping[Port, Signal]) -> None:
+        """Over the columns of what is observed."""
+        self._system, self._signals = system, tuple(observed.values())
+        self._places = np.array(
+            [
+                place
+                for place, port in enumerate(observed)
+                if port not in system.watched or _is_long(system, port)
+            ],
+            np.intp,
+        )
+        is_integer = [self._signals[place].kind == "Integer" for place in self._places]
+        self._limits = np.where(is_integer, float(EXACT), np.inf)
+        self._log: dict[int, str] = {}
+
+    def saved(self) -> dict[int, str]:
+        """What was said until now, for restore()."""
+        return dict(self._log)
+
+    def restore(self, saved: dict[int, str]) -> None:
+        """Go back to what was saved."""
+        self._log = dict(saved)
+
+    @property
+    def log(self) -> list[str]:
+        """A line for each of these signals, in the order of the system."""
+        return [self._log[i] for i in sorted(self._log)]
+
+    def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+        """Look at rows of all that is observed."""
+        if not len(self._places):
+            return
+        columns = rows[:, self._places]
+        beyond = ~(largest(columns) < self._limits)  # true of nan, too
+        for i in np.flatnonzero(beyond).tolist():
+            if i not in self._log:
+                row = int((~(np.abs(columns[:, i]) < self._limits[i])).argmax())
+                self._log[i] = self._line(i, int(steps[row]), columns[row, i])
+
+    def _line(self, i: int, step: int, value: float) -> str:
+        signal = self._signals[self._places[i]]
+        time = seconds(self._system.time_ns(step))
+        if signal.kind == "Integer":
+            note = "recorded to the 53 bits that a float64 holds"
+            return f"{signal.name} is {value:.0f} at t = {time}: {note}"
+        return f"{signal.name} is {value} at t = {time}: recorded as it is"
+
+
+def _is_long(system: System, port: Port) -> bool:
+    """True for a whole number of 64 bits, which need not fit into a float64."""
+    component = system.component(port.component, str(port)).loaded
+    _, high = limits(component.by_name[port.variable].type, component.version)
+    return isinstance(high, int) and high >= EXACT
