@@ -94,7 +94,7 @@ def qualify(
     is_file = candidate.suffix.lower() in FILES
     if not is_file:
         check_runs(candidate)
-    of_system, of_component, values = _parted(overrides, component)
+    of_system, of_component, values = _sorted_overrides(overrides, component)
     system = natively(chosen_system(SystemOptions(overrides=of_system, **system_options)), native)
     qualification = run_qualification(
         system,
@@ -119,7 +119,7 @@ def qualify(
     return 0 if qualification.qualified else NEGATIVE
 
 
-def _parted(
+def _sorted_overrides(
     overrides: Iterable[Override], component: str
 ) -> tuple[list[Override], dict[str, dict[str, Any]], list[Override]]:
     """The overrides of the system, entries of the candidate by name, and values of variables."""

@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
     debug = "--debug" in arguments
     with harmless_streams():
         try:
-            return _commanded(arguments)
+            return _exit_code_of_command(arguments)
         except click.exceptions.NoArgsIsHelpError as error:
             click.echo(error.ctx.get_help(), err=True)
             return WRONG
@@ -82,7 +82,7 @@ def main(arguments: list[str]) -> int:
             return fail(f"{type(error).__name__}: {error} (--debug shows where)", FAILED, debug)
 
 
-def _commanded(arguments: list[str]) -> int:
+def _exit_code_of_command(arguments: list[str]) -> int:
     """The exit code of a command; what it raises is raised. A fork of an FMU ends here."""
     owner = os.getpid()
     try:
@@ -91,7 +91,7 @@ def _commanded(arguments: list[str]) -> int:
         end_fork(owner)
 
 
-def _exited(_: object) -> None:
+def _end_at_exit(_: object) -> None:
     """A run that an FMU ends by exit() would look like one that is done; we end by leave()."""
     if os.getpid() == _OWNER:  # and not a fork
         remedy = "with isolation = 'process' that ends it alone"
@@ -100,7 +100,7 @@ def _exited(_: object) -> None:
 
 
 _OWNER = os.getpid()
-_EXITED = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(_exited)
+_EXITED = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(_end_at_exit)
 
 
 # ------------------------------------------------------------------ standard output and error
@@ -170,8 +170,8 @@ def keep_output_for_us() -> None:
             os.open(os.devnull, os.O_RDONLY)
     standard_output = os.dup(1)
     os.dup2(2, 1)
-    sys.stdout = _opened(standard_output, sys.stdout)
-    sys.stderr = _opened(os.dup(2), sys.stderr)
+    sys.stdout = _text_stream(standard_output, sys.stdout)
+    sys.stderr = _text_stream(os.dup(2), sys.stderr)
 
 
 def leave(code: int) -> NoReturn:
@@ -186,7 +186,7 @@ def leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _opened(descriptor: int, like: Any) -> Any:
+def _text_stream(descriptor: int, like: Any) -> Any:
     """A text stream with the encoding of another, None where that was closed; not in ASCII."""
     is_ascii = like is None or lookup(like.encoding).name == "ascii"
     encoding, errors = ("utf-8", "backslashreplace") if is_ascii else (like.encoding, like.errors)

@@ -85,7 +85,7 @@ def init(
         for option, value in of_systems.items():
             if value:
                 raise InputError(f"{option} cannot be used with --template, which is no system")
-        return _block(file, template, force, as_json)
+        return _write_block(file, template, force, as_json)
     if file.suffix.lower() != ".toml":
         kinds = choices([f"--template {kind}" for kind in KINDS])
         block = f"; a block in Python has {kinds}" if file.suffix == ".py" else ""
@@ -93,8 +93,8 @@ def init(
     if file.is_file() and not force:
         raise InputError(f"{file}: is there already; give another name, or --force")
     check_file(file)
-    foreign = _paired("--as", candidates)
-    alone_fmus = _paired("--fmu", fmus)
+    foreign = _fmus_by_component("--as", candidates)
+    alone_fmus = _fmus_by_component("--fmu", fmus)
     hand = fingers is not None or angles is not None
     _check_together(file, foreign, alone=bool(alone_fmus), hand=hand, tandem=tandem)
     drafts: dict[str, Draft] = {}
@@ -103,9 +103,9 @@ def init(
         paths = {name: (fmu, path_from(file.parent, fmu)) for name, fmu in alone_fmus.items()}
         text, notes = alone(paths)
     elif hand:
-        text, notes = _hand(file.parent, fingers, angles)
+        text, notes = _hand_text(file.parent, fingers, angles)
     else:
-        text, drafts = _built_in(file.parent, tandem, foreign)
+        text, drafts = _built_in_text(file.parent, tandem, foreign)
     write_text(file, text)
     unfilled = to_do(text)
     if not unfilled and file.is_file():
@@ -119,13 +119,13 @@ def init(
         "todo": [{"line": number, "text": line} for number, line in unfilled.items()],
         "notes": notes,
     }
-    show(as_json, report, "\n    ".join(_lines(file, drafts, unfilled)))
+    show(as_json, report, "\n    ".join(_report_lines(file, drafts, unfilled)))
     for note in notes if not as_json else ():
         say(note)
     return 0
 
 
-def _block(file: Path, kind: str, force: bool, as_json: bool) -> int:
+def _write_block(file: Path, kind: str, force: bool, as_json: bool) -> int:
     """Write a block in Python and its test; say how to go on."""
     from ..fmu_export.own_block import fmu_name  # only here: it takes time to load
 
@@ -193,7 +193,7 @@ def path_from(folder: Path, fmu: Path) -> str:
     return fmu.as_posix()
 
 
-def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
+def _fmus_by_component(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
     """The FMUs of an option by component."""
     fmus: dict[str, Path] = {}
     for text in texts:
@@ -205,7 +205,7 @@ def _paired(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
     return fmus
 
 
-def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, list[str]]:
+def _hand_text(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, list[str]]:
     """The text of a hand, and what is to be said of it."""
     from ..grasp.system import built
     from ..hand.system import directions_of, faint, hand_text, sized
@@ -220,7 +220,7 @@ def _hand(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, l
     return _from_below(hand_text(directions)), [note] if note else []
 
 
-def _built_in(
+def _built_in_text(
     folder: Path, tandem: bool, foreign: Mapping[str, Path]
 ) -> tuple[str, dict[str, Draft]]:
     """The text of a built-in system, with foreign FMUs in the place of components."""
@@ -255,7 +255,9 @@ def _as_json(draft: Draft) -> dict[str, Any]:
     }
 
 
-def _lines(file: Path, drafts: Mapping[str, Draft], unfilled: Mapping[int, str]) -> list[str]:
+def _report_lines(
+    file: Path, drafts: Mapping[str, Draft], unfilled: Mapping[int, str]
+) -> list[str]:
     lines = [f"{file}: written"]
     for name, draft in drafts.items():
         doubtful = sum(bool(match.doubt) for match in draft.found.values())

@@ -84,13 +84,13 @@ def component_from(
         entry = entry.__file__
     if isinstance(entry, str | Path):
         path = Path(entry)
-        return Component(name, _built(place, path) if path.suffix == ".py" else path, {})
+        return Component(name, _built_fmu(place, path) if path.suffix == ".py" else path, {})
     if not is_code(entry):
         raise InputError(f"{place} = {entry!r}: must be {MUST_OF_COMPONENT}")
-    return _of_code(place, name, entry, known_components, [*connections])
+    return _python_component(place, name, entry, known_components, [*connections])
 
 
-def _of_code(
+def _python_component(
     place: str,
     name: str,
     code: Any,
@@ -104,7 +104,7 @@ def _of_code(
         for causality, port, peer in ends:
             if port.component == name:
                 end = connected[causality].get(port.variable, End())
-                connected[causality][port.variable] = end.or_as(_end(known_components, peer))
+                connected[causality][port.variable] = end.or_as(_end_at(known_components, peer))
     python_code: PythonCode = with_interface(place, code, connected)
     interface = python_code.interface
     values: dict[str, Any] = {}
@@ -114,7 +114,7 @@ def _of_code(
     return Component(name, interface.path, values, code=python_code)
 
 
-def _end(known_components: Mapping[str, Component], port: Port) -> End:
+def _end_at(known_components: Mapping[str, Component], port: Port) -> End:
     """What is known of a variable of a component with an FMU; nothing where there is none."""
     component = known_components.get(port.component)
     variable = component.interface.by_name.get(port.variable) if component else None
@@ -123,7 +123,7 @@ def _end(known_components: Mapping[str, Component], port: Port) -> End:
     return End(variable.kind, unit_of(component.interface, variable))
 
 
-def _built(place: str, file: Path) -> Path:
+def _built_fmu(place: str, file: Path) -> Path:
     """The FMU of the block in a file, which is kept for as long as the file stays as it is."""
     try:
         fmu: Path = registered("blocks", ".py")(file)

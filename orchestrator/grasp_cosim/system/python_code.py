@@ -112,7 +112,7 @@ def with_interface(place: str, code: Any, connected: Mapping[str, Mapping[str, E
     units: dict[str, Unit] = {}
     for attribute, causality in CAUSALITIES.items():
         ends = connected.get(causality, {})
-        declared = _declared(f"{place}: {attribute}", getattr(code, attribute, None))
+        declared = _declared_variables(f"{place}: {attribute}", getattr(code, attribute, None))
         if declared is None:
             declared = dict(ends)
         for name, declaration in declared.items():
@@ -124,7 +124,7 @@ def with_interface(place: str, code: Any, connected: Mapping[str, Mapping[str, E
                 )
             end = declaration.or_as(ends.get(name, End()))
             if causality == "parameter":
-                end = _of_attribute(end, getattr(code, name, None))
+                end = _with_attribute(end, getattr(code, name, None))
             variables.append(_variable(name, causality, end, len(variables)))
             if end.unit:
                 units[end.unit.name] = end.unit
@@ -159,25 +159,25 @@ def _variable(name: str, causality: str, end: End, reference: int) -> Variable:
     )
 
 
-def _of_attribute(end: End, value: Any) -> End:
+def _with_attribute(end: End, value: Any) -> End:
     """A parameter that starts as its attribute, if there is one; whole numbers have no unit."""
     value = unwrapped(value)
     start = value if type(value) in KIND_OF_TYPE else 0.0 if end.start is None else end.start
     return End("Real" if end.unit else KIND_OF_TYPE[type(start)], end.unit, start)
 
 
-def _declared(place: str, entries: Any) -> dict[str, End] | None:
+def _declared_variables(place: str, entries: Any) -> dict[str, End] | None:
     """What a class declares; None where it declares nothing."""
     if entries is None:
         return None
     if isinstance(entries, Mapping):
-        return {name: _end(f"{place}: {name!r}", entry) for name, entry in entries.items()}
+        return {name: _end_from(f"{place}: {name!r}", entry) for name, entry in entries.items()}
     if isinstance(entries, str) or not isinstance(entries, Iterable):
         raise InputError(f"{place} = {entries!r}: must be names, or names with {MUST_OF_VARIABLE}")
     return {name: End() for name in entries}
 
 
-def _end(place: str, entry: Any) -> End:
+def _end_from(place: str, entry: Any) -> End:
     """A variable by its start value, its unit, both of them or neither."""
     start, unit = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, None)
     start = unwrapped(start)

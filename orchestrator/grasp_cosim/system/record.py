@@ -81,12 +81,12 @@ class Record:
         for component in components:
             supported = [v for v in component.interface.variables if v.supported]
             if taken_in:
-                variables = _taken(component, supported, taken_in)
+                variables = _matching(component, supported, taken_in)
             else:
                 names = {v.name for v in by_default(component.interface)}
                 names |= {p.variable for p in acted_on if p.component == component.name}
                 variables = [v for v in supported if v.name in names]
-            unwanted = {v.name for v in _taken(component, variables, left_out)}
+            unwanted = {v.name for v in _matching(component, variables, left_out)}
             for v in variables:
                 if v.name not in unwanted:
                     chosen[Port(component.name, v.name)] = v
@@ -98,7 +98,7 @@ class Record:
         watched: dict[Port, Variable] = {}
         for component in components:
             outputs = [v for v in component.interface.of("output") if v.supported]
-            unwanted = {v.name for v in _taken(component, outputs, left_out)}
+            unwanted = {v.name for v in _matching(component, outputs, left_out)}
             for v in outputs:
                 if v.name not in unwanted:
                     watched[Port(component.name, v.name)] = v
@@ -201,7 +201,7 @@ def missing(
 _LISTINGS = "`grasp-cosim inspect FMU`"
 
 
-def _taken(
+def _matching(
     component: Component, variables: Sequence[Variable], patterns: Sequence[Pattern]
 ) -> list[Variable]:
     """The variables of a component that match any of the patterns."""

@@ -28,11 +28,11 @@ def replayed(system: Structure, stimuli: Stimuli) -> tuple[Stimuli, str]:
     columns = stimuli.recorded_columns
     through = {c.target: c for c in stimuli.recorded or () if c.source in columns}
     driven: dict[Port, Stimulus] = {}
-    for port in _free(system):
+    for port in _undriven_ports(system):
         if port in columns:
             driven[port] = columns[port]
         elif port in through:
-            driven[port] = _passed(columns[through[port].source], through[port])
+            driven[port] = _passed_by_connection(columns[through[port].source], through[port])
     if not driven and not stimuli.partial:
         raise InputError(
             f"{stimuli.file}: is a recorded run, none of whose columns can drive {system.name}; "
@@ -45,7 +45,7 @@ def replayed(system: Structure, stimuli: Stimuli) -> tuple[Stimuli, str]:
     return replace(stimuli, columns=driven), note
 
 
-def _free(system: Structure) -> Sequence[Port]:
+def _undriven_ports(system: Structure) -> Sequence[Port]:
     """The inputs and tunable parameters without a source."""
     sources = {connection.target for connection in system.connections}
     for event in system.events:
@@ -60,7 +60,7 @@ def _free(system: Structure) -> Sequence[Port]:
     return [port for port in ports if port not in sources]
 
 
-def _passed(column: Stimulus, connection: Connection) -> Stimulus:
+def _passed_by_connection(column: Stimulus, connection: Connection) -> Stimulus:
     """What went through a connection."""
     if connection.factor is None and connection.offset is None:
         return column

@@ -51,7 +51,7 @@ _CONDITION = re.compile(r"""(.+?\S)\s*(<=|>=|==|!=|<|>)\s*('[^']*'|"[^"]*"|[^<>=
 def read_events(name: str, entries: Any) -> tuple[Event, ...]:
     """The events of a list of entries; a System checks them. InputError where one is malformed."""
     events = []
-    for place, entry in _entries(name, "events", entries):
+    for place, entry in _tables(name, "events", entries):
         check_keys(place, entry, {"at", "when", "set"})
         values = as_table(f"{place}: set", entry.get("set"))
         check_values(f"{place}: set", values)
@@ -68,13 +68,13 @@ def read_events(name: str, entries: Any) -> tuple[Event, ...]:
 def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> tuple[Fault, ...]:
     """The faults of a list of entries on connections; as read_events()."""
     faults = []
-    for place, entry in _entries(name, "faults", entries):
+    for place, entry in _tables(name, "faults", entries):
         kind: Any = entry.get("kind")
         faults.append(
             Fault(
-                _target(place, entry.get("connection"), connections),
+                _target_port(place, entry.get("connection"), connections),
                 kind,
-                {key: value for key, value in entry.items() if key not in _entries_of(kind)},
+                {key: value for key, value in entry.items() if key not in _entries_of_kind(kind)},
                 _time(place, {"from": 0.0, **entry}, "from", zero=True) or 0,
                 _time(place, entry, "until"),
                 entry.get("seed", 0) if kind in RANDOM else 0,
@@ -87,7 +87,7 @@ def read_faults(name: str, entries: Any, connections: Sequence[Connection]) -> t
 def read_limits(name: str, entries: Any) -> tuple[Limit, ...]:
     """The limits of a list of entries; as read_events()."""
     limits = []
-    for place, entry in _entries(name, "limits", entries):
+    for place, entry in _tables(name, "limits", entries):
         check_keys(place, entry, {"when", "then"})
         condition = _condition(place, entry)
         if condition is None:
@@ -127,13 +127,13 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
     return entry
 
 
-def _entries_of(kind: Any) -> list[str]:
+def _entries_of_kind(kind: Any) -> list[str]:
     """The entries of a fault of a kind, besides its parameters."""
     seed = ["seed"] if kind in RANDOM else []
     return ["connection", "kind", "from", "until", "when", *seed]
 
 
-def _entries(name: str, key: str, entries: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+def _tables(name: str, key: str, entries: Any) -> Iterator[tuple[str, dict[str, Any]]]:
     """The tables of a list, each with its place."""
     if not isinstance(entries, list):
         raise InputError(f"{name}: {key} = {entries!r}: must be a list of tables, [[{key}]]")
@@ -145,7 +145,7 @@ def _time(place: str, entry: Mapping[str, Any], key: str, zero: bool = False) ->
     return in_nanoseconds(f"{place}: {key}", entry[key], zero) if key in entry else None
 
 
-def _target(place: str, text: Any, connections: Sequence[Connection]) -> Port:
+def _target_port(place: str, text: Any, connections: Sequence[Connection]) -> Port:
     """The target of the connection that the text names, by both of its ends or the target alone."""
     ends = [part.strip() for part in text.split("->")] if isinstance(text, str) else [text]
     if len(ends) == 1:
@@ -164,7 +164,7 @@ def _condition(place: str, entry: Mapping[str, Any]) -> Condition | None:
     parts = _CONDITION.fullmatch(text.strip()) if isinstance(text, str) else None
     try:
         port, relation, constant = parts.groups() if parts else ("", "", "none")
-        value = _constant(constant)
+        value = _constant_from(constant)
     except ValueError:
         raise InputError(
             f"{place}: when = {text!r}: must be like 'plant.gap[1] < 0.01', "
@@ -173,7 +173,7 @@ def _condition(place: str, entry: Mapping[str, Any]) -> Condition | None:
     return Condition(as_signal(f"{place}: when", port), relation, value)  # type: ignore[arg-type]
 
 
-def _constant(text: str) -> float | bool | str:
+def _constant_from(text: str) -> float | bool | str:
     if text in ("true", "false"):
         return text == "true"
     return text[1:-1] if text[0] in "'\"" else real(text)
@@ -226,12 +226,14 @@ def parse_set_values(system: Structure, port: Port, value: Given, place: str) ->
         settable_kinds = (
             "what can be set in a run is an input without a source, or a tunable parameter"
         )
-        raise InputError(f"{place}: {_why_not(system, interface, port)}; {settable_kinds}; {near}")
+        raise InputError(
+            f"{place}: {_reason_unsettable(system, interface, port)}; {settable_kinds}; {near}"
+        )
     values = parse_values(interface, place, port.variable, value)
     return {Port(port.component, name): v for name, v in values.items()}
 
 
-def _why_not(system: Structure, interface: Interface, port: Port) -> str:
+def _reason_unsettable(system: Structure, interface: Interface, port: Port) -> str:
     """Why a variable, or a whole array, cannot be set in the run, and what else does that."""
     v = interface.sample(port.variable)
     if v is None:
@@ -301,7 +303,7 @@ def _check_fault(system: Structure, fault: Fault, place: str) -> None:
             f"{place}: kind = {fault.kind!r}: {fault.target} is {kind}; must be one of "
             f"{choices(possible if kind != 'String' else ())}"
         )
-    entries = [*fault_kind.parameters, *_entries_of(fault.kind)]
+    entries = [*fault_kind.parameters, *_entries_of_kind(fault.kind)]
     for name in fault.parameters:
         known(f"{place}: unknown entry", name, entries, f" of {fault.kind}")
     for name, valid_range in fault_kind.parameters.items():

@@ -66,7 +66,9 @@ def by_element(
     return tuple(by_elements)
 
 
-def _end(system: Structure, port: Port, causality: str, place: str) -> tuple[Interface, Variable]:
+def _end_of_connection(
+    system: Structure, port: Port, causality: str, place: str
+) -> tuple[Interface, Variable]:
     """The interface and the variable at an end of a connection; InputError where there is none."""
     interface = system.component(port.component, place).interface
     valid = {v.name: v for v in interface.of(causality)}
@@ -144,7 +146,7 @@ def check_connections(system: Structure) -> None:
                 "have one"
             )
         sources[target] = source
-    fed = _fed(system)
+    fed = _fed_inputs(system)
     missing = [
         Port(c.name, v.name)
         for c in system.components
@@ -165,7 +167,7 @@ def check_connections(system: Structure) -> None:
 
 def check_arrays(system: Structure) -> None:
     """InputError where a part of an array is given, and the rest has no start for its size."""
-    fed, stimuli = _fed(system), driven(system)
+    fed, stimuli = _fed_inputs(system), driven(system)
     for c in system.components:
         valued = {*c.values, *(p.variable for p in stimuli if p.component == c.name)}
         for name, elements in c.interface.arrays.items():
@@ -180,7 +182,7 @@ def check_arrays(system: Structure) -> None:
                 )
 
 
-def _fed(system: Structure) -> Mapping[str, set[str]]:
+def _fed_inputs(system: Structure) -> Mapping[str, set[str]]:
     """The inputs that have a connection, or that stimuli drive, by component."""
     inputs: dict[str, set[str]] = {c.name: set() for c in system.components}
     for port in (*(connection.target for connection in system.connections), *driven(system)):
@@ -195,12 +197,12 @@ def connection_transform(system: Structure, connection: Connection) -> tuple[flo
     where an end does not exist, and where values cannot be passed from one end to the other.
     """
     place = f"{system.name}: connection '{connection}'"
-    source_fmu, source = _end(system, connection.source, "output", place)
-    target_fmu, target = _end(system, connection.target, "input", place)
+    source_fmu, source = _end_of_connection(system, connection.source, "output", place)
+    target_fmu, target = _end_of_connection(system, connection.target, "input", place)
     ranges = limits(source.type, source_fmu.version), limits(target.type, target_fmu.version)
     _check_types(place, connection, (source, target), ranges)
     if connection.factor is not None or connection.offset is not None:
-        return _declared(place, connection, target)
+        return _declared_transform(place, connection, target)
     source_unit, target_unit = source.unit, target.unit
     if source_unit is None or target_unit is None or source_unit == target_unit:
         return 1.0, 0.0
@@ -254,7 +256,9 @@ def _check_types(
         )
 
 
-def _declared(place: str, connection: Connection, target: Variable) -> tuple[float, float]:
+def _declared_transform(
+    place: str, connection: Connection, target: Variable
+) -> tuple[float, float]:
     factor = 1.0 if connection.factor is None else float(connection.factor)
     offset = 0.0 if connection.offset is None else float(connection.offset)
     if not factor or not math.isfinite(factor):
@@ -307,11 +311,15 @@ def _check_exact(system: Structure) -> None:
 
 def remarks(system: Structure) -> tuple[str, ...]:
     """Remarks on a system that is valid, a line each."""
-    return (*_of_connections(system), *_of_components(system), *of_declared_steps(system))
+    return (
+        *_remarks_on_connections(system),
+        *_remarks_on_components(system),
+        *of_declared_steps(system),
+    )
 
 
-def _of_components(system: Structure) -> Iterator[str]:
-    fed = _fed(system)
+def _remarks_on_components(system: Structure) -> Iterator[str]:
+    fed = _fed_inputs(system)
     of_locals: Counter[str] = Counter()
     if not system.record.takes_in:
         of_locals.update(p.component for p, v in system.recorded.items() if v.causality == "local")
@@ -328,7 +336,8 @@ def _of_components(system: Structure) -> Iterator[str]:
             )
         for v in c.interface.of("input", "output"):
             if v.clock and v.causality == "input":
-                yield f"{Port(c.name, v.name)} is a clock that ticks by time: {_of_clock(v.clock)}"
+                ticks = _ticks_in_words(v.clock)
+                yield f"{Port(c.name, v.name)} is a clock that ticks by time: {ticks}"
             elif not v.supported:
                 outcome = "keeps its start value" if v.causality == "input" else "not recorded"
                 yield f"{Port(c.name, v.name)} is of type {v.nature}: {outcome}"
@@ -352,7 +361,7 @@ def _of_components(system: Structure) -> Iterator[str]:
         )
 
 
-def _of_clock(clock: Clock) -> str:
+def _ticks_in_words(clock: Clock) -> str:
     """When a clock ticks, in words."""
     if clock.variability in ("constant", "fixed") and clock.interval is not None:
         shift = f", the first {float(clock.shift):g} s after the start" if clock.shift else ""
@@ -360,11 +369,11 @@ def _of_clock(clock: Clock) -> str:
     return f"when the FMU says ({clock.variability})"
 
 
-def _of_connections(system: Structure) -> Iterator[str]:
+def _remarks_on_connections(system: Structure) -> Iterator[str]:
     """Remarks on connections that round values, or lack a unit at one end; and on stimuli."""
     for as_given, connection in {c.of_arrays or c: c for c in system.connections}.items():
-        _, source = _end(system, connection.source, "output", "")
-        _, target = _end(system, connection.target, "input", "")
+        _, source = _end_of_connection(system, connection.source, "output", "")
+        _, target = _end_of_connection(system, connection.target, "input", "")
         if target.type == "Float32" and source.type in ("Real", "Float64"):
             yield f"{as_given}: from {source.type} to Float32, rounded to 7 digits"
         if target.kind == "Real" and connection.factor is None and connection.offset is None:
@@ -378,7 +387,7 @@ def _of_connections(system: Structure) -> Iterator[str]:
         yield f"{system.input.file} drives {ports}, each step by the values at its beginning"
         for port in driven(system):
             unit = system.input.columns[port].unit
-            if unit is not None and _variable(system, port).unit is None:
+            if unit is not None and _variable_of(system, port).unit is None:
                 yield f"{system.input.file}: {port} has no unit, taken to be in {unit}"
 
 
@@ -400,12 +409,12 @@ def driven(system: Structure) -> tuple[Port, ...]:
 
 def driven_inputs(system: Structure) -> tuple[Port, ...]:
     """The inputs among these, which get a value for each step."""
-    return tuple(p for p in driven(system) if _variable(system, p).causality == "input")
+    return tuple(p for p in driven(system) if _variable_of(system, p).causality == "input")
 
 
 def driven_parameters(system: Structure) -> tuple[Port, ...]:
     """The tunable parameters among these, which are set where their values change."""
-    return tuple(p for p in driven(system) if _variable(system, p).causality != "input")
+    return tuple(p for p in driven(system) if _variable_of(system, p).causality != "input")
 
 
 def is_drivable(variable: Variable) -> bool:
@@ -414,7 +423,7 @@ def is_drivable(variable: Variable) -> bool:
     return variable.causality == "input" or tunable
 
 
-def _variable(system: Structure, port: Port) -> Variable:
+def _variable_of(system: Structure, port: Port) -> Variable:
     return system.component(port.component, str(port)).interface.by_name[port.variable]
 
 
@@ -465,7 +474,7 @@ def check_stimuli(system: Structure, all_columns: bool = False) -> None:
             raise InputError(f"{place}: {port} has two sources, {two}; must have one")
         numbers = v.kind == "Real" and not column.texts
         for row in column.extremes if numbers else column.distinct:
-            value = _value(stimuli, port, interface, row)
+            value = _value_of_row(stimuli, port, interface, row)
             exact(stimuli.place(port, row), value, column.text(row))
 
 
@@ -475,9 +484,9 @@ def samples_of(system: Structure, port: Port) -> array[float]:
     column = system.input.columns[port]
     interface = system.component(port.component, str(port)).interface
     if column.texts:
-        values = [float(_value(system.input, port, interface, r)) for r in column.distinct]
+        values = [float(_value_of_row(system.input, port, interface, r)) for r in column.distinct]
         return array("d", (values[int(i)] for i in column.samples))
-    change = _conversion(system.input.place(port), interface, port, column)
+    change = _conversion_of_column(system.input.place(port), interface, port, column)
     same = change == IDENTITY
     return array("d", column.samples if same else (change(x) for x in column.samples))
 
@@ -485,10 +494,10 @@ def samples_of(system: Structure, port: Port) -> array[float]:
 def _driven_in_words(system: Structure, stimuli: Stimuli) -> Iterator[str]:
     """What stimuli drive, and whether it is interpolated between two rows."""
     ports = driven(system)
-    linear_ports = [port for port in ports if is_linear(stimuli, _variable(system, port))]
+    linear_ports = [port for port in ports if is_linear(stimuli, _variable_of(system, port))]
     if linear_ports:
         yield f"{choices(linear_ports, 6)} (linear)"
-    held_ports = [port for port in ports if not is_linear(stimuli, _variable(system, port))]
+    held_ports = [port for port in ports if not is_linear(stimuli, _variable_of(system, port))]
     if held_ports:
         yield f"{choices(held_ports, 6)} (held)"
 
@@ -499,17 +508,19 @@ def is_linear(stimuli: Stimuli, variable: Variable) -> bool:
     return stimuli.interpolation == "linear" and continuous
 
 
-def _value(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Value:
+def _value_of_row(stimuli: Stimuli, port: Port, interface: Interface, row: int) -> Value:
     """The sample of a row as a value of its input; InputError where it is none."""
     column = stimuli.columns[port]
-    change = _conversion(stimuli.place(port), interface, port, column)
+    change = _conversion_of_column(stimuli.place(port), interface, port, column)
     value: Value = column.text(row)
     if change != IDENTITY and not column.texts:
         value = change(column.samples[row])
     return parse_value(interface, stimuli.place(port, row), port.variable, value, text=True)
 
 
-def _conversion(place: str, interface: Interface, port: Port, column: Stimulus) -> Conversion:
+def _conversion_of_column(
+    place: str, interface: Interface, port: Port, column: Stimulus
+) -> Conversion:
     """The conversion of a column into the unit of its input; InputError where there is none."""
     variable = interface.by_name[port.variable]
     if column.unit is None or variable.unit in (None, column.unit):
