@@ -10,7 +10,7 @@ Value = float | int | bool | str
 """A value of a variable."""
 
 Kind = Literal["Real", "Integer", "Boolean", "String", "Binary", "Clock"]
-KINDS: tuple[str, ...] = get_args(Kind)
+VARIABLE_KINDS: tuple[str, ...] = get_args(Kind)
 """What the system makes of the types of FMI; whole numbers and enumerations are Integer."""
 
 SUPPORTED_KINDS = ("Real", "Integer", "Boolean", "String")
@@ -51,7 +51,7 @@ def kind_of(fmi_type: str) -> Kind:
     """The kind that the system makes of an FMI type of any version."""
     if fmi_type.startswith(("Real", "Float")):
         return "Real"
-    return fmi_type if fmi_type in KINDS else "Integer"  # type: ignore[return-value]
+    return fmi_type if fmi_type in VARIABLE_KINDS else "Integer"  # type: ignore[return-value]
 
 
 def typed(fmi_type: str, text: str | None) -> Value | None:

@@ -1,6 +1,5 @@
 """The folder of a run, on disk while it runs, its rows and run.json beside them."""
 
-import json
 import os
 import platform
 import time
@@ -11,7 +10,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import Any, Literal, Self, TypedDict, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +19,7 @@ from ..base.errors import InputError
 from ..base.files import make_folder, of_any_format, remove, unwritable
 from ..base.registry import names
 from ..base.scratch import SUFFIX, Lock
+from ..base.typed_json import Decoder, json_in
 from ..exchange.listener import Experiment, Listener, Signal
 from ..metrics.in_si import in_si
 from ..metrics.metric import Measured
@@ -202,14 +202,21 @@ def save_run(result: RecordedRun, folder: Path, form: Form) -> None:
         into.finish(result)
 
 
+class GroupsOfRun(TypedDict, total=False):
+    """What _groups() reads of run.json."""
+
+    metrics: list[str]
+
+
 def _groups(settings: Path) -> Sequence[str]:
     """The groups of metrics of the run of a run.json, whose pictures have their names.
 
     All that there are where it is damaged.
     """
     try:
-        return [str(name) for name in json.loads(settings.read_bytes()).get("metrics", ())]
-    except (ValueError, AttributeError, TypeError):
+        content = json_in(str(settings), settings.read_bytes())
+        return Decoder().decoded(GroupsOfRun, str(settings), content).get("metrics", [])
+    except InputError:
         return names("groups")
 
 
