@@ -66,17 +66,17 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     u_1, u_2 = series.outputs(p, x.layers, u).force
-    held = holding.hold(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
+    hold = holding.hold(p.hold, 0.5 * u_2 - 0.5 * u_1, closing)
     floor = p.impact_reduction.intensity_floor
-    free, lines = 1.0 - held, (x.line_1, x.line_2)
+    free, lines = 1.0 - hold, (x.line_1, x.line_2)
     line_1, line_2 = reflectance_ratio.both_moved(
         p.reflectance, lines, floor, u.position, u.intensity, free, h
     )
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     alike = reflectance_ratio.alike(estimate, u.intensity)
-    f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)
+    f_s = free * layer_3.virtual_force(p.simultaneous_contact, alike)  # Eq. (2')
     layers = series.advance(p, x.layers, u, f_s, h)
-    return State(layers, line_1, line_2, estimate, closing, held)
+    return State(layers, line_1, line_2, estimate, closing, hold)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:

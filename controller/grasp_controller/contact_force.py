@@ -31,4 +31,4 @@ def force(p: Params, x: float, x_dot: float, x_v1: Motion) -> float:
     object's motion.
     """
     position, velocity = x_v1
-    return -p.damping * (x_dot - velocity) - p.stiffness * (x - position)
+    return -p.damping * (x_dot - velocity) - p.stiffness * (x - position)  # Eq. (7)

@@ -24,13 +24,13 @@ from .hand_size import FINGERS
 from .impedance import Motion
 
 if TYPE_CHECKING:
-    Each = tuple[float, ...]
+    PerFinger = tuple[float, ...]
     Motions = tuple[Motion, ...]
 else:
-    Each = tuple[(float,) * FINGERS]
+    PerFinger = tuple[(float,) * FINGERS]
     Motions = tuple[(Motion,) * FINGERS]
 
-ZEROS: Each = (0.0,) * FINGERS
+ZEROS: PerFinger = (0.0,) * FINGERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Params:
     """The weights of the fingers, and the parameters of the three layers."""
 
     weight: Annotated[
-        Each,
+        PerFinger,
         Parameter(
             "n_k, balance weight of the finger; with its direction e_k the sum of n_k·e_k is 0",
             unit="1",
@@ -71,13 +71,13 @@ class Inputs(NamedTuple):
     """Samples of the hand and of its sensors."""
 
     position: Annotated[
-        Each, Input("s_k, way of the fingertip from the wrist", unit="m", nominal=0.1)
+        PerFinger, Input("s_k, way of the fingertip from the wrist", unit="m", nominal=0.1)
     ] = (0.11,) * FINGERS
     velocity: Annotated[
-        Each, Input("s_k', velocity of the fingertip, opening", unit="m/s", nominal=0.1)
+        PerFinger, Input("s_k', velocity of the fingertip, opening", unit="m/s", nominal=0.1)
     ] = ZEROS
     intensity: Annotated[
-        Each,
+        PerFinger,
         Input("xi_k, offset-compensated output of the proximity sensor", unit="V", nominal=0.1),
     ] = (0.03,) * FINGERS
 
@@ -87,13 +87,13 @@ class State(NamedTuple):
 
     target: Motions
     virtual: Motions
-    intensity: Each
-    simultaneous_contact_force: Each
-    impact_reduction_force: Each
+    intensity: PerFinger
+    simultaneous_contact_force: PerFinger
+    impact_reduction_force: PerFinger
 
 
 Force = Annotated[
-    Each,
+    PerFinger,
     Output(
         "u_k, actuator force on the finger, opening",
         unit="N",
@@ -102,14 +102,14 @@ Force = Annotated[
     ),
 ]
 TargetPosition = Annotated[
-    Each, Output("z_k, target of the finger", unit="m", nominal=0.1, depends_on={"position"})
+    PerFinger, Output("z_k, target of the finger", unit="m", nominal=0.1, depends_on={"position"})
 ]
 VirtualPosition = Annotated[
-    Each,
+    PerFinger,
     Output("s_vk, virtual object of the finger", unit="m", nominal=0.1, depends_on={"position"}),
 ]
 SimultaneousContactForce = Annotated[
-    Each,
+    PerFinger,
     Output(
         "f_sk, virtual force of layer 3",
         unit="N",
@@ -119,7 +119,7 @@ SimultaneousContactForce = Annotated[
     ),
 ]
 ImpactReductionForce = Annotated[
-    Each, Output("f_pk, virtual force of layer 2", unit="N", nominal=1.0, depends_on=set())
+    PerFinger, Output("f_pk, virtual force of layer 2", unit="N", nominal=1.0, depends_on=set())
 ]
 
 
@@ -147,36 +147,39 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     return advance(p, x, u, virtual_forces(p, u.intensity), h)
 
 
-def advance(p: Params, x: State, u: Inputs, f_s: Each, h: float) -> State:
+def advance(p: Params, x: State, u: Inputs, f_s: PerFinger, h: float) -> State:
     """The virtual objects h seconds later, the samples u and the virtual forces f_s in N held."""
-    third, second = p.simultaneous_contact, p.impact_reduction
-    before = after = _desired(p, u)
-    if third.enabled:
-        before = x.target
-        a = impedance.transition(third.mass, third.damping, third.stiffness, h)
-        after = tuple(
-            layer_3.follow(third, a, z, z_d, f)
-            for z, (z_d, _), f in zip(before, after, f_s, strict=True)
+    gains_3, gains_2 = p.simultaneous_contact, p.impact_reduction
+    old_target = new_target = _desired(p, u)
+    if gains_3.enabled:
+        old_target = x.target
+        a = impedance.transition(gains_3.mass, gains_3.damping, gains_3.stiffness, h)
+        # Eq. (3N)
+        new_target = tuple(
+            layer_3.follow(gains_3, a, z, z_d, f)
+            for z, (z_d, _), f in zip(old_target, new_target, f_s, strict=True)
         )
-    viscosity, floor = second.viscosity, second.intensity_floor
+    viscosity, floor = gains_2.viscosity, gains_2.intensity_floor
+    # Eq. (5) and (6) for each finger
     f_p = tuple(
-        layer_2.virtual_force(viscosity, floor, xi, was, h)
-        for xi, was in zip(u.intensity, x.intensity, strict=True)
+        layer_2.virtual_force(viscosity, floor, xi, previous_xi, h)
+        for xi, previous_xi in zip(u.intensity, x.intensity, strict=True)
     )
-    virtual = after
-    if second.enabled:
-        a = impedance.transition(second.mass, second.damping, second.stiffness, h)
+    virtual = new_target
+    if gains_2.enabled:
+        a = impedance.transition(gains_2.mass, gains_2.damping, gains_2.stiffness, h)
         virtual = tuple(
-            layer_2.follow(second, a, s_v, z, z_after, f)
-            for s_v, z, z_after, f in zip(x.virtual, before, after, f_p, strict=True)
+            layer_2.follow(gains_2, a, s_v, z, z_after, f)
+            for s_v, z, z_after, f in zip(x.virtual, old_target, new_target, f_p, strict=True)
         )
-    return State(after, virtual, u.intensity, f_s, f_p)
+    return State(new_target, virtual, u.intensity, f_s, f_p)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The forces for the samples u; a layer that is off passes on the layer above."""
     target = x.target if p.simultaneous_contact.enabled else _desired(p, u)
     virtual = x.virtual if p.impact_reduction.enabled else target
+    # Eq. (7N)
     forces = tuple(
         n * layer_1.force(p.contact_force, s, s_dot, s_v)
         for n, s, s_dot, s_v in zip(p.weight, u.position, u.velocity, virtual, strict=True)
@@ -190,20 +193,21 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     )
 
 
-def virtual_forces(p: Params, intensity: Each) -> Each:
+def virtual_forces(p: Params, intensity: PerFinger) -> PerFinger:
     """f_sk in N, Eq. (2N), from the intensities in V; zero where no sensor sees anything."""
     lit = tuple(layer_3.lit(xi) for xi in intensity)
     total = 0.0
     for xi in lit:
         total = total + xi
-    others = float(FINGERS - 1)
-    contrasts = tuple(layer_3.contrast(xi, (total - xi) / others) for xi in lit)
+    other_fingers = float(FINGERS - 1)
+    contrasts = tuple(layer_3.contrast(xi, (total - xi) / other_fingers) for xi in lit)
     mean = weighted_mean(p.weight, contrasts)
+    # Eq. (2N)
     return tuple(p.simultaneous_contact.gain * (phi - mean) for phi in contrasts)
 
 
-def weighted_mean(weight: Each, values: Each) -> float:
-    """<q> of a value per finger."""
+def weighted_mean(weight: PerFinger, values: PerFinger) -> float:
+    """<q> of a value per finger, q_k, with the weights n_k."""
     total = 0.0
     for n, value in zip(weight, values, strict=True):
         total = total + n * value
@@ -213,4 +217,5 @@ def weighted_mean(weight: Each, values: Each) -> float:
 def _desired(p: Params, u: Inputs) -> Motions:
     """z_dk of Eq. (4N): no velocity and no acceleration, by definition."""
     mean = weighted_mean(p.weight, u.position)
+    # Eq. (4N)
     return tuple((s - mean, 0.0) for s in u.position)

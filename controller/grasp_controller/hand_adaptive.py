@@ -9,7 +9,8 @@ Each finger's line (reflectance_ratio.py) gives a_k = ln(K·alpha_k) with the va
 of ln alpha_k is N(mu, sigma_b^2/2), its mean unknown, as is K:
 
     g_k = v/(v + V_k),    v = sigma_b^2/2,    mu = sum g_k·a_k/sum g_k
-    b_k = t·g_k·(a_k - mu),    t = min(1, beta_max/(largest less smallest a_k with a slope))
+    b_k = t·g_k·(a_k - mu)     (R7)
+    t = min(1, beta_max/(largest less smallest a_k with a slope))
 
 With two fingers b_1 - b_2 is beta of reflectance_ratio.py, gain and limit included.
 Card: controller/README.md
@@ -23,8 +24,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from block_variables import Output
 
 from . import hand, holding, reflectance_ratio
-from .hand import Each
 from .hand import Inputs as Inputs
+from .hand import PerFinger
 from .hand_size import FINGERS
 from .reflectance_ratio import Line
 
@@ -52,7 +53,7 @@ class State(NamedTuple):
 
     layers: hand.State
     lines: Lines
-    brightness: Each
+    brightness: PerFinger
     closing: float
     hold: float
 
@@ -66,7 +67,7 @@ class Outputs(NamedTuple):
     simultaneous_contact_force: hand.SimultaneousContactForce
     impact_reduction_force: hand.ImpactReductionForce
     reflectance_ratio: Annotated[
-        Each,
+        PerFinger,
         Output(
             "alpha_k to the mean of all faces, reflectance as learnt",
             unit="1",
@@ -75,7 +76,7 @@ class Outputs(NamedTuple):
         ),
     ]
     reflectance_ratio_standard_deviation: Annotated[
-        Each,
+        PerFinger,
         Output(
             "standard deviation of that ratio, by noise alone",
             unit="1",
@@ -84,7 +85,7 @@ class Outputs(NamedTuple):
         ),
     ]
     estimated_gap: Annotated[
-        Each,
+        PerFinger,
         Output(
             "l_k, gap as learnt",
             unit="m",
@@ -115,17 +116,18 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
         pressed = pressed - force
     fingers = float(FINGERS)
     closing = holding.filtered(p.hold, x.closing, 2.0 * rate / fingers, h)
-    held = holding.hold(p.hold, pressed / fingers, closing)
+    hold = holding.hold(p.hold, pressed / fingers, closing)
     floor = p.impact_reduction.intensity_floor
-    free, low_pass = 1.0 - held, reflectance_ratio.low_pass(p.reflectance, h)
+    free, low_pass = 1.0 - hold, reflectance_ratio.low_pass(p.reflectance, h)
     lines = tuple(
         reflectance_ratio.moved(p.reflectance, line, floor, s, xi, free, low_pass)
         for line, s, xi in zip(x.lines, u.position, u.intensity, strict=True)
     )
     b = brightnesses(p.reflectance, lines)
     f_s = hand.virtual_forces(p, alike(b, u.intensity))
+    # Eq. (2N')
     layers = hand.advance(p, x.layers, u, tuple(free * f for f in f_s), h)
-    return State(layers, lines, b, closing, held)
+    return State(layers, lines, b, closing, hold)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -148,15 +150,16 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     )
 
 
-def brightnesses(p: reflectance_ratio.Params, lines: Lines) -> Each:
+def brightnesses(p: reflectance_ratio.Params, lines: Lines) -> PerFinger:
     """b_k, the logarithm of each face's reflectance to the mean, as far as the lines are certain.
 
     All are zero before there is a slope.
     """
     gains = tuple(gain(p, line) for line in lines)
-    told = tuple(p.diffusion_exponent * log(line.per_y) for line in lines)
+    # a_k = ln(K·alpha_k)
+    log_gains = tuple(p.diffusion_exponent * log(line.per_y) for line in lines)
     total, weighted, low, high = 0.0, 0.0, inf, -inf
-    for g, a in zip(gains, told, strict=True):
+    for g, a in zip(gains, log_gains, strict=True):
         total = total + g
         weighted = weighted + g * a
         low = min(low, a) if g > 0.0 else low
@@ -165,13 +168,14 @@ def brightnesses(p: reflectance_ratio.Params, lines: Lines) -> Each:
         return tuple(0.0 for _ in gains)
     mean = weighted / total
     t = p.limit / (high - low) if high - low > p.limit else 1.0
-    return tuple(t * g * (a - mean) for g, a in zip(gains, told, strict=True))
+    # (R7)
+    return tuple(t * g * (a - mean) for g, a in zip(gains, log_gains, strict=True))
 
 
 def gain(p: reflectance_ratio.Params, line: Line) -> float:
     """g_k: how far a line is believed, from 0 without a slope to 1."""
     v = _prior(p)
-    return v / (v + line.variance) if v > 0.0 else 0.0
+    return v / (v + line.variance) if v > 0.0 else 0.0  # g_k of (R7)
 
 
 def deviation(p: reflectance_ratio.Params, line: Line) -> float:
@@ -179,12 +183,12 @@ def deviation(p: reflectance_ratio.Params, line: Line) -> float:
     return sqrt(_prior(p) * (1.0 - gain(p, line)))
 
 
-def alike(b: Each, intensity: Each) -> Each:
+def alike(b: PerFinger, intensity: PerFinger) -> PerFinger:
     """The intensities in V as faces would give them that are all as dark as the darkest."""
     darkest = b[0]
-    for one in b:
-        darkest = min(darkest, one)
-    return tuple(exp(darkest - one) * xi for one, xi in zip(b, intensity, strict=True))
+    for b_k in b:
+        darkest = min(darkest, b_k)
+    return tuple(exp(darkest - b_k) * xi for b_k, xi in zip(b, intensity, strict=True))
 
 
 def _prior(p: reflectance_ratio.Params) -> float:

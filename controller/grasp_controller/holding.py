@@ -1,6 +1,6 @@
 """Tells a grasp from an approach: the fingers press, and no longer move towards each other.
 
-P: mean force with which they press         h = P^2/(P^2 + P_0^2) · w_0^2/(w_0^2 + w^2)
+P: mean force with which they press         h = P^2/(P^2 + P_0^2) · w_0^2/(w_0^2 + w^2)    (R6)
 """
 
 from dataclasses import dataclass
@@ -40,9 +40,9 @@ class Params(Group, name="hold"):
     ] = 0.02
 
 
-def filtered(p: Params, before: float, closing: float, h: float) -> float:
+def filtered(p: Params, previous: float, closing: float, h: float) -> float:
     """The low-passed speed of closing in m/s, h seconds later."""
-    return before + h / (p.time_constant + h) * (closing - before)
+    return previous + h / (p.time_constant + h) * (closing - previous)
 
 
 def hold(p: Params, squeeze: float, closing: float) -> float:
@@ -52,5 +52,5 @@ def hold(p: Params, squeeze: float, closing: float) -> float:
     """
     squeeze = max(0.0, squeeze)
     pressed, slow = squeeze * squeeze, p.speed * p.speed
-    of = (pressed + p.squeeze * p.squeeze) * (slow + closing * closing)
-    return pressed * slow / of
+    denominator = (pressed + p.squeeze * p.squeeze) * (slow + closing * closing)
+    return pressed * slow / denominator  # (R6)

@@ -63,42 +63,52 @@ class Params(Gains, name="impact_reduction"):
     intensity_floor: Floor = 1e-6
 
 
-def virtual_forces(p: Params, xi: Pair, xi_before: Pair, h: float) -> Pair:
+def virtual_forces(p: Params, xi: Pair, previous_xi: Pair, h: float) -> Pair:
     """f_pj in N, Eq. (5), from two samples of the intensities in V, h seconds apart."""
     xi_1, xi_2 = xi
-    was_1, was_2 = xi_before
+    previous_1, previous_2 = previous_xi
     d_1, d_2 = p.viscosity
     floor = p.intensity_floor
-    return virtual_force(d_1, floor, xi_1, was_1, h), virtual_force(d_2, floor, xi_2, was_2, h)
+    return (
+        virtual_force(d_1, floor, xi_1, previous_1, h),
+        virtual_force(d_2, floor, xi_2, previous_2, h),
+    )
 
 
-def virtual_force(viscosity: float, floor: float, xi: float, was: float, h: float) -> float:
-    """f_p in N of one finger, Eq. (5), whose intensity was `was` and is xi in V h seconds later.
+def virtual_force(viscosity: float, floor: float, xi: float, previous_xi: float, h: float) -> float:
+    """f_p in N of one finger, Eq. (5), from two samples of its intensity in V, h seconds apart.
 
     xi'/xi is the rate of ln xi, and is sampled as the difference of two logarithms: noise then has
-    no mean in it, which it has in (xi - was)/(h·xi). Zero unless both samples reach the floor:
-    where xi is nothing, xi'/xi has no meaning.
+    no mean in it, which it has in (xi - previous_xi)/(h·xi). Zero unless both samples
+    reach the floor: where xi is nothing, xi'/xi has no meaning.
     """
-    return 0.0 if xi < floor or was < floor else viscosity * log(xi / was) / h
+    if xi < floor or previous_xi < floor:
+        return 0.0
+    return viscosity * log(xi / previous_xi) / h  # Eq. (5)
 
 
-def advance(p: Gains, x_v1: Motions, before: Motion, after: Motion, f_p: Pair, h: float) -> Motions:
+def advance(
+    p: Gains, x_v1: Motions, old_target: Motion, new_target: Motion, f_p: Pair, h: float
+) -> Motions:
     """The virtual objects of both fingers h seconds later, Eq. (6), the forces f_p in N held.
 
-    before and after are the target's motion x_v2 at the two ends of the step.
+    The targets are the motion x_v2 at the two ends of the step.
     """
     a = impedance.transition(p.mass, p.damping, p.stiffness, h)
     x_1, x_2 = x_v1
     f_1, f_2 = f_p
-    return follow(p, a, x_1, before, after, f_1), follow(p, a, x_2, before, after, f_2)
+    return (
+        follow(p, a, x_1, old_target, new_target, f_1),
+        follow(p, a, x_2, old_target, new_target, f_2),
+    )
 
 
 def follow(
-    p: Gains, a: impedance.Matrix, x_v1: Motion, before: Motion, after: Motion, f_p: float
+    p: Gains, a: impedance.Matrix, x_v1: Motion, old_target: Motion, new_target: Motion, f_p: float
 ) -> Motion:
     """The virtual object of one finger after the transition a of the layer, f_p in N held."""
     position, velocity = x_v1
-    x, v = before
-    e, e_dot = impedance.advance(a, position - x, velocity - v, f_p / p.stiffness)
-    x, v = after
+    x, v = old_target
+    e, e_dot = impedance.advance(a, position - x, velocity - v, f_p / p.stiffness)  # Eq. (6)
+    x, v = new_target
     return x + e, v + e_dot

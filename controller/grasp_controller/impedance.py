@@ -43,8 +43,8 @@ def transition(m: float, d: float, k: float, h: float) -> Matrix:
     return c + sigma * s, s, -omega2 * s, c - sigma * s
 
 
-def advance(a: Matrix, e: float, e_dot: float, rest: float) -> Motion:
+def advance(a: Matrix, e: float, e_dot: float, e_inf: float) -> Motion:
     """The deviation e in m and its rate after the transition a, around rest = f/K in m."""
     a_11, a_12, a_21, a_22 = a
-    z = e - rest
-    return rest + a_11 * z + a_12 * e_dot, a_21 * z + a_22 * e_dot
+    z = e - e_inf
+    return e_inf + a_11 * z + a_12 * e_dot, a_21 * z + a_22 * e_dot

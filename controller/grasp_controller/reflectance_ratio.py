@@ -4,10 +4,11 @@ By Eq. (9) y = xi^(-1/n) is a straight line over the finger's way s, with the sl
 kappa = (K·alpha)^(-1/n). Each finger fits its line while it moves; the slopes give alpha_1/alpha_2.
 Derivation: controller/README.md
 
-    w = xi^q·travel                       weight of a point, by the travel that it stands for
-    kappa = C_sy/C_ss                     from weighted sums about the weighted means
-    V = sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
-    beta = sigma_b^2/(sigma_b^2 + V_1 + V_2)·clip(n·ln(kappa_2/kappa_1), -beta_max, beta_max)
+    (R1) y = kappa·(s - surface + l_0),   kappa = (K·alpha)^(-1/n)
+    (R2) w = xi^q·travel                  weight of a point, by the travel that it stands for
+    (R3) kappa = C_sy/C_ss                from weighted sums about the weighted means
+    (R4) beta = sigma_b^2/(sigma_b^2 + V_1 + V_2)·clip(n·ln(kappa_2/kappa_1), -beta_max, beta_max)
+    (R5) V = sigma^2·Q/C_sy^2,     Q = sum of (w·xi^(-1-1/n)·(s - mean of s))^2·(1 + 2·T_f/h)
 """
 
 from dataclasses import dataclass
@@ -166,8 +167,8 @@ class Estimate(NamedTuple):
 
 def first_point(p: Params, floor: float, s: float, xi: float) -> Line:
     """The line of a finger at s in m that sees xi in V: a point, without a slope."""
-    seen = max(xi, floor)
-    return _point(seen, s, exp(-log(seen) / p.diffusion_exponent), 0.0)
+    xi_f = max(xi, floor)
+    return _point(xi_f, s, exp(-log(xi_f) / p.diffusion_exponent), 0.0)
 
 
 def low_pass(p: Params, h: float) -> LowPass:
@@ -183,49 +184,52 @@ def moved(
     What is new weighs by the travel that position and light both report; `believed` is the share
     of it that counts, from 0 to 1.
     """
+    # xi and s through the same low-pass
     share = low_pass.share
-    seen = max(line.intensity + share * (max(xi, floor) - line.intensity), floor)
-    at = line.s + share * (s - line.s)
-    brightness = log(seen)
-    y = exp(-brightness / p.diffusion_exponent)
-    weight = believed * exp(p.weight_exponent * brightness) * _travel(line, at, y)
+    xi_f = max(line.intensity + share * (max(xi, floor) - line.intensity), floor)
+    s_f = line.s + share * (s - line.s)
+    log_xi = log(xi_f)
+    y = exp(-log_xi / p.diffusion_exponent)  # (R1)
+    weight = believed * exp(p.weight_exponent * log_xi) * _travel(line, s_f, y)  # (R2)
     total = line.weight + weight
     if total <= 0.0:
-        return _point(seen, at, y, s - at)
+        return _point(xi_f, s_f, y, s - s_f)
+    # Means and sums about them, with one point more
     new = weight / total
-    shift = new * (at - line.mean_s)
+    shift = new * (s_f - line.mean_s)
     mean_s = line.mean_s + shift
-    rest = at - mean_s
-    c_ss = line.c_ss + weight * (at - line.mean_s) * rest
-    c_sy = line.c_sy + weight * (y - line.mean_y) * rest
+    distance = s_f - mean_s
+    c_ss = line.c_ss + weight * (s_f - line.mean_s) * distance
+    c_sy = line.c_sy + weight * (y - line.mean_y) * distance
     mean_y = line.mean_y + new * (y - line.mean_y)
-    noise = weight * y / seen
+    # Q of (R5), from moments about the mean that moves by `shift`
+    noise = weight * y / xi_f
     noise = noise * noise * low_pass.alike
     q_0 = line.q_0 + noise
-    q_1 = line.q_1 - shift * line.q_0 + noise * rest
-    q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * rest * rest
+    q_1 = line.q_1 - shift * line.q_0 + noise * distance
+    q_2 = line.q_2 + shift * (shift * line.q_0 - 2.0 * line.q_1) + noise * distance * distance
     per_y, variance = 1.0, inf
     if 0.0 < c_ss < inf and 0.0 < c_sy < inf and 0.0 < q_2 < inf:
-        per_y = c_ss / c_sy
+        per_y = c_ss / c_sy  # 1/kappa, (R3)
         relative = p.intensity_noise / c_sy
-        variance = relative * relative * q_2
+        variance = relative * relative * q_2  # V, (R5)
     sums = (total, mean_s, mean_y, c_ss, c_sy, q_0, q_1, q_2)
-    return Line(seen, at, y, s - at, *sums, per_y, variance)
+    return Line(xi_f, s_f, y, s - s_f, *sums, per_y, variance)
 
 
-def _point(seen: float, at: float, y: float, ahead: float) -> Line:
-    return Line(seen, at, y, ahead, 0.0, at, y, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, inf)
+def _point(xi_f: float, s_f: float, y: float, ahead: float) -> Line:
+    return Line(xi_f, s_f, y, ahead, 0.0, s_f, y, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, inf)
 
 
-def _travel(line: Line, at: float, y: float) -> float:
-    """The way in m from the last point, as far as the light agrees with it by the slope so far."""
-    ds = at - line.s
-    way = abs(ds)
+def _travel(line: Line, s_f: float, y: float) -> float:
+    """The travel in m from the last point, as far as the light agrees by the slope so far."""
+    ds = s_f - line.s
+    travel = abs(ds)
     if line.c_sy <= 0.0:
-        return way
+        return travel
     dy = y - line.y
-    seen = (dy if ds > 0.0 else -dy) * line.per_y
-    return _clamped(seen, 0.0, way)
+    light_travel = (dy if ds > 0.0 else -dy) * line.per_y  # the travel of (R2)
+    return _clamped(light_travel, 0.0, travel)
 
 
 def first_points(p: Params, floor: float, position: Pair, xi: Pair) -> Lines:
@@ -253,7 +257,7 @@ def ratio(p: Params, line_1: Line, line_2: Line) -> Estimate:
         return Estimate(0.0, 0.0, 1.0)
     gain = prior / (prior + (line_1.variance + line_2.variance))
     fitted = p.diffusion_exponent * (log(line_1.per_y) - log(line_2.per_y))
-    beta = gain * _clamped(fitted, -p.limit, p.limit)
+    beta = gain * _clamped(fitted, -p.limit, p.limit)  # (R4)
     return Estimate(beta, p.prior_deviation * sqrt(1.0 - gain), exp(-abs(beta)))
 
 
@@ -283,8 +287,8 @@ def gap(p: Params, line: Line, white: float) -> float:
     """The gap in m of a finger, 1/kappa drawn towards that of a white face as it is uncertain."""
     prior = p.prior_deviation * p.prior_deviation
     gain = prior / (prior + line.variance) if prior > 0.0 else 0.0
-    way = (1.0 - gain) * white + gain * line.per_y
-    return line.y * way - p.offset_distance + line.ahead
+    per_y = (1.0 - gain) * white + gain * line.per_y
+    return line.y * per_y - p.offset_distance + line.ahead  # (R1) for the gap
 
 
 def _clamped(x: float, low: float, high: float) -> float:

@@ -115,15 +115,15 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
 
 def advance(p: Params, x: State, u: Inputs, f_s: float, h: float) -> State:
     """The virtual objects h seconds later, the samples u and the virtual force f_s in N held."""
-    before = after = _middle(u)
+    old_target = new_target = _middle(u)
     if p.simultaneous_contact.enabled:
-        before = x.target
-        after = layer_3.advance(p.simultaneous_contact, before, after[0], f_s, h)
+        old_target = x.target
+        new_target = layer_3.advance(p.simultaneous_contact, old_target, new_target[0], f_s, h)
     f_p = layer_2.virtual_forces(p.impact_reduction, u.intensity, x.intensity, h)
-    virtual = (after, after)
+    virtual = (new_target, new_target)
     if p.impact_reduction.enabled:
-        virtual = layer_2.advance(p.impact_reduction, x.virtual, before, after, f_p, h)
-    return State(after, virtual, u.intensity, f_s, f_p)
+        virtual = layer_2.advance(p.impact_reduction, x.virtual, old_target, new_target, f_p, h)
+    return State(new_target, virtual, u.intensity, f_s, f_p)
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:

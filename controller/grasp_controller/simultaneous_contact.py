@@ -42,6 +42,7 @@ class Params(Group, name="simultaneous_contact"):
 def virtual_force(p: Params, xi: tuple[float, float]) -> float:
     """f_s in N, Eq. (2), from the intensities in V; zero where neither sensor sees anything."""
     xi_1, xi_2 = xi
+    # Eq. (2)
     return p.gain * contrast(lit(xi_1), lit(xi_2))
 
 
@@ -50,27 +51,27 @@ def lit(xi: float) -> float:
     return 0.0 if xi < 0.0 else xi
 
 
-def contrast(xi: float, other: float) -> float:
+def contrast(xi: float, other_xi: float) -> float:
     """How much brighter than the other an intensity is, both from 0 V on: from -tanh(1) to tanh(1).
 
     Zero where both are zero.
     """
-    return tanh(relative(xi, other))
+    return tanh(relative(xi, other_xi))
 
 
-def relative(xi: float, other: float) -> float:
+def relative(xi: float, other_xi: float) -> float:
     """The difference of two intensities as a share of their sum, both from 0 V on: from -1 to 1.
 
     Zero where both are zero.
     """
-    total = xi + other
-    return 0.0 if total == 0.0 else (xi - other) / total
+    total = xi + other_xi
+    return 0.0 if total == 0.0 else (xi - other_xi) / total
 
 
 def desired_position(x: tuple[float, float]) -> float:
     """x_d in m, Eq. (4): the middle of the fingertips."""
     x_1, x_2 = x
-    return 0.5 * (x_1 + x_2)
+    return 0.5 * (x_1 + x_2)  # Eq. (4)
 
 
 def advance(p: Params, x_v2: Motion, x_d: float, f_s: float, h: float) -> Motion:
@@ -82,5 +83,5 @@ def advance(p: Params, x_v2: Motion, x_d: float, f_s: float, h: float) -> Motion
 def follow(p: Params, a: impedance.Matrix, x_v2: Motion, x_d: float, f_s: float) -> Motion:
     """The target after the transition a of the layer, x_d in m and f_s in N held."""
     position, velocity = x_v2
-    e, e_dot = impedance.advance(a, position - x_d, velocity, f_s / p.stiffness)
+    e, e_dot = impedance.advance(a, position - x_d, velocity, f_s / p.stiffness)  # Eq. (3)
     return x_d + e, e_dot

@@ -2,9 +2,9 @@
 
 Layers 1 and 2 close the grip, layer 3 moves the wrist; nothing switches:
 
-    layer 3   X_c' = clip(g·(1 - h')·(T - X_c), ±v_max)               wrist_guidance.py
-    layer 2   M·w_v'' + D·w_v' + K·(1 - rho^2)^p·w_v = (f_p1 - f_p2)/2     the grip waits for it
-    layer 1   F = -2·D_i·(w' - w_v') - 2·K_i·(w - w_v)
+    layer 3   X_c' = clip(g·(1 - h')·(T - X_c), ±v_max)          (2T, 3T)  wrist_guidance.py
+    layer 2   M·w_v'' + D·w_v' + K·(1 - rho^2)^p·w_v = (f_p1 - f_p2)/2     (6T)  it waits
+    layer 1   F = -2·D_i·(w' - w_v') - 2·K_i·(w - w_v)                      (7T)
 
 w = (x_1 - x_2)/2 is half the opening. Derivation: controller/README.md
 """
@@ -149,7 +149,7 @@ def initial_state(p: Params, u: Inputs) -> State:
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     middle = _middle(u)
     target = wrist_guidance.within(
-        middle + _way(p, u, line_1, line_2, _imbalance(estimate, u)), u.position
+        middle + _offset_to_middle(p, u, line_1, line_2, _imbalance(estimate, u)), u.position
     )
     virtual = (_half_opening(u) if p.impact_reduction.enabled else 0.0), 0.0
     nothing = (0.0, 0.0)
@@ -164,16 +164,18 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     v_1, v_2 = u.velocity
     closing = holding.filtered(p.hold, x.closing, v_1 - v_2, h)
     pressed = holding.hold(p.hold, -0.5 * _grip_force(p, x.virtual, u), closing)
-    held = wrist_guidance.agreed(pressed, _imbalance(x.estimate, u))
-    free = 1.0 - held
-    counted = free * wrist_guidance.steadiness(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
+    hold = wrist_guidance.agreed(pressed, _imbalance(x.estimate, u))
+    free = 1.0 - hold
+    believed = free * wrist_guidance.steadiness(0.5 * (v_1 - v_2), 0.5 * (v_1 + v_2))
     floor, lines = p.impact_reduction.intensity_floor, (x.line_1, x.line_2)
     line_1, line_2 = reflectance_ratio.both_moved(
-        p.reflectance, lines, floor, u.position, u.intensity, counted, h
+        p.reflectance, lines, floor, u.position, u.intensity, believed, h
     )
     estimate = reflectance_ratio.ratio(p.reflectance, line_1, line_2)
     rho = _imbalance(estimate, u)
-    target = wrist_guidance.within(_middle(u) + _way(p, u, line_1, line_2, rho), x.fingertips)
+    target = wrist_guidance.within(
+        _middle(u) + _offset_to_middle(p, u, line_1, line_2, rho), x.fingertips
+    )
     wrist_command, pull = x.wrist_command, 1.0
     if p.simultaneous_contact.enabled:
         wrist_command = wrist_guidance.move(p.wrist, wrist_command, target, free, h)
@@ -182,7 +184,7 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     virtual = _closed(p, x.virtual, pull, f_p, h)
     return State(
         virtual, wrist_command, target, x.fingertips, u.intensity, f_p,
-        line_1, line_2, estimate, closing, held,
+        line_1, line_2, estimate, closing, hold,
     )  # fmt: skip
 
 
@@ -219,14 +221,14 @@ def _imbalance(estimate: reflectance_ratio.Estimate, u: Inputs) -> float:
     return published.relative(published.lit(xi_1), published.lit(xi_2))
 
 
-def _way(p: Params, u: Inputs, line_1: Line, line_2: Line, rho: float) -> float:
+def _offset_to_middle(p: Params, u: Inputs, line_1: Line, line_2: Line, rho: float) -> float:
     """S·d·tanh(rho)/n: from the wrist to the object's middle, m."""
     gap_1, gap_2 = reflectance_ratio.gaps(p.reflectance, p.white, line_1, line_2)
     between = min(0.5 * (gap_1 + gap_2), _half_opening(u))
     d = between + p.reflectance.offset_distance
     noise = p.reflectance.intensity_noise
-    seen = wrist_guidance.sight(noise, line_1.intensity, line_2.intensity)
-    return seen * d * tanh(rho) / p.reflectance.diffusion_exponent
+    sight = wrist_guidance.sight(noise, line_1.intensity, line_2.intensity)
+    return sight * d * tanh(rho) / p.reflectance.diffusion_exponent  # T - X of (2T)
 
 
 def _closed(p: Params, virtual: Motion, pull: float, f_p: layer_2.Pair, h: float) -> Motion:
@@ -241,10 +243,10 @@ def _closed(p: Params, virtual: Motion, pull: float, f_p: layer_2.Pair, h: float
     stiffness = pull * gains.stiffness
     a = impedance.transition(gains.mass, gains.damping, stiffness, h)
     half, rate = virtual
-    return impedance.advance(a, half, rate, 0.5 * (f_1 - f_2) / stiffness)
+    return impedance.advance(a, half, rate, 0.5 * (f_1 - f_2) / stiffness)  # (6T)
 
 
 def _grip_force(p: Params, virtual: Motion, u: Inputs) -> float:
-    """F in N, layer 1."""
+    """F in N, layer 1, Eq. (7T)."""
     v_1, v_2 = u.velocity
     return 2.0 * layer_1.force(p.contact_force, _half_opening(u), 0.5 * (v_1 - v_2), virtual)

@@ -6,7 +6,8 @@ Eqs. (1) to (7) in sum and difference:
     layer 1       F = u_1 - u_2 closes the grip, and the wrist gives way as free fingers would,
                   2m·X_c'' = -2·D_i·(X_c' - s') - 2·K_i·(X_c - s) + f_c1 + f_c2,   s = mean of x_vj1
 
-It holds where the wrist follows X_c at once and its force is measured: from about 100 Hz on.
+The last equation is (P3) of the card. The law holds where the wrist follows X_c at once and its
+force is measured: from about 100 Hz on.
 Derivation: controller/README.md
 """
 
@@ -90,7 +91,7 @@ def initial_state(p: Params, u: Inputs) -> State:
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance the virtual objects and the wrist's command by h seconds (h > 0), samples held."""
     layers = series.step(p, x.layers, _samples(u), h)
-    return State(layers, _given_way(p, x.wrist, layers, u, h))
+    return State(layers, _advance_admittance(p, x.wrist, layers, u, h))
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
@@ -112,7 +113,9 @@ def _samples(u: Inputs) -> series.Inputs:
     return series.Inputs(u.position, u.velocity, u.intensity)
 
 
-def _given_way(p: Params, wrist: Motion, layers: series.State, u: Inputs, h: float) -> Motion:
+def _advance_admittance(
+    p: Params, wrist: Motion, layers: series.State, u: Inputs, h: float
+) -> Motion:
     """The wrist's command h seconds later, the virtual objects and the wrist's force held."""
     gains = p.contact_force
     (s_1, v_1), (s_2, v_2) = layers.virtual
@@ -120,6 +123,6 @@ def _given_way(p: Params, wrist: Motion, layers: series.State, u: Inputs, h: flo
     damping, stiffness = 2.0 * gains.damping, 2.0 * gains.stiffness
     position, velocity = wrist
     a = impedance.transition(p.admittance.mass, damping, stiffness, h)
-    rest = (damping * v + u.wrist_force) / stiffness
-    deviation, velocity = impedance.advance(a, position - s, velocity, rest)
+    e_inf = (damping * v + u.wrist_force) / stiffness  # (P3)
+    deviation, velocity = impedance.advance(a, position - s, velocity, e_inf)
     return s + deviation, velocity

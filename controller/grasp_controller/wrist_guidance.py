@@ -123,9 +123,11 @@ def within(place: float, fingertips: tuple[float, float]) -> float:
 def move(p: Wrist, command: float, target: float, free: float, h: float) -> float:
     """X_c in m h seconds later, exactly for a target T in m that is held; `free` is 1 - h'."""
     gain, fastest = p.gain * free, p.speed_limit
-    off = target - command
-    far = abs(off)
-    at_limit = min(h, (far - fastest / gain) / fastest) if gain * far > fastest else 0.0
+    deviation = target - command
+    distance = abs(deviation)
+    at_limit = 0.0  # s for which the speed is limited
+    if gain * distance > fastest:
+        at_limit = min(h, (distance - fastest / gain) / fastest)
     limited = fastest * at_limit
-    way = limited - expm1(-gain * (h - at_limit)) * (far - limited)
-    return command + copysign(way, off)
+    travel = limited - expm1(-gain * (h - at_limit)) * (distance - limited)
+    return command + copysign(travel, deviation)  # (3T)

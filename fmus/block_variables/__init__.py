@@ -104,5 +104,7 @@ def check_value(
 def _parameters(kind: type[Any]) -> list[tuple[str, Parameter]]:
     """Return the fields of `kind` that are declared as a Parameter; read once per class."""
     hints = get_type_hints(kind, include_extras=True)
-    found = ((name, getattr(hint, "__metadata__", (None,))[0]) for name, hint in hints.items())
-    return [(name, declared) for name, declared in found if isinstance(declared, Parameter)]
+    declarations = (
+        (name, getattr(hint, "__metadata__", (None,))[0]) for name, hint in hints.items()
+    )
+    return [(name, declared) for name, declared in declarations if isinstance(declared, Parameter)]

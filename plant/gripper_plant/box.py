@@ -1,7 +1,7 @@
 """An upright box on a floor, pushed from both sides: it slides, tilts about an edge, falls back.
 
 theta > 0 is a tilt over the right edge; the mirrored box tilts to the left. Equations of motion,
-their symbols and their limits: plant/README.md.
+(B1) to (B3), their symbols and their limits: plant/README.md.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from .contact import time_to_contact
 GRAVITY = 9.80665
 """m/s^2."""
 
-PIECES = 4
-"""Most parts of a sub-step: it is cut where the edge stops sliding and where the box lands.
+MAX_PARTS = 4
+"""Parts of a sub-step, at most: it is cut where the edge stops sliding and where the box lands.
 
 A box that does more than that within one rattles, and what is left of the sub-step is not resolved.
 """
@@ -169,21 +169,23 @@ def energy(q: Shape, box: Box) -> float:
 
 def advance(q: Shape, box: Box, push: Pushes, d: float) -> Box:
     """The box d seconds later, the pushes held."""
-    rest = d
-    for _ in range(PIECES):
-        side = _side(q, box, push)
+    remaining = d
+    for _ in range(MAX_PARTS):
+        side = _pivot_side(q, box, push)
         if side == 0.0:
-            weight = q.mu * q.m * GRAVITY
-            floor = (weight, weight, 0.0, 1.0)
-            x, v = friction.move(box.x, box.v, q.m, push.left - push.right, floor, rest)
+            grip = q.mu * q.m * GRAVITY
+            floor = (grip, grip, 0.0, 1.0)  # (F1)
+            x, v = friction.move(box.x, box.v, q.m, push.left - push.right, floor, remaining)
             return Box(x, 0.0, v, 0.0)
         if side > 0.0:
-            box, used = _turn(q, box, push, rest)
+            box, used = _turn_about_edge(q, box, push, remaining)
         else:
-            box, used = _turn(q, _mirrored(box), Pushes(push.right, push.left), rest)
+            box, used = _turn_about_edge(
+                q, _mirrored(box), Pushes(push.right, push.left), remaining
+            )
             box = _mirrored(box)
-        rest -= used
-        if rest <= 0.0:
+        remaining -= used
+        if remaining <= 0.0:
             break
     return box
 
@@ -192,8 +194,8 @@ def _mirrored(box: Box) -> Box:
     return Box(-box.x, 0.0 - box.tilt, 0.0 - box.v, 0.0 - box.w)
 
 
-def _side(q: Shape, box: Box, push: Pushes) -> float:
-    """1 for a box on its right edge, -1 on its left; 0 for one that is flat and stays so.
+def _pivot_side(q: Shape, box: Box, push: Pushes) -> float:
+    """The edge that the box turns about: 1 for the right one, -1 for the left one, 0 for neither.
 
     A flat box starts to turn about an edge where the floor can bear it nowhere else.
     """
@@ -203,85 +205,87 @@ def _side(q: Shape, box: Box, push: Pushes) -> float:
     grip = q.mu * weight
     sticks = box.v == 0.0 and abs(force) <= grip
     net = 0.0 if sticks else force - copysign(grip, box.v if box.v != 0.0 else force)
-    moment = force * q.h - net * q.a
+    moment = force * q.h - net * q.a  # about the centre; (B2) at theta = 0 and at rest
     return 1.0 if moment > weight * q.b else -1.0 if moment < -weight * q.b else 0.0
 
 
-def _turn(q: Shape, box: Box, push: Pushes, d: float) -> tuple[Box, float]:
+def _turn_about_edge(q: Shape, box: Box, push: Pushes, d: float) -> tuple[Box, float]:
     """A box on its right edge, and how many of the d seconds it took to get there.
 
     It stops early where the edge comes to rest, or the box lands.
     """
     slip = _slip(q, box.tilt, box.v, box.w, push)
-    after, turn = _ahead(q, box, push, slip, d)
+    next_box, theta_ddot = _midpoint_step(q, box, push, slip, d)
     used = d
-    if box.v * after.v < 0.0:
-        used = d * box.v / (box.v - after.v)
-        after, turn = _ahead(q, box, push, slip, used)
-        after = Box(after.x, after.tilt, 0.0, after.w)
-    if after.tilt <= 0.0 and (box.tilt > 0.0 or after.tilt < 0.0):
-        used = min(used, time_to_contact(box.tilt, box.w, turn))
-        after, _ = _ahead(q, box, push, slip, used)
-        after = _landed(q, after)
-    return after, used
+    if box.v * next_box.v < 0.0:
+        used = d * box.v / (box.v - next_box.v)
+        next_box, theta_ddot = _midpoint_step(q, box, push, slip, used)
+        next_box = Box(next_box.x, next_box.tilt, 0.0, next_box.w)
+    if next_box.tilt <= 0.0 and (box.tilt > 0.0 or next_box.tilt < 0.0):
+        used = min(used, time_to_contact(box.tilt, box.w, theta_ddot))
+        next_box, _ = _midpoint_step(q, box, push, slip, used)
+        next_box = _land(q, next_box)
+    return next_box, used
 
 
-def _ahead(q: Shape, box: Box, push: Pushes, slip: float, d: float) -> tuple[Box, float]:
+def _midpoint_step(q: Shape, box: Box, push: Pushes, slip: float, d: float) -> tuple[Box, float]:
     """The box after d seconds by the midpoint rule, and its angular acceleration on the way."""
-    _, turn = _accelerations(q, box.tilt, box.w, push, slip)
-    tilt, w = box.tilt + 0.5 * d * box.w, box.w + 0.5 * d * turn
-    slide, turn = _accelerations(q, tilt, w, push, slip)
-    x = box.x + d * (box.v + 0.5 * d * slide)
-    tilt = box.tilt + d * (box.w + 0.5 * d * turn)
-    return Box(x, tilt, box.v + d * slide, box.w + d * turn), turn
+    _, theta_ddot = _accelerations(q, box.tilt, box.w, push, slip)
+    midpoint_tilt, midpoint_w = box.tilt + 0.5 * d * box.w, box.w + 0.5 * d * theta_ddot
+    p_ddot, theta_ddot = _accelerations(q, midpoint_tilt, midpoint_w, push, slip)
+    x = box.x + d * (box.v + 0.5 * d * p_ddot)
+    tilt = box.tilt + d * (box.w + 0.5 * d * theta_ddot)
+    return Box(x, tilt, box.v + d * p_ddot, box.w + d * theta_ddot), theta_ddot
 
 
-def _landed(q: Shape, box: Box) -> Box:
+def _land(q: Shape, box: Box) -> Box:
     """Flat again, without a rebound: the floor takes the turning, its friction what it can of the
     sliding. The impulse of the floor is m·b·|theta'|.
     """
     v = box.v + q.a * box.w
-    left = max(0.0, abs(v) - q.mu * q.b * abs(box.w))
-    return Box(box.x, 0.0, copysign(left, v), 0.0)
+    speed = max(0.0, abs(v) - q.mu * q.b * abs(box.w))
+    return Box(box.x, 0.0, copysign(speed, v), 0.0)
 
 
 def _slip(q: Shape, tilt: float, v: float, w: float, push: Pushes) -> float:
-    """The way in which the right edge slides, 1 or -1; 0 where it sticks."""
+    """The direction in which the right edge slides, 1 or -1; 0 where it sticks."""
     if v != 0.0:
         return copysign(1.0, v)
     x, z = _arms(q, tilt)
-    _, turn = _accelerations(q, tilt, w, push, 0.0)
-    needed = q.m * (z * turn + x * w * w) - (push.left - push.right)
-    normal = q.m * x * turn + _load(q, tilt, w, push)
+    _, theta_ddot = _accelerations(q, tilt, w, push, 0.0)
+    needed = q.m * (z * theta_ddot + x * w * w) - (push.left - push.right)  # F_f of (B1), p at rest
+    normal = q.m * x * theta_ddot + _load(q, tilt, w, push)  # (B3)
     return 0.0 if abs(needed) <= q.mu * normal else -copysign(1.0, needed)
 
 
 def _accelerations(
     q: Shape, tilt: float, w: float, push: Pushes, slip: float
 ) -> tuple[float, float]:
-    """P'' in m/s^2 and theta'' in rad/s^2 of a box on its right edge that slips as given."""
+    """The pair p'' in m/s^2 and theta'' in rad/s^2 of a box on its right edge that slips."""
     x, z = _arms(q, tilt)
     inertia = 4.0 / 3.0 * q.m * (q.a * q.a + q.b * q.b)
-    squeeze = cos(tilt) * cos(tilt)
-    moment = (push.left * (q.h - 2.0 * q.b * sin(tilt)) - push.right * q.h) / squeeze
-    moment -= q.m * GRAVITY * x
+    cos_squared = cos(tilt) * cos(tilt)
+    moment = (push.left * (q.h - 2.0 * q.b * sin(tilt)) - push.right * q.h) / cos_squared
+    moment -= q.m * GRAVITY * x  # Q - m·g·X of (B2)
     if slip == 0.0:
-        return 0.0, moment / inertia
+        return 0.0, moment / inertia  # (B2), p at rest
     force, load = push.left - push.right - q.m * x * w * w, _load(q, tilt, w, push)
     drag = slip * q.mu
-    turn = (moment - z * (force - drag * load)) / (inertia - q.m * z * (z + drag * x))
-    if load + q.m * x * turn < 0.0:  # the floor does not hold the box down
+    # (B1) to (B3) with F_f = -drag·N, solved for theta''
+    theta_ddot = (moment - z * (force - drag * load)) / (inertia - q.m * z * (z + drag * x))
+    if load + q.m * x * theta_ddot < 0.0:  # the floor does not hold the box down
         drag = 0.0
-        turn = (moment - z * force) / (inertia - q.m * z * z)
-    return (force - drag * load) / q.m - (z + drag * x) * turn, turn
+        theta_ddot = (moment - z * force) / (inertia - q.m * z * z)
+    p_ddot = (force - drag * load) / q.m - (z + drag * x) * theta_ddot  # (B1) with (B3)
+    return p_ddot, theta_ddot
 
 
 def _load(q: Shape, tilt: float, w: float, push: Pushes) -> float:
-    """N less its part m·X·theta'', N."""
+    """The part of N in (B3) without theta'', N."""
     _, z = _arms(q, tilt)
     return q.m * (GRAVITY - z * w * w) + (push.left - push.right) * tan(tilt)
 
 
 def _arms(q: Shape, tilt: float) -> tuple[float, float]:
-    """X and Z in m."""
+    """X and Z of (B1) to (B3): from the edge to the centre, m."""
     return q.b * cos(tilt) - q.a * sin(tilt), q.b * sin(tilt) + q.a * cos(tilt)

@@ -17,7 +17,7 @@ from .fingers import Side
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
-ITERATIONS = 8
+MAX_FORCE_ITERATIONS = 8
 """To find the contact force: each leaves 1/19 of the error, or less."""
 
 
@@ -72,8 +72,8 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance both fingers by h seconds (h > 0), the forces held; each in its opening direction."""
-    n = fingers.count(_rate(p, x, u, h), h)
-    if n > fingers.MOST:
+    n = fingers.substep_count(_rate(p, x, u, h), h)
+    if n > fingers.MAX_SUBSTEPS:
         return x._replace(position=fingers.UNRESOLVED)
     x_1, x_2 = x.position
     v_1, v_2 = x.velocity
@@ -113,15 +113,15 @@ def _press(
 
     The force and the way that the finger goes under it are found by iteration, from a guess in N.
     """
-    surface, m, rub = side
-    contact_force, after, rate = guess, s, v
-    for _ in range(ITERATIONS):
-        after, rate = friction.move(s, v, m, f + contact_force, rub, d)
-        found = contact_laws.mean_force(law, surface - s, surface - after, d)
-        if contact_laws.settled(found, contact_force):
+    surface, m, friction_law = side
+    contact_force, next_s, next_v = guess, s, v
+    for _ in range(MAX_FORCE_ITERATIONS):
+        next_s, next_v = friction.move(s, v, m, f + contact_force, friction_law, d)  # Eq. (1)
+        new_force = contact_laws.mean_force(law, surface - s, surface - next_s, d)
+        if contact_laws.settled(new_force, contact_force):
             break
-        contact_force = found
-    return after, rate, contact_force
+        contact_force = new_force
+    return next_s, next_v, contact_force
 
 
 def _rate(p: Params, x: State, u: Inputs, h: float) -> float:

@@ -1,7 +1,8 @@
 """One finger against a rigid surface: unilateral contact, Baumgarte stabilised.
 
 Everything is counted in the direction in which the finger opens, the gap g = s - surface:
-m·g'' = f + f_c, with the actuator's force f and the contact's f_c >= 0. Card: plant/README.md
+m·g'' = f + f_c, with the actuator's force f and the contact's f_c >= 0. Equation (C1) and card:
+plant/README.md
 """
 
 from math import inf, nan, sqrt
@@ -24,7 +25,7 @@ class Rates(NamedTuple):
     beta: float
 
 
-ITERATIONS = 8
+MAX_FORCE_ITERATIONS = 8
 """To find the contact force beside friction: each leaves 1/19 of the error, or less."""
 
 
@@ -54,98 +55,110 @@ def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) ->
 
     Without friction free flight is exact, and so is the moment of contact within a sub-step.
     """
-    surface, m, rub = side
-    if friction.acts(rub):
-        return _advance_rubbing(side, rates, s, v, f, h)
+    surface, m, friction_law = side
+    if friction.acts(friction_law):
+        return _advance_with_friction(side, rates, s, v, f, h)
     if time_to_contact(s - surface, v, f / m) >= h:
-        return _fly(s, v, f / m, h)
-    n = fingers.count(fastest(rates), h)
-    if n > fingers.MOST:
+        return _free_flight(s, v, f / m, h)
+    n = fingers.substep_count(fastest(rates), h)
+    if n > fingers.MAX_SUBSTEPS:
         return UNRESOLVED
     contact_force = 0.0
     d = h / n
     for _ in range(n):
-        free = time_to_contact(s - surface, v, f / m)
-        if free >= d:
-            s, v, contact_force = _fly(s, v, f / m, d)
+        flight_time = time_to_contact(s - surface, v, f / m)
+        if flight_time >= d:
+            s, v, contact_force = _free_flight(s, v, f / m, d)
         else:
-            if free > 0.0:
-                _, v, _ = _fly(s, v, f / m, free)
+            if flight_time > 0.0:
+                _, v, _ = _free_flight(s, v, f / m, flight_time)
                 s = surface
-            s, v, contact_force = _touch(side, rates, s, v, f, d - free)
+            s, v, contact_force = _advance_contact(side, rates, s, v, f, d - flight_time)
     return s, v, contact_force
 
 
-def _advance_rubbing(side: Side, rates: Rates, s: float, v: float, f: float, h: float) -> Finger:
+def _advance_with_friction(
+    side: Side, rates: Rates, s: float, v: float, f: float, h: float
+) -> Finger:
     """advance() of a finger with friction, which acts beside the contact force."""
-    surface, m, rub = side
-    n = fingers.count(max(fastest(rates), friction.rate(rub, m)), h)
-    if n > fingers.MOST:
+    surface, m, friction_law = side
+    n = fingers.substep_count(max(fastest(rates), friction.rate(friction_law, m)), h)
+    if n > fingers.MAX_SUBSTEPS:
         return UNRESOLVED
     contact_force = 0.0
     d = h / n
     for _ in range(n):
-        after, rate = friction.move(s, v, m, f, rub, d)
-        if after > surface:
-            s, v, contact_force = after, rate, 0.0
+        next_s, next_v = friction.move(s, v, m, f, friction_law, d)
+        if next_s > surface:
+            s, v, contact_force = next_s, next_v, 0.0
             continue
-        free = min(d, time_to_contact(s - surface, v, (rate - v) / d)) if s > surface else 0.0
-        if free > 0.0:
-            _, v = friction.move(s, v, m, f, rub, free)
+        flight_time = 0.0
+        if s > surface:
+            flight_time = min(d, time_to_contact(s - surface, v, (next_v - v) / d))
+        if flight_time > 0.0:
+            _, v = friction.move(s, v, m, f, friction_law, flight_time)
             s = surface
-        s, v, contact_force = _touch_rubbing(side, rates, s, v, f, d - free)
+        s, v, contact_force = _advance_contact_with_friction(side, rates, s, v, f, d - flight_time)
     return s, v, contact_force
 
 
-def _touch_rubbing(side: Side, rates: Rates, s: float, v: float, f: float, d: float) -> Finger:
+def _advance_contact_with_friction(
+    side: Side, rates: Rates, s: float, v: float, f: float, d: float
+) -> Finger:
     """One step of the stabilised constraint beside friction; the contact force is held over it.
 
     The force is that of the mean rate and the mean gap, found by iteration. It takes the energy
     2·alpha·m·d·(mean velocity)^2 and gives none.
     """
-    surface, m, rub = side
+    surface, m, friction_law = side
     alpha, beta = rates
     contact_force = max(0.0, -f)
-    after, rate = s, v
-    for _ in range(ITERATIONS if d > 0.0 else 0):
-        after, rate = friction.move(s, v, m, f + contact_force, rub, d)
-        mean_rate, mean_gap = (after - s) / d, 0.5 * (s + after) - surface
+    next_s, next_v = s, v
+    for _ in range(MAX_FORCE_ITERATIONS if d > 0.0 else 0):
+        next_s, next_v = friction.move(s, v, m, f + contact_force, friction_law, d)
+        mean_rate, mean_gap = (next_s - s) / d, 0.5 * (s + next_s) - surface
+        # (C1) for g'', in m·g'' = f + f_c
         contact_force = max(0.0, -m * (2.0 * alpha * mean_rate + beta * beta * mean_gap) - f)
-    return after, rate, contact_force if after <= surface else 0.0
+    return next_s, next_v, contact_force if next_s <= surface else 0.0
 
 
-def _fly(s: float, v: float, acceleration: float, d: float) -> Finger:
-    after = v + acceleration * d
-    return s + 0.5 * d * (v + after), after, 0.0
+def _free_flight(s: float, v: float, acceleration: float, d: float) -> Finger:
+    """The finger after d seconds without contact, exactly."""
+    next_v = v + acceleration * d
+    return s + 0.5 * d * (v + next_v), next_v, 0.0
 
 
-def _touch(side: Side, rates: Rates, s: float, v: float, f: float, d: float) -> Finger:
+def _advance_contact(side: Side, rates: Rates, s: float, v: float, f: float, d: float) -> Finger:
     """One trapezoidal step of the stabilised constraint; the contact force is held over it.
 
     The rule takes the energy 2·alpha·m·d·(mean velocity)^2 and gives none, whatever d is.
     """
     surface, m, _ = side
     alpha, beta = rates
+    # g'' of (C1) at the mean of both ends
     constrained = -(2.0 * alpha * v + beta * beta * (s - surface + 0.5 * d * v)) / (
         1.0 + alpha * d + 0.25 * beta * beta * d * d
     )
-    contact_force = max(0.0, m * constrained - f)
+    contact_force = max(0.0, m * constrained - f)  # m·g'' = f + f_c, and no pull
     acceleration = (f + contact_force) / m
-    after, v_after, _ = _fly(s, v, acceleration, d)
-    if after > surface:
-        return _leave(side, surface - s, v, acceleration, f, d)
-    return after, v_after, contact_force
+    next_s, next_v, _ = _free_flight(s, v, acceleration, d)
+    if next_s > surface:
+        return _lift_off(side, surface - s, v, acceleration, f, d)
+    return next_s, next_v, contact_force
 
 
-def _leave(side: Side, depth: float, v: float, acceleration: float, f: float, d: float) -> Finger:
+def _lift_off(
+    side: Side, depth: float, v: float, acceleration: float, f: float, d: float
+) -> Finger:
     """The contact lets go where the finger passes the surface, depth m further out.
 
     A finger that would be back before the end of the sub-step stays: so short a bounce is not
     resolved, and taking its energy lets a pressed finger come to rest.
     """
     surface, m, _ = side
-    leaving = sqrt(max(0.0, v * v + 2.0 * acceleration * depth))
-    rest = d - (2.0 * depth / (v + leaving) if depth > 0.0 else 0.0)
-    if time_to_contact(0.0, leaving, f / m) < rest:
+    leaving_v = sqrt(max(0.0, v * v + 2.0 * acceleration * depth))
+    time_to_surface = 2.0 * depth / (v + leaving_v) if depth > 0.0 else 0.0
+    remaining = d - time_to_surface
+    if time_to_contact(0.0, leaving_v, f / m) < remaining:
         return surface, 0.0, max(0.0, -f)
-    return _fly(surface, leaving, f / m, rest)
+    return _free_flight(surface, leaving_v, f / m, remaining)

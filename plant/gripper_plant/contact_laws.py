@@ -15,13 +15,13 @@ from block_variables import Group, Parameter
 Law = tuple[float, float, float, float]
 """k in N/m^n, n, c in N.s/m, lambda in s/m."""
 
-SHORT = 1e-5
-"""Way through a sub-step, relative to the depth, for which stored energies differ too little."""
+SHORT_TRAVEL = 1e-5
+"""Travel in a sub-step, relative to the depth, for which stored energies differ too little."""
 
-DEEPEST = 0.1
+MAX_RESOLVED_DEPTH = 0.1
 """m; a finger that sinks in deeper is not resolved any better."""
 
-SETTLED = 1e-11
+FORCE_TOLERANCE = 1e-11
 """Relative change of a contact force below which an iteration has found it."""
 
 
@@ -85,7 +85,7 @@ def rate(law: Law, deepest: float, m: float) -> float:
     if deepest <= 0.0:
         return 0.0
     k, n, c, lam = law
-    depth = min(DEEPEST, deepest)
+    depth = min(MAX_RESOLVED_DEPTH, deepest)
     return max(sqrt(k * n * power(depth, n - 1.0) / m), (c + lam * k * power(depth, n)) / m)
 
 
@@ -95,27 +95,28 @@ def energy(law: Law, depth: float) -> float:
     return k * power(depth, n + 1.0) / (n + 1.0) if depth > 0.0 else 0.0
 
 
-def mean_force(law: Law, before: float, after: float, d: float) -> float:
-    """f_c in N, held over d seconds in which the depth goes from before to after, in m.
+def mean_force(law: Law, from_depth: float, to_depth: float, d: float) -> float:
+    """f_c in N, held over d seconds in which the depth goes from one to another, in m.
 
     The impulse is that of the law also where the contact begins or ends on the way.
     """
-    if before <= 0.0 and after <= 0.0:
+    if from_depth <= 0.0 and to_depth <= 0.0:
         return 0.0
     k, n, c, lam = law
-    start, end = max(0.0, before), max(0.0, after)
-    way = after - before
+    start, end = max(0.0, from_depth), max(0.0, to_depth)
+    travel = to_depth - from_depth
     if n == 1.0:
         spring = 0.5 * k * (start + end)
-        if before < 0.0 or after < 0.0:
-            spring = spring * (end - start) / way
-    elif abs(way) <= SHORT * max(start, end):
+        if from_depth < 0.0 or to_depth < 0.0:
+            spring = spring * (end - start) / travel
+    elif abs(travel) <= SHORT_TRAVEL * max(start, end):
         spring = k * power(0.5 * (start + end), n)
     else:
-        spring = (energy(law, after) - energy(law, before)) / way
-    return max(0.0, spring + (spring * lam * way + c * (end - start)) / d)
+        spring = (energy(law, to_depth) - energy(law, from_depth)) / travel
+    damping = (spring * lam * travel + c * (end - start)) / d
+    return max(0.0, spring + damping)  # Kelvin-Voigt: lam = 0; Hunt-Crossley: c = 0
 
 
-def settled(found: float, before: float) -> bool:
+def settled(force: float, previous: float) -> bool:
     """True if an iteration need not go on from one contact force in N to the next."""
-    return abs(found - before) <= SETTLED * found
+    return abs(force - previous) <= FORCE_TOLERANCE * force

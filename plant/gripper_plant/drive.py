@@ -1,6 +1,6 @@
 """The drive of a gripper whose fingers move in tandem: a force, or a speed servo with its limit.
 
-    force    F as it is told
+    force    F as it is commanded
     speed    v_r' = F/M,  force of the motor  M·omega_d·(v_r - w')
 
 So a speed servo moves as the fingers would under F without friction; what holds them up, it works
@@ -20,7 +20,7 @@ from .friction import Law
 
 
 class Kind(IntEnum):
-    """What the drive is told."""
+    """What the drive is commanded: a force, or a speed."""
 
     FORCE = 1
     SPEED = 2
@@ -79,20 +79,22 @@ class Drive(Group, name="drive"):
 
 def limited(p: Drive, f: float) -> float:
     """A force in N as the drive brings it up."""
-    most = p.force_limit
-    return min(max(f, -most), most) if most > 0.0 else f
+    limit = p.force_limit
+    return min(max(f, -limit), limit) if limit > 0.0 else f
 
 
-def force(p: Drive, mass: float, told: float, reference: float, speed: float) -> float:
+def force(p: Drive, mass: float, commanded: float, reference: float, speed: float) -> float:
     """The drive's force in N at the mean reference v_r and the mean speed w' in m/s."""
     if p.kind == Kind.FORCE:
-        return limited(p, told)
+        return limited(p, commanded)
     return limited(p, mass * p.omega * (reference - speed))
 
 
-def reference(p: Drive, mass: float, told: float, before: float, speed: float, d: float) -> float:
-    """v_r in m/s d seconds later, F = told in N held, the gripper at w' = speed in m/s by then."""
+def reference(
+    p: Drive, mass: float, commanded: float, previous: float, speed: float, d: float
+) -> float:
+    """v_r in m/s d seconds later, the commanded F in N held, the gripper at w' in m/s by then."""
     if p.kind == Kind.FORCE:
         return speed
     ahead = p.force_limit / (mass * p.omega)
-    return min(max(before + d * told / mass, speed - ahead), speed + ahead)
+    return min(max(previous + d * commanded / mass, speed - ahead), speed + ahead)

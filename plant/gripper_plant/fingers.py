@@ -17,11 +17,13 @@ from .friction import Pair as Pair
 LONGEST_STEP = 2.0
 """s, of every plant; a longer communication step is discarded."""
 
-RATIO = 0.1
+SUBSTEP_RATIO = 0.1
 """Longest sub-step as a fraction of the fastest time constant."""
 
-MOST = 20_000
-"""In a communication step, so that none is endless; one that needs more has no result."""
+MAX_SUBSTEPS = 20_000
+"""Sub-steps of a communication step, at most, so that none is endless; one that needs more has no
+result.
+"""
 
 UNRESOLVED = (nan, nan)
 """Where the fingers are after more sub-steps than a plant takes: nowhere, so the step is refused.
@@ -113,15 +115,15 @@ class Params(Place):
         """Right and left."""
         x_m, half = self.initial_object_position, 0.5 * self.object_width
         m_1, m_2 = self.finger_mass
-        rub_1, rub_2 = finger_friction.laws(self.friction)
-        return Side(half + x_m, m_1, rub_1), Side(half - x_m, m_2, rub_2)
+        friction_1, friction_2 = finger_friction.laws(self.friction)
+        return Side(half + x_m, m_1, friction_1), Side(half - x_m, m_2, friction_2)
 
     @cached_property
     def friction_rate(self) -> float:
         """How fast friction slows down the lighter finger, 1/s."""
         m = min(self.finger_mass)
-        (_, _, rub_1), (_, _, rub_2) = self.sides
-        return max(finger_friction.rate(rub_1, m), finger_friction.rate(rub_2, m))
+        (_, _, friction_1), (_, _, friction_2) = self.sides
+        return max(finger_friction.rate(friction_1, m), finger_friction.rate(friction_2, m))
 
 
 Force: TypeAlias = Annotated[
@@ -166,8 +168,8 @@ ObjectPosition: TypeAlias = Annotated[
 def forces(p: Actuator, u: Inputs) -> Pair:
     """u_j in N as the actuators bring them up."""
     u_1, u_2 = u.force
-    most_1, most_2 = p.force_limit
-    return _limited(u_1, most_1), _limited(u_2, most_2)
+    limit_1, limit_2 = p.force_limit
+    return _limited(u_1, limit_1), _limited(u_2, limit_2)
 
 
 def deepest(p: Params, position: Pair, velocity: Pair, faces: Pair, u: Inputs, h: float) -> float:
@@ -180,10 +182,10 @@ def deepest(p: Params, position: Pair, velocity: Pair, faces: Pair, u: Inputs, h
     return max(right - x_1 + reach_1, x_2 - left + reach_2)
 
 
-def _limited(u: float, most: float) -> float:
-    return u if most == 0.0 or abs(u) <= most else copysign(most, u)
+def _limited(u: float, limit: float) -> float:
+    return u if limit == 0.0 or abs(u) <= limit else copysign(limit, u)
 
 
-def count(rate: float, h: float) -> int:
+def substep_count(rate: float, h: float) -> int:
     """Number of equal sub-steps that resolve a rate in 1/s within h seconds."""
-    return max(1, ceil(h * rate / RATIO - 1e-9))
+    return max(1, ceil(h * rate / SUBSTEP_RATIO - 1e-9))

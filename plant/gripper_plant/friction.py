@@ -82,9 +82,9 @@ def resistance(law: Law, speed: float) -> float:
     """F(v) in N at a speed in m/s."""
     coulomb, static, viscous, v_s = law
     if static == coulomb:
-        return coulomb + viscous * speed
+        return coulomb + viscous * speed  # (F2) with F_S = F_C
     ratio = speed / v_s
-    return coulomb + (static - coulomb) * exp(-ratio * ratio) + viscous * speed
+    return coulomb + (static - coulomb) * exp(-ratio * ratio) + viscous * speed  # (F2)
 
 
 def move(x: float, v: float, m: float, f: float, law: Law, d: float) -> Motion:
@@ -94,21 +94,21 @@ def move(x: float, v: float, m: float, f: float, law: Law, d: float) -> Motion:
     there it stays, unless f exceeds the breakaway force.
     """
     if not acts(law):
-        after = v + d * f / m
-        return x + 0.5 * d * (v + after), after
+        next_v = v + d * f / m
+        return x + 0.5 * d * (v + next_v), next_v
     _, static, _, _ = law
     if v == 0.0 and abs(f) <= static:
         return x, 0.0
-    way = copysign(1.0, v if v != 0.0 else f)
-    middle = way * v + 0.5 * d * (way * f - resistance(law, way * v)) / m
-    a = (f - way * resistance(law, max(0.0, middle))) / m
-    after = v + a * d
-    if way * after >= 0.0:
-        return x + 0.5 * d * (v + after), after
-    stop = -v / a
-    x += 0.5 * stop * v
+    direction = copysign(1.0, v if v != 0.0 else f)
+    middle_speed = direction * v + 0.5 * d * (direction * f - resistance(law, direction * v)) / m
+    a = (f - direction * resistance(law, max(0.0, middle_speed))) / m  # (F1)
+    next_v = v + a * d
+    if direction * next_v >= 0.0:
+        return x + 0.5 * d * (v + next_v), next_v
+    stop_time = -v / a
+    x += 0.5 * stop_time * v
     if abs(f) <= static:
         return x, 0.0
-    rest = d - stop
-    after = rest * (f - copysign(static, f)) / m
-    return x + 0.5 * rest * after, after
+    remaining = d - stop_time
+    next_v = remaining * (f - copysign(static, f)) / m
+    return x + 0.5 * remaining * next_v, next_v

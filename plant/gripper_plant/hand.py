@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
-from . import contact, fingers, hand_fingers, rigid
+from . import contact, fingers, friction, hand_fingers, rigid
 from .fingers import Side
-from .friction import NONE
-from .hand_fingers import Each
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
+from .hand_fingers import PerFinger
 from .hand_size import FINGERS
 
 LONGEST_STEP = fingers.LONGEST_STEP
@@ -39,17 +38,17 @@ class Params(hand_fingers.Params):
     def sides(self) -> Sides:
         """Each finger and its face of the object."""
         return tuple(
-            Side(begins, mass, NONE)
-            for begins, mass in zip(self.surfaces, self.finger_mass, strict=True)
+            Side(surface, mass, friction.NONE)
+            for surface, mass in zip(self.surfaces, self.finger_mass, strict=True)
         )
 
 
 class State(NamedTuple):
     """Fingertip positions in m, velocities in m/s and contact forces in N."""
 
-    position: Each
-    velocity: Each
-    contact_force: Each
+    position: PerFinger
+    velocity: PerFinger
+    contact_force: PerFinger
 
 
 def initial_state(p: Params, u: Inputs) -> State:
@@ -59,18 +58,20 @@ def initial_state(p: Params, u: Inputs) -> State:
 
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance all fingers by h seconds (h > 0), the forces held."""
-    moved = tuple(
+    moved_fingers = tuple(
         contact.advance(side, p.rates, s, v, f, h)
         for side, s, v, f in zip(p.sides, x.position, x.velocity, u.force, strict=True)
     )
     return State(
-        tuple(s for s, _, _ in moved), tuple(v for _, v, _ in moved), tuple(f for _, _, f in moved)
+        tuple(s for s, _, _ in moved_fingers),
+        tuple(v for _, v, _ in moved_fingers),
+        tuple(f for _, _, f in moved_fingers),
     )
 
 
 def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """The outputs, as the sensors see them; no input reaches an output without a step."""
-    gaps = tuple(s - begins for s, begins in zip(x.position, p.surfaces, strict=True))
+    gaps = tuple(s - surface for s, surface in zip(x.position, p.surfaces, strict=True))
     return Outputs(
         x.position,
         x.velocity,

@@ -8,20 +8,20 @@ flat face under each finger, or a disc.
     disc:  nu_k = (p_k - c)/|p_k - c|,  surface on the ray  c·e_k + sqrt(R^2 - q_k^2)
 
 nu_k is the outward normal where finger k is, q_k how far its ray passes beside the centre.
-Card: plant/README.md
+Equations (H1) and card: plant/README.md
 """
 
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from math import cos, fmod, inf, pi, sin, sqrt
+from math import cos, fmod, inf, nan, pi, sin, sqrt
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Input, Output, Parameter, check
 
 from .hand_size import FINGERS
 
-FACING = 0.1
+MIN_FACING = 0.1
 """Cosine of a prism's turn below which its faces do not look to the rays any more."""
 
 FAR = 10.0
@@ -61,21 +61,24 @@ class Normal(NamedTuple):
 
 
 if TYPE_CHECKING:
-    Each = tuple[float, ...]
+    PerFinger = tuple[float, ...]
     Touches = tuple[bool, ...]
     Rays = tuple[Ray, ...]
 else:
-    Each = tuple[(float,) * FINGERS]
+    PerFinger = tuple[(float,) * FINGERS]
     Touches = tuple[(bool,) * FINGERS]
     Rays = tuple[(Ray,) * FINGERS]
 
 Plane = tuple[float, float]
 """x and y in the plane of the rays, the wrist at the origin."""
 
-ZEROS: Each = (0.0,) * FINGERS
+ZEROS: PerFinger = (0.0,) * FINGERS
 OUTSIDE: Touches = (False,) * FINGERS
 
-OPPOSITE = 1e-6
+UNRESOLVED: PerFinger = (nan,) * FINGERS
+"""Where the fingers are after more sub-steps than a plant takes: the step is refused."""
+
+OPPOSITE_TOLERANCE = 1e-6
 """rad by which two directions may be off and yet be opposite."""
 
 
@@ -87,16 +90,16 @@ class Params:
     """
 
     angle: Annotated[
-        Each,
+        PerFinger,
         Parameter(
             "direction of the finger, from the x axis", unit="rad", low=-2.0 * pi, high=2.0 * pi
         ),
     ] = tuple(2.0 * pi * k / FINGERS for k in range(FINGERS))
     finger_mass: Annotated[
-        Each, Parameter("m_k, mass of the finger", unit="kg", low=1e-3, high=1e3, tunable=True)
+        PerFinger, Parameter("m_k, mass of the finger", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = (0.5,) * FINGERS
     initial_position: Annotated[
-        Each,
+        PerFinger,
         Parameter(
             "s_init,k, way of the fingertip from the wrist at the start",
             unit="m",
@@ -109,7 +112,7 @@ class Params:
         float, Parameter("R, radius of a disc", unit="m", low=1e-4, high=10.0)
     ] = 0.035
     half_width: Annotated[
-        Each,
+        PerFinger,
         Parameter(
             "h_k, from the middle of a prism to its face under the finger",
             unit="m",
@@ -133,8 +136,10 @@ class Params:
 
     def __post_init__(self) -> None:
         check(self)
-        widest, second = gaps_between(self.angle)
-        if widest > pi + OPPOSITE or (widest > pi - OPPOSITE and second < pi - OPPOSITE):
+        widest, second = angles_between(self.angle)
+        if widest > pi + OPPOSITE_TOLERANCE or (
+            widest > pi - OPPOSITE_TOLERANCE and second < pi - OPPOSITE_TOLERANCE
+        ):
             raise ValueError(
                 f"angle: there is no finger within {widest:.6g} rad of another; fingers can hold "
                 f"where that is less than {pi:.6g}, or where all are on one line, at both ends"
@@ -166,21 +171,21 @@ class Params:
         return Pose(x, y, self.initial_object_angle)
 
     @cached_property
-    def surfaces(self) -> Each:
+    def surfaces(self) -> PerFinger:
         """Where the object begins on each ray at the start, m; -inf where it is beside."""
         shape, radius, pose = self.shape, self.object_radius, self.first_pose
         return tuple(surface(shape, radius, ray, pose) for ray in self.rays)
 
 
-def gaps_between(angle: Each) -> tuple[float, float]:
+def angles_between(angle: PerFinger) -> tuple[float, float]:
     """The widest and the second widest angle in rad between neighbouring directions."""
     widest, second = 0.0, 0.0
     for a in angle:
         following = 2.0 * pi
         for b in angle:
-            way = fmod(b - a, 2.0 * pi)
-            way = way + 2.0 * pi if way <= 0.0 else way
-            following = min(following, way)
+            angle_ahead = fmod(b - a, 2.0 * pi)
+            angle_ahead = angle_ahead + 2.0 * pi if angle_ahead <= 0.0 else angle_ahead
+            following = min(following, angle_ahead)
         second = max(second, min(widest, following))
         widest = max(widest, following)
     return widest, second
@@ -190,14 +195,14 @@ def surface(shape: Shape, radius: float, ray: Ray, pose: Pose) -> float:
     """Where the object begins on a ray, m from the wrist; -inf where it is beside the ray."""
     if shape == Shape.PRISM:
         facing = cos(pose.angle)
-        if facing < FACING:
+        if facing < MIN_FACING:
             return -inf
         x, y = cos(ray.angle + pose.angle), sin(ray.angle + pose.angle)
         return (ray.half_width + x * pose.x + y * pose.y) / facing
     along = ray.x * pose.x + ray.y * pose.y
     beside = ray.x * pose.y - ray.y * pose.x
-    left = radius * radius - beside * beside
-    return along + sqrt(left) if left >= 0.0 else -inf
+    half_chord_squared = radius * radius - beside * beside
+    return along + sqrt(half_chord_squared) if half_chord_squared >= 0.0 else -inf
 
 
 def normal(shape: Shape, radius: float, face: float, ray: Ray, pose: Pose, s: float) -> Normal:
@@ -209,7 +214,7 @@ def normal(shape: Shape, radius: float, face: float, ray: Ray, pose: Pose, s: fl
     if shape == Shape.PRISM:
         facing = cos(pose.angle)
         x, y = cos(ray.angle + pose.angle), sin(ray.angle + pose.angle)
-        if facing < FACING or abs(arm_x * y - arm_y * x) > 0.5 * face:
+        if facing < MIN_FACING or abs(arm_x * y - arm_y * x) > 0.5 * face:
             return Normal(x, y, -FAR)
         return Normal(x, y, ray.half_width + x * pose.x + y * pose.y - s * facing)
     x, y = arm_x, arm_y
@@ -223,7 +228,7 @@ class Inputs(NamedTuple):
     """Held over the step."""
 
     force: Annotated[
-        Each, Input("u_k, actuator force on the finger, opening", unit="N", nominal=1.0)
+        PerFinger, Input("u_k, actuator force on the finger, opening", unit="N", nominal=1.0)
     ] = ZEROS
 
 
@@ -231,17 +236,17 @@ class Outputs(NamedTuple):
     """Measured at the fingers and at the object."""
 
     position: Annotated[
-        Each,
+        PerFinger,
         Output("s_k, way of the fingertip from the wrist", unit="m", nominal=0.1, depends_on=set()),
     ]
     velocity: Annotated[
-        Each,
+        PerFinger,
         Output(
             "s_k', velocity of the fingertip, opening", unit="m/s", nominal=0.1, depends_on=set()
         ),
     ]
     gap: Annotated[
-        Each,
+        PerFinger,
         Output(
             "l_k, distance from the sensor face to the object surface along the ray",
             unit="m",
@@ -250,7 +255,7 @@ class Outputs(NamedTuple):
         ),
     ]
     contact_force: Annotated[
-        Each,
+        PerFinger,
         Output(
             "f_ck, force of the object on the finger along the ray",
             unit="N",

@@ -1,9 +1,10 @@
 """A hand of N fingers and an object on a floor that slides and turns: a prism or a disc.
 
     m_k·s_k'' = u_k + f_k·(nu_k·e_k)
-    m·c'' = -sum f_k·nu_k + floor,    m·r^2·theta'' = -sum (p_k - c) x f_k·nu_k + floor
+    m·c'' = -sum f_k·nu_k + F,    m·r^2·theta'' = -sum (p_k - c) x f_k·nu_k + M            (H1)
 
-The fingertips are points without friction on stiff rails. Card: plant/README.md
+F and M are the friction of the floor. The fingertips are points without friction on stiff rails.
+Card: plant/README.md
 """
 
 from dataclasses import dataclass
@@ -13,15 +14,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from block_variables import Parameter
 
-from . import contact_laws, fingers, hand_fingers
+from . import contact_laws, fingers, friction, hand_fingers
 from .box import GRAVITY
 from .contact_laws import HuntCrossley, KelvinVoigt
-from .friction import NONE, move
-from .hand_fingers import FAR, Each, Normal, Pose, Rays, Touches
+from .hand_fingers import FAR, Normal, PerFinger, Pose, Rays, Touches
 from .hand_fingers import Inputs as Inputs
 from .hand_fingers import Outputs as Outputs
 from .hand_size import FINGERS
-from .movable import ITERATIONS
+from .movable import MAX_FORCE_ITERATIONS
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
@@ -96,9 +96,9 @@ class State(NamedTuple):
     nothing.
     """
 
-    position: Each
-    velocity: Each
-    normal_force: Each
+    position: PerFinger
+    velocity: PerFinger
+    normal_force: PerFinger
     inside: Touches
     body: Body
 
@@ -113,9 +113,9 @@ def initial_state(p: Params, u: Inputs) -> State:
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and object by h seconds (h > 0), the forces held."""
     rays = p.rays
-    n = fingers.count(_rate(p, rays, x, u, h), h)
-    if n > fingers.MOST:
-        return x._replace(position=tuple(s + inf - inf for s in x.position))
+    n = fingers.substep_count(_rate(p, rays, x, u, h), h)
+    if n > fingers.MAX_SUBSTEPS:
+        return x._replace(position=hand_fingers.UNRESOLVED)
     for _ in range(n):
         x = _substep(p, rays, x, u.force, h / n)
     return x
@@ -128,32 +128,39 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     """
     pose, rays = x.body.pose, p.rays
     normals = _normals(p, rays, x)
-    begins = tuple(hand_fingers.surface(p.shape, p.object_radius, ray, pose) for ray in rays)
+    surfaces = tuple(hand_fingers.surface(p.shape, p.object_radius, ray, pose) for ray in rays)
     gaps = tuple(
-        0.0 if at.depth >= 0.0 else FAR if at.depth <= -FAR else min(FAR, max(0.0, s - begin))
-        for at, s, begin in zip(normals, x.position, begins, strict=True)
+        _gap(normal.depth, s - surface)
+        for normal, s, surface in zip(normals, x.position, surfaces, strict=True)
     )
     forces = tuple(
-        0.0 + f * (at.x * ray.x + at.y * ray.y)
-        for f, at, ray in zip(x.normal_force, normals, rays, strict=True)
+        0.0 + f * (normal.x * ray.x + normal.y * ray.y)
+        for f, normal, ray in zip(x.normal_force, normals, rays, strict=True)
     )
     return Outputs(
         x.position,
         x.velocity,
         gaps,
         forces,
-        tuple(at.depth >= 0.0 for at in normals),
+        tuple(normal.depth >= 0.0 for normal in normals),
         (pose.x, pose.y),
         pose.angle,
     )
 
 
+def _gap(depth: float, distance: float) -> float:
+    """The gap in m of a finger from its depth and its distance to the object along the ray, m."""
+    if depth >= 0.0:
+        return 0.0
+    return FAR if depth <= -FAR else min(FAR, max(0.0, distance))
+
+
 def _normals(p: Params, rays: Rays, x: State) -> Normals:
     """The normals at the fingertips; what a finger does not touch is far away."""
-    raw = _raw_normals(p, rays, x)
+    raw_normals = _raw_normals(p, rays, x)
     return tuple(
-        at if inside or at.depth <= SHALLOW else Normal(at.x, at.y, -FAR)
-        for at, inside in zip(raw, x.inside, strict=True)
+        normal if inside or normal.depth <= SHALLOW else Normal(normal.x, normal.y, -FAR)
+        for normal, inside in zip(raw_normals, x.inside, strict=True)
     )
 
 
@@ -164,37 +171,43 @@ def _raw_normals(p: Params, rays: Rays, x: State) -> Normals:
     )
 
 
-def _substep(p: Params, rays: Rays, x: State, u: Each, d: float) -> State:
-    """D seconds with the normal forces held along today's normals, found by iteration."""
+def _substep(p: Params, rays: Rays, x: State, u: PerFinger, d: float) -> State:
+    """D seconds with the normal forces held, found by iteration along the normals at the start."""
     normals = _normals(p, rays, x)
-    along = tuple(at.x * ray.x + at.y * ray.y for at, ray in zip(normals, rays, strict=True))
-    forces, body, moved = x.normal_force, x.body, x
-    for _ in range(ITERATIONS):
-        body = _pushed(p, rays, x, normals, forces, d)
-        reached = tuple(
-            move(s, v, m, f + share * push, NONE, d)
+    ray_shares = tuple(
+        normal.x * ray.x + normal.y * ray.y for normal, ray in zip(normals, rays, strict=True)
+    )
+    forces, body, next_state = x.normal_force, x.body, x
+    for _ in range(MAX_FORCE_ITERATIONS):
+        body = _advance_object(p, rays, x, normals, forces, d)
+        moved_fingers = tuple(
+            friction.move(s, v, m, f + share * push, friction.NONE, d)
             for s, v, m, f, share, push in zip(
-                x.position, x.velocity, p.finger_mass, u, along, forces, strict=True
+                x.position, x.velocity, p.finger_mass, u, ray_shares, forces, strict=True
             )
         )
-        tips, rates = tuple(s for s, _ in reached), tuple(v for _, v in reached)
-        moved = State(tips, rates, forces, x.inside, body)
-        after = _raw_normals(p, rays, moved)
-        found = tuple(
-            0.0 if at.depth <= -FAR else contact_laws.mean_force(p.law, at.depth, then.depth, d)
-            for at, then in zip(normals, after, strict=True)
+        tips, rates = tuple(s for s, _ in moved_fingers), tuple(v for _, v in moved_fingers)
+        next_state = State(tips, rates, forces, x.inside, body)
+        next_normals = _raw_normals(p, rays, next_state)
+        new_forces = tuple(
+            0.0
+            if normal.depth <= -FAR
+            else contact_laws.mean_force(p.law, normal.depth, next_normal.depth, d)
+            for normal, next_normal in zip(normals, next_normals, strict=True)
         )
-        if all(contact_laws.settled(new, old) for new, old in zip(found, forces, strict=True)):
+        if all(contact_laws.settled(new, old) for new, old in zip(new_forces, forces, strict=True)):
             break
-        forces = found
+        forces = new_forces
     inside = tuple(
-        at.depth >= 0.0 and (was or at.depth <= SHALLOW)
-        for at, was in zip(_raw_normals(p, rays, moved), x.inside, strict=True)
+        normal.depth >= 0.0 and (was_inside or normal.depth <= SHALLOW)
+        for normal, was_inside in zip(_raw_normals(p, rays, next_state), x.inside, strict=True)
     )
-    return moved._replace(inside=inside)
+    return next_state._replace(inside=inside)
 
 
-def _pushed(p: Params, rays: Rays, x: State, normals: Normals, forces: Each, d: float) -> Body:
+def _advance_object(
+    p: Params, rays: Rays, x: State, normals: Normals, forces: PerFinger, d: float
+) -> Body:
     """The object d seconds later under normal forces in N, with the friction of the floor.
 
     The floor takes what it can of the speeds that the object would have without it: it comes to
@@ -202,28 +215,30 @@ def _pushed(p: Params, rays: Rays, x: State, normals: Normals, forces: Each, d: 
     """
     pose, m = x.body.pose, p.object_mass
     push_x, push_y, moment = 0.0, 0.0, 0.0
-    for ray, s, at, f in zip(rays, x.position, normals, forces, strict=True):
-        push_x = push_x - f * at.x
-        push_y = push_y - f * at.y
+    for ray, s, normal, f in zip(rays, x.position, normals, forces, strict=True):
+        push_x = push_x - f * normal.x
+        push_y = push_y - f * normal.y
         arm_x, arm_y = s * ray.x - pose.x, s * ray.y - pose.y
-        moment = moment - f * (arm_x * at.y - arm_y * at.x)
+        moment = moment - f * (arm_x * normal.y - arm_y * normal.x)
+    # (H1) without the floor
     x_dot, y_dot = x.body.x_dot + d * push_x / m, x.body.y_dot + d * push_y / m
     inertia = m * p.radius_of_gyration * p.radius_of_gyration
     turning = x.body.turning + d * moment / inertia
-    kept = _kept(sqrt(x_dot * x_dot + y_dot * y_dot), d * p.drag / m)
-    turned = _kept(abs(turning), d * p.drag * p.floor_contact_radius / inertia)
-    x_dot, y_dot, turning = kept * x_dot, kept * y_dot, turned * turning
-    after = Pose(
+    # F and M of (H1): what friction can take of the speeds
+    sliding_share = _remaining_share(sqrt(x_dot * x_dot + y_dot * y_dot), d * p.drag / m)
+    turning_share = _remaining_share(abs(turning), d * p.drag * p.floor_contact_radius / inertia)
+    x_dot, y_dot, turning = sliding_share * x_dot, sliding_share * y_dot, turning_share * turning
+    next_pose = Pose(
         pose.x + 0.5 * d * (x.body.x_dot + x_dot),
         pose.y + 0.5 * d * (x.body.y_dot + y_dot),
         pose.angle + 0.5 * d * (x.body.turning + turning),
     )
-    return Body(after, x_dot, y_dot, turning)
+    return Body(next_pose, x_dot, y_dot, turning)
 
 
-def _kept(speed: float, taken: float) -> float:
-    """The share of a speed that is left after friction has taken so much of it."""
-    return 0.0 if speed <= taken else (speed - taken) / speed
+def _remaining_share(speed: float, loss: float) -> float:
+    """The share of a speed that is left after friction has taken `loss` of it."""
+    return 0.0 if speed <= loss else (speed - loss) / speed
 
 
 def _rate(p: Params, rays: Rays, x: State, u: Inputs, h: float) -> float:
@@ -234,20 +249,20 @@ def _rate(p: Params, rays: Rays, x: State, u: Inputs, h: float) -> float:
     body, pose = x.body, x.body.pose
     speed = sqrt(body.x_dot * body.x_dot + body.y_dot * body.y_dot)
     normals = _normals(p, rays, x)
-    deepest, near, even, odd, turned = -inf, 0.0, 0.0, 0.0, 0.0
-    for ray, at, s, v, m, f in zip(
+    deepest, touching, even, odd, turning = -inf, 0.0, 0.0, 0.0, 0.0
+    for ray, normal, s, v, m, f in zip(
         rays, normals, x.position, x.velocity, p.finger_mass, u.force, strict=True
     ):
-        lever = (s * ray.x - pose.x) * at.y - (s * ray.y - pose.y) * at.x
+        lever = (s * ray.x - pose.x) * normal.y - (s * ray.y - pose.y) * normal.x
         ratio = lever / p.radius_of_gyration
         reach = speed + abs(body.turning * lever) + abs(v) + 0.5 * h * abs(f) / m
-        depth = at.depth + h * reach
+        depth = normal.depth + h * reach
         touches = 1.0 if depth > 0.0 else 0.0
-        near = near + touches
-        even = even + touches * (at.x * at.x - at.y * at.y)
-        odd = odd + touches * 2.0 * at.x * at.y
-        turned = turned + touches * ratio * ratio
+        touching = touching + touches
+        even = even + touches * (normal.x * normal.x - normal.y * normal.y)
+        odd = odd + touches * 2.0 * normal.x * normal.y
+        turning = turning + touches * ratio * ratio
         deepest = max(deepest, depth)
-    pushed = 0.5 * (near + sqrt(even * even + odd * odd))  # the most, in any direction
-    gives = 1.0 / min(p.finger_mass) + (pushed + turned) / p.object_mass
-    return contact_laws.rate(p.law, deepest, 1.0 / gives)
+    pushing = 0.5 * (touching + sqrt(even * even + odd * odd))  # the most, in any direction
+    mobility = 1.0 / min(p.finger_mass) + (pushing + turning) / p.object_mass
+    return contact_laws.rate(p.law, deepest, 1.0 / mobility)

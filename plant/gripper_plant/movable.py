@@ -18,7 +18,7 @@ from .fingers import Pair as Pair
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
-ITERATIONS = 16
+MAX_FORCE_ITERATIONS = 16
 """To find the contact forces: each leaves 1/19 of the error, or less; 1/5 where the box tilts."""
 
 
@@ -54,8 +54,8 @@ def initial_state(p: Params, u: Inputs) -> State:
 def step(p: Params, x: State, u: Inputs, h: float) -> State:
     """Advance fingers and box by h seconds (h > 0), the forces held."""
     q = standing.shape(p)
-    n = fingers.count(_rate(p, q, x, u, h), h)
-    if n > fingers.MOST:
+    n = fingers.substep_count(_rate(p, q, x, u, h), h)
+    if n > fingers.MAX_SUBSTEPS:
         return x._replace(position=fingers.UNRESOLVED)
     forces = fingers.forces(p.actuator, u)
     for _ in range(n):
@@ -82,22 +82,23 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
 
 def _substep(p: Params, q: Shape, x: State, forces: Pair, d: float) -> State:
     """D seconds with the contact forces held; they and the ways under them found by iteration."""
-    (_, m_1, rub_1), (_, m_2, rub_2) = p.sides
+    (_, m_1, friction_1), (_, m_2, friction_2) = p.sides
     x_1, x_2 = x.position
     v_1, v_2 = x.velocity
     u_1, u_2 = forces
     right, left = standing.faces(q, x.box)
     f_1, f_2 = x.contact_force[0], -x.contact_force[1]
-    for _ in range(ITERATIONS):
-        s_1, w_1 = friction.move(x_1, v_1, m_1, u_1 + f_1, rub_1, d)
-        s_2, w_2 = friction.move(-x_2, -v_2, m_2, f_2 - u_2, rub_2, d)
+    for _ in range(MAX_FORCE_ITERATIONS):
+        # Eq. (1) for each finger, counted as it opens; (B1) to (B3) for the box
+        s_1, w_1 = friction.move(x_1, v_1, m_1, u_1 + f_1, friction_1, d)
+        s_2, w_2 = friction.move(-x_2, -v_2, m_2, f_2 - u_2, friction_2, d)
         box = x.box if x.toppled else standing.advance(q, x.box, Pushes(f_2, f_1), d)
-        to_right, to_left = standing.faces(q, box)
-        found_1 = contact_laws.mean_force(p.law, right - x_1, to_right - s_1, d)
-        found_2 = contact_laws.mean_force(p.law, x_2 - left, -s_2 - to_left, d)
-        if contact_laws.settled(found_1, f_1) and contact_laws.settled(found_2, f_2):
+        next_right, next_left = standing.faces(q, box)
+        new_f_1 = contact_laws.mean_force(p.law, right - x_1, next_right - s_1, d)
+        new_f_2 = contact_laws.mean_force(p.law, x_2 - left, -s_2 - next_left, d)
+        if contact_laws.settled(new_f_1, f_1) and contact_laws.settled(new_f_2, f_2):
             break
-        f_1, f_2 = found_1, found_2
+        f_1, f_2 = new_f_1, new_f_2
     toppled = x.toppled or standing.topples(q, box)
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)

@@ -2,10 +2,10 @@
 
 X is where the wrist is, w half the opening:  x_1 = X + w,  x_2 = X - w,
 
-    M·w'' = F + f_c1 - f_c2 - friction                      F = u_1 - u_2, M of both fingers
+    M·w'' = F + f_c1 - f_c2 - friction      (T1), with F = u_1 - u_2 and M of both fingers
 
-The wrist is positioned (wrist.py), the drive is told a force (drive.py). The object is fixed, or a
-box on a floor (box.py), and gives (contact_laws.py). Signs as in fingers.py: F < 0 closes.
+The wrist is positioned (wrist.py), the drive is commanded a force (drive.py). The object is fixed,
+or a box on a floor (box.py), and gives (contact_laws.py). Signs as in fingers.py: F < 0 closes.
 Card: plant/README.md
 """
 
@@ -27,13 +27,13 @@ from .wrist import Wrist
 
 LONGEST_STEP = fingers.LONGEST_STEP
 
-ITERATIONS = 16
+MAX_FORCE_ITERATIONS = 16
 """To find the forces that are held over a sub-step: each leaves 1/19 of the error, or less."""
 
 SAME_MOMENT = 1e-9
 """Share of a step below which two moments in it are one."""
 
-NOWHERE = fingers.UNRESOLVED
+WRIST_UNRESOLVED = fingers.UNRESOLVED
 """Where the wrist is after more sub-steps than a plant takes: so the step is refused."""
 
 
@@ -151,7 +151,7 @@ class Outputs(NamedTuple):
 
 
 def initial_state(p: Params, u: Inputs) -> State:
-    """All at rest, the fingers free of the object; the wrist has been told to be where it is."""
+    """All at rest, the fingers free of the object; the wrist is commanded to be where it is."""
     x_1, x_2 = p.initial_position
     middle = 0.5 * (x_1 + x_2)
     box = Box(p.initial_object_position, 0.0, 0.0, 0.0)
@@ -165,12 +165,12 @@ def step(p: Params, x: State, u: Inputs, h: float) -> State:
     if p.wrist.delay == 0.0:
         return x._replace(body=_advance(p, x.body, u.grip_force, u.wrist_command, h))
     line = command_delay.entered(x.line, u.wrist_command, p.wrist.delay, h)
-    body, now = x.body, 0.0
+    body, elapsed = x.body, 0.0
     for command, end in zip(line.value, line.end, strict=True):
         until = h if end > h - SAME_MOMENT * h else end
-        if until > now + SAME_MOMENT * h:
-            body = _advance(p, body, u.grip_force, command, until - now)
-            now = until
+        if until > elapsed + SAME_MOMENT * h:
+            body = _advance(p, body, u.grip_force, command, until - elapsed)
+            elapsed = until
     return State(body, command_delay.later(line, h))
 
 
@@ -196,59 +196,65 @@ def outputs(p: Params, x: State, u: Inputs) -> Outputs:
     )
 
 
-def _advance(p: Params, x: Body, told: float, command: float, h: float) -> Body:
-    """H seconds with the drive told a force in N and the wrist to be somewhere in m."""
-    if x.wrist[0] != x.wrist[0]:  # it is nowhere
+def _advance(p: Params, x: Body, grip_force: float, command: float, h: float) -> Body:
+    """H seconds with the force of the drive in N and the command of the wrist in m held."""
+    if x.wrist[0] != x.wrist[0]:  # it is not resolved
         return x
-    n = fingers.count(max(_contact_rate(p, x, told, command, h), p.servo_rate), h)
-    if n > fingers.MOST:
-        return x._replace(wrist=NOWHERE)
+    n = fingers.substep_count(max(_contact_rate(p, x, grip_force, command, h), p.servo_rate), h)
+    if n > fingers.MAX_SUBSTEPS:
+        return x._replace(wrist=WRIST_UNRESOLVED)
     d = h / n
     a = wrist.transition(p.wrist, d)
     for _ in range(n):
-        x = _substep(p, a, x, told, command, d)
+        x = _substep(p, a, x, grip_force, command, d)
     return x
 
 
-def _substep(p: Params, a: wrist.Matrix, x: Body, told: float, command: float, d: float) -> Body:
+def _substep(
+    p: Params, a: wrist.Matrix, x: Body, grip_force: float, command: float, d: float
+) -> Body:
     """D seconds with all forces held; they and the ways under them are found by iteration."""
     q, m, (middle, v), (half, speed) = p.shape, p.moving_mass, x.wrist, x.opening
     right, left = standing.faces(q, x.box)
     gap_1, gap_2 = half + middle - right, half - middle + left
-    off = v - x.box.v - q.h * x.box.w  # of the wrist from the faces, m/s
-    f_1 = contact_laws.mean_force(p.law, -gap_1, -gap_1 - d * (speed + off), d)
-    f_2 = contact_laws.mean_force(p.law, -gap_2, -gap_2 - d * (speed - off), d)
-    mean = x.reference + 0.5 * d * told / m
-    driven = drive.force(p.drive, m, told, mean, speed)
-    at, opening, box = x.wrist, x.opening, x.box
-    for _ in range(ITERATIONS):
-        at = wrist.follow(p.wrist, a, x.wrist, command, f_1 - f_2, d)
-        opening = friction.move(half, speed, m, driven + (f_1 + f_2), p.drive.law, d)
+    approach = v - x.box.v - q.h * x.box.w  # speed of the wrist relative to the faces, m/s
+    f_1 = contact_laws.mean_force(p.law, -gap_1, -gap_1 - d * (speed + approach), d)
+    f_2 = contact_laws.mean_force(p.law, -gap_2, -gap_2 - d * (speed - approach), d)
+    mean = x.reference + 0.5 * d * grip_force / m
+    drive_force = drive.force(p.drive, m, grip_force, mean, speed)
+    next_wrist, opening, box = x.wrist, x.opening, x.box
+    for _ in range(MAX_FORCE_ITERATIONS):
+        next_wrist = wrist.follow(p.wrist, a, x.wrist, command, f_1 - f_2, d)  # (T2)
+        # (T1); friction of the drive as in (F1)
+        opening = friction.move(half, speed, m, drive_force + (f_1 + f_2), p.drive.law, d)
         if not (p.object_fixed or x.toppled):
             box = standing.advance(q, x.box, Pushes(f_2, f_1), d)
-        to_right, to_left = standing.faces(q, box)
-        to_1, to_2 = opening[0] + at[0] - to_right, opening[0] - at[0] + to_left
-        found_1 = contact_laws.mean_force(p.law, -gap_1, -to_1, d)
-        found_2 = contact_laws.mean_force(p.law, -gap_2, -to_2, d)
-        motor = drive.force(p.drive, m, told, mean, (opening[0] - half) / d)
-        near = contact_laws.settled(found_1, f_1) and contact_laws.settled(found_2, f_2)
-        if near and contact_laws.settled(abs(motor), abs(driven)):
+        next_right, next_left = standing.faces(q, box)
+        next_gap_1, next_gap_2 = (
+            opening[0] + next_wrist[0] - next_right,
+            opening[0] - next_wrist[0] + next_left,
+        )
+        new_f_1 = contact_laws.mean_force(p.law, -gap_1, -next_gap_1, d)
+        new_f_2 = contact_laws.mean_force(p.law, -gap_2, -next_gap_2, d)
+        new_drive_force = drive.force(p.drive, m, grip_force, mean, (opening[0] - half) / d)
+        contacts_settled = contact_laws.settled(new_f_1, f_1) and contact_laws.settled(new_f_2, f_2)
+        if contacts_settled and contact_laws.settled(abs(new_drive_force), abs(drive_force)):
             break
-        f_1, f_2, driven = found_1, found_2, motor
+        f_1, f_2, drive_force = new_f_1, new_f_2, new_drive_force
     toppled = x.toppled or standing.topples(q, box)
     if toppled:
         box = Box(box.x, box.tilt, 0.0, 0.0)
-    reference = drive.reference(p.drive, m, told, x.reference, opening[1], d)
-    return Body(at, opening, reference, (f_1, 0.0 - f_2), box, toppled)
+    reference = drive.reference(p.drive, m, grip_force, x.reference, opening[1], d)
+    return Body(next_wrist, opening, reference, (f_1, 0.0 - f_2), box, toppled)
 
 
-def _contact_rate(p: Params, x: Body, told: float, command: float, h: float) -> float:
+def _contact_rate(p: Params, x: Body, grip_force: float, command: float, h: float) -> float:
     """The fastest that a contact can do within h seconds, 1/s; 0 where no finger comes so far."""
     q, (middle, v), (half, speed) = p.shape, x.wrist, x.opening
     right, left = standing.faces(q, x.box)
     m, p_d = p.moving_mass, p.drive
-    pushed = abs(drive.limited(p_d, told)) / m + p_d.omega * (abs(x.reference) + abs(speed))
+    pushed = abs(drive.limited(p_d, grip_force)) / m + p_d.omega * (abs(x.reference) + abs(speed))
     accelerated = pushed + wrist.acceleration_bound(p.wrist, x.wrist, command)
-    ways = abs(v) + abs(speed) + abs(x.box.v) + q.h * abs(x.box.w) + 0.5 * h * accelerated
-    deepest = h * ways + max(right - middle - half, middle - left - half)
+    travel_rate = abs(v) + abs(speed) + abs(x.box.v) + q.h * abs(x.box.w) + 0.5 * h * accelerated
+    deepest = h * travel_rate + max(right - middle - half, middle - left - half)
     return contact_laws.rate(p.law, deepest, p.lightest)

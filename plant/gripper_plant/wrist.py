@@ -1,6 +1,6 @@
-"""The wrist of an arm as a position servo: where it is, X, follows where it is told to be, X_c.
+"""The wrist of an arm as a position servo: where it is, X, follows its command, X_c.
 
-    X'' = omega^2·(X_c(t - tau) - X) - 2·zeta·omega·X' + omega^2·c·(f_c1 + f_c2)
+    X'' = omega^2·(X_c(t - tau) - X) - 2·zeta·omega·X' + omega^2·c·(f_c1 + f_c2)    (T2)
 
 Its acceleration and its speed stay within limits. Card: plant/README.md
 """
@@ -117,21 +117,28 @@ def follow(p: Wrist, a: Matrix, x: Motion, command: float, push: float, d: float
     """
     position, velocity = x
     a_11, a_12, a_21, a_22 = a
-    rest = command + p.compliance * push
-    deviation = position - rest
-    free = rest + a_11 * deviation + a_12 * velocity, a_21 * deviation + a_22 * velocity
-    wanted = (free[1] - velocity) / d
-    most = p.acceleration_limit
-    acceleration = copysign(most, wanted) if most > 0.0 and abs(wanted) > most else wanted
-    after = velocity + acceleration * d
-    fastest = p.speed_limit
-    if most > 0.0 and fastest > 0.0:  # one that has been lowered is braked to
-        fastest = max(fastest, abs(velocity) - most * d)
-    if fastest > 0.0 and abs(after) > fastest:
-        return _up_to_speed(x, acceleration, copysign(fastest, after), d)
-    if acceleration == wanted:
-        return free
-    return position + 0.5 * d * (velocity + after), after
+    rest_position = command + p.compliance * push  # (T2) with X'' = X' = 0
+    deviation = position - rest_position
+    unlimited = (
+        rest_position + a_11 * deviation + a_12 * velocity,
+        a_21 * deviation + a_22 * velocity,
+    )
+    unlimited_acceleration = (unlimited[1] - velocity) / d
+    acceleration_limit = p.acceleration_limit
+    acceleration = (
+        copysign(acceleration_limit, unlimited_acceleration)
+        if acceleration_limit > 0.0 and abs(unlimited_acceleration) > acceleration_limit
+        else unlimited_acceleration
+    )
+    next_velocity = velocity + acceleration * d
+    speed_limit = p.speed_limit
+    if acceleration_limit > 0.0 and speed_limit > 0.0:  # one that has been lowered is braked to
+        speed_limit = max(speed_limit, abs(velocity) - acceleration_limit * d)
+    if speed_limit > 0.0 and abs(next_velocity) > speed_limit:
+        return _up_to_speed(x, acceleration, copysign(speed_limit, next_velocity), d)
+    if acceleration == unlimited_acceleration:
+        return unlimited
+    return position + 0.5 * d * (velocity + next_velocity), next_velocity
 
 
 def acceleration_bound(p: Wrist, x: Motion, command: float) -> float:

@@ -34,8 +34,8 @@ class Ambient(Group, name="ambient"):
 
 def ambient_voltage(p: Ambient, t: float) -> float:
     """The offset in V, t s after the calibration; before it, the one that was there then."""
-    there = p.offset + p.calibration_error
-    return there + p.drift * t if t > 0.0 else there
+    offset = p.offset + p.calibration_error
+    return offset + p.drift * t if t > 0.0 else offset
 
 
 @dataclass(frozen=True, slots=True)

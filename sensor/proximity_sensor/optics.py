@@ -96,7 +96,7 @@ def outputs(p: Params, u: Inputs) -> Outputs:
     if u.gap > FARTHEST:
         return Outputs(0.0)
     l = 0.0 if u.gap < 0.0 else u.gap
-    return Outputs(p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent)
+    return Outputs(p.gain * p.alpha / (l + p.offset_distance) ** p.diffusion_exponent)  # Eq. (9)
 
 
 class Surface(IntEnum):

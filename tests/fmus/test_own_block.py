@@ -87,7 +87,7 @@ def test_a_change_is_built_and_both_run_in_one_process(tmp_path):
 
 def test_packages_of_our_blocks_come_along(tmp_path):
     text = LAG.replace("from math", "from gripper_plant import fingers\nfrom math")
-    text = text.replace("State(0.0)", "State(float(fingers.count(30.0, 1.0)))")
+    text = text.replace("State(0.0)", "State(float(fingers.substep_count(30.0, 1.0)))")
     built = build_block(write(tmp_path, text), tmp_path)
     expected = 1.0 + 299.0 * exp(-0.6)  # 30 1/s over 1 s, sub-steps of 0.1
     assert answer(built.path, tmp_path / "a") == pytest.approx(expected, rel=1e-14)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gripper_plant import contact, friction, rigid
 from gripper_plant.contact import Rates, time_to_contact
-from gripper_plant.fingers import MOST, Side, count
+from gripper_plant.fingers import MAX_SUBSTEPS, Side, substep_count
 from gripper_plant.rigid import Inputs, Params
 from hypothesis import given
 from hypothesis import strategies as st
@@ -103,7 +103,7 @@ def test_it_moves_as_scipy_has_it(case, rates, law):
 @pytest.mark.parametrize("case", CASES)
 def test_a_long_step_is_made_of_sub_steps(case, rates, law):
     """Which are those of a run in steps as long as they are, to the rounding."""
-    n = max(count(contact.fastest(rates), 5e-3), count(law[2] / M, 5e-3))
+    n = max(substep_count(contact.fastest(rates), 5e-3), substep_count(law[2] / M, 5e-3))
     *_, fine = islice(run(*CASES[case], rates, 5e-3 / n, law), n)
     assert next(run(*CASES[case], rates, 5e-3, law)) == pytest.approx(fine, rel=1e-9, abs=1e-15)
 
@@ -168,7 +168,7 @@ def test_a_finger_that_sticks_inside_stays():
 @pytest.mark.parametrize("viscous", [0.0, 1e-6])
 @pytest.mark.parametrize(("share", "finite"), [(0.999, True), (1.001, False)])
 def test_a_finger_with_too_many_sub_steps_has_no_result(viscous, share, finite):
-    rates = Rates(0.5 * share * MOST, 1.0)
+    rates = Rates(0.5 * share * MAX_SUBSTEPS, 1.0)
     after = next(run(0.0, 0.0, -1.0, rates, 0.1, (0.0, 0.0, viscous, 1.0)))
     assert all(map(isfinite, after)) == finite
 
@@ -177,7 +177,7 @@ def test_a_finger_with_too_many_sub_steps_has_no_result(viscous, share, finite):
     ("rate", "h", "n"), [(400.0, 1e-4, 1), (400.0, 1e-3, 4), (900.0, 1e-3, 9), (0.0, 1.0, 1)]
 )
 def test_sub_steps_of_round_numbers(rate, h, n):
-    assert count(rate, h) == n
+    assert substep_count(rate, h) == n
     assert contact.fastest(Rates(rate / 2.0, 0.1 * rate)) == rate
 
 
