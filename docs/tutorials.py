@@ -22,7 +22,7 @@ from grasp_cosim import cli
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import CLOSING, FINGERS
 from grasp_cosim.grasp.pictures import COLOR, draw_contact_forces, draw_targets
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.recording.result import Result
 from grasp_cosim.report.plot import (
@@ -367,7 +367,7 @@ PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
     "your_plant": draw_your_plant,
 }
 
-BLOCKS = (TEMPLATES / "spring_plant.py", HERE / "moving_object.py")
+BLOCKS = (TEMPLATE_FOLDER / "spring_plant.py", HERE / "moving_object.py")
 """What the pages build before they run it."""
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .grasp.published.evaluation import evaluate
     from .grasp.system import grasp_system
     from .hand.system import hand_system
-    from .inspection.inspection import inspect_fmu
+    from .inspection.declarations import inspect_fmu
     from .linearisation.linearise import linearise
     from .linearisation.state_space import StateSpace
     from .master.session import Session
@@ -90,7 +90,7 @@ _MODULES = {
     "grasp_system": "grasp.system",
     "hand_system": "hand.system",
     "identify": "grasp.identification.identification",
-    "inspect_fmu": "inspection.inspection",
+    "inspect_fmu": "inspection.declarations",
     "linearise": "linearisation.linearise",
     "load_run": "recording.read_back",
     "metric": "metrics.metric",

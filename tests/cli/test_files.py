@@ -10,7 +10,7 @@ from threading import Thread
 import pytest
 from grasp_cosim import InputError, load_run, simulate
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from grasp_cosim.ssp.to_archive import write_ssp
 
 WRITERS = {
@@ -220,7 +220,7 @@ def test_a_line_of_toml_is_named(text, said, command, tmp_path):
 # Modules in the current folder, which may be that of a stranger, are not run.
 
 MARK = "imported.txt"
-BLOCK_FILE = TEMPLATES / "spring_plant.py"
+BLOCK_FILE = TEMPLATE_FOLDER / "spring_plant.py"
 
 
 def poison(folder, names):

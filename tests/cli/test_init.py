@@ -12,7 +12,7 @@ from comparison.made import write_fmu
 from grasp_cosim import System
 from grasp_cosim.cli.systems import path_from
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.inspection.template import KINDS
+from grasp_cosim.inspection.block_templates import BLOCK_TEMPLATES
 from support.native_fmus import build_model, needs_gcc
 
 FOREIGN = {
@@ -122,7 +122,7 @@ def test_an_fmu_that_was_built_here_needs_no_process_of_its_own(fmus_here):
         assert System.load(file).component("plant", "test").isolation == "none"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", BLOCK_TEMPLATES)
 def test_a_block_to_start_from(command, tmp_path, kind):
     """It builds as the command says, and is not written over."""
     code, out, err = command("init", "mine.py", "--template", kind)
@@ -142,7 +142,7 @@ def test_a_block_to_start_from(command, tmp_path, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", BLOCK_TEMPLATES)
 def test_its_test_passes_as_it_is_written(command, tmp_path, kind):
     assert command("init", "mine.py", "--template", kind)[0] == 0
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py"]

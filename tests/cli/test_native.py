@@ -14,7 +14,7 @@ from grasp_cosim.fmu_export import package
 from grasp_cosim.fmu_export.build import build_block, planned
 from grasp_cosim.fmu_export.native.targets import here
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.interface.read import describe
 from support.kinds import TRANSLATED
@@ -22,7 +22,7 @@ from support.marks import needs_compiler, needs_zig, slow
 
 pytestmark = needs_compiler
 
-SPRING = TEMPLATES / "spring_plant.py"
+SPRING = TEMPLATE_FOLDER / "spring_plant.py"
 SHORT = ("--step", "1e-3", "--stop", "0.3")
 SWAP = ("--swap", "plant=fmus/build/SpringPlant.fmu", *SHORT)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import tune
 from grasp_cosim import simulate
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from gripper_plant.friction import Params as Friction
 from scipy import integrate
 
@@ -39,7 +39,7 @@ def test_an_object_that_moves_is_a_fixed_one_seen_from_it():
 
 def test_the_spring_plant_obeys_its_equations():
     """Against an adaptive integration, error control at the step at which a face is touched."""
-    plant = runpy.run_path(str(TEMPLATES / "spring_plant.py"))
+    plant = runpy.run_path(str(TEMPLATE_FOLDER / "spring_plant.py"))
     p = plant["Params"](initial_position=(0.07, -0.11))
     u = plant["Inputs"](force=(-0.5, 0.1))
 

@@ -11,7 +11,7 @@ import pytest
 from grasp_cosim import cli, simulate
 from grasp_cosim.fmu_export.contract import declared
 from grasp_cosim.fmu_export.shipped import blocks
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from grasp_cosim.recording.read_back import load_run
 from support.pages import BLOCKS, INDENTED, commands_of, fill_in
 from support.pictures import assert_same_picture
@@ -81,7 +81,7 @@ def test_limits(checkout):
 @pytest.mark.slow
 def test_your_plant(checkout, capsys):
     assert cli.main(shlex.split(INDENTED.findall(page("your_plant"))[0])[1:]) == 0
-    source = (TEMPLATES / "spring_plant.py").read_text("utf-8")
+    source = (TEMPLATE_FOLDER / "spring_plant.py").read_text("utf-8")
     excerpts = 0
     for kind, block in BLOCKS.findall(page("your_plant").partition("## b.")[0]):
         if kind == "python":

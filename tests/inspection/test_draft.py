@@ -6,8 +6,8 @@ import pytest
 from comparison.made import write_fmu
 from grasp_cosim import System
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.inspection.alike import candidates, matches
-from grasp_cosim.inspection.draft import alone, replacing
+from grasp_cosim.inspection.draft import draft_of, system_of_fmus
+from grasp_cosim.inspection.name_matching import candidates, match_variables
 from grasp_cosim.interface.interface import Interface
 from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.variables import Variable
@@ -33,7 +33,7 @@ def foreign(*variables):
 def names(plant, *variables, certain=None):
     return {
         name: match.variable.name
-        for name, match in matches(plant, foreign(*variables)).items()
+        for name, match in match_variables(plant, foreign(*variables)).items()
         if certain in (None, not match.doubt)
     }
 
@@ -57,7 +57,7 @@ def test_names_of_the_gaps(plant, pair, doubt):
     """In any order of declaration, beside positions in the same unit."""
     gaps = [output(name, "mm") for name in pair]
     others = [output(f"fingertip_x_{side}", "mm") for side in ("right", "left")]
-    chosen = matches(plant, foreign(*gaps[::-1], *others))
+    chosen = match_variables(plant, foreign(*gaps[::-1], *others))
     assert {n: (m.variable.name, m.doubt) for n, m in chosen.items()} == {
         "gap[1]": (pair[0], doubt),
         "gap[2]": (pair[1], doubt),
@@ -93,7 +93,7 @@ def test_parameters(plant):
 def test_no_force_is_proposed_for_a_position(plant):
     theirs = foreign(*(output(name) for name in ("F_1", "F_2", "contactForce", "way", "x_1")))
     assert [v.name for v in candidates(plant, "position[1]", theirs, [])] == ["way", "x_1"]
-    assert not {"position[1]", "position[2]"} & matches(plant, theirs).keys()
+    assert not {"position[1]", "position[2]"} & match_variables(plant, theirs).keys()
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_foreign_plant(fmus, tmp_path, snapshot):
     write_fmu(tmp_path / "vendor.fmu", VENDOR, {})
     system = System.load(SYSTEM, fmus).with_values({"plant.object_width": 0.06})
     asked = ("friction.coulomb[1]", "friction.viscous[1]", "friction.viscous[2]")
-    draft = replacing(system, "plant", tmp_path / "vendor.fmu", "here/vendor.fmu", asked)
+    draft = draft_of(system, "plant", tmp_path / "vendor.fmu", "here/vendor.fmu", asked)
     lines = [f'"plant.{name}" = 1.5  # a comment' for name in ("object_width", *asked)]
     text = draft.put_into("\n".join(["[presets.bench]", *lines]))
     assert draft.text == snapshot
@@ -154,7 +154,7 @@ def test_fmus_alone(tmp_path, snapshot):
     write_fmu(tmp_path / "a.fmu", VENDOR, {})
     write_fmu(tmp_path / "b.fmu", {**many, "y": 'causality="output" | Real'}, {}, step="0")
     paths = {"first": (tmp_path / "a.fmu", "a.fmu"), "second": (tmp_path / "b.fmu", "b.fmu")}
-    text, notes = alone(paths)
+    text, notes = system_of_fmus(paths)
     assert notes == ["no FMU recommends a stop time: chosen, step = 0.001 s, stop = 1 s"]
     kept = [line for line in text.splitlines() if not line.startswith("# p") or line[3:5] == "10"]
     assert kept == snapshot
@@ -168,7 +168,7 @@ def test_the_times_of_fmus_alone(tmp_path):
         for i, attributes in enumerate(experiments):
             write_fmu(path := tmp_path / f"{i}.fmu", {}, {}, step=f'0.3" {attributes} x="')
             fmus[f"c{i}"] = (path, path.name)
-        text, notes = alone(fmus)
+        text, notes = system_of_fmus(fmus)
         entries = (line.partition("  #")[0] for line in text.splitlines())
         keys = ("step", "stop", "start")
         return [line for line in entries if line.partition(" = ")[0] in keys], notes

@@ -4,7 +4,7 @@ import json
 
 import pytest
 from grasp_cosim.inspection import loading
-from grasp_cosim.inspection.inspection import as_text, inspect_fmu
+from grasp_cosim.inspection.declarations import declarations_text, inspect_fmu
 from grasp_cosim.interface import read
 from ssp.hand_made import described
 from support.native_fmus import needs_gcc, talker
@@ -131,8 +131,8 @@ def test_the_report_and_its_text(xml, files, archive, snapshot):
     assert [
         json.dumps(part) for part in ({**report, "variables": len(variables)}, *variables)
     ] == snapshot
-    assert as_text(report) == snapshot
-    assert as_text(report, 127).split("\n\n")[1] == snapshot
+    assert declarations_text(report) == snapshot
+    assert declarations_text(report, 127).split("\n\n")[1] == snapshot
 
 
 SLOPPY = {
@@ -169,7 +169,7 @@ def test_the_categories_of_its_log_are_listed(tmp_path):
     report = inspect_fmu(talker(tmp_path))
     names = ["logEvents", "logSecrets", "logStatusWarning", "logStatusError"]
     assert report["log_categories"] == names
-    assert f"log categories      {', '.join(names)}\n" in as_text(report)
+    assert f"log categories      {', '.join(names)}\n" in declarations_text(report)
 
 
 def test_an_fmu_is_read_once(archive, monkeypatch):

@@ -90,14 +90,14 @@ def test_our_fmu_loads_here(fmus):
 
 def test_text_is_one_line_each_with_the_fix_below():
     findings = [Finding("a", "ok", "fine", None), Finding("b c", "problem", "broken", "mend it")]
-    assert loading.as_text(findings, tried=True).splitlines() == [
+    assert loading.findings_text(findings, tried=True).splitlines() == [
         "loads on this machine: no",
         "ok       a            fine",
         "problem  b c          broken",
         "                      fix: mend it",
     ]
     said = "loads on this machine: yes, as far as the file says; --load tries"
-    assert loading.as_text(findings[:1], tried=False).splitlines()[0] == said
+    assert loading.findings_text(findings[:1], tried=False).splitlines()[0] == said
 
 
 ASK = "ask the vendor for an export as FMI 2.0 or 3.0, for co-simulation or model exchange"

@@ -10,7 +10,7 @@ import pytest
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.cli import main
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.inspection.inspection import inspect_fmu
+from grasp_cosim.inspection.declarations import inspect_fmu
 from grasp_cosim.inspection.loading import examine, unpack
 from grasp_cosim.interface import attributes, model_description
 from grasp_cosim.interface.read import describe, read_interface

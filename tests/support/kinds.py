@@ -9,7 +9,7 @@ import pytest
 from grasp_cosim.fmu_export.build import build_block, build_model, planned
 from grasp_cosim.fmu_export.package import shipped_model
 from grasp_cosim.fmu_export.shipped import SHIPPED
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 
 from .marks import platforms, slow
 
@@ -25,7 +25,7 @@ native_slowly = pytest.mark.parametrize(
 both_of_fmi_2 = pytest.mark.kinds("python", "native")
 python_only = pytest.mark.kinds("python")
 
-OWN = {"SpringPlant": TEMPLATES / "spring_plant.py"}
+OWN = {"SpringPlant": TEMPLATE_FOLDER / "spring_plant.py"}
 """Blocks that are a file of one's own, by the names of their FMUs."""
 
 

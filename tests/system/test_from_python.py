@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, System, metric, simulate, sweep
 from grasp_cosim.grasp.presets import SYSTEM
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from grasp_cosim.ssp.to_archive import write_ssp
 from grasp_cosim.sweeps.run import Task, packed, run_packed
 from grasp_cosim.system.parts import Component, Connection, Port
 from grasp_cosim.system.toml import toml_table
 
 EXPERIMENT = {"step": 1e-3, "stop": 0.5}
-SPRING = TEMPLATES / "spring_plant.py"
+SPRING = TEMPLATE_FOLDER / "spring_plant.py"
 
 
 class Brake:

@@ -9,7 +9,7 @@ import click
 
 from ..base.collector import without_collector
 from ..inspection import loading
-from ..inspection.inspection import as_text, inspect_fmu
+from ..inspection.declarations import declarations_text, inspect_fmu
 from .frame import NEGATIVE, PATH, json_option, show, waiting
 
 
@@ -34,7 +34,7 @@ def inspect(fmu: Path, load: bool, as_json: bool) -> int:
         text = ""
         if not as_json:
             width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-            text = f"{as_text(report, width)}\n\n{loading.as_text(findings, load)}"
+            text = f"{declarations_text(report, width)}\n\n{loading.findings_text(findings, load)}"
         verdict = {"loads": loading.loads(findings), "findings": [asdict(f) for f in findings]}
         show(as_json, report | verdict, text)
     return 0 if verdict["loads"] else NEGATIVE

@@ -12,8 +12,8 @@ import click
 from ..base.checks import real
 from ..base.errors import InputError, choices
 from ..base.files import FMU_FOLDER, check_file, write_text
-from ..inspection.draft import Draft, alone, replacing
-from ..inspection.template import KINDS, test_of, texts
+from ..inspection.block_templates import BLOCK_TEMPLATES, block_files, test_file_of
+from ..inspection.draft import Draft, draft_of, system_of_fmus
 from ..interface.read import read_interface
 from ..system.description import System
 from ..system.overrides import Override
@@ -45,7 +45,7 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
 )
 @click.option(
     "--template",
-    type=click.Choice([*KINDS]),
+    type=click.Choice([*BLOCK_TEMPLATES]),
     help="Write a block in Python, to build an FMU of, and its test.",
 )
 @click.option("--force", is_flag=True, help="Replace a file that is there already.")
@@ -87,7 +87,7 @@ def init(
                 raise InputError(f"{option} cannot be used with --template, which is no system")
         return _write_block(file, template, force, as_json)
     if file.suffix.lower() != ".toml":
-        kinds = choices([f"--template {kind}" for kind in KINDS])
+        kinds = choices([f"--template {kind}" for kind in BLOCK_TEMPLATES])
         block = f"; a block in Python has {kinds}" if file.suffix == ".py" else ""
         raise InputError(f"{file}: must end in .toml, a system file{block}")
     if file.is_file() and not force:
@@ -101,7 +101,7 @@ def init(
     notes: list[str] = []
     if alone_fmus:
         paths = {name: (fmu, path_from(file.parent, fmu)) for name, fmu in alone_fmus.items()}
-        text, notes = alone(paths)
+        text, notes = system_of_fmus(paths)
     elif hand:
         text, notes = _hand_text(file.parent, fingers, angles)
     else:
@@ -133,7 +133,7 @@ def _write_block(file: Path, kind: str, force: bool, as_json: bool) -> int:
         name = fmu_name(file)
     except ValueError as error:
         raise InputError(f"--template {kind}: {error}") from error
-    written = texts(file, kind)
+    written = block_files(file, kind)
     for path in written:
         if path.is_file() and not force:
             raise InputError(f"{path}: is there already; give another name, or --force")
@@ -141,11 +141,11 @@ def _write_block(file: Path, kind: str, force: bool, as_json: bool) -> int:
     for path, text in written.items():
         write_text(path, text)
     fmu = FMU_FOLDER / f"{name}.fmu"
-    swaps = " ".join(f"--swap {component}={fmu}" for component in KINDS[kind].components)
+    swaps = " ".join(f"--swap {component}={fmu}" for component in BLOCK_TEMPLATES[kind].components)
     then = [
         f"grasp-cosim build {quote(str(file))}",
         f"grasp-cosim run --step 1e-3 {swaps}",
-        f"python -m pytest {quote(str(test_of(file)))}",
+        f"python -m pytest {quote(str(test_file_of(file)))}",
     ]
     lines = [f"{path}: written" for path in written] + [f"    then: {line}" for line in then]
     show(as_json, {"files": [str(path) for path in written], "then": then}, "\n".join(lines))
@@ -236,7 +236,7 @@ def _built_in_text(
         built_in.component(name, f"--as {name}")
         keys = [key.partition(".") for preset in built_in.presets.values() for key in preset]
         preset = [variable for component, _, variable in keys if component == name]
-        drafts[name] = replacing(built_in, name, fmu, path_from(folder, fmu), preset)
+        drafts[name] = draft_of(built_in, name, fmu, path_from(folder, fmu), preset)
         text = drafts[name].put_into(text)
     return text, drafts
 
@@ -249,9 +249,9 @@ def _from_below(text: str) -> str:
 def _as_json(draft: Draft) -> dict[str, Any]:
     """The matches, doubts and units of a component that was filled in, for JSON."""
     return {
-        "found": {name: match.variable.name for name, match in draft.found.items()},
-        "to_check": {name: match.doubt for name, match in draft.found.items() if match.doubt},
-        "units": {name: draft.theirs.by_name[name].unit for name in draft.found},
+        "found": {name: match.variable.name for name, match in draft.matches.items()},
+        "to_check": {name: match.doubt for name, match in draft.matches.items() if match.doubt},
+        "units": {name: draft.foreign.by_name[name].unit for name in draft.matches},
     }
 
 
@@ -260,9 +260,9 @@ def _report_lines(
 ) -> list[str]:
     lines = [f"{file}: written"]
     for name, draft in drafts.items():
-        doubtful = sum(bool(match.doubt) for match in draft.found.values())
+        doubtful = sum(bool(match.doubt) for match in draft.matches.values())
         check = f", {doubtful} of them to check: CHECK" if doubtful else ""
-        lines.append(f"{name}: {len(draft.found)} of the FMU's variables found{check}")
+        lines.append(f"{name}: {len(draft.matches)} of the FMU's variables found{check}")
     lines += [f"line {number}: {line}" for number, line in unfilled.items()]
     then = "when no TODO is left" if unfilled else "then"
     return [*lines, f"{then}: grasp-cosim run {quote(str(file))}"]

@@ -1,4 +1,4 @@
-"""Whether this machine loads an FMU, as far as its file says, and the fix; or by a trial."""
+"""Checks whether this machine loads an FMU, by its file alone or by a trial; each names a fix."""
 
 from __future__ import annotations
 
@@ -28,17 +28,20 @@ from ..interface.read import describe
 
 Status = Literal["ok", "warning", "problem"]
 Verdict = tuple[Status, str, str | None]
-"""What a check says: status, text, and the fix where one is needed."""
+"""The status, the message and, where one is needed, the fix that a check gives."""
 
-VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
+PYTHON_VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
 LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-LIBPYTHON = f"libpython{VERSION}{getattr(sys, 'abiflags', '')}.so.1.0"
+LIBPYTHON = f"libpython{PYTHON_VERSION}{getattr(sys, 'abiflags', '')}.so.1.0"
 """What a host that is not Python needs of this Python."""
 
-_PACKAGES = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"}
-"""Packages that are not called as their module."""
+MAX_LINKER_NAMES = 5
+"""So many libraries or symbols that the linker misses are named."""
 
-_TRIAL = """
+_PACKAGE_OF_MODULE = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml": "pyyaml"}
+"""Packages that are named otherwise than their module."""
+
+_TRIAL_PROGRAM = """
 import os, sys
 from pathlib import Path
 from grasp_cosim.fmi.process import load_here
@@ -54,7 +57,7 @@ print("freed")
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A finding of one check; fix is a command or an instruction to copy."""
+    """The finding of a check; `text` is its message, `fix` a command or an instruction to copy."""
 
     check: str
     status: Status
@@ -64,7 +67,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Unpacked:
-    """An unpacked FMU: what its description says, and the binary it would have to have here."""
+    """An unpacked FMU: what its description declares, and the binary that it must have here."""
 
     path: Path
     folder: Path
@@ -76,7 +79,9 @@ def examine(fmu: Path, load: bool = False) -> list[Finding]:
     """Check an FMU as far as its file says, which runs none of its code.
 
     With `load` it is loaded in a child process, too, and what it needs of this machine is checked.
-    InputError where fmu is no readable FMU.
+
+    Raises:
+        InputError: The file is no readable FMU.
     """
     with ScratchFolder() as scratch:
         unpacked = unpack(fmu, Path(scratch.name))
@@ -85,10 +90,13 @@ def examine(fmu: Path, load: bool = False) -> list[Finding]:
         if unpacked.declared.python:
             verdicts["script"] = script(unpacked)
         if load:
-            tried = trial(unpacked)
-            linked = linker(unpacked.binary)
-            needs = libraries(linked, loads=tried[0] == "ok")
-            verdicts |= {"host": host(unpacked, linked), "libraries": needs, "trial": tried}
+            trial_verdict = trial(unpacked)
+            linker_output = linker(unpacked.binary)
+            verdicts |= {
+                "host": host(unpacked, linker_output),
+                "libraries": libraries(linker_output, loads=trial_verdict[0] == "ok"),
+                "trial": trial_verdict,
+            }
         return [Finding(name, *verdict) for name, verdict in verdicts.items() if verdict]
 
 
@@ -97,19 +105,20 @@ def loads(findings: Iterable[Finding]) -> bool:
     return not any(f.status == "problem" for f in findings)
 
 
-def as_text(findings: Sequence[Finding], tried: bool) -> str:
+def findings_text(findings: Sequence[Finding], tried: bool) -> str:
     """The verdict, then one line for each finding, a fix below it."""
-    said = "" if tried else ", as far as the file says; --load tries"
-    lines = [f"loads on this machine: {'yes' if loads(findings) else 'no'}{said}"]
-    for f in findings:
-        lines.append(f"{f.status:8s} {f.check:12s} {f.text}")
-        lines += [f"{'':21s} fix: {f.fix}"] if f.fix else []
+    reservation = "" if tried else ", as far as the file says; --load tries"
+    lines = [f"loads on this machine: {'yes' if loads(findings) else 'no'}{reservation}"]
+    for finding in findings:
+        lines.append(f"{finding.status:8s} {finding.check:12s} {finding.text}")
+        if finding.fix:
+            lines.append(f"{'':21s} fix: {finding.fix}")
     return "\n".join(lines)
 
 
 def unpack(fmu: Path, folder: Path) -> Unpacked:
     """Unpack an FMU to a folder; InputError where it is none."""
-    found = describe(fmu)
+    declared = describe(fmu)
     try:
         with zipfile.ZipFile(fmu) as archive:
             for name in archive.namelist():
@@ -118,101 +127,126 @@ def unpack(fmu: Path, folder: Path) -> Unpacked:
             archive.extractall(folder)
     except Exception as error:  # zipfile and its decompressors raise whatever they like
         raise unreadable(fmu, str(error).replace(f"{folder}/", "")) from error
-    file = f"{found.identifier}{LIBRARY_SUFFIX}"
-    return Unpacked(fmu, folder, found, folder / "binaries" / this_machine(found.version) / file)
+    platform = folder / "binaries" / this_machine(declared.version)
+    binary_file = platform / f"{declared.identifier}{LIBRARY_SUFFIX}"
+    return Unpacked(fmu, folder, declared, binary_file)
 
 
 def description(fmu: Unpacked) -> Verdict:
-    """FMI version and kind."""
-    source = "needs Python" if fmu.declared.python else "native, needs no Python"
+    """Check that an FMU of this FMI version and kind is run here."""
+    language = "needs Python" if fmu.declared.python else "native, needs no Python"
     kind = ", ".join([f"FMI {fmu.declared.version}", *fmu.declared.kinds])
-    text = f"{kind}, made by {fmu.declared.tool or 'an unknown tool'}; {source}"
+    text = f"{kind}, made by {fmu.declared.tool or 'an unknown tool'}; {language}"
     if obstacle := of_kind(fmu.declared):
         return "problem", f"{text}; {obstacle.reason}", obstacle.remedy
     if "CoSimulation" not in fmu.declared.kinds:
         text += "; run here by a solver, elsewhere ask the vendor for an export for co-simulation"
-    if tied := of_loading(fmu.declared, ""):
-        return "warning", f"{text}; {tied.reason}", tied.remedy
+    if obstacle := of_loading(fmu.declared, ""):
+        return "warning", f"{text}; {obstacle.reason}", obstacle.remedy
     return "ok", text, None
 
 
 def binary(fmu: Unpacked) -> Verdict:
     """Check that there is a binary for this system and processor, of the name that it must have."""
-    wanted, ours = fmu.binary.relative_to(fmu.folder).as_posix(), fmu.binary.parent.name
+    expected = fmu.binary.relative_to(fmu.folder).as_posix()
+    platform = fmu.binary.parent.name
     if obstacle := of_binary(fmu.declared):
         return "problem", obstacle.reason, obstacle.remedy
-    there = f"there is: {choices(fmu.declared.platforms)}; this machine: {ours}"
+    platforms = f"there is: {choices(fmu.declared.platforms)}; this machine: {platform}"
     if fmu.binary.is_file():
-        return "ok", f"{wanted}; {there}", None
+        return "ok", f"{expected}; {platforms}", None
     files = choices(sorted(path.name for path in fmu.binary.parent.glob("*")))
-    return "problem", f"no {wanted}, but {files}; {there}", f"build it again for {ours}"
+    return "problem", f"no {expected}, but {files}; {platforms}", f"build it again for {platform}"
 
 
 def script(fmu: Unpacked) -> Verdict:
     """Check that the script of a Python FMU is there, parses here, and has what it imports."""
-    resources, fix = fmu.folder / "resources", "build it again with pythonfmu"
-    named = resources / "slavemodule.txt"  # which is elsewhere where a name has backslashes
-    name = named.read_text("utf-8", "replace").partition("\n")[0] if named.is_file() else ""
+    resources = fmu.folder / "resources"
+    name = _script_name(resources)
     if not (name and (resources / f"{name}.py").is_file()):
-        return "problem", f"no script: resources/slavemodule.txt names {name or 'none'}", fix
+        reason = f"no script: resources/slavemodule.txt names {name or 'none'}"
+        return "problem", reason, "build it again with pythonfmu"
     try:
-        outside = _outside(resources, name) - sys.stdlib_module_names
+        imported = sorted(_imports_from_outside(resources, name) - sys.stdlib_module_names)
     except (SyntaxError, ValueError) as error:
-        return "problem", f"no Python {VERSION}: {error}", "correct it and build the FMU again"
-    finders = [f.find_spec for f in sys.meta_path]  # sys.modules may hold an earlier one
-    if missing := sorted(n for n in outside if not any(find(n, None) for find in finders)):
-        fix = install_command(*(_PACKAGES.get(name, name) for name in missing))
+        reason = f"no Python {PYTHON_VERSION}: {error}"
+        return "problem", reason, "correct it and build the FMU again"
+    if missing := [module for module in imported if not _is_installed(module)]:
+        fix = install_command(*(_PACKAGE_OF_MODULE.get(module, module) for module in missing))
         return "problem", f"imports what is neither packed nor installed: {choices(missing)}", fix
-    text = f"resources/{name}.py imports, besides the standard library: {choices(sorted(outside))}"
+    text = f"resources/{name}.py imports, besides the standard library: {choices(imported)}"
     return "ok", text, None
 
 
-def _outside(resources: Path, script: str) -> set[str]:
-    """What a script imports at once from outside of the FMU.
+def _script_name(resources: Path) -> str:
+    """The module that an FMU of pythonfmu names as its script; empty where it names none."""
+    file = resources / "slavemodule.txt"  # which is elsewhere where a name has backslashes
+    if not file.is_file():
+        return ""
+    return file.read_text("utf-8", "replace").partition("\n")[0]
+
+
+def _is_installed(module: str) -> bool:
+    """True if this Python finds a module of that name; what it has loaded does not count."""
+    return any(finder.find_spec(module, None) for finder in sys.meta_path)
+
+
+def _imports_from_outside(resources: Path, script_name: str) -> set[str]:
+    """The modules that a script imports at once from outside of the FMU.
 
     An import that is allowed to fail, under try or if or in a function, does not count. SyntaxError
     or ValueError where the script does not parse.
     """
     with warnings.catch_warnings(action="ignore"):
-        tree = ast.parse((resources / f"{script}.py").read_bytes(), f"{script}.py")
-    names = [alias.name for n in tree.body if isinstance(n, ast.Import) for alias in n.names]
-    names += [n.module for n in tree.body if isinstance(n, ast.ImportFrom) and n.module]
-    packed = ("", *all_suffixes())
-    tops = {name.partition(".")[0] for name in names}
-    return {t for t in tops if not any((resources / f"{t}{end}").exists() for end in packed)}
+        tree = ast.parse((resources / f"{script_name}.py").read_bytes(), f"{script_name}.py")
+    names = set()
+    for statement in tree.body:
+        if isinstance(statement, ast.Import):
+            names |= {alias.name for alias in statement.names}
+        if isinstance(statement, ast.ImportFrom) and statement.module:
+            names.add(statement.module)
+    modules = {name.partition(".")[0] for name in names}
+    return {module for module in modules if not _is_packed(resources, module)}
+
+
+def _is_packed(resources: Path, module: str) -> bool:
+    """True if an FMU has a module in its resources: a folder, or a file of any kind of module."""
+    endings = ("", *all_suffixes())
+    return any((resources / f"{module}{ending}").exists() for ending in endings)
 
 
 def _run(*command: str, timeout: float = 20.0, cwd: Path | None = None) -> tuple[int | None, str]:
     """Exit code, None where it does not start or end in time, and output of a program."""
     try:
-        done = subprocess.run(  # noqa: S603  an FMU's code runs: that is the trial
+        process = subprocess.run(  # noqa: S603  an FMU's code runs: that is the trial
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             encoding="utf-8", errors="replace", cwd=cwd, timeout=timeout, check=False,
             env=os.environ | ({"TMPDIR": str(cwd)} if cwd else {}),
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired):
         return None, ""
-    return done.returncode, done.stdout
+    return process.returncode, process.stdout
 
 
 def linker(binary: Path) -> str:
-    """Words of the dynamic linker on a binary outside of Python; empty where it cannot tell."""
+    """The output of the dynamic linker on a binary outside of Python; empty where it has none."""
     return _run("env", "LC_ALL=C", "ldd", "-r", str(binary))[1]
 
 
-def host(fmu: Unpacked, linked: str) -> Verdict | None:
-    """What a host that is not Python needs for the binary of a Python FMU."""
-    if "libpython" in linked or not re.search("undefined symbol: _?Py", linked):
+def host(fmu: Unpacked, linker_output: str) -> Verdict | None:
+    """Check what a host that is not Python needs for the binary of a Python FMU."""
+    needs_python = re.search("undefined symbol: _?Py", linker_output)
+    if "libpython" in linker_output or not needs_python:
         return None
-    beside = Path(sys.base_prefix, "lib", LIBPYTHON)
-    fix = f"LD_PRELOAD={quote(str(beside) if beside.is_file() else LIBPYTHON)} HOST"
+    library = Path(sys.base_prefix, "lib", LIBPYTHON)
+    fix = f"LD_PRELOAD={quote(str(library) if library.is_file() else LIBPYTHON)} HOST"
     if fmu.declared.ours:
         fix += ", or grasp-cosim build --native"
     text = "bound to no libpython: hosts that are not Python miss the symbol _Py_NoneStruct"
     return "warning", text, fix
 
 
-_LACKS = {
+_LINKER_ERRORS = {
     r"(\S+) => not found": (
         "not found",
         "install the packages that hold them; of what is packed beside the binary: patchelf "
@@ -224,16 +258,22 @@ _LACKS = {
         "link the binary with the libraries that define them",
     ),
 }
-"""What the dynamic linker says, that in our words, and the fix; the first goes before the rest."""
+"""By the pattern of what the dynamic linker reports: our message and the fix.
+
+Of several that it reports the first of these is shown.
+"""
 
 
-def libraries(linked: str, loads: bool) -> Verdict | None:
-    """Check that the dynamic linker finds what the binary needs; loads says that it loads here."""
-    if not re.search("=>|statically linked", linked):
+def libraries(linker_output: str, loads: bool) -> Verdict | None:
+    """Check that the dynamic linker finds what the binary needs.
+
+    `loads` is true if the binary loads here.
+    """
+    if not re.search("=>|statically linked", linker_output):
         return None
-    for pattern, (what, fix) in _LACKS.items():
-        if names := dict.fromkeys(re.findall(pattern, linked)):
-            text = f"{what}: {choices(names, 5)}"
+    for pattern, (message, fix) in _LINKER_ERRORS.items():
+        if names := dict.fromkeys(re.findall(pattern, linker_output)):
+            text = f"{message}: {choices(names, MAX_LINKER_NAMES)}"
             if loads:  # a host that has libm, say, has them
                 return "warning", f"{text}; this host has them, others may not", fix
             return "problem", text, fix
@@ -245,19 +285,20 @@ def trial(fmu: Unpacked, timeout: float = 60.0) -> Verdict:
     if of_kind(fmu.declared) or of_binary(fmu.declared) or not fmu.binary.is_file():
         return "warning", "not loaded: of a kind that is not run here, or without a binary", None
     started = time.monotonic()
-    arguments = ["-P", "-u", "-c", _TRIAL, str(fmu.path.absolute())]
-    code, said = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
-    said = said.replace(f"{fmu.folder}/", "").replace(f"trial: {fmu.path.absolute()} ", "")
-    last = ["", *filter(None, map(str.strip, said.splitlines()))][-1]
+    arguments = ["-P", "-u", "-c", _TRIAL_PROGRAM, str(fmu.path.absolute())]
+    code, output = _run(sys.executable, *arguments, timeout=timeout, cwd=fmu.folder)
+    output = output.replace(f"{fmu.folder}/", "").replace(f"trial: {fmu.path.absolute()} ", "")
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
+    last_line = lines[-1] if lines else ""
     if code is None:
         return "problem", f"does not load and instantiate within {timeout:g} s", None
     if code < 0:
-        when = f"when instantiated; it says {last or 'nothing'}"
-        if last == "freed":
+        when = f"when instantiated; it says {last_line or 'nothing'}"
+        if last_line == "freed":
             when = "after it was freed"
         return "problem", f"crashes with {signal.Signals(-code).name} {when}", None
-    if code or last != "freed":
-        last = last.removeprefix("does not load: ") or "no reason given"
-        tied = of_loading(fmu.declared, last)
-        return "problem", f"does not instantiate: {last}", tied.remedy if tied else None
+    if code > 0 or last_line != "freed":
+        reason = last_line.removeprefix("does not load: ") or "no reason given"
+        obstacle = of_loading(fmu.declared, reason)
+        return "problem", f"does not instantiate: {reason}", obstacle.remedy if obstacle else None
     return "ok", f"loads, instantiates and frees in {time.monotonic() - started:.1f} s", None

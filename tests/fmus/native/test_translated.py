@@ -10,7 +10,7 @@ from random import Random
 import pytest
 from fmus.native.c_block import Both, loaded
 from grasp_cosim.fmu_export.shipped import block_of as block_of_ours
-from grasp_cosim.inspection.template import TEMPLATES
+from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from support.kinds import TRANSLATED
 from support.marks import part, platforms, seeds, slow
 from support.native_fmus import needs_gcc
@@ -18,7 +18,7 @@ from support.native_fmus import needs_gcc
 pytestmark = needs_gcc
 
 DOCS = Path(__file__).parents[3] / "docs"
-BLOCKS = [*TEMPLATES.glob("*_*.py"), DOCS / "moving_object.py"]
+BLOCKS = [*TEMPLATE_FOLDER.glob("*_*.py"), DOCS / "moving_object.py"]
 OWN = {block.stem: block for block in sorted(BLOCKS)}
 NAMES = [*TRANSLATED, *OWN]
 

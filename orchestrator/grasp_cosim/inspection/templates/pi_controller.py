@@ -92,11 +92,11 @@ def outputs(p: Params, s: State, u: Inputs) -> Outputs:
 
 def _errors(p: Params, u: Inputs) -> Pair:
     """How much too slowly each finger closes, in m/s."""
-    v_1, v_2 = _wanted(p, u.intensity[0]), _wanted(p, u.intensity[1])
+    v_1, v_2 = _closing_speed(p, u.intensity[0]), _closing_speed(p, u.intensity[1])
     return v_1 + u.velocity[0], v_2 - u.velocity[1]
 
 
-def _wanted(p: Params, intensity: float) -> float:
+def _closing_speed(p: Params, intensity: float) -> float:
     """The speed at which a finger is to close, in m/s."""
     return p.speed * p.near / max(p.near, intensity)
 
