@@ -27,9 +27,9 @@ from grasp_cosim.grasp.published.page import figures
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.view import draw_hand as draw_three_fingers
 from grasp_cosim.recording.read_back import load_run
-from grasp_cosim.report.plot import headed, new_figure, save
-from grasp_cosim.report.system import connections_svg, stand_alone
-from grasp_cosim.report.tables import Caption, about
+from grasp_cosim.report.plot import add_heading, new_figure, save_figure
+from grasp_cosim.report.system_html import connections_svg, stand_alone
+from grasp_cosim.report.wording import Caption, about
 from grasp_cosim.system.settings import settings
 from hand import hand_svg, tandem_svg, three_svg
 
@@ -113,8 +113,10 @@ def draw_evaluation(folder: Path) -> None:
     evidence = compared(grasp_system(), "simulation", os.cpu_count() or 1, progress=False)
     for name, (title, figure) in figures(evidence, "simulation").items():
         if name != "target_position":
-            headed(figure, Caption(f"Published simulation, GraspController: {title}", about({})))
-            save(figure, folder / f"{name}.png")
+            add_heading(
+                figure, Caption(f"Published simulation, GraspController: {title}", about({}))
+            )
+            save_figure(figure, folder / f"{name}.png")
 
 
 def draw_map(folder: Path) -> None:
@@ -144,8 +146,10 @@ def draw_layer_2(folder: Path) -> None:
     gain.legend(title="at", fontsize=8)
     phase.set(ylabel="phase of -L, \N{DEGREE SIGN}", xlabel="frequency, rad/s")
     phase.set(ylim=(-250.0, 160.0), yticks=[-180, -90, 0, 90])
-    headed(figure, Caption("Layer 2 on the way to the surface", about({})), "bars: phase margins")
-    save(figure, folder / "layer_2_loop.png")
+    add_heading(
+        figure, Caption("Layer 2 on the way to the surface", about({})), "bars: phase margins"
+    )
+    save_figure(figure, folder / "layer_2_loop.png")
 
 
 PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {

@@ -27,17 +27,17 @@ from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.recording.result import Result
 from grasp_cosim.report.plot import (
     BLUE,
-    DASHES,
+    FINGER_STYLES,
     GREY,
+    LINE_STYLES,
     RED,
-    STYLES,
-    finish,
-    headed,
+    add_heading,
+    finish_axes,
+    legend_below,
     new_figure,
-    one_legend,
-    save,
+    save_figure,
 )
-from grasp_cosim.report.tables import Caption, about
+from grasp_cosim.report.wording import Caption, about
 
 HERE = Path(__file__).parent
 
@@ -225,8 +225,8 @@ def _picture(
     """A grid of axes, saved as a picture under its title, the date and the version."""
     figure = new_figure(width, height)
     yield figure.subplots(*grid, squeeze=False, **shared)
-    headed(figure, Caption(title, about(None)))
-    save(figure, path)
+    add_heading(figure, Caption(title, about(None)))
+    save_figure(figure, path)
 
 
 def draw_limits(tables: Sequence[Runs], folder: Path) -> None:
@@ -250,7 +250,7 @@ def _in_columns(rows: Any) -> None:
         axes.set_ylabel("")
     for axes in rows[-1]:
         axes.set_xlabel("time in s")
-    one_legend(rows[0, 0].figure)
+    legend_below(rows[0, 0].figure)
 
 
 def draw_layers(cases: Runs, path: Path) -> None:
@@ -261,8 +261,8 @@ def draw_layers(cases: Runs, path: Path) -> None:
             run = cases[f"--case {case}"]
             for j in FINGERS:
                 gap = 1e3 * run.signals[f"plant.gap[{j}]"]
-                gaps.plot(run.time, gap, DASHES[j], color=COLOR[j], label=f"finger {j}")
-            finish(gaps, "gap in mm", legend=False)
+                gaps.plot(run.time, gap, FINGER_STYLES[j], color=COLOR[j], label=f"finger {j}")
+            finish_axes(gaps, "gap in mm", legend=False)
             draw_contact_forces(forces, run)
             draw_targets(target, [(run, "-", "")])
             gaps.set_title(f"Case {case}: {layer}", fontsize=10)
@@ -286,19 +286,19 @@ def draw_objects(box: Runs, tall: Runs, cup: Runs, path: Path) -> None:
         middle.axhline(-degrees * math.atan2(0.07, 0.1), color="black", ls=":", label="balance")
         _over_time(right, cup, "plant.squeeze", 1e3, "Case {}", "squeeze of the cup in mm")
         right.axhline(8.0, color="black", ls=":", label="damaged above")
-        one_legend(left.figure)
+        legend_below(left.figure)
 
 
 def _over_time(
     axes: Any, runs: Runs, name: str, factor: float, label: str, y: str, *, legend: bool = False
 ) -> None:
     """A signal of all runs; the label has {} in the place of the value in the first column."""
-    for plain, (value, run) in zip(STYLES, runs.items(), strict=False):
+    for plain, (value, run) in zip(LINE_STYLES, runs.items(), strict=False):
         named = label.format(value)
         style, colour = _CASES.get(named, (plain, BLUE))
         axes.plot(run.time, factor * run.signals[name], style, color=colour, label=named)
     axes.set_xlabel("time in s")
-    finish(axes, y, legend)
+    finish_axes(axes, y, legend)
 
 
 def draw_failures(tables: Sequence[Runs], path: Path) -> None:
@@ -311,12 +311,12 @@ def draw_failures(tables: Sequence[Runs], path: Path) -> None:
         fixed.plot(curve, [1e3 * gap_at_equal_intensity(r) for r in curve], color=GREY)
         fixed.set_title("unequal reflectances, fixed object", fontsize=10)
         fixed.set_xlabel("reflectance of the right face / left face")
-        finish(fixed, "gap of the second finger\nat the first contact in mm", legend=False)
+        finish_axes(fixed, "gap of the second finger\nat the first contact in mm", legend=False)
         fixed.legend(["simulated", "Eq. (9), equal intensities"], fontsize=8)
         free.set_title("reflectances 0.86 / 1, free object", fontsize=10)
         y = "position of the object in mm"
         _over_time(free, carried, "plant.object_position", 1e3, "{} kg", y, legend=True)
-        for style, (volts, run) in zip(STYLES, converter.items(), strict=False):
+        for style, (volts, run) in zip(LINE_STYLES, converter.items(), strict=False):
             speed = 1e3 * CLOSING[1] * run.signals["plant.velocity[1]"]
             before = ~run.signals["plant.contact[1]"].astype(bool) & (speed > 0.0)
             before &= np.cumsum(~before & (run.time > 1.0)) == 0
@@ -326,7 +326,7 @@ def draw_failures(tables: Sequence[Runs], path: Path) -> None:
         near.set_xlim(20.0, 0.0)
         near.set_ylim(0.0, 80.0)
         near.set_xlabel("gap of finger 1 in mm")
-        finish(near, "closing speed in mm/s")
+        finish_axes(near, "closing speed in mm/s")
         held.set_title("Coulomb friction of the fingers", fontsize=10)
         held.set_ylim(-1.0, 30.0)
         held.set_xlim(0.0, 8.0)
@@ -344,10 +344,10 @@ def draw_colour(laws: Runs, path: Path) -> None:
                 how = {"color": COLOR[j], "label": f"finger {j}, {face} face"}
                 gap = 1e3 * run.signals[f"plant.gap[{j}]"]
                 force = abs(run.signals[f"plant.contact_force[{j}]"])
-                gaps.plot(run.time, gap, DASHES[j], **how)
-                forces.plot(run.time, force, DASHES[j], **how)
-            finish(gaps, "gap in mm", legend=False)
-            finish(forces, "contact force in N", legend=False)
+                gaps.plot(run.time, gap, FINGER_STYLES[j], **how)
+                forces.plot(run.time, force, FINGER_STYLES[j], **how)
+            finish_axes(gaps, "gap in mm", legend=False)
+            finish_axes(forces, "contact force in N", legend=False)
             apart = run.metrics["time_difference"]
             gaps.set_title(f"black and white, {law} law: {apart:.2f} s apart", fontsize=10)
         _in_columns(rows)

@@ -147,7 +147,7 @@ def test_a_run_is_written_read_back_drawn_and_reported(python, folder):
 
         from grasp_cosim import System, load_run, simulate
         from grasp_cosim.metrics.metric import load_metrics
-        from grasp_cosim.report.page import write_page
+        from grasp_cosim.report.run_report import write_page
 
         system = System.load("oscillator.toml")
         result = simulate(system, metrics=load_metrics(Path("mine.py")))

@@ -21,7 +21,7 @@ from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.metrics import FINGERS, METRICS
 from grasp_cosim.grasp.presets import CASES, SYSTEM
 from grasp_cosim.grasp.scene import scene_script, scene_style
-from grasp_cosim.report.page import page_style, traces_script
+from grasp_cosim.report.traces_page import page_style, traces_script
 
 from . import wasm
 from .wasm import LAWS, MODELS, PLANTS, model, shipped

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from .metrics.metric import AnyOf, Metric, metric
     from .recording.read_back import load_run
     from .recording.result import Result
-    from .report.page import write_report
+    from .report.run_report import write_report
     from .ssp.to_archive import write_ssp
     from .sweeps.sweep import sweep
     from .system.description import System
@@ -98,7 +98,7 @@ _MODULES = {
     "simulate": "master.simulation",
     "sweep": "sweeps.sweep",
     "tandem_system": "tandem.system",
-    "write_report": "report.page",
+    "write_report": "report.run_report",
     "write_ssp": "ssp.to_archive",
 }
 """The modules of the public names, by which these are imported when they are asked for."""
@@ -114,9 +114,9 @@ _FOR_LOWER_PACKAGES: tuple[tuple[Kind, str, str, str], ...] = (
     ("groups", "grasp", "grasp.group", "GROUP"),
     ("groups", "hand", "hand.group", "GROUP"),
     ("groups", "tandem", "tandem.group", "GROUP"),
-    ("html", "Parameters", "report.system", "parameters_html"),
-    ("html", "Result", "report.tables", "result_html"),
-    ("html", "System", "report.system", "system_html"),
+    ("html", "Parameters", "report.system_html", "parameters_html"),
+    ("html", "Result", "report.html_tables", "result_html"),
+    ("html", "System", "report.system_html", "system_html"),
     ("pictures", "Result", "report.plot", "plot_signals"),
     ("readers", ".ssp", "ssp.from_archive", "read_ssp"),
     ("twins", "System", "twins.twins", "natives"),

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from grasp_cosim.recording.read_back import load_run
-from grasp_cosim.report.page import page_html
+from grasp_cosim.report.run_report import page_html
 from report.runs import grasp_run, write_run
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from grasp_cosim.grasp import pictures
 from grasp_cosim.grasp.scene import grasp_scene
-from grasp_cosim.report.page import page_html
+from grasp_cosim.report.run_report import page_html
 from report.runs import grasp_run, ring_run
 from report.test_page import Elements
 from support.marks import slow
@@ -37,7 +37,7 @@ def test_signals_go_by_roles():
     scene = grasp_scene(replace(run, signals=other, units=units, settings=settings))
     assert scene is not None
     assert scene.state["gap"] == {1: "hand.gap[1]", 2: "hand.gap[2]"}
-    assert scene.shown == [
+    assert scene.first_signals == [
         *(f"hand.{q}[{j}]" for q in ("gap", "contact_force", "velocity") for j in (1, 2)),
         "controller.target_position",
     ]

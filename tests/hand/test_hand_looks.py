@@ -7,7 +7,7 @@ import pytest
 from grasp_cosim import hand_system, simulate
 from grasp_cosim.hand.metrics import directions, is_disc
 from grasp_cosim.hand.view import _prism, draw_hand
-from grasp_cosim.report.page import page_html
+from grasp_cosim.report.run_report import page_html
 from report.javascript import in_browser
 
 SCENE = """

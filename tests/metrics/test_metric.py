@@ -18,7 +18,7 @@ from grasp_cosim.metrics.metric import (
     measure,
     needed,
 )
-from grasp_cosim.report.terminal import as_json
+from grasp_cosim.report.terminal import run_json
 
 TIME = np.array([0.0, 0.5, 1.0])
 GAP = np.array([0.3, 0.2, 0.1])
@@ -280,7 +280,7 @@ def test_a_name_is_a_column_and_a_key(name):
 
 def test_what_every_run_prints_is_no_name_of_a_metric(grasp):
     """No figure of `run --json` can take the place of a metric, or a metric that of one."""
-    told = as_json(simulate(grasp, step=1e-3, stop=0.01, realtime=Realtime(factor=100.0)))
+    told = run_json(simulate(grasp, step=1e-3, stop=0.01, realtime=Realtime(factor=100.0)))
     assert "realtime" in told
     assert {*told} - {m.name for m in METRICS} <= RESERVED
     for name in RESERVED:

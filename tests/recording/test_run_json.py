@@ -11,8 +11,8 @@ from grasp_cosim.comparison.comparison_page import write_comparison
 from grasp_cosim.recording.folder import RunFolder
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.report import terminal
-from grasp_cosim.report.page import write_report
-from grasp_cosim.report.tables import result_html
+from grasp_cosim.report.html_tables import result_html
+from grasp_cosim.report.run_report import write_report
 from grasp_cosim.system.scenario import read_events, read_faults
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -112,7 +112,7 @@ def test_it_reads_or_one_line_says_what_is_wrong(runs, tmp_path_factory, data):
         run = load_run(folder)
         assert run.metrics["steps"] == 20
         assert repr(run)
-        assert terminal.as_text(run)
+        assert terminal.run_text(run)
         assert result_html(run)
 
     read_anew(runs, data, tmp_path_factory, use)

@@ -6,8 +6,8 @@ import pytest
 from grasp_cosim import simulate
 from grasp_cosim.recording.read_back import load_run
 from grasp_cosim.recording.verdict import judge
-from grasp_cosim.report.page import page_html
-from grasp_cosim.report.terminal import as_json, as_text
+from grasp_cosim.report.run_report import page_html
+from grasp_cosim.report.terminal import run_json, run_text
 from grasp_cosim.system.parts import Acceptance, Condition, Limit, Port
 
 QUIET = {
@@ -93,8 +93,8 @@ def test_it_is_on_the_page_in_the_text_and_in_what_is_read_back(warned, tmp_path
     assert "Test protocol" in page
     assert "Failed: limits that were exceeded." in page
     assert read.origin["fmus"]["plant"]["sha256"] in page
-    assert "verdict               failed 1 of 2 criteria" in as_text(read)
-    assert as_json(read)["verdict"] == [c.as_dict() for c in read.verdict]
+    assert "verdict               failed 1 of 2 criteria" in run_text(read)
+    assert run_json(read)["verdict"] == [c.as_dict() for c in read.verdict]
 
 
 @pytest.fixture

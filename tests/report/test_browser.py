@@ -10,7 +10,7 @@ import pytest
 from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.comparison_page import comparison_html
 from grasp_cosim.recording.read_back import load_run
-from grasp_cosim.report.page import page_html
+from grasp_cosim.report.run_report import page_html
 from report.javascript import in_browser
 from report.runs import grasp_run, paced, ring_run, write_run
 from report.test_page import BY, GAP, two_runs

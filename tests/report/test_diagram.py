@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import pytest
-from grasp_cosim.report.diagram import Link, diagram_svg
+from grasp_cosim.report.diagram import Arrow, diagram_svg
 from support.marks import slow
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -25,21 +25,21 @@ controller.force[2] plant.force[2]
 
 def links(text):
     ends = [line.split() for line in text.split("\n") if line]
-    return [Link(*(tuple(end.split(".", 1)) for end in pair)) for pair in ends]
+    return [Arrow(*(tuple(end.split(".", 1)) for end in pair)) for pair in ends]
 
 
 def many(seed, components, connections):
     numbers = random.Random(seed)
     names = [f"c{k}" for k in range(components)]
     pairs = [(numbers.choice(names), numbers.choice(names)) for _ in range(connections)]
-    return names, [Link((a, f"y{k % 3}"), (b, f"u{k}")) for k, (a, b) in enumerate(pairs)]
+    return names, [Arrow((a, f"y{k % 3}"), (b, f"u{k}")) for k, (a, b) in enumerate(pairs)]
 
 
 CASES = {
     "grasp": (["plant", "sensor_1", "sensor_2", "controller"], links(GRASP_CONNECTIONS)),
     "ring of 64": (
         [f"c{k}" for k in range(64)],
-        [Link((f"c{k}", "y"), (f"c{(k + 1) % 64}", "u")) for k in range(64)],
+        [Arrow((f"c{k}", "y"), (f"c{(k + 1) % 64}", "u")) for k in range(64)],
     ),
     "64 at random": many(1, 64, 100),
     "12 at random": many(2, 12, 40),

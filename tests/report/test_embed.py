@@ -5,7 +5,7 @@ import zlib
 
 import numpy as np
 import pytest
-from grasp_cosim.report.embed import fit, packed
+from grasp_cosim.report.embed import excerpt_of, packed
 from report.javascript import run_node
 from support.marks import slow
 
@@ -48,7 +48,7 @@ def test_values_come_back_to_the_bit(values, tmp_path):
 
 def test_of_many_signals_a_page_takes_fewer_values():
     time = np.arange(5000.0)
-    few, many = (fit(time, {str(k): time for k in range(count)}) for count in (499, 501))
+    few, many = (excerpt_of(time, {str(k): time for k in range(count)}) for count in (499, 501))
     assert few.rows_per_pair is None
     assert len(many.time) * 502 <= 2_000_000
     assert len(many.signals) == 501
@@ -61,7 +61,7 @@ def test_a_thinned_run_keeps_the_extremes_of_each_block_and_the_end(rows):
         "a.y": np.random.default_rng(rows).normal(size=rows),
         "a.touch": np.arange(rows) % 700 == 5,
     }
-    shown = fit(time, signals, limit=600)
+    shown = excerpt_of(time, signals, max_values=600)
     size = shown.rows_per_pair
     assert size is not None
     assert len(shown.time) * 3 <= 600

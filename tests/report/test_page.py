@@ -14,8 +14,9 @@ from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.comparison_page import comparison_html
 from grasp_cosim.metrics.metric import Metric
 from grasp_cosim.recording.read_back import load_run
-from grasp_cosim.report.page import Scene, Zoom, page_html, write_report
-from grasp_cosim.report.tables import about, caption, changes
+from grasp_cosim.report.run_report import page_html, write_report
+from grasp_cosim.report.traces_page import Scene, Zoom
+from grasp_cosim.report.wording import about, caption, changes
 from report.runs import grasp_run, paced, ring_run, write_run
 from report.test_embed import unpacked
 
@@ -131,7 +132,7 @@ SCENE = Scene(
     style="#stage { color: red; }",
     scripts="const startScene = () => ({ draw() {}, toggle() {} });",
     state={"moments": [0.5], "text": "</script>"},
-    shown=["plant.gap[2]"],
+    first_signals=["plant.gap[2]"],
     colors={"plant.gap[2]": "--c3"},
     marks=[(0.5, "--c1")],
     zooms=[Zoom("<Half>", 0.25, 0.75, "f1")],

@@ -12,13 +12,13 @@ from report.runs import ring_run
 def saved(monkeypatch):
     """Collects the figures that are saved."""
     figures = []
-    save = plot.save
+    save = plot.save_figure
 
     def keep(figure, path):
         figures.append(figure)
         save(figure, path)
 
-    monkeypatch.setattr(plot, "save", keep)
+    monkeypatch.setattr(plot, "save_figure", keep)
     return figures
 
 
@@ -68,7 +68,7 @@ def test_of_many_signals_a_picture_has_those_that_matter(tmp_path):
     run = replace(run, settings={**run.settings, "connections": [ends], "changed": {}})
     figure = plot.plot_signals(run)
     drawn = {line.get_label() for axes in figure.axes for line in axes.lines}
-    assert len(drawn) == plot.MOST_SIGNALS
+    assert len(drawn) == plot.MAX_SIGNALS
     assert {"m999.y", "m998.y", "m000.y"} <= drawn
     assert "964 more signals: the page of `report`" in [t.get_text() for t in figure.texts][-1]
     figure = plot.plot_signals(run, of=["m500.y"])

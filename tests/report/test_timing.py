@@ -7,11 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from grasp_cosim.realtime.timing import Histogram, Overrun, Spread, Timing
-from grasp_cosim.report import timing as drawn
+from grasp_cosim.report import timing_chart
 from grasp_cosim.report.plot import RED
-from grasp_cosim.report.tables import Caption
 from grasp_cosim.report.terminal import timing_lines
-from grasp_cosim.report.timing import decades, duration, kept, looks, tail, timing_html
+from grasp_cosim.report.timing_chart import (
+    decade_limits,
+    duration,
+    exceedance,
+    part_styles,
+    timing_html,
+    timing_sentence,
+)
+from grasp_cosim.report.wording import Caption
 from matplotlib.colors import same_color
 from report.runs import PERIOD, paced
 from report.test_page import Elements
@@ -20,7 +27,7 @@ from report.test_page import Elements
 def test_a_tail_is_the_share_that_took_at_least_as_long():
     """Of 1, 2, 2, 3 and 90 us."""
     bars = Histogram((1e-6, 1.5e-6, 2.5e-6, 4e-6, 50e-6, 100e-6), (1, 2, 1, 0, 1))
-    assert tail(Spread(2e-6, 90e-6, 90e-6, 90e-6, 0.0), bars) == [
+    assert exceedance(Spread(2e-6, 90e-6, 90e-6, 90e-6, 0.0), bars) == [
         (1e-6, 1.0),
         (1.5e-6, 0.8),
         (2e-6, 0.5),  # the median
@@ -32,8 +39,13 @@ def test_a_tail_is_the_share_that_took_at_least_as_long():
 
 
 def test_an_axis_begins_where_the_clock_is_exact_and_has_a_decade_at_least():
-    assert decades([2e-9, 3e-9, PERIOD]) == pytest.approx((1e-7, 1e-2))
-    assert decades([0.0]) == decades([]) == decades([1e-9]) == pytest.approx((1e-7, 1e-6))
+    assert decade_limits([2e-9, 3e-9, PERIOD]) == pytest.approx((1e-7, 1e-2))
+    assert (
+        decade_limits([0.0])
+        == decade_limits([])
+        == decade_limits([1e-9])
+        == pytest.approx((1e-7, 1e-6))
+    )
 
 
 PARTS = {
@@ -66,15 +78,15 @@ BROKEN_OFF = replace(NONE_LATE, steps=0, parts={})
 )
 def test_any_timing_can_be_drawn(timing, tmp_path):
     path = tmp_path / "timing.png"
-    drawn.draw_timing(timing, 3.0, path, Caption("a run", "from 2026"))
+    timing_chart.draw_timing(timing, 3.0, path, Caption("a run", "from 2026"))
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
 def test_curves_of_parts_a_red_period_and_overruns_in_the_colours_of_their_culprits(monkeypatch):
     def figure_of(timing):
         figures = []
-        monkeypatch.setattr(drawn, "save", lambda figure, path: figures.append(figure))
-        drawn.draw_timing(timing, 3.0, Path(), Caption("a run", "from 2026"))
+        monkeypatch.setattr(timing_chart, "save_figure", lambda figure, _: figures.append(figure))
+        timing_chart.draw_timing(timing, 3.0, Path(), Caption("a run", "from 2026"))
         return figures[0].axes
 
     def points(line):
@@ -84,8 +96,8 @@ def test_curves_of_parts_a_red_period_and_overruns_in_the_colours_of_their_culpr
     above, below = figure_of(timing)
     lines = {line.get_label().partition(":")[0].strip(): line for line in above.lines}
     for part, spread in timing.parts.items():
-        line = lines[drawn.label(part)]
-        assert same_color(line.get_color(), looks(timing)[part][0])
+        line = lines[timing_chart.part_label(part)]
+        assert same_color(line.get_color(), part_styles(timing)[part][0])
         assert points(line)[-1] == [spread.worst, 1.0 / timing.steps]
     limits = [line for line in above.lines if same_color(line.get_color(), RED)]
     assert [points(line) for line in limits] == [[[PERIOD, 0.0], [PERIOD, 1.0]]]
@@ -93,7 +105,7 @@ def test_curves_of_parts_a_red_period_and_overruns_in_the_colours_of_their_culpr
     assert [line.get_label() for line in below.lines] == names
     for line, overrun in zip(below.lines, (LISTED[2], LISTED[0], LISTED[1]), strict=False):
         assert points(line) == [[overrun.time, overrun.late]]
-        assert same_color(line.get_color(), looks(timing)[overrun.culprit][0])
+        assert same_color(line.get_color(), part_styles(timing)[overrun.culprit][0])
     assert below.get_xlim() == (0.0, 3.0)
     assert below.get_title(loc="right") == "grey: 2 more, counted only"
     below = figure_of(paced(steps=100, hiccups=0))[1]
@@ -113,8 +125,8 @@ def test_durations():
 )
 def test_in_words_and_on_the_page(timing, monkeypatch, snapshot):
     """Names stay text; what is beyond the period is marked."""
-    monkeypatch.setattr(drawn, "_chart", lambda *_: "")
-    assert kept(timing) == snapshot
+    monkeypatch.setattr(timing_chart, "_chart_html", lambda *_: "")
+    assert timing_sentence(timing) == snapshot
     assert timing_lines(timing) == snapshot
     html = timing_html(timing, 3.0)
     assert not {tag for tag, _ in Elements(html).found} & {"sensor", "u", "a"}

@@ -2,7 +2,7 @@
 
 import pytest
 from grasp_cosim import simulate, tandem_system
-from grasp_cosim.report.page import page_html
+from grasp_cosim.report.run_report import page_html
 from grasp_cosim.tandem.view import draw_tandem
 from report.javascript import in_browser
 

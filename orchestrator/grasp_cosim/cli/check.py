@@ -16,7 +16,7 @@ from ..comparison.qualify import component_of
 from ..comparison.qualify import qualify as run_qualification
 from ..interface.read import check_runs
 from ..recording.log_names import LogNames
-from ..report.page import write_report
+from ..report.run_report import write_report
 from ..system.description import FILES
 from ..system.overrides import SECTIONS, Override
 from .frame import (

@@ -12,7 +12,7 @@ from ..recording.folder import FORMS, Form, RunFolder
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..report import terminal
-from ..report.timing import draw_result
+from ..report.timing_chart import draw_pictures
 from ..system.structure import SCHEMES
 from .frame import (
     INTERRUPTED,
@@ -116,7 +116,7 @@ def run(
         def finish(result: Result, error: SimulationError | None) -> None:
             _write(result, folder, out, plot, mdf)
             if error is None:
-                show(as_json, terminal.as_json(result), terminal.as_text(result))
+                show(as_json, terminal.run_json(result), terminal.run_text(result))
             elif out:
                 say(f"kept what was recorded, in {out}")
 
@@ -152,5 +152,5 @@ def _write(
         result.to_mdf(out / "signals.mf4")
     if plot and result.numbers:
         with waiting("drawing"):
-            for picture in draw_result(result, out or Path(), "png"):
+            for picture in draw_pictures(result, out or Path(), "png"):
                 say(f"drew {picture}")

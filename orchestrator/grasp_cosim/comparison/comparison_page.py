@@ -14,21 +14,18 @@ import numpy.typing as npt
 
 from ..base.files import write_text
 from ..base.text import counted, grouped
-from ..report.embed import LIMIT, Shown, fit
-from ..report.page import Scene, data_html, document, looks, moments, scripts, traces_html
-from ..report.tables import (
-    Caption,
-    about,
-    bullets,
-    caption,
-    changes,
-    number,
-    origin_rows,
-    scaled,
-    summary,
-    table,
-    text_table,
+from ..report.embed import MAX_VALUES, Excerpt, excerpt_of
+from ..report.html_tables import bullets, origin_rows, summary, table, text_table
+from ..report.traces_page import (
+    Scene,
+    columns_html,
+    log_times,
+    scripts,
+    signal_styles,
+    traces_html,
+    traces_page,
 )
+from ..report.wording import Caption, about, caption, changes, number, scaled
 from .bands import Compared, plain
 from .outcome import ComparisonData, QualificationData
 from .side import Side
@@ -70,11 +67,11 @@ def write_qualification(q: QualificationData, path: Path) -> bool:
         return False
     remarks = [*difference_lines(q.swap.differences), *notes(c)]
     text = f"{qualification_verdict(q)}: {reason(q)}"
-    write_text(path, _html(c, LIMIT, text, q.qualified, remarks))
+    write_text(path, _html(c, MAX_VALUES, text, q.qualified, remarks))
     return True
 
 
-def comparison_html(c: ComparisonData, limit: int = LIMIT) -> str:
+def comparison_html(c: ComparisonData, limit: int = MAX_VALUES) -> str:
     """Return the page as text; of more than `limit` values the signals are thinned."""
     return _html(c, limit, verdict(c), c.alike, [*absent_lines(c), *notes(c)])
 
@@ -103,7 +100,7 @@ def _html(
 ) -> str:
     """Return the page as text, with the headline at its top, and remarks on the runs."""
     time = np.union1d(*(run.part(c.begin, c.end).time for run in (c.a, c.b)))
-    embedded = fit(
+    embedded = excerpt_of(
         time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit
     )
     ids = {key: f"column{k}" for k, key in enumerate(embedded.signals)}
@@ -125,12 +122,12 @@ def _html(
         "signals-table": ("Signals, the worst first", f'<div class="pairs">{signals}</div>'),
     }
     titles = [str((s.result and s.result.origin.get("title")) or s.name) for s in (c.a, c.b)]
-    return document(
+    return traces_page(
         Caption(" and ".join(titles), about(None)),
         f'<span class="{"" if is_good else "warn"}">{escape(headline)}</span>',
         sections,
         _state(c, embedded, ids, scene, texts),
-        data_html(
+        columns_html(
             embedded.time,
             {ids[key]: values for key, values in embedded.signals.items()},
         ),
@@ -155,21 +152,21 @@ def _drawn(
 
 
 def _state(
-    c: ComparisonData, embedded: Shown, ids: Mapping[str, str], scene: Scene | None,
+    c: ComparisonData, embedded: Excerpt, ids: Mapping[str, str], scene: Scene | None,
     texts: Mapping[str, str],
 ) -> dict[str, Any]:  # fmt: skip
     """Return the data for the scripts, without the values of the signals."""
     logs = [run.result.log for run in (c.a, c.b) if run.result]
-    in_scene = [name for name in (scene.shown if scene else ()) if name in c.curves[0]]
+    in_scene = [name for name in (scene.first_signals if scene else ()) if name in c.curves[0]]
     worst = [s.name for s in c.signals[:AT_FIRST]]
     return {
         "rows": len(embedded.time),
         "names": list(c.names),
         "signals": [_signal_state(c, s, ids, texts) for s in c.signals],
         "shown": list(dict.fromkeys([*in_scene, *worst])),
-        **looks(scene),
+        **signal_styles(scene),
         "about": about(None),
-        "marks": [{"t": t, "color": "--fault"} for log in logs for t in moments(log)],
+        "marks": [{"t": t, "color": "--fault"} for log in logs for t in log_times(log)],
         "scene": None,
     }
 

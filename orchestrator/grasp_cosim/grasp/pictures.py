@@ -12,17 +12,17 @@ from ..base.text import fixed
 from ..recording.result import Result
 from ..report.plot import (
     BLUE,
-    DASHES,
+    FINGER_STYLES,
     GREY,
     RED,
-    drawn,
-    finish,
-    headed,
-    kept,
+    add_heading,
+    drawn_line,
+    finish_axes,
+    legend_below,
     new_figure,
-    one_legend,
+    saved_figure,
 )
-from ..report.tables import caption
+from ..report.wording import caption
 from .metrics import CLOSING, FINGERS, TARGET_POSITION, first_contact
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ class Line(NamedTuple):
 def draw_grasp(run: Result, path: Path | None = None, *beside: Line) -> Figure:
     """Gaps, contact forces, target and closing speed; on the right around the contacts.
 
-    With a `path` the figure is written there, see report.plot.save(); places `beside` the target
-    are drawn with it.
+    With a `path` the figure is written there, see report.plot.save_figure(); places `beside` the
+    target are drawn with it.
     """
     spans = _around_contacts(run)
     figure = new_figure(7.2 + 2.9 * len(spans), 8.0)
@@ -70,20 +70,20 @@ def draw_grasp(run: Result, path: Path | None = None, *beside: Line) -> Figure:
     for axes in rows[:, 0]:
         axes.sharex(rows[2, 0])
     _gaps(gaps, run, slice(None), FINGERS)
-    finish(gaps, "gap to the object in mm", legend=False)
+    finish_axes(gaps, "gap to the object in mm", legend=False)
     draw_contact_forces(contact, run)
     for line in beside:
         place = 1e3 * run.by_role[line.signal]
-        target.plot(*drawn(run.time, place), line.style, color=line.color, label=line.label)
+        target.plot(*drawn_line(run.time, place), line.style, color=line.color, label=line.label)
     draw_targets(target, [(run, "-", "")])
     target.set_xlabel("time in s")
     for (fingers, begin, end), column in zip(spans, rows[:, 1:].T, strict=True):
         _around(column, run, fingers, begin, end)
         for axes in rows[:, 0]:
             axes.axvspan(begin, end, color="#000000", alpha=0.06, linewidth=0.0)
-    one_legend(figure)
-    headed(figure, caption(run))
-    return kept(figure, path)
+    legend_below(figure)
+    add_heading(figure, caption(run))
+    return saved_figure(figure, path)
 
 
 def _around_contacts(run: Result) -> list[tuple[Sequence[int], float, float]]:
@@ -108,8 +108,8 @@ def _around(
     for j in fingers:
         force = abs(run.by_role[f"plant.contact_force[{j}]"][rows])
         speed = 1e3 * CLOSING[j] * run.by_role[f"plant.velocity[{j}]"][rows]
-        forces.plot(time, force, DASHES[j], color=COLOR[j], label=f"finger {j}")
-        speeds.plot(time, speed, DASHES[j], color=COLOR[j], label=f"finger {j}")
+        forces.plot(time, force, FINGER_STYLES[j], color=COLOR[j], label=f"finger {j}")
+        speeds.plot(time, speed, FINGER_STYLES[j], color=COLOR[j], label=f"finger {j}")
     speeds.set_xlabel("time in s")
     for axes, label in (
         (gaps, "gap in mm"),
@@ -119,13 +119,15 @@ def _around(
         axes.sharex(speeds)
         axes.set_xlim(begin, end)
         axes.locator_params(axis="x", nbins=4)
-        finish(axes, label, legend=False)
+        finish_axes(axes, label, legend=False)
 
 
 def _gaps(axes: Axes, run: Result, rows: slice, fingers: Sequence[int]) -> None:
     for j in fingers:
         gap = 1e3 * run.by_role[f"plant.gap[{j}]"][rows]
-        axes.plot(*drawn(run.time[rows], gap), DASHES[j], color=COLOR[j], label=f"finger {j}")
+        axes.plot(
+            *drawn_line(run.time[rows], gap), FINGER_STYLES[j], color=COLOR[j], label=f"finger {j}"
+        )
 
 
 def draw_contact_forces(axes: Axes, run: Result) -> None:
@@ -134,13 +136,15 @@ def draw_contact_forces(axes: Axes, run: Result) -> None:
     for j in FINGERS:
         force = abs(run.by_role[f"plant.contact_force[{j}]"])
         peaks.append(float(force.max()))
-        axes.plot(*drawn(run.time, force), DASHES[j], color=COLOR[j], label=f"finger {j}")
+        axes.plot(
+            *drawn_line(run.time, force), FINGER_STYLES[j], color=COLOR[j], label=f"finger {j}"
+        )
     highest = max(peaks)
     axes.set_ylim(-0.03 * min(highest, FORCE_LIMIT), 1.1 * min(max(highest, 1e-3), FORCE_LIMIT))
     if highest > FORCE_LIMIT:
         text = f"peaks: {' and '.join(fixed(peak, 0) for peak in peaks)} N"
         axes.text(0.99, 0.95, text, transform=axes.transAxes, ha="right", va="top", fontsize=8)
-    finish(axes, "contact force in N", legend=False)
+    finish_axes(axes, "contact force in N", legend=False)
 
 
 def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
@@ -151,11 +155,11 @@ def draw_targets(axes: Axes, runs: Sequence[tuple[Result, str, str]]) -> None:
     for result, style, label in (run for run in runs if TARGET_POSITION in run[0].by_role):
         target = 1e3 * result.by_role[TARGET_POSITION]
         name = f"target, {label}" if label else "target"
-        axes.plot(*drawn(result.time, target), style, color=TARGET, label=name)
+        axes.plot(*drawn_line(result.time, target), style, color=TARGET, label=name)
     result = runs[0][0]
     centre = 1e3 * result.by_role["plant.object_position"]
-    axes.plot(*drawn(result.time, centre), ":", color=GREY, label="centre of the object")
-    finish(axes, "position in mm", legend=False)
+    axes.plot(*drawn_line(result.time, centre), ":", color=GREY, label="centre of the object")
+    finish_axes(axes, "position in mm", legend=False)
 
 
 def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int) -> None:
@@ -177,9 +181,9 @@ def draw_contact_times(axes: Axes, rows: Sequence[Mapping[str, Any]], case: int)
             [r[key] for r in of_case if r["finger"] == j] for key in ("simulated", "published")
         )
         (dot, ring), name = MARKS[j], f"finger {j}"
-        axes.plot(x, simulated, dot if colours else DASHES[j], color=COLOR[j], label=name)
+        axes.plot(x, simulated, dot if colours else FINGER_STYLES[j], color=COLOR[j], label=name)
         axes.plot(x, published, ring, color=COLOR[j], mfc="none", label=f"{name}, published")
     axes.set_title(f"Case {case}", fontsize=10)
     latest = max(max(r["simulated"], r["published"]) for r in rows if r["finger"])
     axes.set_ylim(0.0, max(3.0, np.ceil(latest)))
-    finish(axes, "time to contact in s", legend=False)
+    finish_axes(axes, "time to contact in s", legend=False)

@@ -15,7 +15,7 @@ import numpy as np
 from ..base.si_units import known_unit
 from ..metrics.metric import resolved
 from ..recording.result import Result
-from ..report.page import Scene, Zoom
+from ..report.traces_page import Scene, Zoom
 from .metrics import FINGERS, TARGET_POSITION, fingers_of, first_contact, is_grasp, touching
 
 BEFORE, AFTER = 0.005, 0.03
@@ -72,7 +72,7 @@ def scene_of_fingers(
             "toSi": {n: c._asdict() for n in used if (c := result.to_si.get(n))},
             "contacts": contacts,
         },
-        shown=[*shown, *more],
+        first_signals=[*shown, *more],
         colors=_of_fingers(result, {str(j): f"--finger{j}" for j in fingers}),
         dashes=_of_fingers(result, {str(j): j - 1 for j in fingers}),
         marks=[(c["t"], f"--finger{c['finger']}") for c in contacts],

@@ -15,9 +15,19 @@ from ..grasp.presets import case_of, words_of
 from ..grasp.scene import scene_of_fingers
 from ..metrics.metric import resolved
 from ..recording.result import Result, View
-from ..report.page import Scene
-from ..report.plot import BLUE, GREY, RED, drawn, finish, headed, kept, new_figure, one_legend
-from ..report.tables import caption
+from ..report.plot import (
+    BLUE,
+    GREY,
+    RED,
+    add_heading,
+    drawn_line,
+    finish_axes,
+    legend_below,
+    new_figure,
+    saved_figure,
+)
+from ..report.traces_page import Scene
+from ..report.wording import caption
 from .metrics import directions, is_disc, is_hand
 
 if TYPE_CHECKING:
@@ -43,7 +53,7 @@ Points = npt.NDArray[np.complex128]
 def draw_hand(run: Result, path: Path | None = None) -> Figure:
     """Gaps, contact forces and closing speeds by finger; beside them the hand at the end.
 
-    With a `path` the figure is written there, see report.plot.save().
+    With a `path` the figure is written there, see report.plot.save_figure().
     """
     figure = new_figure(11.0, 7.5)
     grid = figure.add_gridspec(3, 2, width_ratios=[1.3, 1.0])
@@ -58,14 +68,14 @@ def draw_hand(run: Result, path: Path | None = None) -> Figure:
     ):
         axes.sharex(rows[-1])
         for i, k in enumerate(fingers_of(signals)):
-            line = drawn(run.time, factor * signals[f"plant.{name}[{k}]"])
+            line = drawn_line(run.time, factor * signals[f"plant.{name}[{k}]"])
             axes.plot(*line, linestyle=DASHES[i], color=COLORS[i], label=f"finger {k}")
-        finish(axes, label, legend=False)
+        finish_axes(axes, label, legend=False)
     rows[-1].set_xlabel("time in s")
     _from_above(figure.add_subplot(grid[:, 1]), run)
-    one_legend(figure)
-    headed(figure, caption(run))
-    return kept(figure, path)
+    legend_below(figure)
+    add_heading(figure, caption(run))
+    return saved_figure(figure, path)
 
 
 def _from_above(axes: Axes, run: Result) -> None:
@@ -104,7 +114,7 @@ def _from_above(axes: Axes, run: Result) -> None:
     title = f"seen from above at {run.time[-1]:g} s; arrows: forces on the object"
     axes.set_title(title, fontsize=10)
     axes.set_xlabel("x in mm")
-    finish(axes, "y in mm", legend=False)
+    finish_axes(axes, "y in mm", legend=False)
 
 
 def _prism(faces: Points, normals: Points, far: float) -> Points:
@@ -141,7 +151,7 @@ def hand_scene(result: Result) -> Scene | None:
         scene,
         style=scene.style + _text("hand.css"),
         scripts=f"{scene.scripts}\n{_text('hand.js')}",
-        shown=[name for name in scene.shown if name not in pose_signals],
+        first_signals=[name for name in scene.first_signals if name not in pose_signals],
     )
 
 

@@ -14,19 +14,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-LIMIT = 20_000_000
+MAX_VALUES = 20_000_000
 """So many values at most go into a page, 25 MB if they are smooth, 200 if they are pure noise; of
 longer runs the extremes are kept."""
 
-MANY, LIMIT_OF_MANY = 500, 2_000_000
-"""Of more signals than so many, so many values at most go into a page, which a browser opens."""
+MANY_SIGNALS, MAX_VALUES_OF_MANY_SIGNALS = 500, 2_000_000
+"""Of more signals than the first number a page has at most so many values as the second one, which
+a browser still opens."""
 
-EFFORT = 4
+COMPRESSION_LEVEL = 4
 """Of zlib: 10 s for the most values that go into a page; 9 takes minutes to save a tenth."""
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class Excerpt:
     """The rows of a run in its page: time in s and signals, thinned if rows_per_pair is not None.
 
     Then every two rows stand for rows_per_pair recorded ones: the lowest and the highest value of
@@ -38,27 +39,32 @@ class Shown:
     rows_per_pair: int | None
 
 
-def fit(
-    time: npt.NDArray[np.float64], signals: Mapping[str, npt.NDArray[Any]], limit: int = LIMIT
-) -> Shown:
-    """Return the run as it is if it has at most `limit` values, else thinned to fit."""
+def excerpt_of(
+    time: npt.NDArray[np.float64],
+    signals: Mapping[str, npt.NDArray[Any]],
+    max_values: int = MAX_VALUES,
+) -> Excerpt:
+    """Return the run as it is if it has at most `max_values` values, else thinned to these."""
     columns = 1 + len(signals)
-    limit = min(limit, LIMIT_OF_MANY) if columns > MANY else limit
-    if len(time) * columns <= limit:
-        return Shown(time, signals, None)
-    pairs = max((limit // columns - 1) // 2, 1)
-    size = -(-len(time) // pairs)
-    starts = np.arange(0, len(time), size)
-    middles = np.minimum(starts + size // 2, len(time) - 1)
-    kept = np.append(np.column_stack((time[starts], time[middles])), time[-1])
-    rows = np.flatnonzero(np.diff(kept, append=np.inf) > 0.0)  # the last block may be of one row
-    thinned = {name: _extremes(values, size)[rows] for name, values in signals.items()}
-    return Shown(kept[rows], thinned, size)
+    if columns > MANY_SIGNALS:
+        max_values = min(max_values, MAX_VALUES_OF_MANY_SIGNALS)
+    if len(time) * columns <= max_values:
+        return Excerpt(time, signals, None)
+    pairs = max((max_values // columns - 1) // 2, 1)
+    rows_per_pair = -(-len(time) // pairs)
+    starts = np.arange(0, len(time), rows_per_pair)
+    middles = np.minimum(starts + rows_per_pair // 2, len(time) - 1)
+    times = np.append(np.column_stack((time[starts], time[middles])), time[-1])
+    # The last block may have a single row, whose time is then there twice.
+    rows = np.flatnonzero(np.diff(times, append=np.inf) > 0.0)
+    extremes = {name: _extremes(values, rows_per_pair)[rows] for name, values in signals.items()}
+    return Excerpt(times[rows], extremes, rows_per_pair)
 
 
-def _extremes(values: npt.NDArray[Any], size: int) -> npt.NDArray[Any]:
+def _extremes(values: npt.NDArray[Any], block_rows: int) -> npt.NDArray[Any]:
     """The lowest and highest value of each block as they come, and the last value."""
-    blocks = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+    blocks = np.pad(values, (0, -len(values) % block_rows), mode="edge")
+    blocks = blocks.reshape(-1, block_rows)
     pairs = np.sort(np.column_stack((blocks.argmin(axis=1), blocks.argmax(axis=1))), axis=1)
     return np.append(np.take_along_axis(blocks, pairs, axis=1), values[-1])
 
@@ -67,6 +73,6 @@ def packed(values: npt.NDArray[Any]) -> str:
     """Values as base64 of deflated text; numbers and booleans become doubles, which are exact."""
     bits = np.ascontiguousarray(values, "<f8").view(np.int64)
     zero = np.int64(0)
-    second = np.diff(np.diff(bits, prepend=zero), prepend=zero)  # modulo 2^64
-    planes = second.astype("<i8").view(np.uint8).reshape(-1, 8).T
-    return base64.b64encode(zlib.compress(planes.tobytes(), EFFORT)).decode("ascii")
+    second_differences = np.diff(np.diff(bits, prepend=zero), prepend=zero)  # modulo 2^64
+    planes = second_differences.astype("<i8").view(np.uint8).reshape(-1, 8).T
+    return base64.b64encode(zlib.compress(planes.tobytes(), COMPRESSION_LEVEL)).decode("ascii")

@@ -6,41 +6,40 @@ from typing import Any
 from ..base.text import counted, fixed, significant
 from ..realtime.timing import Timing
 from ..recording.result import Result
-from .timing import kept
+from .timing_chart import timing_sentence
 
 
-def as_json(result: Result) -> dict[str, Any]:
+def run_json(result: Result) -> dict[str, Any]:
     """The metrics of a run and their units, and its timing where it was paced."""
-    timing = {"realtime": result.timing.as_dict()} if result.timing else {}
-    missing = list(result.measured.missing)
-    verdict = [criterion.as_dict() for criterion in result.verdict]
-    return {
-        **result.metrics,
-        "units": result.metric_units,
-        **({"verdict": verdict} if verdict else {}),
-        **({"missing_metrics": missing} if missing else {}),
-        **timing,
-    }
+    entries: dict[str, Any] = {**result.metrics, "units": result.metric_units}
+    if result.verdict:
+        entries["verdict"] = [criterion.as_dict() for criterion in result.verdict]
+    if result.measured.missing:
+        entries["missing_metrics"] = list(result.measured.missing)
+    if result.timing:
+        entries["realtime"] = result.timing.as_dict()
+    return entries
 
 
-def as_text(result: Result) -> str:
+def run_text(result: Result) -> str:
     """What a run came to, for people: a line for each metric."""
-    m: Mapping[str, Any] = result.metrics
+    metrics: Mapping[str, Any] = result.metrics
     lines = [
-        f"{counted(m['steps'], 'step')} of {1e3 * m['step']:g} ms, {m['scheme']}, "
-        f"{fixed(m['real_time_factor'], 2)} times as fast as real time"
+        f"{counted(metrics['steps'], 'step')} of {1e3 * metrics['step']:g} ms, "
+        f"{metrics['scheme']}, "
+        f"{fixed(metrics['real_time_factor'], 2)} times as fast as real time"
     ]
-    lines += [
-        f"{metric.title:22s}{_numbers(m[metric.name], metric.factor)} "
-        f"{metric.display_unit}".rstrip()
-        for metric in result.measured.metrics
-    ]
+    for metric in result.measured.metrics:
+        numbers = _numbers(metrics[metric.name], metric.factor)
+        lines.append(f"{metric.title:22s}{numbers} {metric.display_unit}".rstrip())
     lines += result.measured.missing
     if result.verdict:
         failed = [criterion for criterion in result.verdict if not criterion.passed]
-        said = f"failed {len(failed)} of" if failed else "passed all"
-        lines.append(f"{'verdict':22s}{said} {len(result.verdict)} criteria")
-    return "\n".join([*lines, *(timing_lines(result.timing) if result.timing else ())])
+        outcome = f"failed {len(failed)} of" if failed else "passed all"
+        lines.append(f"{'verdict':22s}{outcome} {len(result.verdict)} criteria")
+    if result.timing:
+        lines += timing_lines(result.timing)
+    return "\n".join(lines)
 
 
 def _numbers(value: Any, factor: float) -> str:
@@ -53,22 +52,24 @@ def _numbers(value: Any, factor: float) -> str:
 
 def timing_lines(timing: Timing) -> list[str]:
     """How a run kept to the clock, for people."""
-    parts, period = timing.parts, 1e3 * timing.period
+    period_ms = 1e3 * timing.period
     lines = [
         f"paced at {timing.real_time_factor:.4g} of real time, asked for {timing.factor:g}: a step "
-        f"every {period:g} ms",
-        *(
-            f"{label:22s}median {_ms(part.median)}  p99 {_ms(part.p99)}  p99.9 {_ms(part.p999)}  "
-            f"worst {_ms(part.worst)} ms at t = {part.worst_at:.6g} s"
-            for name, label in (("step", "step computes"), ("start", "start is late by"))
-            if (part := parts.get(name))
-        ),
+        f"every {period_ms:g} ms"
     ]
-    lines.append(f"{'overruns':22s}{kept(timing)}")
-    return [*lines, *(_advice(timing) if timing.overruns else ())]
+    for name, label in (("step", "step computes"), ("start", "start is late by")):
+        if part := timing.parts.get(name):
+            quantiles = f"{label:22s}median {_ms(part.median)}  p99 {_ms(part.p99)}"
+            worst = f"worst {_ms(part.worst)} ms at t = {part.worst_at:.6g} s"
+            lines.append(f"{quantiles}  p99.9 {_ms(part.p999)}  {worst}")
+    lines.append(f"{'overruns':22s}{timing_sentence(timing)}")
+    if timing.overruns:
+        lines += _advice(timing)
+    return lines
 
 
 def _advice(timing: Timing) -> list[str]:
+    """A line on what may help against overruns; none where nothing is sure to."""
     step = timing.parts["step"]
     if step.median > timing.period:
         return [
@@ -76,9 +77,9 @@ def _advice(timing: Timing) -> list[str]:
             f"period is {_ms(timing.period)} ms; take a longer step, or a smaller "
             "realtime.factor"
         ]
-    first = {name: n for name, n in timing.culprits.items() if name != "backlog"}
-    waking = first.get("start", 0) + first.get("between", 0)
-    if 2 * waking >= sum(first.values()) and not timing.granted:
+    counts = {name: count for name, count in timing.culprits.items() if name != "backlog"}
+    while_waiting = counts.get("start", 0) + counts.get("between", 0)
+    if 2 * while_waiting >= sum(counts.values()) and not timing.granted:
         return [
             "  mostly the machine let us wait: give the run a priority and a CPU of its own, "
             "--set realtime.priority=80 --set realtime.cpu=1, on an idle machine"

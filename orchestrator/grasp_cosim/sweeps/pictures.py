@@ -13,8 +13,16 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.text import counted
 from ..metrics.metric import Metric
-from ..report.plot import BLUE, COLORS, STYLES, finish, headed, kept, new_figure
-from ..report.tables import Caption
+from ..report.plot import (
+    BLUE,
+    LINE_COLORS,
+    LINE_STYLES,
+    add_heading,
+    finish_axes,
+    new_figure,
+    saved_figure,
+)
+from ..report.wording import Caption
 from .table import Table
 
 if TYPE_CHECKING:
@@ -56,8 +64,8 @@ def draw_sweep(
     else:
         figure = _each_column(table, numbers, metrics)
     subtitle = f"{counted(len(table), 'run')}, {len(table.errors)} of them failed"
-    headed(figure, Caption(title or f"Sweep of {', '.join(table.varied)}", subtitle))
-    return kept(figure, None if path is None else Path(path))
+    add_heading(figure, Caption(title or f"Sweep of {', '.join(table.varied)}", subtitle))
+    return saved_figure(figure, None if path is None else Path(path))
 
 
 def _curves(table: Table, over: str, metrics: Sequence[Metric]) -> Figure:
@@ -65,7 +73,7 @@ def _curves(table: Table, over: str, metrics: Sequence[Metric]) -> Figure:
     figure, panels = _grid(len(metrics))
     order = np.argsort(table[over], kind="stable")
     for axes, metric in zip(panels, metrics, strict=True):
-        looks = zip(metric.columns, cycle(STYLES), cycle(COLORS), strict=False)
+        looks = zip(metric.columns, cycle(LINE_STYLES), cycle(LINE_COLORS), strict=False)
         for column, style, color in looks:
             title, factor, _ = table.shown(column)
             axes.plot(
@@ -76,7 +84,7 @@ def _curves(table: Table, over: str, metrics: Sequence[Metric]) -> Figure:
                 marker=".",
                 label=title,
             )
-        finish(axes, _label(table, metric.name), legend=len(metric.columns) > 1)
+        finish_axes(axes, _label(table, metric.name), legend=len(metric.columns) > 1)
         axes.set_xlabel(_label(table, over))
     return figure
 
@@ -94,7 +102,7 @@ def _each_column(table: Table, numbers: Sequence[str], metrics: Sequence[Metric]
             figure.colorbar(colors, ax=axes, label=_label(table, column))
         else:
             axes.hist(values[np.isfinite(values)], bins="auto", color=BLUE)
-            finish(axes, "runs", legend=False)
+            finish_axes(axes, "runs", legend=False)
             axes.set_xlabel(_label(table, column))
     return figure
 

@@ -351,7 +351,7 @@ def as_text(table: Table) -> str:
 
 def as_html(table: Table) -> str:
     """The same for a notebook, and the first rows of the table."""
-    from ..report.tables import text_table  # only here: it takes time to load
+    from ..report.html_tables import text_table  # only here: it takes time to load
 
     summary, *failures = (f"{escape(line)}<br>" for line in _heads(table))
     rows = _study_rows(table) if is_study(table) else _statistics(table)

@@ -12,7 +12,7 @@ from ..grasp.presets import case_of, words_of
 from ..grasp.scene import grasp_scene
 from ..metrics.metric import resolved
 from ..recording.result import Result, View
-from ..report.page import Scene
+from ..report.traces_page import Scene
 from .metrics import WRIST, is_tandem
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ CARRIER = Line(WRIST, "wrist", "#2e8b57", "-.")
 def draw_tandem(run: Result, path: Path | None = None) -> Figure:
     """The picture of a grasp, with where the wrist is.
 
-    With a `path` the figure is written there, see report.plot.save().
+    With a `path` the figure is written there, see report.plot.save_figure().
     """
     return draw_grasp(run, path, CARRIER)
 
@@ -50,7 +50,7 @@ def tandem_scene(result: Result) -> Scene | None:
         title="Gripper in tandem",
         scripts=f"{scene.scripts}\n{_script()}",
         state={**scene.state, "signals": signals, "toSi": to_si, "wrist": wrist},
-        shown=[*scene.shown, wrist],
+        first_signals=[*scene.first_signals, wrist],
     )
 
 

@@ -8,9 +8,10 @@ from string import Template
 from typing import TYPE_CHECKING, Any
 
 from ...base.text import fixed
-from ...report.page import page_style
-from ...report.plot import as_svg, new_figure, one_legend
-from ...report.tables import about, table
+from ...report.html_tables import table
+from ...report.plot import as_svg, legend_below, new_figure
+from ...report.traces_page import page_style
+from ...report.wording import about
 from ...system.settings import changed
 from ...system.times import in_seconds
 from ..pictures import draw_contact_forces, draw_contact_times, draw_targets
@@ -192,7 +193,7 @@ def figures(evidence: Evidence, source: Source) -> dict[str, tuple[str, Figure]]
         axes.set_xlabel("time in s")
         axes.set_xlim(0.0, how.shown)
     for figure in (times, forces, targets):
-        one_legend(figure)
+        legend_below(figure)
     where = f"object at {1e3 * REFLECTANCE_X_M:.0f} mm"
     return {
         "contact_times": ("contact times, simulated and published", times),

@@ -14,8 +14,9 @@ from ..system.parameters import Parameters
 from ..system.settings import settings
 from ..system.structure import Structure
 from ..system.times import in_seconds
-from .diagram import Link, diagram_svg
-from .tables import number, text_table
+from .diagram import Arrow, diagram_svg
+from .html_tables import text_table
+from .wording import number
 
 
 def system_html(system: Structure) -> str:
@@ -44,28 +45,38 @@ def connections_svg(settings: Mapping[str, Any], units: Mapping[str, str | None]
     faults: dict[str, list[str]] = {}
     for fault in settings["faults"]:
         faults.setdefault(fault["connection"], []).append(fault["kind"])
-    links = []
-    for c in settings["connections"]:
-        label = [] if c["factor"] is None else [f"× {number(c['factor'])}"]
-        label += [f"+ {number(c['offset'])}"] if c["offset"] else []
-        label += faults.get(c["to"], [])
-        source, target = (tuple(c[end].split(".", 1)) for end in ("from", "to"))
-        links.append(Link(source, target, ", ".join(label), fault=c["to"] in faults))
-    boxes = {name: c["fmu"] for name, c in settings["components"].items()}
-    return diagram_svg(boxes, links, units)
+    arrows = []
+    for connection in settings["connections"]:
+        target = connection["to"]
+        labels = []
+        if connection["factor"] is not None:
+            labels.append(f"× {number(connection['factor'])}")
+        if connection["offset"]:
+            labels.append(f"+ {number(connection['offset'])}")
+        labels += faults.get(target, [])
+        ports = _port(connection["from"]), _port(target)
+        arrows.append(Arrow(*ports, ", ".join(labels), fault=target in faults))
+    components = {name: c["fmu"] for name, c in settings["components"].items()}
+    return diagram_svg(components, arrows, units)
+
+
+def _port(text: str) -> tuple[str, str]:
+    """The component and the variable of a port like plant.gap[1]."""
+    component, _, variable = text.partition(".")
+    return component, variable
 
 
 def stand_alone(svg: str) -> str:
     """A diagram with its style and its background, for where no page gives them."""
-    head, tag, rest = svg.partition("<defs>")
-    head = head.replace("<svg ", '<svg class="diagram" ', 1)
-    backing = '<rect width="100%" height="100%" rx="8" fill="var(--paper)"/>'
-    return f"{head}<style>\n{_style()}</style>{backing}{tag}{rest}"
+    opening, defs, drawing = svg.partition("<defs>")
+    opening = opening.replace("<svg ", '<svg class="diagram" ', 1)
+    background = '<rect width="100%" height="100%" rx="8" fill="var(--paper)"/>'
+    return f"{opening}<style>\n{_style()}</style>{background}{defs}{drawing}"
 
 
 @cache
 def _style() -> str:
-    """The part of the pages' style that is of its colours and of a diagram."""
+    """The rules of the pages' style for the colours and for a diagram."""
     css = (files(__package__) / "page/page.css").read_text("utf-8")
     colors, _, _ = css.partition("* {")
     rules = re.findall(r"^(?:\.diagram [.t]|#tip)[^{]*\{[^}]*\}\n", css, re.MULTILINE)

@@ -1,0 +1,195 @@
+"""The page of a run, HTML that needs nothing else: traces, metrics, connections, settings.
+
+More for one kind of system, like the animation of a grasp, comes from higher up as a Scene.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.errors import InputError
+from ..base.files import check_file, of_any_format, remove_parts, write_text
+from ..base.one_piece import is_stream
+from ..base.text import grouped
+from ..exchange.listener import Texts
+from ..recording.csv import quoted
+from ..recording.read_back import load_run
+from ..recording.result import Result
+from .embed import MAX_VALUES, Excerpt, excerpt_of
+from .html_tables import metrics_html, protocol_html, settings_html, summary, svg_button
+from .plot import main_signals
+from .system_html import connections_svg
+from .timing_chart import TIMING_STEM, draw_pictures, timing_html
+from .traces_page import (
+    Scene,
+    columns_html,
+    log_times,
+    scripts,
+    signal_styles,
+    traces_html,
+    traces_page,
+)
+from .wording import caption
+
+LOGGER = logging.getLogger(__name__)
+
+MAX_FIRST_SIGNALS = 6
+"""So many signals are shown when the page opens where no scene says which."""
+
+
+def write_report(
+    run: Result | str | Path, out: str | Path | None = None, title: str = ""
+) -> list[Path]:
+    """Write a page on a run, and the pictures of it.
+
+    Args:
+        run: The result, or the folder or file of one that load_run() reads.
+        out: The file of the page; by default report.html in the folder of the run, or in the
+            current one of a result that has none.
+        title: The title; "" for that of the run.
+
+    Returns:
+        The files: the page, and with matplotlib a picture beside it, and one of the timing of a run
+        in real time.
+
+    Raises:
+        InputError: The folder has no run, or the page cannot be written.
+    """
+    result = run if isinstance(run, Result) else load_run(run)
+    result = result.titled(title)
+    folder = result.folder or Path()
+    page = Path(out) if out else folder / "report.html"
+    if result.folder and result.wall_time is None:
+        LOGGER.warning("%s: unfinished, to t = %.6g s", folder, result.time[-1])
+    check_file(page)
+    remove_parts(page.parent, page.name, *of_any_format(result.view.stem, TIMING_STEM))
+    write_page(result, page, scene=result.view.scene(result))
+    files = [page]
+    if is_stream(page):
+        return files
+    try:
+        files += draw_pictures(result, page.parent)
+    except InputError as error:
+        LOGGER.warning("no picture: %s", error)
+    return files
+
+
+def write_page(
+    result: Result, path: Path, *, scene: Scene | None = None, max_values: int = MAX_VALUES
+) -> None:
+    """Write the page of a result, under its title: see wording.caption().
+
+    Of more than `max_values` values the signals are thinned, and the page says so.
+    """
+    write_text(path, page_html(result, scene=scene, max_values=max_values))
+
+
+def page_html(result: Result, *, scene: Scene | None = None, max_values: int = MAX_VALUES) -> str:
+    """Return the page as text, see write_page."""
+    columns = {name: _numbers(column) for name, column in result.items()}
+    excerpt = excerpt_of(result.time, columns, max_values)
+    heading = caption(result)
+    embedded = {f"signal{k}": values for k, values in enumerate(excerpt.signals.values())}
+    return traces_page(
+        heading,
+        summary(result.metrics),
+        _sections(result, excerpt, scene),
+        _state(result, excerpt, scene) | {"about": heading.about},
+        columns_html(excerpt.time, embedded),
+        [scripts("save", "panels"), scene.scripts if scene else ""],
+        scene.style if scene else "",
+    )
+
+
+def _sections(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str, tuple[str, str]]:
+    """The sections of the page by their ids, each its head and its HTML."""
+    sections = {}
+    if result.verdict:
+        sections["protocol"] = "Test protocol", protocol_html(result)
+    if scene:
+        sections["scene"] = scene.title, scene.html
+    sections["traces"] = "Traces", _traces_html(result, excerpt, scene)
+    sections["metrics"] = "Metrics", metrics_html(result)
+    if result.timing:
+        sections["timing"] = "Real time", timing_html(result.timing, float(result.time[-1]))
+    sections["connections"] = "Connections", _connections_html(result)
+    sections["settings"] = "Settings", settings_html(result)
+    return sections
+
+
+def _state(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str, Any]:
+    """Return the data for the scripts, without the values of the signals."""
+    marks = [*scene.marks] if scene else []
+    marks += [(time, "--fault") for time in log_times(result.log)]
+    first_signals = list(scene.first_signals) if scene else []
+    return {
+        "rows": len(excerpt.time),
+        "signals": [_signal_state(result, k, name) for k, name in enumerate(result.signals)],
+        "shown": first_signals or main_signals(result, MAX_FIRST_SIGNALS),
+        **signal_styles(scene),
+        "header": ",".join(map(quoted, ("time", *result.signals))),
+        "csv": "signals.csv" if excerpt.rows_per_pair is None else "signals_thinned.csv",
+        "marks": [{"t": time, "color": color} for time, color in marks],
+        "scene": scene.state if scene else None,
+    }
+
+
+def _signal_state(result: Result, k: int, name: str) -> dict[str, Any]:
+    """Return the data on the signal of this name, the k-th of the run, for the scripts.
+
+    Of Strings that are the texts that their numbers stand for, and the cells of a CSV with them.
+    """
+    values = result.signals[name]
+    state: dict[str, Any] = {
+        "name": name,
+        "unit": result.units[name],
+        "steps": values.dtype.kind != "f",
+        "text": result.descriptions.get(name, ""),
+        "id": f"signal{k}",
+        "texts": None,
+    }
+    if values.dtype == object:
+        texts = list(dict.fromkeys(values))
+        state |= {"texts": texts, "cells": [quoted(text) for text in texts]}
+    return state
+
+
+def _numbers(column: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A column as it is drawn: of a String the numbers of its texts, in the order they came."""
+    if column.dtype != object:
+        return column
+    texts = Texts()
+    return np.array([texts.number(text) for text in column])
+
+
+def _traces_html(result: Result, excerpt: Excerpt, scene: Scene | None) -> str:
+    points = f"{grouped(len(result.time))} points of {len(excerpt.signals)} signals"
+    exactness = f"All {points} are in this page, to the last bit."
+    if excerpt.rows_per_pair is not None:
+        exactness = (
+            f"<b>Of {points} this page keeps, of each {excerpt.rows_per_pair}, the lowest and the "
+            "highest value;</b> all are in signals.csv."
+        )
+    return traces_html(
+        exactness,
+        {name: result.units[name] for name in result.signals},
+        result.descriptions,
+        scene.zooms if scene else (),
+        '<button id="csv" type="button">CSV</button>',
+    )
+
+
+def _connections_html(result: Result) -> str:
+    svg = connections_svg(result.settings, result.units)
+    return (
+        f'<div class="diagram">{svg}</div>'
+        f"{svg_button('.diagram svg', 'connections')}"
+        '<p class="hint">From left to right in the order of execution. Above: connections past '
+        "others. Dashed, below: connections back to a component that steps earlier. Hold the "
+        "pointer over one for its name.</p>"
+    )
