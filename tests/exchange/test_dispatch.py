@@ -170,6 +170,33 @@ def test_what_grows_evenly_trips_at_six_decades(rate):
     assert 6.0 <= np.log10(curve[watch(curve)[0]]) < 7.5
 
 
+def stairs(spans):
+    """A curve that stays at each decade for so many rows, and at last where it is."""
+    reached = np.cumsum([0, *spans])
+    return 10.0 ** (np.searchsorted(reached, K, side="right") - 1.0)
+
+
+@pytest.mark.parametrize(
+    ("spans", "trips"),
+    [
+        ([30] * 6, True),
+        ([1] * 6, True),
+        ([30] * 5, False),
+        ([75, 30, 30, 30, 30, 75], True),  # one takes 2.5 times as long as another
+        ([76, 30, 30, 30, 30, 76], False),
+        ([40, 40, 40, 50, 50, 50], True),  # the second half takes 1.25 times as long
+        ([40, 40, 40, 50, 50, 51], False),
+        ([50, 50, 50, 40, 40, 40], True),
+        ([200, 30, 30, 30, 30, 30, 30], True),  # only the last six count
+        ([0, 30, 30, 30, 30, 30], False),
+        ([0] * 6, False),
+    ],
+)
+def test_six_decades_that_take_about_equally_long_are_growth(spans, trips):
+    found = watch(stairs(spans))
+    assert (None if found is None else found[0]) == (sum(spans) if trips else None)
+
+
 GROWN = 10.0 ** (K / 500.0)
 """Up to 1e8."""
 

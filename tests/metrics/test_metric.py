@@ -181,6 +181,29 @@ def test_metrics_that_lack_the_same_are_named_in_one_line():
     assert found.missing == (f"no {', '.join(lost)}, carried: plant lacks object_position",)
 
 
+def test_of_a_group_the_rest_is_named_where_most_is_lost():
+    """Of each group for itself: half of the first is there, of the second one of three."""
+    first = [made(n, lambda _: 1.0, group="b", needs=(f"plant.{n}",)) for n in ("gap", "speed")]
+    second = [
+        made(n, lambda _: 1.0, group="a", needs=("plant.gap" if n == "q" else "plant.speed",))
+        for n in ("p", "q", "r")
+    ]
+    assert measure(signals(), [*first, *second]).missing == (
+        "no speed, metrics of the a but q: plant lacks speed",
+    )
+    assert measure(signals(), [*second, *first]).missing == (
+        "no metrics of the a but q, speed: plant lacks speed",
+    )
+    assert measure(signals(), [first[1], second[0]]).missing == (
+        "no metrics of the b, metrics of the a: plant lacks speed",
+    )
+
+
+def test_of_an_array_that_is_not_there_the_first_element_is_missed():
+    touch = made("touch", lambda _: [0.0], needs=["plant.speed[*]"], entries=("finger *",))
+    assert measure(signals(), [touch]).missing == ("no touch: plant lacks speed[1]",)
+
+
 def test_a_grasp_whose_components_have_other_names_is_told_of_the_roles():
     run = grasp_signals()
     names = {"plant": "gripper", "controller": "law"}
@@ -350,6 +373,15 @@ def test_a_file_that_is_no_python_is_not_run(tmp_path):
     path = tmp_path / "ball.toml"
     path.write_text("raise_an_error_if_run", "utf-8")
     with pytest.raises(InputError, match=r"ball\.toml: must be a Python file, NAME\.py$"):
+        load_metrics(path)
+
+
+def test_a_file_that_cannot_be_read_is_one_line(tmp_path):
+    path = tmp_path / "mine.py"
+    with pytest.raises(InputError, match=r"mine\.py: No such file .*; must be a Python file$"):
+        load_metrics(path)
+    path.write_bytes(b"x = '\xff'\n")
+    with pytest.raises(InputError, match=r"mine\.py: .*0xff.*; must be a Python file$"):
         load_metrics(path)
 
 

@@ -113,6 +113,26 @@ def test_the_unit_of_what_need_not_be_there_counts_where_it_is(load):
             in_si(load(y="N"), [m])
 
 
+def test_a_need_that_is_not_there_hides_none_behind_it(load):
+    """Nor does one without a unit, or one of which the first alternative is not there."""
+    for behind in ({"gone": "m", "x": "m"}, {"y": None, "x": "m"}):
+        used = Metric("used", travel.function, uses={f"room.{n}": u for n, u in behind.items()})
+        with pytest.raises(InputError, match=r"room\.x is in N; used must know its unit"):
+            in_si(load(x="N"), [used])
+
+
+def test_only_numbers_are_taken_to_be_in_si(load, tmp_path):
+    """A Boolean and an Integer have no unit, and need none."""
+    load()
+    kinds = {"on": "Boolean", "count": "Integer"}
+    outputs = {n: f'causality="output" variability="discrete" | {k}' for n, k in kinds.items()}
+    write_fmu(tmp_path / "room.fmu", ROOM | outputs)
+    system = System.load(tmp_path / "rooms.toml")
+    assert {str(port) for port in system.observed} >= {"room.on", "room.count"}
+    notes = in_si(system, (Metric("free", travel.function),)).notes
+    assert notes == ("room.x, room.y: no unit, taken to be in SI",)
+
+
 def test_what_a_metric_may_read_without_a_unit_is_said(load):
     free = Metric("free", travel.function)
     note = ("room.x: no unit, taken to be in SI",)

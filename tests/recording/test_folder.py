@@ -355,6 +355,9 @@ def test_signals_that_are_damaged_are_refused_in_one_line(tmp_path, csv, reason)
         ({"types": {"a.on": "bit"}}, "type of a.on = 'bit': must be one of float64,"),
         ({"types": {"a.x": "int64"}}, "a.x = int64: must be a type of its values, like 1.5"),
         ({"units": {"a.x": "m"}}, "those of the recorded columns: a.x, a.on"),
+        ({"units": {"a.on": None, "a.x": "m"}}, "those of the recorded columns: a.x, a.on"),
+        ({"units": {"a.x": "m", "b.y": None}}, "units are those of a.x, b.y; must be those of"),
+        ({"units": {"a.on": None, "a.a": "m"}}, "units are those of a.on, a.a; must be those of"),
         ({"to_si": {"a.x": 1.0}}, "to_si: a.x = 1.0; must be a JSON object"),
     ],
 )
@@ -368,6 +371,14 @@ def test_a_run_json_that_is_damaged_is_refused_in_one_line(tmp_path, content, re
     assert message.startswith(f"{tmp_path / 'run.json'}: ")
     assert reason in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("column", [[3.0, 1.5], [3.0, -1.5], [-2.0, 2.25]])
+def test_the_value_that_has_no_type_is_named(tmp_path, column):
+    rows = "".join(f"{k / 10},{value},1\n" for k, value in enumerate(column))
+    written(tmp_path, f'"time","a.x","a.on"\n{rows}', types={"a.x": "int64"})
+    with pytest.raises(InputError, match=f"must be a type of its values, like {column[1]}$"):
+        load_run(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["run.json", "signals.csv"])

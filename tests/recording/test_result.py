@@ -42,6 +42,21 @@ def test_a_decimated_result_keeps_its_times_in_every_format(result, tmp_path):
     assert found[GAP] == "m"
 
 
+@pytest.mark.parametrize("start", [0.5, 1.0])
+def test_a_run_that_starts_later_keeps_its_times_in_every_format(grasp, tmp_path, start):
+    system = grasp.with_settings({"experiment.start": start, "experiment.stop": start + 0.01})
+    few = simulate(system, every=30)
+    points = [*(round(start + k * 0.003, 9) for k in range(4)), round(start + 0.01, 9)]
+    assert few.time.round(9).tolist() == points
+    few.save(tmp_path / "csv")
+    few.save(tmp_path / "arrow", "arrow")
+    few.to_mdf(tmp_path / "s.mf4")
+    for time in (*(load_run(tmp_path / form).time for form in ("csv", "arrow")),
+                 read_mdf(tmp_path / "s.mf4")[0]):  # fmt: skip
+        assert time.tolist() == few.time.tolist()
+    assert few.metrics["steps"] == load_run(tmp_path / "csv").metrics["steps"] == 100
+
+
 def test_json_has_the_metrics_and_what_led_to_them(grasp, result, tmp_path):
     told = replace(
         result,

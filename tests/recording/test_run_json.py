@@ -168,3 +168,16 @@ def test_a_wrong_entry_of_a_component_is_named(runs, tmp_path, entry, value):
     (tmp_path / "run.json").write_text(json.dumps(changed))
     with pytest.raises(InputError, match=rf"run.json: components: plant: {entry} = .*; must be "):
         load_run(tmp_path)
+
+
+@pytest.mark.parametrize("end", ["from", "to"])
+@pytest.mark.parametrize("number", [0, 3])
+def test_a_connection_of_no_component_is_named(runs, tmp_path, end, number):
+    folder, written = runs[0]
+    changed = copy.deepcopy(written)
+    changed["connections"][number][end] = "sensr_1.gap"
+    (tmp_path / "signals.csv").write_bytes((folder / "signals.csv").read_bytes())
+    (tmp_path / "run.json").write_text(json.dumps(changed))
+    said = rf"connections\[{number}\]: {end} = 'sensr_1\.gap': no component"
+    with pytest.raises(InputError, match=said):
+        load_run(tmp_path)
