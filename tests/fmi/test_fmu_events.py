@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from grasp_cosim import SimulationError
 from grasp_cosim.base.calls import Call
-from grasp_cosim.fmi.events import ITERATIONS, MOST_DENSE, ConnectedInputs, Events
+from grasp_cosim.fmi.events import MAX_DENSE_EVENTS, MAX_UPDATES, ConnectedInputs, Events
 
 
 def refuse(what, time, must=""):
@@ -58,7 +58,7 @@ def test_inputs_arrive_with_each_tick_and_its_clock_is_scheduled():
 
 
 def test_what_does_not_settle_ends_the_run():
-    with pytest.raises(SimulationError, match=f"does not settle an event in {ITERATIONS} iter"):
+    with pytest.raises(SimulationError, match=f"does not settle an event in {MAX_UPDATES} iter"):
         Events(clocks(), refuse).settle(0.1, lambda: AGAIN, lambda _: None)
     with pytest.raises(SimulationError, match="names nan as the time of its next event"):
         Events(clocks(), refuse).settle(0.1, updates((*NEXT[:5], math.nan)), lambda _: None)
@@ -66,13 +66,13 @@ def test_what_does_not_settle_ends_the_run():
 
 def test_events_that_come_one_upon_another_end_the_run():
     events, apart = Events(clocks(), refuse), Events(clocks(), refuse)
-    for k in range(MOST_DENSE):
+    for k in range(MAX_DENSE_EVENTS):
         events.count(0.25 * k, 0.25, 1.0)
         apart.count(0.5 * k, 0.25, 1.0)
-    apart.count(0.5 * MOST_DENSE, 0.25, 1.0)
+    apart.count(0.5 * MAX_DENSE_EVENTS, 0.25, 1.0)
     message = r"next at t = 300 s\) at t = 250 s; must have .* or have a shorter step than 1 s$"
     with pytest.raises(SimulationError, match=message):
-        events.count(0.25 * MOST_DENSE, 0.25, 1.0, 300.0)
+        events.count(0.25 * MAX_DENSE_EVENTS, 0.25, 1.0, 300.0)
 
 
 def test_inputs_are_passed_on_once_for_each_change():

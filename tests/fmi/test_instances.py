@@ -17,7 +17,8 @@ import fmpy.fmi1
 import numpy as np
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
-from grasp_cosim.fmi.co_simulation import CONVENTION, SharedInstance, formatted, logger_type
+from grasp_cosim.fmi.co_simulation import SharedInstance
+from grasp_cosim.fmi.fmi2_logger import CONVENTION, formatted, logger_type
 from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
 from grasp_cosim.fmi.process import load
 from grasp_cosim.interface.obstacles import this_platform

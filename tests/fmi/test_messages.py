@@ -7,7 +7,7 @@ import sys
 import pytest
 from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi.instance import ERROR, OK, WARNING
-from grasp_cosim.fmi.messages import KEPT, Message, Messages
+from grasp_cosim.fmi.messages import MAX_KEPT, Message, Messages
 from support.marks import engines, needs_pythonfmu, slow
 from support.native_fmus import needs_gcc, talker
 
@@ -182,12 +182,12 @@ def test_settings_of_a_command_line_name_categories(tmp_path):
 
 def test_errors_take_the_last_messages_and_leave_the_warnings():
     messages = Messages("a", False, lambda: 0.5)
-    for number in range(KEPT + 3):
+    for number in range(MAX_KEPT + 3):
         messages.take(WARNING, b"w%d" % number)
     messages.take(ERROR, b"the lamp\nis broken")
-    assert messages.reasons() == [*(f"w{n}" for n in range(4, KEPT + 3)), "the lamp\nis broken"]
+    assert messages.reasons() == [*(f"w{n}" for n in range(4, MAX_KEPT + 3)), "the lamp\nis broken"]
     assert messages.reasons() == []
-    assert messages.remarks() == [f"a: warning at t = 0.5 s: w0; {KEPT + 2} more followed"]
+    assert messages.remarks() == [f"a: warning at t = 0.5 s: w0; {MAX_KEPT + 2} more followed"]
 
 
 def test_an_error_has_the_messages_of_its_step():

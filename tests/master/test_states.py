@@ -7,7 +7,7 @@ import pytest
 from fmi.test_instances import KINDS, alone
 from grasp_cosim import InputError, Realtime, SimulationError, System, simulate
 from grasp_cosim.exchange.listener import Listener
-from grasp_cosim.fmi.events import MOST_DENSE
+from grasp_cosim.fmi.events import MAX_DENSE_EVENTS
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.system.parts import Component, Condition, Connection, Event, Fault, Limit, Port
 from support.marks import engines, needs_pythonfmu, slow
@@ -179,7 +179,7 @@ def test_an_event_that_is_met_again_and_again_is_no_chatter(tmp_path):
     with simulate.session(system, engine="python") as session:
         session.step()
         state = session.save()
-        for _ in range(MOST_DENSE + 1):
+        for _ in range(MAX_DENSE_EVENTS + 1):
             session.step()
             session.restore(state)
 

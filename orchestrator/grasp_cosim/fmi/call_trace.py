@@ -60,7 +60,7 @@ class CallTrace:
     """Writes the calls of one instance to a file, to which it appends."""
 
     def __init__(
-        self, component: str, path: Path, functions: type, now: Callable[[], float]
+        self, component: str, path: Path, functions: type, clock: Callable[[], float]
     ) -> None:
         """Open the file; InputError where that cannot be written.
 
@@ -68,10 +68,10 @@ class CallTrace:
             component: The name of the component, for errors.
             path: The file.
             functions: FMPy's class of the instance, whose methods declare the functions of FMI.
-            now: Returns the simulated time in s.
+            clock: Returns the simulated time in s.
         """
         self._component, self._path = component, path
-        self._functions, self._now = functions, now
+        self._functions, self._clock = functions, clock
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         except OSError as error:
@@ -83,14 +83,14 @@ class CallTrace:
         SimulationError where the file cannot be written to any more.
         """
         passed, returned = _signature(self._functions, name)
-        listed = [_in_words(argument, arguments) for argument in passed]
-        self._write(f"t={self._now()!r} {name}({', '.join(listed)}")
+        inputs = [_in_words(argument, arguments) for argument in passed]
+        self._write(f"t={self._clock()!r} {name}({', '.join(inputs)}")
         try:
             answer = function(*arguments)
         except FMICallException as error:
             self._write(f") -> {_status(error.status)}\n")
             raise
-        separator = ", " if listed and returned else ""
+        separator = ", " if inputs and returned else ""
         results = [_in_words(argument, arguments) for argument in returned]
         self._write(f"{separator}{', '.join(results)}){_outcome(name, answer)}\n")
         return answer
@@ -180,8 +180,8 @@ def _in_words(argument: Argument, arguments: Sequence[Any]) -> str:
     elements = _elements(argument.kind, value, size)
     if argument.name == BYTES_OF_STATE:
         return f"{argument.name}={bytes(elements).hex()}"
-    listed = [_literal(argument.kind, element) for element in elements]
-    return f"{argument.name}=[{', '.join(listed)}]"
+    literals = [_literal(argument.kind, element) for element in elements]
+    return f"{argument.name}=[{', '.join(literals)}]"
 
 
 def _plain(kind: Any, value: Any) -> Any:

@@ -31,7 +31,7 @@ Bind = Callable[..., Callable[..., int]]
 """Gives a function of the FMU, for its instance, by its name and the types of its arguments."""
 
 Refuse = Callable[[str, int], SimulationError]
-"""Gives the error for what the FMU did, in words, and the status that it returned."""
+"""Gives the error for a reason, what the FMU did in words, and the status that it returned."""
 
 
 class Clocks:
@@ -61,13 +61,13 @@ class Clocks:
                 case "countdown":
                     self._restart(v, clock)
                 case "changing":
-                    self._due[reference] = begin + self._known(v, clock)
+                    self._due[reference] = begin + self._required_interval(v, clock)
                 case "calculated":
-                    self._interval[reference] = self._known(v, clock)
+                    self._interval[reference] = self._required_interval(v, clock)
                     self._due[reference] = begin + self._shift(v, clock)
                 case "tunable":
                     interval = clock.interval
-                    self._interval[reference] = interval or self._known(v, clock)
+                    self._interval[reference] = interval or self._required_interval(v, clock)
                     self._due[reference] = begin + self._shift(v, clock)
                 case _:
                     assert clock.interval is not None  # noqa: S101 - see interface/obstacles.py
@@ -115,7 +115,7 @@ class Clocks:
             if reference in ticked and clock.variability != "countdown":
                 interval = self._interval.get(reference)
                 if interval is None:  # it is another each time
-                    interval = self._known(v, clock)
+                    interval = self._required_interval(v, clock)
                 self._due[reference] = self._last[reference] + interval
 
     def _due_now(self) -> dict[int, Fraction]:
@@ -129,37 +129,37 @@ class Clocks:
 
     def _restart(self, v: Variable, clock: Clock) -> None:
         """Have a countdown begin now if the FMU wants that."""
-        qualifier, interval = self._asked(v, clock)
+        qualifier, interval = self._present_interval(v, clock)
         if qualifier == CHANGED:
             self._due[v.reference] = self._now + interval
 
     def _tune(self, v: Variable, clock: Clock) -> None:
         """Take the interval that the FMU has now; it counts from the last tick on."""
-        qualifier, interval = self._asked(v, clock)
+        qualifier, interval = self._present_interval(v, clock)
         if qualifier != NOT_YET_KNOWN and interval > 0 and interval != self._interval[v.reference]:
             self._interval[v.reference] = interval
             if v.reference in self._last:
                 self._due[v.reference] = max(self._last[v.reference] + interval, self._now)
 
-    def _known(self, v: Variable, clock: Clock) -> Fraction:
+    def _required_interval(self, v: Variable, clock: Clock) -> Fraction:
         """The interval in s, which has to be known now."""
-        qualifier, interval = self._asked(v, clock)
+        qualifier, interval = self._present_interval(v, clock)
         if qualifier == NOT_YET_KNOWN or interval <= 0:
-            what = f"does not say the interval of its clock {v.name!r} ({clock.variability})"
-            raise self._refuse(what, OK)
+            reason = f"does not say the interval of its clock {v.name!r} ({clock.variability})"
+            raise self._refuse(reason, OK)
         return interval
 
-    def _asked(self, v: Variable, clock: Clock) -> tuple[int, Fraction]:
+    def _present_interval(self, v: Variable, clock: Clock) -> tuple[int, Fraction]:
         """What the FMU says of the interval of a clock now, and the interval in s."""
-        what, qualifier = f"does not say the interval of its clock {v.name!r}", c_int()
+        failure, qualifier = f"does not say the interval of its clock {v.name!r}", c_int()
         counter, resolution, interval = c_uint64(), c_uint64(), c_double()
         reference = byref(c_uint(v.reference))
         if clock.fractions:
             fraction = byref(counter), byref(resolution), byref(qualifier)
-            self._call("GetIntervalFraction", what, reference, 1, *fraction)
+            self._call("GetIntervalFraction", failure, reference, 1, *fraction)
         else:
             decimal = byref(interval), byref(qualifier)
-            self._call("GetIntervalDecimal", what, reference, 1, *decimal)
+            self._call("GetIntervalDecimal", failure, reference, 1, *decimal)
         if qualifier.value == NOT_YET_KNOWN:
             return NOT_YET_KNOWN, Fraction(0)
         if clock.fractions:
@@ -168,13 +168,13 @@ class Clocks:
 
     def _shift(self, v: Variable, clock: Clock) -> Fraction:
         """The time from the start to the first tick, in s."""
-        what = f"does not say the shift of its clock {v.name!r}"
+        failure = f"does not say the shift of its clock {v.name!r}"
         counter, resolution, shift = c_uint64(), c_uint64(), c_double()
         reference = byref(c_uint(v.reference))
         if clock.fractions:
-            self._call("GetShiftFraction", what, reference, 1, byref(counter), byref(resolution))
+            self._call("GetShiftFraction", failure, reference, 1, byref(counter), byref(resolution))
             return self._fraction(v, counter.value, resolution.value)
-        self._call("GetShiftDecimal", what, reference, 1, byref(shift))
+        self._call("GetShiftDecimal", failure, reference, 1, byref(shift))
         return self._decimal(v, shift.value)
 
     def _decimal(self, v: Variable, value: float) -> Fraction:
@@ -187,13 +187,13 @@ class Clocks:
             raise self._refuse(f"says {counter}/0 s for its clock {v.name!r}", OK)
         return Fraction(counter, resolution)
 
-    def _call(self, name: str, what: str, *arguments: object) -> None:
-        """Call a function for clocks; SimulationError, with what the FMU did, where it fails."""
+    def _call(self, name: str, failure: str, *arguments: object) -> None:
+        """Call a function for clocks; SimulationError, with these words, where it fails."""
         if name not in self._functions:
             self._functions[name] = self._bind(name, c_void_p, c_size_t, *ARGUMENTS[name])
         status = self._functions[name](*arguments)
         if status > WARNING:
-            raise self._refuse(what, status)
+            raise self._refuse(failure, status)
 
 
 def _exact(value: float) -> Fraction:

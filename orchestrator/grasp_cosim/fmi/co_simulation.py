@@ -3,134 +3,32 @@
 Of FMI 3.0 without intermediate update; event mode, and clocks, are in event_mode.py. Without event
 mode an FMU is not allowed to end a step early: it handles its events itself. Binaries are left
 alone.
-
-The logger of FMI 2.0 is called like printf: a format, then arguments. Python cannot define such a
-function. On Linux, with the processors below, the arguments lie where those of a function would
-that has fixed ones: first in registers, of whole numbers and addresses or of doubles, then on the
-stack. So the logger takes as many as these hold and some from the stack, wanted or not, and puts
-them where C's vsnprintf looks for them: in a va_list.
 """
 
 import ctypes
-import platform
-import re
-import struct
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
-from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
-import fmpy
 import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
     fmi2LastSuccessfulTime,
     fmi2Terminated,
 )
 
 from ..base.calls import STEP_2, STEP_3, Call, Native
 from ..base.scratch import ScratchFolder
-from ..base.system_calls import c_library
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface
+from ..interface.variables import Variable
 from ..system.parts import Logging
+from .fmi2_logger import callbacks_for
 from .fmpy_private import FMU2CoSimulation, FMU3CoSimulation, MissingFunctionError
 from .instance import DUE, EARLY, EVENT, WARNING
 from .loaded import LoadedInstance
-from .messages import Messages
-
-_NAMED = c_void_p, c_char_p, c_int, c_char_p, c_char_p
-"""Environment, instance, status, category and the format."""
-
-_STACKED = 32
-"""The most arguments on the stack."""
-
-_LONG = re.compile(rb"%[^A-Za-z%]*L")
-"""A long double, which has registers of its own kind, or none."""
-
-
-_CONVENTIONS: Mapping[str, tuple[int, Callable[[int, int], bytes]]] = {
-    "x86_64": (6, lambda words, stack: struct.pack("IIPP", 40, 48, stack, words)),
-    "aarch64": (8, lambda words, stack: struct.pack("PPPii", stack, words + 64, stack, -24, -128)),
-}
-"""Of the ABIs of System V and Arm for Linux.
-
-The registers for whole numbers and addresses; there are eight for doubles. The va_list by the
-addresses of what was in registers and, behind it, of what was on the stack.
-"""
-
-CONVENTION = _CONVENTIONS.get(platform.machine()) if sys.platform == "linux" else None
-
-
-@cache
-def logger_type() -> Any:
-    """The type of a logger: a function of the five named arguments, and of all that may follow."""
-    if CONVENTION is None:
-        return ctypes.CFUNCTYPE(None, *_NAMED)
-    words = [c_size_t] * (CONVENTION[0] - len(_NAMED))
-    return ctypes.CFUNCTYPE(None, *_NAMED, *words, *[c_double] * 8, *[c_size_t] * _STACKED)
-
-
-def formatted(form: bytes, passed: Sequence[float]) -> bytes:
-    """The format with the arguments that a logger was passed behind it.
-
-    As it comes where this processor is none of those above, where one of them is a long double, or
-    where there are too many.
-    """
-    places = form.count(b"%") + form.count(b"*")
-    if CONVENTION is None or not 0 < places <= _STACKED or _LONG.search(form):
-        return form
-    (registers, va_list), named = CONVENTION, len(_NAMED)
-    layout = f"={8 * named}x{registers - named}Q{'d8x' * 8}{_STACKED}Q"
-    area = ctypes.create_string_buffer(struct.pack(layout, *passed))
-    words = ctypes.addressof(area)
-
-    def printed(text: Any, size: int) -> int:
-        read = va_list(words, words + 8 * registers + 128)
-        return int(_vsnprintf()(text, size, form, ctypes.create_string_buffer(read)))
-
-    size = printed(None, 0)
-    if size < 0:
-        return form
-    text = ctypes.create_string_buffer(size + 1)
-    printed(text, size + 1)
-    return text.value
-
-
-@cache
-def _vsnprintf() -> Any:
-    found = c_library().vsnprintf
-    found.argtypes = c_void_p, c_size_t, c_char_p, c_void_p
-    return found
-
-
-def callbacks_for(messages: Messages) -> fmi2CallbackFunctions:
-    """The functions that an FMU may call: its logger, which is its own, and memory."""
-
-    def log(
-        _: Any,
-        instance: Any,
-        status: int,
-        category: bytes | None,
-        message: bytes | None,
-        *arguments: float,
-    ) -> None:
-        if messages.wants(status, category):
-            messages.take(status, formatted(message or b"", arguments))
-
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = ctypes.cast(logger_type()(log), fmi2CallbackLoggerTYPE)
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
-    return callbacks
 
 
 class FmuInstance(LoadedInstance):
@@ -258,14 +156,17 @@ class Fmi3Instance(LoadedInstance):
             self._messages.take(status, message)
 
     def _start(self, values: Mapping[str, Value], stop: float | None, start: float) -> None:
-        given = [(self.interface.by_name[name], value) for name, value in values.items()]
-        structural = [(v, x) for v, x in given if v.causality == "structuralParameter"]
-        others = [(v, x) for v, x in given if v.causality != "structuralParameter"]
+        structural: list[tuple[Variable, Value]] = []
+        ordinary: list[tuple[Variable, Value]] = []
+        for name, value in values.items():
+            variable = self.interface.by_name[name]
+            is_structural = variable.causality == "structuralParameter"
+            (structural if is_structural else ordinary).append((variable, value))
         if structural:
             self._slave.enterConfigurationMode()
             self._assign(structural, fetch=False)
             self._slave.exitConfigurationMode()
-        self._assign(others, fetch=False)
+        self._assign(ordinary, fetch=False)
         self._slave.enterInitializationMode(self.tolerance, startTime=start, stopTime=stop)
 
     def saved(self) -> Any:
@@ -274,9 +175,9 @@ class Fmi3Instance(LoadedInstance):
 
     def restore(self, saved: Any) -> None:
         """As LoadedInstance."""
-        own, flags, self._last[0], self._limit[0] = saved
+        state, flags, self._last[0], self._limit[0] = saved
         self._flags[:] = np.frombuffer(flags, np.bool_)
-        super().restore(own)
+        super().restore(state)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         bound, address = self._stepping(clock, step, ctypes.c_bool(True), *self._places())
@@ -322,5 +223,5 @@ class Fmi3Instance(LoadedInstance):
 
     def last_successful_time(self) -> float | None:
         """A step that was discarded did nothing; what the flags say is then of an earlier one."""
-        said = self._flags[SHORT] or self._flags[TERMINATE]
-        return float(self._last[0]) if said else self._time()
+        has_returned_early = self._flags[SHORT] or self._flags[TERMINATE]
+        return float(self._last[0]) if has_returned_early else self._time()

@@ -118,13 +118,13 @@ class EventInstance(Fmi3Instance):
 
     def restore(self, saved: Any) -> None:
         """As Fmi3Instance."""
-        own, (events, clocks, self._point, self._next), self._started, pending, passed = saved
+        state, (events, clocks, self._point, self._next), self._started, pending, passed = saved
         self._events.restore(events)
         self._clocks.restore(clocks)
         self._pending = dict(pending)
         for inputs, last in zip(self._inputs_at_events, passed, strict=True):
             inputs.passed = last
-        super().restore(own)
+        super().restore(state)
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
         """As Instance.transfer: inputs that are not continuous arrive by an event."""
@@ -194,17 +194,17 @@ class EventInstance(Fmi3Instance):
                 stop = due if due < end - AT_POINT else end
                 if stop < end and not self.interface.can_vary_step:
                     raise self._error("has an event within a step, which cannot vary,", due)
-                before = self._point
-                status = self._do_step(before, length_until(before, stop))
+                begin_of_part = self._point
+                status = self._do_step(begin_of_part, length_until(begin_of_part, stop))
                 if status > WARNING:
-                    return status, before
+                    return status, begin_of_part
                 if self._flags[TERMINATE]:
                     break
                 self._point = self._reached(stop)
                 if self._flags[NEEDED]:
                     self._event(near)
-                elif self._point <= before:
-                    return EARLY, before
+                elif self._point <= begin_of_part:
+                    return EARLY, begin_of_part
         return EARLY, self._point
 
     def _reached(self, stop: float) -> float:

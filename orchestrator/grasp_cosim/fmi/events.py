@@ -14,10 +14,10 @@ from ..base.calls import Call
 from ..base.errors import SimulationError
 from .clocks import Clocks
 
-ITERATIONS = 1000
+MAX_UPDATES = 1000
 """The most updates of the discrete states in one event."""
 
-DENSE, MOST_DENSE = 0.01, 1000
+DENSE, MAX_DENSE_EVENTS = 0.01, 1000
 """So many events, each within this part of a communication step after the one before, end a run."""
 
 Update = Callable[[], tuple[bool, bool, bool, bool, bool, float]]
@@ -31,10 +31,10 @@ Arrive = Callable[[Collection[int]], None]
 
 
 class Refuse(Protocol):
-    """Gives the error for what the FMU did at a time in s, and how that must be."""
+    """Gives the error for a reason, what the FMU did in words, at a time in s."""
 
-    def __call__(self, what: str, time: float, must: str = "") -> SimulationError:
-        """`must` is the end of the line."""
+    def __call__(self, reason: str, time: float, must: str = "") -> SimulationError:
+        """`must` says how that must be, as the end of the line."""
 
 
 class Settled(NamedTuple):
@@ -69,11 +69,11 @@ class Events:
         """
         self._in_a_row = self._in_a_row + 1 if time - self._last <= near else 0
         self._last = time
-        if self._in_a_row < MOST_DENSE:
+        if self._in_a_row < MAX_DENSE_EVENTS:
             return
         next_one = f", the next at t = {following:.9g} s" if following < math.inf else ""
         raise self._refuse(
-            f"chatters, or does not come to rest ({MOST_DENSE} events in a row, each within "
+            f"chatters, or does not come to rest ({MAX_DENSE_EVENTS} events in a row, each within "
             f"{DENSE:.0%} of the step after the one before{next_one})",
             time,
             "; must have a hysteresis, name later times for its events, or have a shorter step "
@@ -88,21 +88,21 @@ class Events:
         ticked = self._clocks.tick()
         arrive(ticked)
         new_nominals = False
-        for _ in range(ITERATIONS):
-            again, ended, renominated, _, defined, named = update()
+        for _ in range(MAX_UPDATES):
+            needs_another, ended, renominated, _, has_next, next_time = update()
             new_nominals = new_nominals or renominated
             if ended:
                 return Settled(True, new_nominals, math.inf)
             self._clocks.schedule(ticked)
             ticked = self._clocks.tick()
             arrive(ticked)
-            if not again and not ticked:
+            if not needs_another and not ticked:
                 break
         else:
-            raise self._refuse(f"does not settle an event in {ITERATIONS} iterations", time)
-        if defined and math.isnan(named):
+            raise self._refuse(f"does not settle an event in {MAX_UPDATES} iterations", time)
+        if has_next and math.isnan(next_time):
             raise self._refuse("names nan as the time of its next event", time)
-        return Settled(False, new_nominals, named if defined else math.inf)
+        return Settled(False, new_nominals, next_time if has_next else math.inf)
 
 
 class ConnectedInputs:

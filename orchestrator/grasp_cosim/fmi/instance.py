@@ -163,20 +163,28 @@ class Instance(Protocol):
         """End and free the instance as far as FMI permits after what it returned."""
 
 
+NUMPY_TYPES_OF_FMI_2: Mapping[str, str] = {
+    "Real": "float64",
+    "Integer": "int32",
+    "Boolean": "int32",
+    "Enumeration": "int32",
+}
+"""The element type by the type of FMI 1.0 and 2.0, for those of numbers."""
+
+
 def dtype(version: str, fmi_type: str) -> np.dtype[Any]:
     """The element type of an FMI type in a version; KeyError or TypeError for one not of numbers.
 
     An Enumeration is an Integer in FMI 2.0, an Int64 in 3.0.
     """
     if version.startswith("3"):
-        own = {"Boolean": "bool", "Enumeration": "int64"}
-        return np.dtype(own.get(fmi_type, fmi_type.lower()))
-    whole = dict.fromkeys(("Integer", "Boolean", "Enumeration"), "int32")
-    return np.dtype({"Real": "float64", **whole}[fmi_type])
+        exceptions = {"Boolean": "bool", "Enumeration": "int64"}
+        return np.dtype(exceptions.get(fmi_type, fmi_type.lower()))
+    return np.dtype(NUMPY_TYPES_OF_FMI_2[fmi_type])
 
 
-MOST = 6
-"""The most inputs that are named; those that are not finite or out of their range come first."""
+MAX_INPUTS_NAMED = 6
+"""Of an instance in an error; those that are not finite or out of their range come first."""
 
 
 class Inputs:
@@ -185,30 +193,30 @@ class Inputs:
     def __init__(self) -> None:
         self.running = False
         """True once the buffers hold what the FMU gets."""
-        self._given: dict[Variable, Value] = {}
+        self._set_singly: dict[Variable, Value] = {}
         self._bound: list[tuple[Sequence[Variable], npt.NDArray[Any]]] = []
 
     def forget(self) -> None:
         """It has none of the values any more."""
         self.running = False
-        self._given.clear()
+        self._set_singly.clear()
 
     def saved(self) -> dict[Variable, Value]:
         """What was set one by one, for restore(); the buffers are their owner's."""
-        return dict(self._given)
+        return dict(self._set_singly)
 
     def restore(self, saved: Mapping[Variable, Value]) -> None:
         """Go back to what was saved."""
-        self._given = dict(saved)
+        self._set_singly = dict(saved)
 
     def set(self, variable: Variable, value: Value) -> None:
         """Note a value that is about to be set; one of a parameter is not kept."""
         if variable.causality == "input":
-            self._given[variable] = value
+            self._set_singly[variable] = value
 
     def last(self, variable: Variable) -> Value | None:
         """The value that was set last, one by one; None where there is none."""
-        return self._given.get(variable)
+        return self._set_singly.get(variable)
 
     def bind(self, variables: Sequence[Variable], data: npt.NDArray[Any]) -> None:
         """Note the buffer from which the variables are set in the run."""
@@ -219,19 +227,23 @@ class Inputs:
         connected: dict[Variable, Value] = {}
         for variables, data in self._bound if self.running else ():
             connected |= zip(variables, data.tolist(), strict=True)
-        found = {**connected, **self._given, **connected}  # before those that stay as they are
-        named = sorted(found, key=lambda v: _usual(v, found[v]))
-        return f" (inputs: {choices((_named(v, found[v]) for v in named), MOST)})" if found else ""
+        # Connected inputs come before those that were set one by one and stay as they are.
+        values = {**connected, **self._set_singly, **connected}
+        if not values:
+            return ""
+        by_suspicion = sorted(values, key=lambda v: _is_usual(v, values[v]))
+        listed = (_in_words(v, values[v]) for v in by_suspicion)
+        return f" (inputs: {choices(listed, MAX_INPUTS_NAMED)})"
 
 
-def _usual(variable: Variable, value: Value) -> bool:
+def _is_usual(variable: Variable, value: Value) -> bool:
     """False for a number that is not finite, or out of its declared range."""
     if isinstance(value, str):
         return True
     return isfinite(value) and variable.low <= value <= variable.high
 
 
-def _named(variable: Variable, value: Value) -> str:
+def _in_words(variable: Variable, value: Value) -> str:
     if variable.kind == "Boolean":
         value = bool(value)
     text = f"{value:.6g}" if isinstance(value, float) else literal(value)

@@ -213,8 +213,8 @@ class LoadedInstance(ABC):
                     f"{error.strerror}; must have room there, or TMPDIR must be another folder"
                 ) from error
             limit = not_its_fault(error)
-            state = f"cannot be read: {limit}" if limit else f"is damaged: {error}"
-            raise InputError(f"{self.name}: {self.interface.called} {state}") from error
+            problem = f"cannot be read: {limit}" if limit else f"is damaged: {error}"
+            raise InputError(f"{self.name}: {self.interface.called} {problem}") from error
         return folder
 
     def _load(self, folder: Path) -> None:
@@ -225,20 +225,19 @@ class LoadedInstance(ABC):
                 f"{self.name}: temporary folder {folder}: a Python FMU crashes on its characters; "
                 "set TMPDIR to a folder of plain ASCII letters"
             )
-        here = Path.cwd()
+        current_folder = Path.cwd()
         try:
             self._slave = self._instantiate(folder)
         except Exception as error:  # FMPy raises plain Exception
             reason = self._reason(error)
             if reason.startswith(FAILED_TO_INSTANTIATE):  # and the FMU logged nothing
                 reason += self._advice(ERROR)
-            obstacle = of_loading(self.interface, reason)
-            raise InputError(
-                f"{self.name}: {self.interface.called} does not load: {reason}"
-                f"{f'; it {obstacle}' if obstacle else ''}"
-            ) from error
+            message = f"{self.name}: {self.interface.called} does not load: {reason}"
+            if obstacle := of_loading(self.interface, reason):
+                message += f"; it {obstacle}"
+            raise InputError(message) from error
         finally:
-            os.chdir(here)  # where loading fails, FMPy stays in the library's folder
+            os.chdir(current_folder)  # where loading fails, FMPy stays in the library's folder
         if self._python:
             _binaries_of_pythonfmu.add(library_file(self._slave))
         self._worst = OK
@@ -327,23 +326,32 @@ class LoadedInstance(ABC):
             self._assign(zip(variables, values, strict=True))
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
-        listed = [v.reference for v in variables if not (v.element and v.element.place)]
-        count, size, place = len(listed), len(variables), data.ctypes.data
-        references = (ctypes.c_uint * count)(*listed)
+        # Of an array its first element stands for all of them.
+        scalars = [v.reference for v in variables if not (v.element and v.element.place)]
+        count, size, values_at = len(scalars), len(variables), data.ctypes.data
+        references = (ctypes.c_uint * count)(*scalars)
         self._keep += [references, data]
         if action == "set":
             self._inputs.bind(variables, data)
-        shape = TRANSFER_3 if self._major == "3" else TRANSFER_2
-        sizes = [ctypes.c_size_t(size)] if shape == TRANSFER_3 else []
+        shape, sizes = TRANSFER_2, []
+        if self._major == "3":
+            shape, sizes = TRANSFER_3, [ctypes.c_size_t(size)]
         bound, address = self._function(
             action.capitalize() + self._suffix(variables[0].type),
             ctypes.byref(references),
             ctypes.c_size_t(count),
-            ctypes.c_void_p(place),
+            ctypes.c_void_p(values_at),
             *sizes,
         )
-        instance, first = self._slave.component, ctypes.addressof(references)
-        native = Native(shape, address, instance, first, count, place, values=size)
+        native = Native(
+            shape,
+            address,
+            self._slave.component,
+            ctypes.addressof(references),
+            count,
+            values_at,
+            values=size,
+        )
         return self._loop_call(bound, native)
 
     def _loop_call(self, call: Callable[[], int], native: Native) -> Call:
@@ -361,14 +369,14 @@ class LoadedInstance(ABC):
         setter = getattr(self._slave, f"set{self._suffix(variable.type)}")
         setter([variable.reference], [_OF_KIND[variable.kind](value)])
 
-    def _assign(self, given: Iterable[tuple[Variable, Value]], fetch: bool = True) -> None:
+    def _assign(self, values: Iterable[tuple[Variable, Value]], fetch: bool = True) -> None:
         """Set values of variables, then of arrays, each whole.
 
-        Elements that are not given keep what they were set to, at first their start value or, with
+        Elements without a value keep what they were set to, at first their start value or, with
         fetch, what the FMU has: before the initialisation it does not tell.
         """
         arrays: dict[int, tuple[Variable, list[Any]]] = {}
-        for variable, value in given:
+        for variable, value in values:
             if variable.element is None:
                 self._set(variable, value)
                 continue
@@ -468,11 +476,11 @@ class LoadedInstance(ABC):
         )
         return States(get, set_, free, overwrites=not self._python)
 
-    def _has_no_state(self, why: str) -> InputError:
+    def _has_no_state(self, reason: str) -> InputError:
         """The error where the state is asked for."""
         return InputError(
-            f"{self.name}: the state of {self.interface.path.name} {why}; must be a co-simulation "
-            "FMU with fmi2GetFMUstate or fmi3GetFMUState"
+            f"{self.name}: the state of {self.interface.path.name} {reason}; must be a "
+            "co-simulation FMU with fmi2GetFMUstate or fmi3GetFMUState"
         )
 
     def the_end(self) -> float | None:
@@ -489,22 +497,23 @@ class LoadedInstance(ABC):
         name = STATUS[status] if status < len(STATUS) else status
         return self._error(f"returned {name}", time, advice=self._advice(status))
 
-    def _refusal(self, what: str, status: int) -> SimulationError:
+    def _refusal(self, reason: str, status: int) -> SimulationError:
         """The error for what the FMU did, now, when it returned a status. It is not used again."""
         self._worst = max(self._worst, status)
-        return self._error(what, self._time())
+        return self._error(reason, self._time())
 
-    def _error(self, what: str, time: float, must: str = "", advice: str = "") -> SimulationError:
+    def _error(self, reason: str, time: float, must: str = "", advice: str = "") -> SimulationError:
         """The error for what the FMU did, with what it logged of it, and its inputs.
 
         Where it logged nothing, with the `advice`.
         """
-        reasons = self._messages.reasons()
+        logged = self._messages.reasons()
+        explanation = as_reason(logged) or advice
         error = SimulationError(
-            f"{self.name}: {self.interface.path.name} {what} at t = {time:.9g} s{must}"
-            f"{as_reason(reasons) or advice}{self._inputs}"
+            f"{self.name}: {self.interface.path.name} {reason} at t = {time:.9g} s{must}"
+            f"{explanation}{self._inputs}"
         )
-        for text in reasons:
+        for text in logged:
             error.add_note(text)
         return error
 
@@ -544,10 +553,11 @@ class LoadedInstance(ABC):
         except FMICallException as error:
             self._worst = error.status
             reason = as_reason(self._messages.reasons())
-            why = reason or f": {error}{self._advice(error.status)}"
+            if not reason:
+                reason = f": {error}{self._advice(error.status)}"
             raise InputError(
                 f"{self.name}: {self.interface.path.name} refused its initialisation"
-                f"{why}{self._inputs}"
+                f"{reason}{self._inputs}"
             ) from error
         except MissingFunctionError as error:
             raise self._incomplete(error) from error
@@ -606,6 +616,9 @@ def _used_here(member: str) -> bool:
 
 def as_reason(messages: Sequence[str]) -> str:
     """Messages, each once, as the end of a one-line error; of a traceback what it comes to."""
-    last = [text.strip().rpartition("\n")[2] if _TRACEBACK in text else text for text in messages]
-    text = " ".join(" ".join(dict.fromkeys(last)).split())
+    reasons: list[str] = []
+    for message in messages:
+        *_, last_line = message.strip().split("\n")
+        reasons.append(last_line if _TRACEBACK in message else message)
+    text = " ".join(" ".join(dict.fromkeys(reasons)).split())
     return f": {text}" if text else ""

@@ -21,7 +21,7 @@ from .instance import DISCARD, ERROR, FATAL, OK, STATUS, WARNING
 LOGGER = logging.getLogger(__name__)
 """Gets the messages. A record of it has the Message as `fmu_message`."""
 
-KEPT = 12
+MAX_KEPT = 12
 """The last warnings and errors that are kept for an error: an FMU may log some at every step."""
 
 SEVERE = {
@@ -56,10 +56,10 @@ class _Tally(NamedTuple):
 class Messages:
     """The messages of one component."""
 
-    def __init__(self, component: str, logging: Logging, now: Callable[[], float]) -> None:
-        """`logging` are the categories that were asked for, or all; now() is the time in s."""
-        self._component, self._logging, self._now = component, logging, now
-        self._last: deque[Message] = deque(maxlen=KEPT)
+    def __init__(self, component: str, logging: Logging, clock: Callable[[], float]) -> None:
+        """`logging` are the categories that were asked for, or all; clock() is the time in s."""
+        self._component, self._logging, self._clock = component, logging, clock
+        self._last: deque[Message] = deque(maxlen=MAX_KEPT)
         self._tallies: dict[int, _Tally] = {}
         self._ignoring = False
         self.count = 0
@@ -81,14 +81,14 @@ class Messages:
     def take(self, status: int, text: bytes | None) -> None:
         """Take a message as the FMU logs it."""
         plain = without_scratch((text or b"").decode(errors="replace"))
-        self.keep(Message(status, plain, self._now()))
+        self.keep(Message(status, plain, self._clock()))
 
     def returned(self, function: str, since: int) -> None:
         """Take the warning that a call of a function returned, if none was logged `since` a count
         of them.
         """
         if self.count == since:
-            self.keep(Message(WARNING, f"{function} returned a warning", self._now()))
+            self.keep(Message(WARNING, f"{function} returned a warning", self._clock()))
 
     def keep(self, message: Message) -> None:
         """Keep a message, and show it to who wants to see it."""
@@ -109,7 +109,7 @@ class Messages:
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved: what was logged since is taken back."""
         last, tallies, self.count, self.unasked = saved
-        self._last, self._tallies = deque(last, KEPT), dict(tallies)
+        self._last, self._tallies = deque(last, MAX_KEPT), dict(tallies)
 
     def forget(self) -> None:
         """Nothing was logged yet."""

@@ -30,10 +30,10 @@ from .fmpy_private import FMU2ModelExchange, FMU3ModelExchange
 from .instance import AT_POINT, DISCARD, EARLY, OK, WARNING
 from .loaded import LoadedInstance
 
-ROUNDED = 16
-"""The smallest numbers in which a time can change, over which nothing is integrated."""
+MIN_SPAN = 16
+"""In units of the last place of a time: over less nothing is integrated."""
 
-MOST_STATES = 20_000
+MAX_STATES = 20_000
 """The solver has a matrix of their square."""
 
 
@@ -50,16 +50,16 @@ class ModelInstance(LoadedInstance):
         self,
         name: str,
         interface: Interface,
-        chosen: Solver,
+        options: Solver,
         logging: Logging = False,
         trace: Path | None = None,
     ) -> None:
         """Extract and instantiate; InputError where the FMU does not load."""
-        self._chosen = chosen
+        self._solver_options = options
         self._solver: Cvode | None = None
         self._connected: list[ConnectedInputs] = []
         self._step = 0.0
-        super().__init__(name, interface, chosen.relative_tolerance, logging, trace)
+        super().__init__(name, interface, options.relative_tolerance, logging, trace)
 
     def _forget(self) -> None:
         """As LoadedInstance."""
@@ -72,7 +72,7 @@ class ModelInstance(LoadedInstance):
         self._get_indicators: Any = None
         self._ended: float | None = None
         self._failed = OK
-        self._given: dict[Variable, Value] = {}
+        self._set_values: dict[Variable, Value] = {}
         self._waiting: dict[Variable, Value] = {}
         self._started = False
         self._zero: npt.NDArray[np.bool_] | None = None
@@ -126,15 +126,15 @@ class ModelInstance(LoadedInstance):
 
         Between the initialisation and the first step they change at once, by an event.
         """
-        given = dict(zip(variables, values, strict=True))
+        value_of = dict(zip(variables, values, strict=True))
         if self._inputs.running:
-            self._waiting |= given
+            self._waiting |= value_of
             if not self._started and self._ended is None:
                 with self._failures():
                     self._event()
         else:
             super().set(variables, values)
-            self._given |= given
+            self._set_values |= value_of
 
     def saved(self) -> Any:
         """InputError: the solver's own state cannot be saved."""
@@ -161,24 +161,24 @@ class ModelInstance(LoadedInstance):
 
     def _advance(self, end: float) -> None:
         with self._failures():
-            self._waiting = {v: x for v, x in self._waiting.items() if self._given.get(v) != x}
+            self._waiting = {v: x for v, x in self._waiting.items() if self._set_values.get(v) != x}
             if self._waiting or any(inputs.changed() for inputs in self._connected):
                 self._event()
             while self._now < end and self._ended is None:
                 stop = self._next if self._next <= end + AT_POINT else end
-                found = self._go_on(stop)
-                if self._ended is None and (found or self._now >= self._next):
-                    self._event(DENSE * self._step if found else AT_POINT)
+                has_event = self._go_on(stop)
+                if self._ended is None and (has_event or self._now >= self._next):
+                    self._event(DENSE * self._step if has_event else AT_POINT)
 
     def _go_on(self, stop: float) -> bool:
         """Take one step of the solver, to `stop` at most; True where there is an event."""
         event = False
-        if self._solver is None or stop - self._now <= ROUNDED * math.ulp(stop):
+        if self._solver is None or stop - self._now <= MIN_SPAN * math.ulp(stop):
             self._now = max(self._now, stop)
             self._check(self._set_time(self._now))
         else:
             if self._zero is not None:
-                stop = min(stop, self._now + max(AT_POINT, 4.0 * ROUNDED * math.ulp(self._now)))
+                stop = min(stop, self._now + max(AT_POINT, 4.0 * MIN_SPAN * math.ulp(self._now)))
             try:
                 self._now, event = self._solver.step(stop)
             except CvodeError as error:
@@ -211,7 +211,7 @@ class ModelInstance(LoadedInstance):
         self._events.count(self._now, near, self._step, self._next)
         self._slave.enterEventMode()
         waiting, self._waiting = self._waiting, {}
-        self._given |= waiting
+        self._set_values |= waiting
         self._assign(waiting.items())
         for inputs in self._connected if self._started else ():
             if inputs.changed():
@@ -261,14 +261,14 @@ class ModelInstance(LoadedInstance):
             self._get_indicators = self._bound("GetEventIndicators", place, size)
         slopes = self._evaluation(self._get_slopes if self._states else _no_slope, self._states)
         crossings = self._evaluation(self._get_indicators, self._indicators)
-        if self._states > MOST_STATES:
+        if self._states > MAX_STATES:
             raise InputError(
                 f"{self.name}: {self.interface.path.name} has {self._states} continuous states; "
-                f"must have {MOST_STATES} at most"
+                f"must have {MAX_STATES} at most"
             )
         if self._states or self._indicators:
             sizes = max(self._states, 1), self._indicators  # CVode needs a state; it stays 0
-            self._solver = Cvode(*sizes, slopes, crossings, self._chosen)
+            self._solver = Cvode(*sizes, slopes, crossings, self._solver_options)
             self._x = self._solver.x.ctypes.data
 
     def _evaluation(self, get: Callable[[int, int], int], size: int) -> Function:
@@ -347,7 +347,7 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
         self,
         name: str,
         interface: Interface,
-        chosen: Solver,
+        options: Solver,
         logging: Logging = False,
         trace: Path | None = None,
     ) -> None:
@@ -357,7 +357,7 @@ class Fmi3Model(ModelInstance, Fmi3Instance):
                 f"{name}: {interface.called}: {choices(clocked, 1)} is an input of a clock; must "
                 "run by co-simulation, as model exchange has no such inputs here"
             )
-        super().__init__(name, interface, chosen, logging, trace)
+        super().__init__(name, interface, options, logging, trace)
 
     def _instantiate(self, folder: Path) -> Any:
         model = self._opened(folder)

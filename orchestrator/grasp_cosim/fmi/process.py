@@ -66,7 +66,7 @@ END_TIMEOUT = 10.0
 OUTPUT_TIMEOUT = 1.0
 """s of wall time to wait for the last of what it printed, which a daemon of its may keep open."""
 
-LINES = 80
+MAX_LINES = 80
 """The last lines of what an FMU printed that are kept for the error: of a crash both stacks."""
 
 STEP, FETCH = b"S", b"F"
@@ -75,8 +75,8 @@ STEP, FETCH = b"S", b"F"
 LOGGED = "FMU: "
 """So begins what an FMU logged, among the lines that its process prints."""
 
-SIZE = 1 << 26
-"""Bytes of shared memory; only what is used of it takes memory."""
+SHARED_BYTES = 1 << 26
+"""Of shared memory; only what is used of it takes memory."""
 
 
 def load(component: Component) -> Instance:
@@ -133,7 +133,7 @@ class _SharedMemory:
     """The memory behind the file with the given descriptor, which both processes see."""
 
     def __init__(self, descriptor: int) -> None:
-        self._memory = mmap.mmap(descriptor, SIZE)
+        self._memory = mmap.mmap(descriptor, SHARED_BYTES)
         self.clock: npt.NDArray[np.float64] = self._view(np.float64, len(CLOCK), 0)
         """That of Instance.stepper."""
         self.step: npt.NDArray[np.float64] = self._view(np.float64, 1, self.clock.nbytes)
@@ -203,16 +203,16 @@ class ProcessInstance:
             )
         self._stack = ExitStack()
         self._lost: SimulationError | None = None
-        self._printed: deque[str] = deque(maxlen=LINES)
+        self._printed: deque[str] = deque(maxlen=MAX_LINES)
         folder = self._stack.enter_context(ScratchFolder()).name
         memory = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
-        memory.truncate(SIZE)
+        memory.truncate(SHARED_BYTES)
         self._shared = _SharedMemory(memory.fileno())
-        ours, theirs = socket.socketpair()
-        self._connection = Connection(ours.detach())
+        master_end, component_end = socket.socketpair()
+        self._connection = Connection(master_end.detach())
         reading, writing = os.pipe()
         self._stack.callback(os.close, writing)
-        ends = (theirs.fileno(), memory.fileno(), reading)
+        ends = (component_end.fileno(), memory.fileno(), reading)
         path = os.pathsep.join(filter(None, sys.path))
         self._process = subprocess.Popen(  # noqa: S603
             [sys.executable, "-P", "-m", "grasp_cosim.fmi.process", *map(str, ends)],
@@ -225,7 +225,7 @@ class ProcessInstance:
             text=True,
             errors="replace",
         )
-        theirs.close()
+        component_end.close()
         os.close(reading)
         self._answers = listener(self._connection)
         self._reader = threading.Thread(target=self._read_output, daemon=True)
@@ -284,8 +284,8 @@ class ProcessInstance:
         """As Instance.saved(), with what is on the way."""
         released = [self._released.popleft() for _ in range(len(self._released))]
         state = _KeptThere(self._ask("keep_state", released), self._released)
-        way = self._fresh, self._shared.saved()
-        return state, way, self._inputs.saved(), self._messages.saved()
+        on_the_way = self._fresh, self._shared.saved()
+        return state, on_the_way, self._inputs.saved(), self._messages.saved()
 
     def restore(self, saved: Any) -> None:
         state, (fresh, shared), inputs, messages = saved
@@ -303,8 +303,8 @@ class ProcessInstance:
         self._messages.forget()
 
     def numbers(self) -> npt.NDArray[np.float64]:
-        found: npt.NDArray[np.float64] = self._ask("numbers")
-        return found
+        numbers: npt.NDArray[np.float64] = self._ask("numbers")
+        return numbers
 
     def take_numbers(self, numbers: npt.NDArray[np.float64]) -> bool:
         return bool(self._ask("take_numbers", numbers))
@@ -421,15 +421,19 @@ class ProcessInstance:
         else:
             self._messages.keep(message)
 
-    def _lose(self, what: str = "") -> SimulationError:
-        """The error for a process that has ended, or is about to."""
+    def _lose(self, ending: str = "") -> SimulationError:
+        """The error for a process that has ended, or is about to; `ending` says how it did.
+
+        Without that its exit code says it.
+        """
         self._wait_for_the_end()
+        if not ending:
+            ending = ended(self._process.returncode)
         logged = [line.removeprefix(LOGGED) for line in self._printed if line.startswith(LOGGED)]
-        said = f": {' '.join(logged[-1].split())}" if logged else ""
+        reason = f": {' '.join(logged[-1].split())}" if logged else ""
         self._lost = SimulationError(
-            f"{self.name}: the process of {self.interface.path.name} "
-            f"{what or ended(self._process.returncode)} "
-            f"at t = {self._shared.clock[0]:.9g} s{said}{self._inputs}"
+            f"{self.name}: the process of {self.interface.path.name} {ending} "
+            f"at t = {self._shared.clock[0]:.9g} s{reason}{self._inputs}"
         )
         for line in self._printed:
             self._lost.add_note(line.rstrip())
@@ -515,13 +519,13 @@ class _Worker:
             step = float(self._shared.step[0])
             if step != self._step:
                 self._step, self._advance = step, self._instance.stepper(self._shared.clock, step)
-            status = self._made(self._advance)
+            status = self._status_of(self._advance)
         if status <= WARNING or status == EARLY:
             for call in self._outputs:
-                self._check(self._made(call))
+                self._check(self._status_of(call))
         return status
 
-    def _made(self, call: Call) -> int:
+    def _status_of(self, call: Call) -> int:
         """The status of a call; a fork that the FMU made in it ends, and writes nothing."""
         status = call.python()
         end_fork(self._owner)
@@ -531,7 +535,7 @@ class _Worker:
         for pending, call in self._inputs:
             if pending[0]:
                 pending[0] = False
-                self._check(self._made(call))
+                self._check(self._status_of(call))
 
     def _check(self, status: int) -> None:
         if status > WARNING:

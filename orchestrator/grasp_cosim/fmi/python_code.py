@@ -33,11 +33,11 @@ class CodeInstance:
         self.name = name
         self.interface = code.interface
         self._code = code
-        self._given = Inputs()
+        self._input_record = Inputs()
         self.reset()
 
     def reset(self) -> None:
-        self._given.forget()
+        self._input_record.forget()
         self._parameters = {v.name: PLAIN[v.kind](v.start_value) for v in self._of("parameter")}
         self._inputs = {v.name: PLAIN[v.kind](v.start_value or 0) for v in self._of("input")}
         self._outputs: dict[str, Value] = {}
@@ -55,7 +55,7 @@ class CodeInstance:
 
     def exit_initialization(self) -> None:
         self._settle()
-        self._given.running = True
+        self._input_record.running = True
 
     def enter_step_mode(self) -> None:
         """It has no events."""
@@ -66,7 +66,7 @@ class CodeInstance:
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         for variable, value in zip(variables, values, strict=True):
-            self._given.set(variable, value)
+            self._input_record.set(variable, value)
             self._assign(variable, value)
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
@@ -77,7 +77,7 @@ class CodeInstance:
                 return OK
 
             return Call(fetch)
-        self._given.bind(variables, data)
+        self._input_record.bind(variables, data)
 
         def put() -> int:
             for variable, value in zip(variables, data.tolist(), strict=True):
@@ -106,14 +106,22 @@ class CodeInstance:
     def saved(self) -> Any:
         state = self._step, self._parameters, self._inputs, self._outputs
         try:
-            return deepcopy(state), self._time, self._at_start, self._changed, self._given.saved()
+            return (
+                deepcopy(state),
+                self._time,
+                self._at_start,
+                self._changed,
+                self._input_record.saved(),
+            )
         except Exception as error:  # of any object that the user's has
-            raise InputError(f"{self.name}: its state cannot be copied: {said(error)}") from error
+            raise InputError(
+                f"{self.name}: its state cannot be copied: {error_in_words(error)}"
+            ) from error
 
     def restore(self, saved: Any) -> None:
-        state, self._time, self._at_start, self._changed, given = saved
+        state, self._time, self._at_start, self._changed, inputs = saved
         self._step, self._parameters, self._inputs, self._outputs = deepcopy(state)
-        self._given.restore(given)
+        self._input_record.restore(inputs)
 
     def numbers(self) -> npt.NDArray[np.float64]:
         raise InputError(
@@ -135,7 +143,7 @@ class CodeInstance:
         error = self._error or SimulationError(f"status {status}")
         if not isinstance(error, Exception):  # Ctrl-C, or sys.exit()
             raise error
-        text = f"{self.name}: {said(error)} at t = {self._time:.9g} s{self._given}"
+        text = f"{self.name}: {error_in_words(error)} at t = {self._time:.9g} s{self._input_record}"
         failed = SimulationError(text)
         failed.__cause__ = error
         return failed
@@ -151,8 +159,8 @@ class CodeInstance:
 
     def _values(self, variables: Sequence[Variable]) -> list[Value]:
         """What they have now."""
-        now = {**self._parameters, **self._inputs, **self._outputs}
-        return [now.get(v.name, v.start_value) for v in variables]  # type: ignore[misc]
+        value_of = {**self._parameters, **self._inputs, **self._outputs}
+        return [value_of.get(v.name, v.start_value) for v in variables]  # type: ignore[misc]
 
     def _of(self, causality: str) -> list[Variable]:
         return self.interface.of(causality)
@@ -162,7 +170,7 @@ class CodeInstance:
         try:
             self._step = self._code.new()
         except Exception as error:  # of the user's class
-            raise InputError(f"{self.name}: cannot be made: {said(error)}") from error
+            raise InputError(f"{self.name}: cannot be made: {error_in_words(error)}") from error
         for name, value in self._parameters.items():
             self._put(name, value)
 
@@ -194,30 +202,35 @@ class CodeInstance:
 
     def _call(self) -> None:
         """Call the function, and take the outputs; InputError where these are wrong."""
-        found, outputs = self._step(self._time, dict(self._inputs)), self._of("output")
-        if not isinstance(found, Mapping):
-            found = {} if found is None else {v.name: found for v in outputs[:1]}
+        answer, outputs = self._step(self._time, dict(self._inputs)), self._of("output")
+        if isinstance(answer, Mapping):
+            returned = answer
+        elif answer is None:
+            returned = {}
+        else:
+            returned = {v.name: answer for v in outputs[:1]}
         names = [v.name for v in outputs]
-        if other := next((name for name in found if name not in names), None):
-            raise InputError(f"returned {other!r}, which is no output; {nearest(other, names)}")
+        unknown = next((name for name in returned if name not in names), None)
+        if unknown:
+            raise InputError(f"returned {unknown!r}, which is no output; {nearest(unknown, names)}")
         for v in outputs:
-            if v.name not in found:
+            if v.name not in returned:
                 raise InputError(f"returned no {v.name!r}; must return a value of each output")
             try:
-                value = PLAIN[v.kind](found[v.name])
+                value = PLAIN[v.kind](returned[v.name])
             except (TypeError, ValueError) as error:
                 raise InputError(
-                    f"returned {v.name} = {found[v.name]!r}; must be a number"
+                    f"returned {v.name} = {returned[v.name]!r}; must be a number"
                 ) from error
             if not isfinite(value):
                 raise InputError(f"returned {v.name} = {value!r}; must be finite")
             self._outputs[v.name] = value
 
 
-def said(error: BaseException) -> str:
+def error_in_words(error: BaseException) -> str:
     """An error of the user's code in a line: its file and line, what it is, and what it says."""
     if isinstance(error, InputError | SimulationError):
         return str(error)
     *_, last = extract_tb(error.__traceback__)
-    what = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"{Path(last.filename).name}, line {last.lineno}: {what}"
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"{Path(last.filename).name}, line {last.lineno}: {text}"
