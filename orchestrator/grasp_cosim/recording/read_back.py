@@ -22,7 +22,7 @@ from .folder import ARROW, SETTINGS, SIGNALS
 from .log_names import AS_THEY_ARE, LogNames
 from .recorded_run import OfEveryStep, Rejection, Trip
 from .result import Result
-from .run_json import MADE, MADE_BESIDE, ORIGIN, read_run_json, unreadable
+from .run_json import MADE, MADE_BESIDE, ORIGIN, RunJson, read_run_json, unreadable
 
 if TYPE_CHECKING:
     from .signals import Log
@@ -60,8 +60,7 @@ def load_run(folder: str | Path) -> Result:
     folder = run_folder(Path(folder))
     path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS
     report = read_run_json(path)
-    entries: Mapping[str, Any] = report
-    units, types, timing = report["units"], report.get("types", {}), report.get("timing")
+    units, types = report["units"], report.get("types", {})
     if not units and not arrow.exists() and not signals.exists():
         raise InputError(f"{path}: this run recorded no signal; must have recorded one")
     rows = arrow if arrow.exists() else signals
@@ -77,32 +76,46 @@ def load_run(folder: str | Path) -> Result:
             f"{path}: units are those of {choices(units)}; "
             f"must be those of the recorded columns: {choices(columns)}"
         )
-    read = Result(
-        settings={key: entries[key] for key in (*MADE, *MADE_BESIDE) if key in entries},
+    typed = {
+        name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
+        for name, column in columns.items()
+    }
+    read = _result_of(report, folder, time, typed)
+    _check_rows(rows, read, report)
+    in_part = read.every > 1 or "record" in report
+    return _with_figures_of_every_step(read, report) if in_part else read
+
+
+def _result_of(
+    report: RunJson, folder: Path, time: npt.NDArray[np.float64], signals: Mapping[str, Any]
+) -> Result:
+    """The result that a run.json describes, with the rows that were recorded."""
+    entries: Mapping[str, Any] = report
+    settings = {key: entries[key] for key in (*MADE, *MADE_BESIDE) if key in entries}
+    origin = {key: entries[key] for key in ORIGIN if key in entries}
+    to_si = {name: Conversion(**change) for name, change in report.get("to_si", {}).items()}
+    rejections = {name: Rejection(**counts) for name, counts in report["rejections"].items()}
+    timing, place = report.get("timing"), f"{folder / SETTINGS}: timing"
+    return Result(
+        settings=settings,
         time=time,
-        signals={
-            name: _typed(f"{path}: type of {name}", column, types.get(name, "float64"))
-            for name, column in columns.items()
-        },
-        units=units,
+        signals=signals,
+        units=report["units"],
         wall_time=report["wall_time"],
         complete=report["complete"],
         ended_at=report.get("ended_at"),
         descriptions=report.get("descriptions", {}),
-        rejections={name: Rejection(**r) for name, r in report["rejections"].items()},
+        rejections=rejections,
         log=tuple(report["log"]),
-        timing=None if timing is None else Timing.from_dict(f"{path}: timing", timing),
+        timing=None if timing is None else Timing.from_dict(place, timing),
         more_metrics=_as_recorded(report),
-        origin={key: entries[key] for key in ORIGIN if key in entries},
-        to_si={name: Conversion(**c) for name, c in report.get("to_si", {}).items()},
+        origin=origin,
+        to_si=to_si,
         folder=folder,
         limits=tuple(Trip(**trip) for trip in report.get("exceeded", ())),
         initialised_anew=tuple(report.get("initialised_anew", ())),
         peers=report.get("peers", {}),
     )
-    _check_rows(rows, read, report)
-    in_part = read.every > 1 or "record" in report
-    return _with_figures_of_every_step(read, report) if in_part else read
 
 
 def _check_rows(path: Path, read: Result, written: Mapping[str, Any]) -> None:

@@ -42,7 +42,7 @@ BITS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trappin
 The last two leave them as they are: nobody reads errno, nor the flags of exceptions.
 """
 
-OWN = ("cc", "gcc", "clang", "cl")
+COMPILERS = ("cc", "gcc", "clang", "cl")
 """Compilers of this machine, the first that is there, unless CC names one."""
 
 INSTALL = shlex.join([sys.executable, "-m", "pip", "install", "ziglang"])
@@ -70,7 +70,7 @@ class Compiler(NamedTuple):
     @property
     def identity(self) -> str:
         """What tells it from others, and from itself after an update."""
-        files = [Path(found) for word in self.command if (found := shutil.which(word))]
+        files = [Path(program) for word in self.command if (program := shutil.which(word))]
         return repr((self.command, [(f.stat().st_size, f.stat().st_mtime_ns) for f in files]))
 
 
@@ -119,17 +119,17 @@ def find_compiler(zig_target: str = "") -> Compiler:
         if zig := find_zig():
             return Compiler((*zig.command, "-target", zig_target, "-s"))
         raise ValueError(f"no C compiler for {zig_target}: must be zig; {INSTALL}")
-    if given := os.environ.get("CC"):
+    if cc := os.environ.get("CC"):
         with suppress(ValueError):  # a quote without the other
-            command = shlex.split(given)
+            command = shlex.split(cc)
             if command and shutil.which(command[0]):
                 return Compiler(tuple(command))
-        raise ValueError(f"CC={given}: no such program; must be a C compiler, or unset")
-    if own := next(filter(shutil.which, OWN), None):
-        return Compiler((own,))
+        raise ValueError(f"CC={cc}: no such program; must be a C compiler, or unset")
+    if program := next(filter(shutil.which, COMPILERS), None):
+        return Compiler((program,))
     if zig := find_zig():
         return zig
-    raise ValueError(f"no C compiler: must be one of CC, {', '.join(OWN)}, zig; {INSTALL}")
+    raise ValueError(f"no C compiler: must be one of CC, {', '.join(COMPILERS)}, zig; {INSTALL}")
 
 
 def find_zig() -> Compiler | None:
@@ -143,8 +143,8 @@ def find_zig() -> Compiler | None:
 def environment(scratch: Path) -> dict[str, str]:
     """Return that of a compiler which leaves nothing but in scratch, and zig's libraries, kept."""
     zig = str(cache.writable("zig") or scratch)
-    own = {"ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig, "TMPDIR": str(scratch)}
-    return {**os.environ, **own, "LC_ALL": "C"}
+    folders = {"ZIG_GLOBAL_CACHE_DIR": zig, "ZIG_LOCAL_CACHE_DIR": zig, "TMPDIR": str(scratch)}
+    return {**os.environ, **folders, "LC_ALL": "C"}
 
 
 def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
@@ -162,7 +162,7 @@ def compile_all(jobs: Iterable[Job], scratch: Path) -> list[Path]:
                 libraries[number] = library
             else:
                 libraries |= compiling.add(number, job, Path(mkdtemp(dir=scratch)))
-        libraries |= compiling.rest()
+        libraries |= compiling.finish()
     return [libraries[number] for number in sorted(libraries)]
 
 
@@ -205,8 +205,8 @@ class _Compiling:
             self._start()
         return libraries
 
-    def rest(self) -> dict[int, Path]:
-        """Do all that is left."""
+    def finish(self) -> dict[int, Path]:
+        """Wait for all jobs that were added."""
         libraries: dict[int, Path] = {}
         while self._running:
             libraries |= self._wait()
@@ -226,7 +226,7 @@ class _Compiling:
                 self._waiting.remove(entry)
                 with deferred(SIGNALS):  # else it runs on where it was started and is not noted
                     process = _started(job, folder)
-                    future = self._threads.submit(_made, job, process, folder)
+                    future = self._threads.submit(_compiled, job, process, folder)
                     self._running[future] = _Running(number, job, process)
 
     def _held_up(self, compiler: Compiler) -> bool:
@@ -259,16 +259,16 @@ def _started(job: Job, folder: Path) -> subprocess.Popen[str]:
             start_new_session=True,
         )  # fmt: skip
     except OSError as error:
-        said = f"{error.filename or folder}: {error.strerror}"
-        raise CompilerError(f"{job.name}.c: {said}") from error
+        reason = f"{error.filename or folder}: {error.strerror}"
+        raise CompilerError(f"{job.name}.c: {reason}") from error
 
 
-def _made(job: Job, process: subprocess.Popen[str], folder: Path) -> Path:
-    said, _ = process.communicate()
+def _compiled(job: Job, process: subprocess.Popen[str], folder: Path) -> Path:
+    output, _ = process.communicate()
     library = folder / f"{job.name}{job.suffix}"
     if process.returncode == 0 and library.is_file():
         return library
-    lines = [line.strip() for line in said.splitlines() if line.strip()] or ["no message"]
+    lines = [line.strip() for line in output.splitlines() if line.strip()] or ["no message"]
     first = next((line for line in lines if re.search(r"\berror\b", line, re.I)), lines[-1])
     command = shlex.join(job.compiler.command)
     raise CompilerError(f"{job.name}.c: {command}: exit code {process.returncode}: {first}")
