@@ -232,6 +232,19 @@ def test_a_number_between_the_items_is_none(grasp, fmus, tmp_path):
         swapped.with_values({"sensor_1.surface": 3})
 
 
+def test_another_fmu_may_not_take_a_number_for_another_item(grasp, fmus, tmp_path):
+    """Where a number that the system sets is the same item, or none is set, it is taken."""
+    brown = grasp.with_values({"sensor_1.surface": "brown"})
+    same = other_sensor(fmus, tmp_path, black=7)
+    assert brown.swap("sensor_1", same).component("sensor_1", "x").values["surface"] == 4
+    assert grasp.swap("sensor_1", other_sensor(fmus, tmp_path, brown=7))
+    swapped = "surface = 4 is brown in ProximitySensor.fmu and {} in Other.fmu; must be set anew"
+    with pytest.raises(InputError, match=swapped.format("nothing")):
+        brown.swap("sensor_1", other_sensor(fmus, tmp_path, brown=7))
+    with pytest.raises(InputError, match=swapped.format("black")):
+        brown.swap("sensor_1", other_sensor(fmus, tmp_path, black=4, brown=5))
+
+
 def test_an_output_cannot_be_set(grasp):
     with pytest.raises(InputError, match=r"gap\[1\] = .* is an output that the FMU calculates"):
         grasp.with_values({"plant.gap[1]": 0.1})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from comparison.made import write_fmu
 from grasp_cosim import System, simulate
 from grasp_cosim.base.errors import InputError
 from grasp_cosim.recording.folder import RunFolder
@@ -48,6 +49,37 @@ def test_a_controller_gets_what_went_through_its_connections(recorded, fmus, tmp
         np.testing.assert_array_equal(
             replayed[f"controller.{name}"][1:], result[source][:-1], err_msg=name
         )
+
+
+@pytest.mark.parametrize(
+    ("change", "factor", "offset"),
+    [({}, 1.0, 0.0), ({"factor": 2.0}, 2.0, 0.0), ({"offset": 0.5}, 1.0, 0.5),
+     ({"factor": -3.0, "offset": 0.25}, -3.0, 0.25), ({"factor": 1.0, "offset": 0.0}, 1.0, 0.0)],
+)  # fmt: skip
+def test_what_went_through_a_connection_is_scaled_as_that_was(tmp_path, change, factor, offset):
+    def rising(t, inputs):
+        return {"gap": 10.0 * t}
+
+    def watching(t, inputs):
+        return {}
+
+    connection = {"from": "plant.gap", "to": "spring.position", **change}
+    experiment = {"step": 0.1, "stop": 0.5}
+    run = simulate(
+        System(
+            components={"plant": rising, "spring": watching},
+            connections=[connection],
+            experiment=experiment,
+        )
+    )
+    run.save(tmp_path / "run")
+    write_fmu(tmp_path / "spring.fmu", {"position": 'causality="input" | Real start="0"'})
+    (tmp_path / "alone.toml").write_text(
+        '[experiment]\nstep = 0.1\nstop = 0.5\n[components.spring]\nfmu = "spring.fmu"\n'
+    )
+    system = System.load(tmp_path / "alone.toml", input=tmp_path / "run" / "signals.csv")
+    (column,) = system.input.columns.values()
+    assert [*column.samples] == [factor * gap + offset for gap in run["plant.gap"]]
 
 
 def test_a_run_that_can_drive_nothing_is_refused(recorded, fmus, tmp_path):
