@@ -41,13 +41,13 @@ class Clocks:
         self._clocks = interface.input_clocks
         self._bind, self._refuse = bind, refuse
         self._functions: dict[str, Callable[..., int]] = {}
-        self._at, self._now = 0.0, Fraction(0)
+        self._event_time, self._exact_event_time = 0.0, Fraction(0)
         """The time of the event, in s, and the same exactly."""
-        self._interval: dict[int, Fraction] = {}
+        self._intervals: dict[int, Fraction] = {}
         """In s, by reference, of those that are periodic."""
-        self._last: dict[int, Fraction] = {}
+        self._last_ticks: dict[int, Fraction] = {}
         """The last tick in s of those that have ticked."""
-        self._due: dict[int, Fraction] = {}
+        self._next_ticks: dict[int, Fraction] = {}
         """The next tick in s of those of which it is known."""
 
     def initialise(self, start: float) -> None:
@@ -55,42 +55,42 @@ class Clocks:
 
         SimulationError where the FMU does not say.
         """
-        self._now = begin = _exact(start)
+        self._exact_event_time = begin = _exact(start)
         for reference, v, clock in self._declared():
             match clock.variability:
                 case "countdown":
                     self._restart(v, clock)
                 case "changing":
-                    self._due[reference] = begin + self._required_interval(v, clock)
+                    self._next_ticks[reference] = begin + self._required_interval(v, clock)
                 case "calculated":
-                    self._interval[reference] = self._required_interval(v, clock)
-                    self._due[reference] = begin + self._shift(v, clock)
+                    self._intervals[reference] = self._required_interval(v, clock)
+                    self._next_ticks[reference] = begin + self._shift(v, clock)
                 case "tunable":
                     interval = clock.interval
-                    self._interval[reference] = interval or self._required_interval(v, clock)
-                    self._due[reference] = begin + self._shift(v, clock)
+                    self._intervals[reference] = interval or self._required_interval(v, clock)
+                    self._next_ticks[reference] = begin + self._shift(v, clock)
                 case _:
                     assert clock.interval is not None  # noqa: S101 - see interface/obstacles.py
-                    self._interval[reference] = clock.interval
-                    self._due[reference] = begin + clock.shift
+                    self._intervals[reference] = clock.interval
+                    self._next_ticks[reference] = begin + clock.shift
 
     def saved(self) -> tuple[dict[int, Fraction], ...]:
         """The ticks that were and are to come, for restore()."""
-        return dict(self._interval), dict(self._last), dict(self._due)
+        return dict(self._intervals), dict(self._last_ticks), dict(self._next_ticks)
 
     def restore(self, saved: tuple[dict[int, Fraction], ...]) -> None:
         """Go back to what was saved."""
-        self._interval, self._last, self._due = map(dict, saved)
+        self._intervals, self._last_ticks, self._next_ticks = map(dict, saved)
 
     @property
     def next(self) -> float:
         """The time of the next tick in s; inf where none is known."""
-        return float(min(self._due.values())) if self._due else inf
+        return float(min(self._next_ticks.values())) if self._next_ticks else inf
 
     def begin(self, time: float) -> None:
         """Begin an event at a time in s."""
-        self._at = time
-        self._now = max(self._due_now().values(), default=_exact(time))
+        self._event_time = time
+        self._exact_event_time = max(self._due_now().values(), default=_exact(time))
 
     def tick(self) -> Collection[int]:
         """Tick what is due, in event mode; the references of these clocks."""
@@ -102,9 +102,9 @@ class Clocks:
         if due:
             references, active = (c_uint * len(due))(*due), (c_bool * len(due))(*[True] * len(due))
             self._call("SetClock", "does not let its clocks tick", references, len(due), active)
-        self._last |= due
+        self._last_ticks |= due
         for reference in due:
-            del self._due[reference]
+            del self._next_ticks[reference]
         return due
 
     def schedule(self, ticked: Collection[int]) -> None:
@@ -113,14 +113,18 @@ class Clocks:
             if clock.variability == "tunable":
                 self._tune(v, clock)
             if reference in ticked and clock.variability != "countdown":
-                interval = self._interval.get(reference)
+                interval = self._intervals.get(reference)
                 if interval is None:  # it is another each time
                     interval = self._required_interval(v, clock)
-                self._due[reference] = self._last[reference] + interval
+                self._next_ticks[reference] = self._last_ticks[reference] + interval
 
     def _due_now(self) -> dict[int, Fraction]:
         """The ticks in s that are due in this event, by reference."""
-        return {r: tick for r, tick in self._due.items() if float(tick) <= self._at + AT_POINT}
+        return {
+            r: tick
+            for r, tick in self._next_ticks.items()
+            if float(tick) <= self._event_time + AT_POINT
+        }
 
     def _declared(self) -> Iterator[tuple[int, Variable, Clock]]:
         for v in self._clocks:
@@ -131,15 +135,17 @@ class Clocks:
         """Have a countdown begin now if the FMU wants that."""
         qualifier, interval = self._present_interval(v, clock)
         if qualifier == CHANGED:
-            self._due[v.reference] = self._now + interval
+            self._next_ticks[v.reference] = self._exact_event_time + interval
 
     def _tune(self, v: Variable, clock: Clock) -> None:
         """Take the interval that the FMU has now; it counts from the last tick on."""
         qualifier, interval = self._present_interval(v, clock)
-        if qualifier != NOT_YET_KNOWN and interval > 0 and interval != self._interval[v.reference]:
-            self._interval[v.reference] = interval
-            if v.reference in self._last:
-                self._due[v.reference] = max(self._last[v.reference] + interval, self._now)
+        if qualifier != NOT_YET_KNOWN and interval > 0 and interval != self._intervals[v.reference]:
+            self._intervals[v.reference] = interval
+            if v.reference in self._last_ticks:
+                self._next_ticks[v.reference] = max(
+                    self._last_ticks[v.reference] + interval, self._exact_event_time
+                )
 
     def _required_interval(self, v: Variable, clock: Clock) -> Fraction:
         """The interval in s, which has to be known now."""

@@ -130,15 +130,15 @@ class Fmi3Instance(LoadedInstance):
         trace: Path | None = None,
     ) -> None:
         """As LoadedInstance."""
-        self._flags = np.zeros(3, np.bool_)
-        self._last = np.zeros(1)
-        self._limit = np.full(1, np.inf)
+        self._step_flags = np.zeros(3, np.bool_)
+        self._last_successful = np.zeros(1)
+        self._event_limit = np.full(1, np.inf)
         """A step that does not end before this time, in s, has an event that is known already."""
         super().__init__(name, interface, tolerance, logging, trace)
 
     def _forget(self) -> None:
         """As LoadedInstance."""
-        self._flags[:], self._last[:], self._limit[:] = False, 0.0, np.inf
+        self._step_flags[:], self._last_successful[:], self._event_limit[:] = False, 0.0, np.inf
 
     def _instantiate(self, folder: Path) -> Any:
         slave = self._opened(folder)
@@ -171,35 +171,42 @@ class Fmi3Instance(LoadedInstance):
 
     def saved(self) -> Any:
         """As LoadedInstance, with what the last step said."""
-        return super().saved(), self._flags.tobytes(), float(self._last[0]), float(self._limit[0])
+        return (
+            super().saved(),
+            self._step_flags.tobytes(),
+            float(self._last_successful[0]),
+            float(self._event_limit[0]),
+        )
 
     def restore(self, saved: Any) -> None:
         """As LoadedInstance."""
-        state, flags, self._last[0], self._limit[0] = saved
-        self._flags[:] = np.frombuffer(flags, np.bool_)
+        state, flags, self._last_successful[0], self._event_limit[0] = saved
+        self._step_flags[:] = np.frombuffer(flags, np.bool_)
         super().restore(state)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
         bound, address = self._stepping(clock, step, ctypes.c_bool(True), *self._places())
         time = memoryview(clock)  # type: ignore[arg-type]
-        limit = memoryview(self._limit)  # type: ignore[arg-type]
+        limit = memoryview(self._event_limit)  # type: ignore[arg-type]
 
         def advance() -> int:
             return DUE if time[2] >= limit[0] else self._outcome(bound())
 
-        flags, last, until = (a.ctypes.data for a in (self._flags, self._last, self._limit))
+        flags, last, until = (
+            a.ctypes.data for a in (self._step_flags, self._last_successful, self._event_limit)
+        )
         component = self._slave.component
         native = Native(STEP_3, address, component, step=step, flags=flags, last=last, limit=until)
         return self._loop_call(advance, native)
 
     def _places(self) -> list[ctypes.c_void_p]:
         """Where DoStep puts its flags and the time that it came to."""
-        flags, last = self._flags.ctypes.data, self._last.ctypes.data
+        flags, last = self._step_flags.ctypes.data, self._last_successful.ctypes.data
         return [ctypes.c_void_p(place) for place in (flags, flags + 1, flags + 2, last)]
 
     def _do_step(self, time: float, step: float) -> int:
         """A step from a time over `step`, both in s; the FMI status."""
-        self._flags[:] = False
+        self._step_flags[:] = False
         size = ctypes.c_double(time), ctypes.c_double(step), ctypes.c_bool(True)
         call, _ = self._function("DoStep", *size, *self._places())
         logged = self._messages.count
@@ -212,16 +219,16 @@ class Fmi3Instance(LoadedInstance):
         """What came of a step that returned a status."""
         if status > WARNING:
             return status
-        if self._flags[TERMINATE]:
+        if self._step_flags[TERMINATE]:
             return EARLY
-        if self._flags[NEEDED]:
+        if self._step_flags[NEEDED]:
             return EVENT
-        return EARLY if self._flags[SHORT] else status
+        return EARLY if self._step_flags[SHORT] else status
 
     def _wants_the_end(self) -> bool:
-        return bool(self._flags[TERMINATE])
+        return bool(self._step_flags[TERMINATE])
 
     def last_successful_time(self) -> float | None:
         """A step that was discarded did nothing; what the flags say is then of an earlier one."""
-        has_returned_early = self._flags[SHORT] or self._flags[TERMINATE]
-        return float(self._last[0]) if has_returned_early else self._time()
+        has_returned_early = self._step_flags[SHORT] or self._step_flags[TERMINATE]
+        return float(self._last_successful[0]) if has_returned_early else self._time()

@@ -47,7 +47,7 @@ class EventInstance(Fmi3Instance):
     ) -> None:
         """As LoadedInstance."""
         self._inputs_at_events: list[_PartOfInputs] = []
-        self._step = 0.0
+        self._communication_step = 0.0
         """The communication step in s."""
         super().__init__(name, interface, tolerance, logging, trace)
 
@@ -56,28 +56,28 @@ class EventInstance(Fmi3Instance):
         super()._forget()
         self._clocks = Clocks(self.interface, self._bound, self._refusal)
         self._events = Events(self._clocks, self._error)
-        self._point = 0.0
+        self._event_time = 0.0
         """The time that the FMU has come to, in s, at its events."""
-        self._next = math.inf
+        self._next_event = math.inf
         """The time in s that it has named for the next event."""
         self._in_step_mode = False
-        self._started = False
-        self._pending: dict[Variable, Value] = {}
+        self._has_stepped = False
+        self._pending_inputs: dict[Variable, Value] = {}
         """What was set one by one, and has not arrived."""
         for inputs in self._inputs_at_events:
-            inputs.passed = b""
+            inputs.last_passed = b""
 
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
     ) -> None:
         """As Instance.enter_initialization()."""
-        self._point = start
+        self._event_time = start
         super().enter_initialization(values, stop, start)
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode for event mode, which ends with enter_step_mode()."""
         try:
-            self._clocks.initialise(self._point)
+            self._clocks.initialise(self._event_time)
         except SimulationError as error:
             raise InputError(str(error)) from error
         super().exit_initialization()
@@ -101,29 +101,35 @@ class EventInstance(Fmi3Instance):
         for variable, value in zip(variables, values, strict=True):
             waits = not _is_continuous(variable) and (self._in_step_mode or variable.clocks)
             (by_event if waits else at_once)[variable] = value
-        self._pending |= by_event
+        self._pending_inputs |= by_event
         with self._failures():
             self._assign(at_once.items())
             if self._in_step_mode and not all(v.clocks for v in by_event):
-                if self._started:
-                    self._limit[0] = -math.inf
+                if self._has_stepped:
+                    self._event_limit[0] = -math.inf
                 else:
                     self._event()
 
     def saved(self) -> Any:
         """As Fmi3Instance, with the events and clocks."""
-        events = self._events.saved(), self._clocks.saved(), self._point, self._next
-        passed = [inputs.passed for inputs in self._inputs_at_events]
-        return super().saved(), events, self._started, dict(self._pending), passed
+        events = self._events.saved(), self._clocks.saved(), self._event_time, self._next_event
+        passed = [inputs.last_passed for inputs in self._inputs_at_events]
+        return super().saved(), events, self._has_stepped, dict(self._pending_inputs), passed
 
     def restore(self, saved: Any) -> None:
         """As Fmi3Instance."""
-        state, (events, clocks, self._point, self._next), self._started, pending, passed = saved
+        (
+            state,
+            (events, clocks, self._event_time, self._next_event),
+            self._has_stepped,
+            pending,
+            passed,
+        ) = saved
         self._events.restore(events)
         self._clocks.restore(clocks)
-        self._pending = dict(pending)
+        self._pending_inputs = dict(pending)
         for inputs, last in zip(self._inputs_at_events, passed, strict=True):
-            inputs.passed = last
+            inputs.last_passed = last
         super().restore(state)
 
     def transfer(self, action: str, variables: Sequence[Variable], data: npt.NDArray[Any]) -> Call:
@@ -146,11 +152,11 @@ class EventInstance(Fmi3Instance):
         self._inputs_at_events += at_events
 
         def put() -> int:
-            if not self._started:
+            if not self._has_stepped:
                 for inputs, places in zip(at_events, by_clocks.values(), strict=True):
                     inputs.expect([self._inputs.last(variables[p]) for p in places])
             if any(inputs.changed() for inputs in at_events if not inputs.clocks):
-                self._limit[0] = -math.inf
+                self._event_limit[0] = -math.inf
             return max((inputs.pass_on() for inputs in at_once), default=OK)
 
         return Call(put)
@@ -160,7 +166,8 @@ class EventInstance(Fmi3Instance):
         if not self.interface.can_vary_step:
             for v in self.interface.input_clocks:
                 self._check_ticks(v, step)
-        self._step = self._step or step  # the first is that of the run; others are parts of it
+        if not self._communication_step:
+            self._communication_step = step  # the first is that of the run; others are parts of it
         return super().stepper(clock, step)
 
     def _check_ticks(self, v: Variable, step: float) -> None:
@@ -178,74 +185,74 @@ class EventInstance(Fmi3Instance):
 
     def through_events(self, status: int, begin: float, end: float) -> tuple[int, float]:
         """As Instance.through_events()."""
-        self._started, self._point = True, begin
+        self._has_stepped, self._event_time = True, begin
         near = DENSE * (end - begin)
         with self._failures():
             if status == EVENT:
-                self._point = self._reached(end)
+                self._event_time = self._reached(end)
                 self._event(near)
-            while not self._flags[TERMINATE]:
-                if self._limit[0] <= self._point:
+            while not self._step_flags[TERMINATE]:
+                if self._event_limit[0] <= self._event_time:
                     self._event()
                     continue
-                if self._point >= end:
+                if self._event_time >= end:
                     return OK, end
-                due = min(self._next, self._clocks.next)
+                due = min(self._next_event, self._clocks.next)
                 stop = due if due < end - AT_POINT else end
                 if stop < end and not self.interface.can_vary_step:
                     raise self._error("has an event within a step, which cannot vary,", due)
-                begin_of_part = self._point
+                begin_of_part = self._event_time
                 status = self._do_step(begin_of_part, length_until(begin_of_part, stop))
                 if status > WARNING:
                     return status, begin_of_part
-                if self._flags[TERMINATE]:
+                if self._step_flags[TERMINATE]:
                     break
-                self._point = self._reached(stop)
-                if self._flags[NEEDED]:
+                self._event_time = self._reached(stop)
+                if self._step_flags[NEEDED]:
                     self._event(near)
-                elif self._point <= begin_of_part:
+                elif self._event_time <= begin_of_part:
                     return EARLY, begin_of_part
-        return EARLY, self._point
+        return EARLY, self._event_time
 
     def _reached(self, stop: float) -> float:
         """The time in s that a step came to which was to go to `stop`."""
-        last = float(self._last[0])
-        return last if self._flags[SHORT] and last < stop - AT_POINT else stop
+        last = float(self._last_successful[0])
+        return last if self._step_flags[SHORT] and last < stop - AT_POINT else stop
 
     def _event(self, near: float = AT_POINT) -> None:
         """Event mode, now; it counts as close upon another that was less than `near` s before."""
-        self._events.count(self._point, near, self._step)
+        self._events.count(self._event_time, near, self._communication_step)
         self._slave.fmi3EnterEventMode(self._slave.component)
         self._settle()
 
     def _settle(self) -> None:
         """Have clocks tick and inputs arrive, update the discrete states until they settle."""
         update = self._slave.updateDiscreteStates
-        settled = self._events.settle(self._point, update, self._take_inputs)
+        settled = self._events.settle(self._event_time, update, self._take_inputs)
         if settled.ended:
-            self._flags[TERMINATE], self._last[0] = True, self._point
+            self._step_flags[TERMINATE], self._last_successful[0] = True, self._event_time
             return
-        handles_it_itself = settled.next == self._next <= self._point + AT_POINT
+        handles_it_itself = settled.next == self._next_event <= self._event_time + AT_POINT
         # its inner steps are behind then: it will return for that event by itself
-        self._next = math.inf if handles_it_itself else settled.next
+        self._next_event = math.inf if handles_it_itself else settled.next
         self._slave.enterStepMode()
         self._in_step_mode = True
-        self._limit[0] = min(self._next, self._clocks.next) - AT_POINT
+        self._event_limit[0] = min(self._next_event, self._clocks.next) - AT_POINT
 
     def _take_inputs(self, ticked: Collection[int]) -> None:
         """Have the inputs arrive that wait for an event, and those of the clocks that tick."""
-        arriving = {v: x for v, x in self._pending.items() if _arrives(v.clocks, ticked)}
+        arriving = {v: x for v, x in self._pending_inputs.items() if _arrives(v.clocks, ticked)}
         for variable in arriving:
-            del self._pending[variable]
+            del self._pending_inputs[variable]
         self._assign(arriving.items())
-        for inputs in self._inputs_at_events if self._started else ():
+        for inputs in self._inputs_at_events if self._has_stepped else ():
             if _arrives(inputs.clocks, ticked) and inputs.changed():
                 status = inputs.pass_on()
                 if status > WARNING:
-                    raise self.failure(status, self._point)
+                    raise self.failure(status, self._event_time)
 
     def _time(self) -> float:
-        return max(self._point, super()._time())
+        return max(self._event_time, super()._time())
 
 
 class _PartOfInputs(ConnectedInputs):
@@ -269,16 +276,16 @@ class _PartOfInputs(ConnectedInputs):
     def expect(self, values: Sequence[Value | None]) -> None:
         """The FMU has these values now, as far as they are known."""
         if None not in values:
-            self.passed = np.array(values, self._part.dtype).tobytes()
+            self.last_passed = np.array(values, self._part.dtype).tobytes()
 
-    def coming(self) -> npt.NDArray[Any]:
-        """As ConnectedInputs.coming()."""
+    def values_to_come(self) -> npt.NDArray[Any]:
+        """As ConnectedInputs.values_to_come()."""
         values: npt.NDArray[Any] = self._data[self._places]
         return values
 
     def pass_on(self) -> int:
         """As ConnectedInputs.pass_on()."""
-        self._part[:] = self.coming()
+        self._part[:] = self.values_to_come()
         return super().pass_on()
 
 

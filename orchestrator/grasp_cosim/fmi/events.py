@@ -51,15 +51,15 @@ class Events:
 
     def __init__(self, clocks: Clocks, refuse: Refuse) -> None:
         self._clocks, self._refuse = clocks, refuse
-        self._in_a_row, self._last = 0, -math.inf
+        self._dense_events, self._last_event = 0, -math.inf
 
     def saved(self) -> tuple[int, float]:
         """What was counted, for restore()."""
-        return self._in_a_row, self._last
+        return self._dense_events, self._last_event
 
     def restore(self, saved: tuple[int, float]) -> None:
         """Go back to what was saved."""
-        self._in_a_row, self._last = saved
+        self._dense_events, self._last_event = saved
 
     def count(self, time: float, near: float, step: float, following: float = math.inf) -> None:
         """Count an event at a time, which is close upon another that was at most `near` before.
@@ -67,9 +67,9 @@ class Events:
         SimulationError where too many come in a row. All in s: `step` is the communication step,
         `following` the time of the next event that the FMU has named.
         """
-        self._in_a_row = self._in_a_row + 1 if time - self._last <= near else 0
-        self._last = time
-        if self._in_a_row < MAX_DENSE_EVENTS:
+        self._dense_events = self._dense_events + 1 if time - self._last_event <= near else 0
+        self._last_event = time
+        if self._dense_events < MAX_DENSE_EVENTS:
             return
         next_one = f", the next at t = {following:.9g} s" if following < math.inf else ""
         raise self._refuse(
@@ -111,18 +111,18 @@ class ConnectedInputs:
     def __init__(self, data: npt.NDArray[Any], call: Call) -> None:
         """The call passes data on."""
         self._data, self._call = data, call
-        self.passed = b""
+        self.last_passed = b""
         """What the FMU has."""
 
-    def coming(self) -> npt.NDArray[Any]:
+    def values_to_come(self) -> npt.NDArray[Any]:
         """The values to come."""
         return self._data
 
     def changed(self) -> bool:
         """True if the FMU has other values."""
-        return self.coming().tobytes() != self.passed
+        return self.values_to_come().tobytes() != self.last_passed
 
     def pass_on(self) -> int:
         """Set them; the FMI status."""
-        self.passed = self.coming().tobytes()
+        self.last_passed = self.values_to_come().tobytes()
         return self._call.python()

@@ -232,8 +232,8 @@ class Inputs:
         if not values:
             return ""
         by_suspicion = sorted(values, key=lambda v: _is_usual(v, values[v]))
-        listed = (_in_words(v, values[v]) for v in by_suspicion)
-        return f" (inputs: {choices(listed, MAX_INPUTS_NAMED)})"
+        words = (_in_words(v, values[v]) for v in by_suspicion)
+        return f" (inputs: {choices(words, MAX_INPUTS_NAMED)})"
 
 
 def _is_usual(variable: Variable, value: Value) -> bool:

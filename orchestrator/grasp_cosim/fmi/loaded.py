@@ -92,15 +92,15 @@ class LoadedInstance(ABC):
         self.tolerance = tolerance
         self._logging = logging
         self._messages = Messages(name, logging, self._time)
-        self._restrained = False
+        self._is_log_restrained = False
         self._major = interface.version[0]
-        self._worst = FATAL  # until it is instantiated
-        self._keep: list[Any] = []
+        self._worst_status = FATAL  # until it is instantiated
+        self._bound_buffers: list[Any] = []
         self._inputs = Inputs()
-        self._arrays: dict[int, list[Any]] = {}
+        self._array_values: dict[int, list[Any]] = {}
         self._clock: npt.NDArray[np.float64] | None = None
         self._folder: ScratchFolder | None = None
-        self._python = False
+        self._is_python = False
         self._slave: Any = None
         self._kept_states: States | None = None
         self._forget()
@@ -143,7 +143,7 @@ class LoadedInstance(ABC):
         It is for pythonfmu, too, which else drops the exceptions that the Python code raises. What
         it logs of a call that goes well is what that code wants logged.
         """
-        return self._python or self._logging is True
+        return self._is_python or self._logging is True
 
     def _choose_categories(self) -> None:
         """Have the FMU log warnings, errors, and the categories that were asked for.
@@ -160,21 +160,21 @@ class LoadedInstance(ABC):
         except (FMICallException, MissingFunctionError) as error:
             fatal = isinstance(error, FMICallException) and error.status >= FATAL
             if categories or fatal:
-                self._worst = FATAL if fatal else self._worst
+                self._worst_status = FATAL if fatal else self._worst_status
                 raise InputError(
                     f"{self.name}: {self.interface.called} does not take log categories: "
                     f"{self._reason(error)}"
                 ) from error
         else:
-            self._restrained = not categories
+            self._is_log_restrained = not categories
 
     def quieten(self) -> None:
         """Switch logging off again in an FMU that takes no notice of the categories it was told.
 
         It would format each call, which may take fifty times as long as the call.
         """
-        if self._restrained and self._messages.unasked:
-            self._restrained = False
+        if self._is_log_restrained and self._messages.unrequested:
+            self._is_log_restrained = False
             with suppress(FMICallException), self._messages.ignored():
                 self._slave.setDebugLogging(False, [])
             LOGGER.info("%s: logs more than its warnings; its log is off", self.name)
@@ -218,9 +218,9 @@ class LoadedInstance(ABC):
         return folder
 
     def _load(self, folder: Path) -> None:
-        self._python = (folder / "resources/slavemodule.txt").exists()
+        self._is_python = (folder / "resources/slavemodule.txt").exists()
         plain = str(folder).replace(" ", "")
-        if self._python and quote(plain) != plain:
+        if self._is_python and quote(plain) != plain:
             raise InputError(
                 f"{self.name}: temporary folder {folder}: a Python FMU crashes on its characters; "
                 "set TMPDIR to a folder of plain ASCII letters"
@@ -238,18 +238,18 @@ class LoadedInstance(ABC):
             raise InputError(message) from error
         finally:
             os.chdir(current_folder)  # where loading fails, FMPy stays in the library's folder
-        if self._python:
+        if self._is_python:
             _binaries_of_pythonfmu.add(library_file(self._slave))
-        self._worst = OK
+        self._worst_status = OK
         self._choose_categories()
 
     def close(self) -> None:
         """Terminate and free the FMU as far as it permits; remove what was extracted."""
-        if self._inputs.running and self._worst < ERROR:
+        if self._inputs.running and self._worst_status < ERROR:
             try:
                 self._slave.terminate()
             except FMICallException as error:
-                self._worst = error.status
+                self._worst_status = error.status
                 reason = as_reason(self._messages.reasons())
                 LOGGER.warning("%s: %s%s", self.name, error, reason)
         if self._slave is not None:
@@ -272,7 +272,7 @@ class LoadedInstance(ABC):
         """False after fmi2Fatal, but where pythonfmu makes that of any call refused: our own Python
         FMUs outlive it.
         """
-        return self._worst < FATAL or (self._python and self.interface.ours)
+        return self._worst_status < FATAL or (self._is_python and self.interface.ours)
 
     def _free(self) -> None:
         """Free the instance, and the library with it."""
@@ -330,7 +330,7 @@ class LoadedInstance(ABC):
         scalars = [v.reference for v in variables if not (v.element and v.element.place)]
         count, size, values_at = len(scalars), len(variables), data.ctypes.data
         references = (ctypes.c_uint * count)(*scalars)
-        self._keep += [references, data]
+        self._bound_buffers += [references, data]
         if action == "set":
             self._inputs.bind(variables, data)
         shape, sizes = TRANSFER_2, []
@@ -356,7 +356,7 @@ class LoadedInstance(ABC):
 
     def _loop_call(self, call: Callable[[], int], native: Native) -> Call:
         """The call for the loop: as Python makes it where it is traced, else also natively."""
-        return Call(call) if self._trace else Call(call, native, self._python)
+        return Call(call) if self._trace else Call(call, native, self._is_python)
 
     def _suffix(self, fmi_type: str) -> str:
         """The end of the names of the functions that set and get an FMI type."""
@@ -389,15 +389,17 @@ class LoadedInstance(ABC):
 
     def _elements(self, variable: Variable, element: Element, fetch: bool) -> list[Any]:
         """The elements of an array that the variable is in, as they were set last."""
-        if variable.reference not in self._arrays:
+        if variable.reference not in self._array_values:
             starts: list[Any] = [None] * element.size
             for v in self.interface.variables:
                 if v.element and v.reference == variable.reference and v.start is not None:
                     starts[v.element.place] = _OF_KIND[v.kind](v.start_value)
             if None in starts and fetch:
                 starts = self._get_array(variable)
-            self._arrays[variable.reference] = [0 if start is None else start for start in starts]
-        return self._arrays[variable.reference]
+            self._array_values[variable.reference] = [
+                0 if start is None else start for start in starts
+            ]
+        return self._array_values[variable.reference]
 
     def _get_array(self, variable: Variable) -> list[Any]:
         """The elements of the array that a variable is in."""
@@ -411,8 +413,8 @@ class LoadedInstance(ABC):
         status, state = self._kept_states.take()
         if state is None:
             raise self.failure(status, self._time())
-        arrays = {reference: [*elements] for reference, elements in self._arrays.items()}
-        return state, self._worst, arrays, self._inputs.saved(), self._messages.saved()
+        arrays = {reference: [*elements] for reference, elements in self._array_values.items()}
+        return state, self._worst_status, arrays, self._inputs.saved(), self._messages.saved()
 
     def restore(self, saved: Any) -> None:
         state, worst, arrays, inputs, messages = saved
@@ -421,8 +423,8 @@ class LoadedInstance(ABC):
         status = self._kept_states.put(state)
         if status > WARNING:
             raise self.failure(status, self._time())
-        self._worst = worst
-        self._arrays = {reference: [*elements] for reference, elements in arrays.items()}
+        self._worst_status = worst
+        self._array_values = {reference: [*elements] for reference, elements in arrays.items()}
         self._inputs.restore(inputs)
         self._messages.restore(messages)
 
@@ -430,10 +432,10 @@ class LoadedInstance(ABC):
         self._check_that_it_may_be_called()
         with self._failures():
             self._slave.reset()
-        self._worst = OK
+        self._worst_status = OK
         self._inputs.forget()
         self._messages.forget()
-        self._arrays.clear()
+        self._array_values.clear()
         self._forget()
         self._choose_categories()
 
@@ -468,13 +470,13 @@ class LoadedInstance(ABC):
         if not self.interface.has_states:
             raise self._has_no_state("cannot be saved (canGetAndSetFMUstate)")
         form = "FMUstate" if self._major == "2" else "FMUState"
-        kind = _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION
+        kind = _PYTHON_FUNCTION if self._is_python else _NATIVE_FUNCTION
         instance = ctypes.c_void_p(self._slave.component)
         get, set_, free = (
             partial(self._symbol(f"{action}{form}", kind), instance)
             for action in ("Get", "Set", "Free")
         )
-        return States(get, set_, free, overwrites=not self._python)
+        return States(get, set_, free, overwrites=not self._is_python)
 
     def _has_no_state(self, reason: str) -> InputError:
         """The error where the state is asked for."""
@@ -491,7 +493,7 @@ class LoadedInstance(ABC):
 
     def failure(self, status: int, time: float) -> SimulationError:
         """The error for a call that returned status at time in s. The FMU is not used again."""
-        self._worst = OK if status == EARLY else status
+        self._worst_status = OK if status == EARLY else status
         if status == EARLY:
             return self._error("ended a step early", time)
         name = STATUS[status] if status < len(STATUS) else status
@@ -499,7 +501,7 @@ class LoadedInstance(ABC):
 
     def _refusal(self, reason: str, status: int) -> SimulationError:
         """The error for what the FMU did, now, when it returned a status. It is not used again."""
-        self._worst = max(self._worst, status)
+        self._worst_status = max(self._worst_status, status)
         return self._error(reason, self._time())
 
     def _error(self, reason: str, time: float, must: str = "", advice: str = "") -> SimulationError:
@@ -519,7 +521,7 @@ class LoadedInstance(ABC):
 
     def _function(self, name: str, *arguments: Any) -> tuple[Callable[[], int], int]:
         """The bound function for Python, and its address, 0 where its calls are traced."""
-        function = self._symbol(name, _PYTHON_FUNCTION if self._python else _NATIVE_FUNCTION)
+        function = self._symbol(name, _PYTHON_FUNCTION if self._is_python else _NATIVE_FUNCTION)
         bound = partial(function, ctypes.c_void_p(self._slave.component), *arguments)
         address = 0 if self._trace else ctypes.cast(function, ctypes.c_void_p).value
         return bound, address or 0
@@ -551,7 +553,7 @@ class LoadedInstance(ABC):
         try:
             yield
         except FMICallException as error:
-            self._worst = error.status
+            self._worst_status = error.status
             reason = as_reason(self._messages.reasons())
             if not reason:
                 reason = f": {error}{self._advice(error.status)}"

@@ -59,23 +59,23 @@ class Messages:
     def __init__(self, component: str, logging: Logging, clock: Callable[[], float]) -> None:
         """`logging` are the categories that were asked for, or all; clock() is the time in s."""
         self._component, self._logging, self._clock = component, logging, clock
-        self._last: deque[Message] = deque(maxlen=MAX_KEPT)
+        self._latest: deque[Message] = deque(maxlen=MAX_KEPT)
         self._tallies: dict[int, _Tally] = {}
-        self._ignoring = False
+        self._is_ignoring = False
         self.count = 0
         """Warnings and errors so far."""
-        self.unasked = 0
+        self.unrequested = 0
         """Messages so far that are neither warnings nor errors, and that nobody asked for."""
 
     def wants(self, status: int, category: bytes | None) -> bool:
         """True for a message of such a status and category that is to be taken."""
         if status > OK:
-            return not self._ignoring
+            return not self._is_ignoring
         if isinstance(self._logging, bool):
             is_asked_for = self._logging
         else:
             is_asked_for = (category or b"").decode(errors="replace") in self._logging
-        self.unasked += not is_asked_for
+        self.unrequested += not is_asked_for
         return is_asked_for
 
     def take(self, status: int, text: bytes | None) -> None:
@@ -98,18 +98,18 @@ class Messages:
             LOGGER.log(level, "%s", line, extra={"fmu_message": message})
         if message.status > OK:
             self.count += 1
-            self._last.append(message)
+            self._latest.append(message)
             first, number = self._tallies.get(message.status, (message, 0))
             self._tallies[message.status] = _Tally(first, number + 1)
 
     def saved(self) -> tuple[Any, ...]:
         """What was logged until now, for restore()."""
-        return [*self._last], dict(self._tallies), self.count, self.unasked
+        return [*self._latest], dict(self._tallies), self.count, self.unrequested
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved: what was logged since is taken back."""
-        last, tallies, self.count, self.unasked = saved
-        self._last, self._tallies = deque(last, MAX_KEPT), dict(tallies)
+        last, tallies, self.count, self.unrequested = saved
+        self._latest, self._tallies = deque(last, MAX_KEPT), dict(tallies)
 
     def forget(self) -> None:
         """Nothing was logged yet."""
@@ -118,19 +118,19 @@ class Messages:
     @contextmanager
     def ignored(self) -> Iterator[None]:
         """What is logged meanwhile says nothing about the run."""
-        self._ignoring = True
+        self._is_ignoring = True
         try:
             yield
         finally:
-            self._ignoring = False
+            self._is_ignoring = False
 
     def reasons(self) -> list[str]:
         """The texts of the last messages, for an error; they are not told again.
 
         They are those of one step: what the FMU warned of before is in the log.
         """
-        texts = [m.text for m in self._last if m.time == self._last[-1].time]
-        self._last.clear()
+        texts = [m.text for m in self._latest if m.time == self._latest[-1].time]
+        self._latest.clear()
         self._tallies = {s: tally for s, tally in self._tallies.items() if s <= WARNING}
         texts = [text for text in texts if not _PYTHONFMU_PREFIX.match(text)] or texts
         return [self._bare(text) for text in texts]

@@ -57,8 +57,8 @@ class ModelInstance(LoadedInstance):
         """Extract and instantiate; InputError where the FMU does not load."""
         self._solver_options = options
         self._solver: Cvode | None = None
-        self._connected: list[ConnectedInputs] = []
-        self._step = 0.0
+        self._connected_inputs: list[ConnectedInputs] = []
+        self._communication_step = 0.0
         super().__init__(name, interface, options.relative_tolerance, logging, trace)
 
     def _forget(self) -> None:
@@ -67,18 +67,18 @@ class ModelInstance(LoadedInstance):
         self._end_solver()
         self._clocks = Clocks(self.interface, self._bound, self._refusal)
         self._events = Events(self._clocks, self._error)
-        self._now = 0.0
-        self._next = math.inf
+        self._solver_time = 0.0
+        self._next_event = math.inf
         self._get_indicators: Any = None
-        self._ended: float | None = None
-        self._failed = OK
+        self._end_time: float | None = None
+        self._failed_status = OK
         self._set_values: dict[Variable, Value] = {}
-        self._waiting: dict[Variable, Value] = {}
-        self._started = False
-        self._zero: npt.NDArray[np.bool_] | None = None
+        self._pending_inputs: dict[Variable, Value] = {}
+        self._has_stepped = False
+        self._zero_indicators: npt.NDArray[np.bool_] | None = None
         self._warnings_noted = 0
-        for inputs in self._connected:
-            inputs.passed = b""
+        for inputs in self._connected_inputs:
+            inputs.last_passed = b""
 
     def _end_solver(self) -> None:
         if self._solver:
@@ -91,13 +91,13 @@ class ModelInstance(LoadedInstance):
         return self.interface.exchange.identifier
 
     def _wants_the_end(self) -> bool:
-        return self._ended is not None
+        return self._end_time is not None
 
     def last_successful_time(self) -> float | None:
-        return self._ended
+        return self._end_time
 
     def _time(self) -> float:
-        return self._now
+        return self._solver_time
 
     def close(self) -> None:
         """Free the solver, then the FMU as far as it permits."""
@@ -107,13 +107,13 @@ class ModelInstance(LoadedInstance):
     def enter_initialization(
         self, values: Mapping[str, Value], stop: float | None, start: float = 0.0
     ) -> None:
-        self._now = start
+        self._solver_time = start
         super().enter_initialization(values, stop, start)
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode; settle the discrete states, and prepare the solver."""
         try:
-            self._clocks.initialise(self._now)
+            self._clocks.initialise(self._solver_time)
             super().exit_initialization()
             with self._refusals():
                 self._bind()
@@ -128,8 +128,8 @@ class ModelInstance(LoadedInstance):
         """
         value_of = dict(zip(variables, values, strict=True))
         if self._inputs.running:
-            self._waiting |= value_of
-            if not self._started and self._ended is None:
+            self._pending_inputs |= value_of
+            if not self._has_stepped and self._end_time is None:
                 with self._failures():
                     self._event()
         else:
@@ -145,7 +145,7 @@ class ModelInstance(LoadedInstance):
         call = super().transfer(action, variables, data)
         if action == "get":
             return call
-        self._connected.append(ConnectedInputs(data, call))
+        self._connected_inputs.append(ConnectedInputs(data, call))
         return Call(lambda: OK)
 
     def stepper(self, clock: npt.NDArray[np.float64], step: float) -> Call:
@@ -153,54 +153,59 @@ class ModelInstance(LoadedInstance):
         time: Any = memoryview(clock)  # type: ignore[arg-type]  # numpy's 3.11 stubs
 
         def advance() -> int:
-            self._step, self._started = step, True
+            self._communication_step, self._has_stepped = step, True
             self._advance(time[2])
-            return OK if self._ended is None else EARLY
+            return OK if self._end_time is None else EARLY
 
         return Call(advance)
 
     def _advance(self, end: float) -> None:
         with self._failures():
-            self._waiting = {v: x for v, x in self._waiting.items() if self._set_values.get(v) != x}
-            if self._waiting or any(inputs.changed() for inputs in self._connected):
+            self._pending_inputs = {
+                v: x for v, x in self._pending_inputs.items() if self._set_values.get(v) != x
+            }
+            if self._pending_inputs or any(inputs.changed() for inputs in self._connected_inputs):
                 self._event()
-            while self._now < end and self._ended is None:
-                stop = self._next if self._next <= end + AT_POINT else end
+            while self._solver_time < end and self._end_time is None:
+                stop = self._next_event if self._next_event <= end + AT_POINT else end
                 has_event = self._go_on(stop)
-                if self._ended is None and (has_event or self._now >= self._next):
-                    self._event(DENSE * self._step if has_event else AT_POINT)
+                if self._end_time is None and (has_event or self._solver_time >= self._next_event):
+                    self._event(DENSE * self._communication_step if has_event else AT_POINT)
 
     def _go_on(self, stop: float) -> bool:
         """Take one step of the solver, to `stop` at most; True where there is an event."""
         event = False
-        if self._solver is None or stop - self._now <= MIN_SPAN * math.ulp(stop):
-            self._now = max(self._now, stop)
-            self._check(self._set_time(self._now))
+        if self._solver is None or stop - self._solver_time <= MIN_SPAN * math.ulp(stop):
+            self._solver_time = max(self._solver_time, stop)
+            self._check(self._set_time(self._solver_time))
         else:
-            if self._zero is not None:
-                stop = min(stop, self._now + max(AT_POINT, 4.0 * MIN_SPAN * math.ulp(self._now)))
+            if self._zero_indicators is not None:
+                stop = min(
+                    stop,
+                    self._solver_time + max(AT_POINT, 4.0 * MIN_SPAN * math.ulp(self._solver_time)),
+                )
             try:
-                self._now, event = self._solver.step(stop)
+                self._solver_time, event = self._solver.step(stop)
             except CvodeError as error:
                 raise self._stuck(error) from None
-            self._check(self._set_time(self._now))
+            self._check(self._set_time(self._solver_time))
             if self._states:
-                self._check(self._set_states(self._x, self._states))
+                self._check(self._set_states(self._states_address, self._states))
             event = event or self._left_zero()
         if self.interface.exchange and self.interface.exchange.wants_completed_steps:
             wants, ended = self._slave.completedIntegratorStep()
             event = event or wants
             if ended:
-                self._ended = self._now
+                self._end_time = self._solver_time
         return event
 
     def _left_zero(self) -> bool:
         """True where an indicator was 0 as the solver began and is not now, which CVode leaves
         out; the solver has gone a tiny step then.
         """
-        if self._zero is None:
+        if self._zero_indicators is None:
             return False
-        zero, self._zero = self._zero, None
+        zero, self._zero_indicators = self._zero_indicators, None
         return bool((zero & (self._indicators_now() != 0.0)).any())
 
     def _event(self, near: float = AT_POINT) -> None:
@@ -208,12 +213,12 @@ class ModelInstance(LoadedInstance):
 
         It counts as close upon another event that was less than `near` s before.
         """
-        self._events.count(self._now, near, self._step, self._next)
+        self._events.count(self._solver_time, near, self._communication_step, self._next_event)
         self._slave.enterEventMode()
-        waiting, self._waiting = self._waiting, {}
+        waiting, self._pending_inputs = self._pending_inputs, {}
         self._set_values |= waiting
         self._assign(waiting.items())
-        for inputs in self._connected if self._started else ():
+        for inputs in self._connected_inputs if self._has_stepped else ():
             if inputs.changed():
                 self._check(inputs.pass_on())
         self._settle()
@@ -221,11 +226,11 @@ class ModelInstance(LoadedInstance):
     def _settle(self, first: bool = False) -> None:
         """Iterate an event until nothing changes, and begin the continuous time after it."""
         update = getattr(self._slave, self.UPDATE)
-        settled = self._events.settle(self._now, update, arrive=lambda _: None)
+        settled = self._events.settle(self._solver_time, update, arrive=lambda _: None)
         if settled.ended:
-            self._ended = self._now
+            self._end_time = self._solver_time
             return
-        self._next = min(settled.next, self._clocks.next)
+        self._next_event = min(settled.next, self._clocks.next)
         self._slave.enterContinuousTimeMode()
         if self._solver:
             self._begin(self._solver, first or settled.new_nominals)
@@ -234,14 +239,14 @@ class ModelInstance(LoadedInstance):
         """Have the solver begin anew with the states that the FMU has now."""
         new = None
         if self._states:
-            self._check(self._get_states(self._x, self._states))
+            self._check(self._get_states(self._states_address, self._states))
             if nominals:
                 new = np.ones(self._states)
                 self._check(self._get_nominals(new.ctypes.data, self._states))
                 new = np.where(np.isfinite(new) & (new > 0.0), new, 1.0)
-        solver.restart(self._now, new)
+        solver.restart(self._solver_time, new)
         zero = self._indicators_now() == 0.0
-        self._zero = zero if zero.any() else None
+        self._zero_indicators = zero if zero.any() else None
 
     def _bind(self) -> None:
         """Bind the functions that are called in the steps of the solver, and make that."""
@@ -269,7 +274,7 @@ class ModelInstance(LoadedInstance):
         if self._states or self._indicators:
             sizes = max(self._states, 1), self._indicators  # CVode needs a state; it stays 0
             self._solver = Cvode(*sizes, slopes, crossings, self._solver_options)
-            self._x = self._solver.x.ctypes.data
+            self._states_address = self._solver.x.ctypes.data
 
     def _evaluation(self, get: Callable[[int, int], int], size: int) -> Function:
         """For the solver: what to get at the time and states that it tries."""
@@ -283,7 +288,7 @@ class ModelInstance(LoadedInstance):
             if status == WARNING:
                 self._note_warning()
             if status > DISCARD:
-                self._failed = status
+                self._failed_status = status
             return 0 if status <= WARNING else 1 if status == DISCARD else -1
 
         return evaluate
@@ -298,7 +303,7 @@ class ModelInstance(LoadedInstance):
         if status == WARNING:
             self._note_warning()
         if status > WARNING:
-            raise self.failure(status, self._now)
+            raise self.failure(status, self._solver_time)
 
     def _note_warning(self) -> None:
         """Keep a warning that a call returned, unless the FMU has logged one since the last."""
@@ -307,9 +312,9 @@ class ModelInstance(LoadedInstance):
 
     def _stuck(self, error: CvodeError) -> SimulationError:
         """The error for a step that the solver could not take."""
-        if self._failed:
-            return self.failure(self._failed, self._now)
-        return self._error(f"cannot be integrated by CVode ({error})", self._now)
+        if self._failed_status:
+            return self.failure(self._failed_status, self._solver_time)
+        return self._error(f"cannot be integrated by CVode ({error})", self._solver_time)
 
 
 def _no_slope(slopes: int, _: int) -> int:

@@ -49,6 +49,6 @@ def _first(interface: Interface) -> int:
     """The byte at which they begin."""
     from ..fmu_export.slave import HEAD  # only here: few runs ask for numbers
 
-    kept = [v for v in interface.variables if v.causality in ("input", "parameter")]
+    saved_variables = [v for v in interface.variables if v.causality in ("input", "parameter")]
     phase_and_time = 2
-    return HEAD + NUMBERS.itemsize * (phase_and_time + len(kept))
+    return HEAD + NUMBERS.itemsize * (phase_and_time + len(saved_variables))

@@ -168,7 +168,7 @@ class _SharedMemory:
         return np.frombuffer(self._memory, element, count, offset)
 
 
-class _KeptThere:
+class _RemoteState:
     """A state that the other process keeps, by its number, until nothing here refers to it."""
 
     def __init__(self, number: int, released: deque[int]) -> None:
@@ -194,7 +194,7 @@ class ProcessInstance:
         self.interface = interface
         self._owner = os.getpid()
         self._messages = Messages(name, logging, lambda: float(self._shared.clock[0]))
-        self._fresh = False
+        self._has_fresh_outputs = False
         self._released: deque[int] = deque()
         self._inputs = Inputs()
         if not POSIX:
@@ -202,7 +202,7 @@ class ProcessInstance:
                 f"{name}: isolation = 'process' needs Linux or macOS; must be 'none' here"
             )
         self._stack = ExitStack()
-        self._lost: SimulationError | None = None
+        self._loss: SimulationError | None = None
         self._printed: deque[str] = deque(maxlen=MAX_LINES)
         folder = self._stack.enter_context(ScratchFolder()).name
         memory = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
@@ -244,7 +244,7 @@ class ProcessInstance:
     def close(self) -> None:
         """Terminate and free the FMU as far as it permits, and end its process."""
         try:
-            if self._lost is None:
+            if self._loss is None:
                 self._ask("close", timeout=END_TIMEOUT)
         except SimulationError as error:
             LOGGER.warning("%s, while it was closed", error)
@@ -266,7 +266,7 @@ class ProcessInstance:
         self._prepare("enter_step_mode")
 
     def through_events(self, status: int, begin: float, end: float) -> tuple[int, float]:
-        self._fresh = False
+        self._has_fresh_outputs = False
         outcome: tuple[int, float] = self._ask("through_events", status, begin, end)
         return outcome
 
@@ -275,7 +275,7 @@ class ProcessInstance:
         return values
 
     def set(self, variables: Sequence[Variable], values: Sequence[Value]) -> None:
-        self._fresh = False
+        self._has_fresh_outputs = False
         for variable, value in zip(variables, values, strict=True):
             self._inputs.set(variable, value)
         self._ask("set", list(variables), list(values))
@@ -283,21 +283,21 @@ class ProcessInstance:
     def saved(self) -> Any:
         """As Instance.saved(), with what is on the way."""
         released = [self._released.popleft() for _ in range(len(self._released))]
-        state = _KeptThere(self._ask("keep_state", released), self._released)
-        on_the_way = self._fresh, self._shared.saved()
+        state = _RemoteState(self._ask("keep_state", released), self._released)
+        on_the_way = self._has_fresh_outputs, self._shared.saved()
         return state, on_the_way, self._inputs.saved(), self._messages.saved()
 
     def restore(self, saved: Any) -> None:
         state, (fresh, shared), inputs, messages = saved
         self._ask("restore_state", state.number)
-        self._fresh = fresh
+        self._has_fresh_outputs = fresh
         self._shared.restore(shared)
         self._inputs.restore(inputs)
         self._messages.restore(messages)
 
     def reset(self) -> None:
         self._ask("reset", timeout=START_TIMEOUT)
-        self._fresh = False
+        self._has_fresh_outputs = False
         self._shared.clear()
         self._inputs.forget()
         self._messages.forget()
@@ -318,13 +318,13 @@ class ProcessInstance:
 
         def put() -> int:
             end_fork(self._owner)  # of an FMU in this process; the memory is not its own
-            self._fresh = False
+            self._has_fresh_outputs = False
             shared[:] = data
             pending[0] = True
             return 0
 
         def fetch() -> int:
-            if not self._fresh:
+            if not self._has_fresh_outputs:
                 self._pass_values(FETCH)
             data[:] = shared
             return 0
@@ -365,9 +365,9 @@ class ProcessInstance:
 
     def _pass_values(self, command: bytes) -> int:
         """STEP or FETCH; the FMI status."""
-        self._fresh = False
+        self._has_fresh_outputs = False
         status: int = self._request(command, TIMEOUT)
-        self._fresh = status <= WARNING or status == EARLY
+        self._has_fresh_outputs = status <= WARNING or status == EARLY
         return status
 
     def _ask(self, method: str, *arguments: Any, timeout: float = TIMEOUT) -> Any:
@@ -388,8 +388,8 @@ class ProcessInstance:
         self._stack.close()
 
     def _request(self, command: bytes, timeout: float) -> Any:
-        if self._lost is not None:
-            raise self._lost
+        if self._loss is not None:
+            raise self._loss
         end_fork(self._owner)
         try:
             self._connection.send_bytes(command)
@@ -431,13 +431,13 @@ class ProcessInstance:
             ending = ended(self._process.returncode)
         logged = [line.removeprefix(LOGGED) for line in self._printed if line.startswith(LOGGED)]
         reason = f": {' '.join(logged[-1].split())}" if logged else ""
-        self._lost = SimulationError(
+        self._loss = SimulationError(
             f"{self.name}: the process of {self.interface.path.name} {ending} "
             f"at t = {self._shared.clock[0]:.9g} s{reason}{self._inputs}"
         )
         for line in self._printed:
-            self._lost.add_note(line.rstrip())
-        return self._lost
+            self._loss.add_note(line.rstrip())
+        return self._loss
 
     def _wait_for_the_end(self) -> None:
         try:

@@ -162,30 +162,30 @@ class Pacer:
         """Wait for the beginning of a step; HaltError, OverrunError where the run ends there."""
         self._use_the_wait(step)
         state, head, origin = self._state, self._head, self._state.origin
-        now = self._arrive(step)
+        now_ns = self._arrive(step)
         due = self._due(step)
-        head[ARRIVED], head[LATE] = now, state.late
+        head[ARRIVED], head[LATE] = now_ns, state.late
         if 0 < state.stall < state.late:
             raise self.stall()
         if state.late > 0 and state.shifts:
-            state.base, state.base_step, due = now, step, now
-        if now + state.spin < due:
-            while (remaining := due - state.spin - now) > 0:
+            state.base, state.base_step, due = now_ns, step, now_ns
+        if now_ns + state.spin < due:
+            while (remaining := due - state.spin - now_ns) > 0:
                 if self.halted():
                     raise HaltError
                 self._sleep(min(remaining, SLICE_NS) / NANOSECONDS)
-                now = self._clock() - origin
-            state.slept = now
-        elif state.breath and now - state.slept > state.breath:
+                now_ns = self._clock() - origin
+            state.slept = now_ns
+        elif state.breath and now_ns - state.slept > state.breath:
             self._sleep(NAP)
-            state.slept = now = self._clock() - origin
-        while now < due:
-            now = self._clock() - origin
-        head[DUE], head[BEGIN] = due, now
+            state.slept = now_ns = self._clock() - origin
+        while now_ns < due:
+            now_ns = self._clock() - origin
+        head[DUE], head[BEGIN] = due, now_ns
 
-    def finish(self, step: int, now: int | None = None) -> None:
+    def finish(self, step: int, now_ns: int | None = None) -> None:
         """The last step has just ended, or did at `now`; OverrunError where it stops at that."""
-        self.meter.end(self._arrive(step, now), self._state.late)
+        self.meter.end(self._arrive(step, now_ns), self._state.late)
 
     def overrun(self) -> OverrunError:
         """The error where it is to stop, also of compiled code."""
@@ -224,10 +224,10 @@ class Pacer:
             if self.spare(2 * spare / 3):
                 self.meter.recorded(step - 1, self._clock() - start)
 
-    def _arrive(self, step: int, now: int | None = None) -> int:
+    def _arrive(self, step: int, now_ns: int | None = None) -> int:
         """The time now; late is by how much the step before ended late, negative if it did not."""
         state = self._state
-        arrived: int = (self._clock() if now is None else now) - state.origin
+        arrived: int = (self._clock() if now_ns is None else now_ns) - state.origin
         if state.base_step < 0:
             state.base, state.base_step, state.slept = arrived, step, arrived
         state.arrived, state.late = arrived, arrived - self._due(step)
