@@ -9,7 +9,7 @@ from support.native_fmus import needs_gcc, talker
 RUN = """if True:
     import sys
     from pathlib import Path
-    from grasp_cosim.fmi.process import load
+    from grasp_cosim.fmi.load import load
     from grasp_cosim.system.parts import Component
     load(Component("a", Path(sys.argv[1]), {})).close()
     print("closed")

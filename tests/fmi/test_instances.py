@@ -20,7 +20,7 @@ from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi.co_simulation import SharedInstance
 from grasp_cosim.fmi.fmi2_logger import CONVENTION, formatted, logger_type
 from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
-from grasp_cosim.fmi.process import load
+from grasp_cosim.fmi.load import load
 from grasp_cosim.interface.obstacles import this_platform
 from grasp_cosim.interface.variables import Variable
 from grasp_cosim.system.parts import Component, Connection, Port

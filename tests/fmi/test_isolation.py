@@ -30,7 +30,7 @@ def workers():
                 parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
             except OSError:  # it ended meanwhile
                 continue
-            if b"grasp_cosim.fmi.process" in line and parent == os.getpid():
+            if b"grasp_cosim.fmi.worker" in line and parent == os.getpid():
                 found.add(int(entry.name))
     return found
 
@@ -170,7 +170,7 @@ def test_the_process_ends_when_the_masters_is_killed(tmp_path):
     code = f"""
 import numpy as np
 from pathlib import Path
-from grasp_cosim.fmi.process import load
+from grasp_cosim.fmi.load import load
 from grasp_cosim.system.parts import Component
 part = load(Component("part", Path({str(fmu)!r}), {{}}, isolation="process"))
 part.enter_initialization({{"hang_at": 0.1}}, 1.0)

@@ -4,7 +4,7 @@ from zipfile import ZipFile
 
 import pytest
 from grasp_cosim import InputError, System, simulate
-from grasp_cosim.fmi.process import load
+from grasp_cosim.fmi.load import load
 from grasp_cosim.system.parts import Component
 from support.fmi2 import read_members
 from support.native_fmus import needs_cvode, needs_gcc, talker

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import pytest
 from grasp_cosim import InputError
-from grasp_cosim.fmi.process import load
+from grasp_cosim.fmi.load import load
 from grasp_cosim.interface.read import describe
 from grasp_cosim.recording.signals import read_log
 from grasp_cosim.system.parts import Component

@@ -72,7 +72,7 @@ class ModelInstance(LoadedInstance):
         self._get_indicators: Any = None
         self._end_time: float | None = None
         self._failed_status = OK
-        self._set_values: dict[Variable, Value] = {}
+        self._values_set: dict[Variable, Value] = {}
         self._pending_inputs: dict[Variable, Value] = {}
         self._has_stepped = False
         self._zero_indicators: npt.NDArray[np.bool_] | None = None
@@ -134,7 +134,7 @@ class ModelInstance(LoadedInstance):
                     self._event()
         else:
             super().set(variables, values)
-            self._set_values |= value_of
+            self._values_set |= value_of
 
     def saved(self) -> Any:
         """InputError: the solver's own state cannot be saved."""
@@ -162,7 +162,7 @@ class ModelInstance(LoadedInstance):
     def _advance(self, end: float) -> None:
         with self._failures():
             self._pending_inputs = {
-                v: x for v, x in self._pending_inputs.items() if self._set_values.get(v) != x
+                v: x for v, x in self._pending_inputs.items() if self._values_set.get(v) != x
             }
             if self._pending_inputs or any(inputs.changed() for inputs in self._connected_inputs):
                 self._event()
@@ -216,7 +216,7 @@ class ModelInstance(LoadedInstance):
         self._events.count(self._solver_time, near, self._communication_step, self._next_event)
         self._slave.enterEventMode()
         waiting, self._pending_inputs = self._pending_inputs, {}
-        self._set_values |= waiting
+        self._values_set |= waiting
         self._assign(waiting.items())
         for inputs in self._connected_inputs if self._has_stepped else ():
             if inputs.changed():

@@ -1,20 +1,16 @@
-"""An instance of a component: in this process, or in one of its own, where it may crash or hang.
+"""An instance of a component in a process of its own, where it may crash or hang.
 
-Both ends of such a process are here: python -m grasp_cosim.fmi.process serves, with the descriptors
-of the connection for commands, of the shared memory and of a pipe that is closed when the master's
-process ends, whereupon this one ends, too. A macro step is one round trip. The master puts inputs
-and the time into the shared memory, sends STEP and waits for the status; the component's process
-passes the inputs on that are pending, steps, fetches all outputs into the shared memory and
-answers. All else is a method with its arguments, and answered by its value or error. What is logged
-there comes with the answer, also with that of a step, and is logged here.
+This is the master's end; the other one is worker.py. A macro step is one round trip. The master
+puts inputs and the time into the shared memory, sends STEP and waits for the status; the
+component's process passes the inputs on that are pending, steps, fetches all outputs into the
+shared memory and answers. All else is a method with its arguments, and answered by its value or
+error. What is logged there comes with the answer, also with that of a step, and is logged here.
 
 What the FMU prints does not get out, but for the last lines, as notes of the error when the process
 is lost.
 """
 
-import faulthandler
 import logging
-import mmap
 import os
 import pickle
 import socket
@@ -25,8 +21,7 @@ import threading
 import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
-from itertools import count
+from contextlib import ExitStack
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -34,7 +29,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..base import interruption
 from ..base.calls import Call
 from ..base.errors import InputError, SimulationError, ended
 from ..base.scratch import ScratchFolder
@@ -42,11 +36,10 @@ from ..base.system_calls import end_fork, end_group, listener
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface
 from ..interface.variables import Variable
-from ..system.parts import Component, Logging, Solver
-from .co_simulation import Fmi3Instance, FmuInstance, SharedInstance
-from .instance import CLOCK, EARLY, OK, WARNING, Inputs, Instance, dtype
+from ..system.parts import Logging, Solver
+from .instance import EARLY, WARNING, Inputs
 from .messages import Message, Messages
-from .python_code import CodeInstance
+from .shared_memory import FETCH, LOGGED, SHARED_BYTES, STEP, SharedMemory
 
 LOGGER = logging.getLogger(__name__)
 """Gets what is logged in the process of a component, but for the messages of its FMU."""
@@ -68,104 +61,6 @@ OUTPUT_TIMEOUT = 1.0
 
 MAX_LINES = 80
 """The last lines of what an FMU printed that are kept for the error: of a crash both stacks."""
-
-STEP, FETCH = b"S", b"F"
-"""Pass pending inputs on and step; pass them on and fetch outputs. Pickles are longer."""
-
-LOGGED = "FMU: "
-"""So begins what an FMU logged, among the lines that its process prints."""
-
-SHARED_BYTES = 1 << 26
-"""Of shared memory; only what is used of it takes memory."""
-
-
-def load(component: Component) -> Instance:
-    """The instance of a component, in a process of its own where it wants one.
-
-    InputError where the FMU does not load. The caller closes it.
-    """
-    name, interface = component.name, component.loaded
-    if component.code:
-        return CodeInstance(name, component.code)
-    if component.isolation == "process":
-        solver, logging = component.solver, component.logging
-        return ProcessInstance(name, interface, solver, logging, component.trace)
-    if component.native and interface.version == "2.0":
-        return SharedInstance(name, interface, logging=component.logging, trace=component.trace)
-    return load_here(name, interface, component.solver, component.logging, component.trace)
-
-
-def load_here(
-    name: str,
-    interface: Interface,
-    solver: Solver | None = None,
-    logging: Logging = False,
-    trace: Path | None = None,
-) -> Instance:
-    """The instance of an FMU in this process.
-
-    By model exchange where it has to be, or where there is a `solver` and the FMU is for that, too.
-    The solver of a co-simulation FMU gets the relative tolerance of this one, or else that of the
-    FMU's default experiment.
-    """
-    three = interface.version.startswith("3")
-    exchanged = "CoSimulation" not in interface.kinds or (solver and interface.exchange)
-    if not exchanged:
-        tolerance = solver.relative_tolerance if solver else interface.tolerance
-        if interface.event_mode:
-            from .event_mode import EventInstance  # only here: few FMUs have it
-
-            return EventInstance(name, interface, tolerance, logging, trace)
-        kind = Fmi3Instance if three else FmuInstance
-        return kind(name, interface, tolerance, logging, trace)
-    try:
-        from .model_exchange import Fmi2Model, Fmi3Model  # loads the solver's libraries
-    except OSError as error:
-        raise InputError(
-            f"{name}: {interface.path.name} is for model exchange, and FMPy has no CVode for "
-            f"this machine: {error}; must be a co-simulation FMU"
-        ) from error
-    model = Fmi3Model if three else Fmi2Model
-    return model(name, interface, solver or Solver(), logging, trace)
-
-
-class _SharedMemory:
-    """The memory behind the file with the given descriptor, which both processes see."""
-
-    def __init__(self, descriptor: int) -> None:
-        self._memory = mmap.mmap(descriptor, SHARED_BYTES)
-        self.clock: npt.NDArray[np.float64] = self._view(np.float64, len(CLOCK), 0)
-        """That of Instance.stepper."""
-        self.step: npt.NDArray[np.float64] = self._view(np.float64, 1, self.clock.nbytes)
-        """The length of the step in s."""
-        self._used = self.clock.nbytes + self.step.nbytes
-
-    def add(
-        self, interface: Interface, variables: Sequence[Variable]
-    ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:
-        """A mark that values of the variables are pending, and room for them.
-
-        Both processes add the same variables in the same order and get the same room.
-        """
-        begin, count = self._used, len(variables)
-        self._used += 8 + 8 * count
-        element = dtype(interface.version, variables[0].type)
-        return self._view(np.bool_, 1, begin), self._view(element, count, begin + 8)
-
-    def saved(self) -> bytes:
-        """What is in the room that was given out, for restore()."""
-        return self._memory[: self._used]
-
-    def clear(self) -> None:
-        """Nothing is pending in it."""
-        self._memory[: self._used] = bytes(self._used)
-
-    def restore(self, saved: bytes) -> None:
-        """Go back to what was saved."""
-        self._memory[: len(saved)] = saved
-
-    def _view(self, element: npt.DTypeLike, count: int, offset: int) -> npt.NDArray[Any]:
-        return np.frombuffer(self._memory, element, count, offset)
 
 
 class _RemoteState:
@@ -207,7 +102,7 @@ class ProcessInstance:
         folder = self._stack.enter_context(ScratchFolder()).name
         memory = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
         memory.truncate(SHARED_BYTES)
-        self._shared = _SharedMemory(memory.fileno())
+        self._shared = SharedMemory(memory.fileno())
         master_end, component_end = socket.socketpair()
         self._connection = Connection(master_end.detach())
         reading, writing = os.pipe()
@@ -215,7 +110,7 @@ class ProcessInstance:
         ends = (component_end.fileno(), memory.fileno(), reading)
         path = os.pathsep.join(filter(None, sys.path))
         self._process = subprocess.Popen(  # noqa: S603
-            [sys.executable, "-P", "-m", "grasp_cosim.fmi.process", *map(str, ends)],
+            [sys.executable, "-P", "-m", "grasp_cosim.fmi.worker", *map(str, ends)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -447,142 +342,3 @@ class ProcessInstance:
             self._process.wait()
         end_group(self._process.pid)  # forks of it
         self._reader.join(OUTPUT_TIMEOUT)
-
-
-class _Log(logging.Handler):
-    """Keeps what is logged for the next answer: level, text, and the message of the FMU.
-
-    Prints it, too: this may be the last that comes of the process.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.records: list[tuple[int, str, Message | None]] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        text, message = record.getMessage(), getattr(record, "fmu_message", None)
-        self.records.append((record.levelno, text, message))
-        sys.stdout.write(f"{LOGGED}{' '.join((message.text if message else text).split())}\n")
-        sys.stdout.flush()
-
-    def taken(self) -> list[tuple[int, str, Message | None]]:
-        """The records since the last call."""
-        records, self.records = self.records, []
-        return records
-
-
-class _Worker:
-    """The other end: serves commands on one instance."""
-
-    def __init__(self, connection: Connection, shared: _SharedMemory, log: _Log) -> None:
-        self._connection = connection
-        self._shared = shared
-        self._log = log
-        self._owner = os.getpid()
-        self._instance: Instance
-        self._inputs: list[tuple[Any, Call]] = []
-        self._outputs: list[Call] = []
-        self._states: dict[int, Any] = {}
-        self._number = count()
-        self._step: float | None = None
-        self._advance: Call
-
-    def serve(self) -> None:
-        """Answer commands until one is to close."""
-        method, answer = "", b""
-        while method != "close":
-            command = self._connection.recv_bytes()
-            try:
-                if len(command) == 1:
-                    status = self._exchange(command)
-                    self._instance.quieten()
-                    answer = bytes([status])
-                    if self._log.records:
-                        answer = pickle.dumps((status, [], self._log.taken()))
-                else:
-                    method, arguments = pickle.loads(command)  # noqa: S301
-                    with warnings.catch_warnings(record=True) as caught:
-                        warnings.simplefilter("always")
-                        value = self._call(method, arguments)
-                        self._instance.quieten()
-                    notes = [str(w.message) for w in caught]
-                    answer = pickle.dumps((value, notes, self._log.taken()))
-            except (InputError, SimulationError) as error:
-                answer = pickle.dumps((error, [], self._log.taken()))
-            end_fork(self._owner)
-            self._connection.send_bytes(answer)
-
-    def _exchange(self, command: bytes) -> int:
-        self._pass_on()
-        status = OK
-        if command == STEP:
-            step = float(self._shared.step[0])
-            if step != self._step:
-                self._step, self._advance = step, self._instance.stepper(self._shared.clock, step)
-            status = self._status_of(self._advance)
-        if status <= WARNING or status == EARLY:
-            for call in self._outputs:
-                self._check(self._status_of(call))
-        return status
-
-    def _status_of(self, call: Call) -> int:
-        """The status of a call; a fork that the FMU made in it ends, and writes nothing."""
-        status = call.python()
-        end_fork(self._owner)
-        return status
-
-    def _pass_on(self) -> None:
-        for pending, call in self._inputs:
-            if pending[0]:
-                pending[0] = False
-                self._check(self._status_of(call))
-
-    def _check(self, status: int) -> None:
-        if status > WARNING:
-            raise self._instance.failure(status, float(self._shared.clock[0]))
-
-    def _call(self, method: str, arguments: tuple[Any, ...]) -> Any:
-        if method == "load":
-            self._instance = load_here(*arguments)
-            return None
-        if method == "transfer":
-            return self._transfer(*arguments)
-        if method == "keep_state":
-            return self._keep_state(*arguments)
-        if method == "restore_state":
-            return self._instance.restore(self._states[arguments[0]])
-        if method in ("get", "set"):
-            self._pass_on()
-        return getattr(self._instance, method)(*arguments)
-
-    def _keep_state(self, released: Sequence[int]) -> int:
-        """Keep the state of now, and those that were released no more; its number."""
-        for number in released:
-            del self._states[number]
-        self._states[number := next(self._number)] = self._instance.saved()
-        return number
-
-    def _transfer(self, action: str, variables: Sequence[Variable]) -> None:
-        pending, data = self._shared.add(self._instance.interface, variables)
-        call = self._instance.transfer(action, variables, data)
-        if action == "set":
-            self._inputs.append((pending, call))
-        else:
-            self._outputs.append(call)
-
-
-def main(connection: int, memory: int, lifeline: int) -> None:
-    """Serve until the instance is closed."""
-    faulthandler.enable()
-    log = _Log()
-    logging.basicConfig(handlers=[log], level=logging.INFO)
-    interruption.worker(lifeline)
-    with suppress(EOFError):  # where the master wants no more of it
-        _Worker(Connection(connection), _SharedMemory(memory), log).serve()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)  # without what the FMU's library might do at exit
-
-
-if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))

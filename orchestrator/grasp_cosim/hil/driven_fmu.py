@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from ..base.errors import SimulationError
 from ..fmi.instance import DISCARD, DUE, EARLY, EVENT, WARNING, Instance, clock_of, dtype
-from ..fmi.process import load_here
+from ..fmi.load import load_here
 from ..fmu_export.link import LinkVariable, Signature
 from ..interface.fmi_types import Value
 from ..interface.interface import Interface

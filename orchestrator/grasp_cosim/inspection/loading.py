@@ -44,7 +44,7 @@ _PACKAGE_OF_MODULE = {"cv2": "opencv-python", "sklearn": "scikit-learn", "yaml":
 _TRIAL_PROGRAM = """
 import os, sys
 from pathlib import Path
-from grasp_cosim.fmi.process import load_here
+from grasp_cosim.fmi.load import load_here
 from grasp_cosim.interface.read import read_interface
 try:
     load_here("trial", read_interface(Path(sys.argv[1])), logging=True).close()

@@ -18,7 +18,7 @@ from ..base.progress import phase
 from ..exchange.listener import Listener
 from ..fmi.call_trace import begin_trace
 from ..fmi.instance import Instance
-from ..fmi.process import load
+from ..fmi.load import load
 from ..interface.units import IDENTITY
 from ..interface.values import Given
 from ..metrics.groups import check_groups
