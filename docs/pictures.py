@@ -22,8 +22,8 @@ import tutorials
 from grasp_cosim import hand_system, simulate, tandem_system
 from grasp_cosim.base.files import write_text
 from grasp_cosim.grasp.presets import with_case
-from grasp_cosim.grasp.published.compared import compared
-from grasp_cosim.grasp.published.page import figures
+from grasp_cosim.grasp.published.evaluation_page import figures
+from grasp_cosim.grasp.published.reproduction import reproduce
 from grasp_cosim.grasp.system import grasp_system
 from grasp_cosim.hand.view import draw_hand as draw_three_fingers
 from grasp_cosim.recording.read_back import load_run
@@ -110,7 +110,7 @@ def draw_timing(folder: Path) -> None:
 
 def draw_evaluation(folder: Path) -> None:
     """contact_times.png and contact_forces.png, which are in the page of `evaluate`."""
-    evidence = compared(grasp_system(), "simulation", os.cpu_count() or 1, progress=False)
+    evidence = reproduce(grasp_system(), "simulation", os.cpu_count() or 1, progress=False)
     for name, (title, figure) in figures(evidence, "simulation").items():
         if name != "target_position":
             add_heading(

@@ -56,7 +56,7 @@ def test_where_nothing_can_be_kept_one_line_says_so_and_threads_share_it(
 ):
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
     monkeypatch.setattr(builds, "_until_the_end", {})
-    of_the_grasp = {name: shipped for name, shipped in SHIPPED.items() if not shipped.size}
+    of_the_grasp = {name: shipped for name, shipped in SHIPPED.items() if not shipped.of_hand}
     monkeypatch.setattr(builds, "SHIPPED", of_the_grasp)
     with ThreadPoolExecutor(8) as pool:
         made = list(pool.map(lambda _: grasp_system(native=False), range(8)))

@@ -255,7 +255,7 @@ def chosen_system(options: SystemOptions) -> System:
     for preset in options.all_presets:
         system = _with_preset(system, preset)
     if options.fitted:
-        from ..grasp.identification.values import with_fitted
+        from ..grasp.identification.fitted_values import with_fitted
 
         system = with_fitted(system, options.fitted)
     system = system.with_overrides(overrides.values())

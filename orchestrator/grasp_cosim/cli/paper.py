@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from ..base.files import check_folder, write_text
-from ..grasp.identification.identification import DEFAULT, GROUPS
+from ..grasp.identification.identification import DEFAULT_GROUPS, GROUPS
 from ..grasp.identification.identification import identify as run_identification
 from ..grasp.published.evaluation import evaluate as run_evaluation
 from ..grasp.published.evaluation import verdict
@@ -57,7 +57,7 @@ def evaluate(
 @click.option(
     "--fit",
     multiple=True,
-    default=DEFAULT,
+    default=DEFAULT_GROUPS,
     metavar="|".join(GROUPS),
     help="Fit this; may be given several times.",
 )

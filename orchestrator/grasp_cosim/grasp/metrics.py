@@ -51,10 +51,10 @@ TOUCH: Mapping[Need, str | None] = {
 }
 """What tells whether each finger touches."""
 
-MOMENT = of_each(*QUANTITIES)
-"""What tells when each finger touches, and how fast, as far as it is there."""
+CONTACT_SIGNALS = of_each(*QUANTITIES)
+"""What tells when each finger touches, and how fast; a plant may lack some of them."""
 
-SHOWN = (*of_each("position", "velocity", "gap", "contact_force"), *OBJECT_POSITION)
+SCENE_SIGNALS = (*of_each("position", "velocity", "gap", "contact_force"), *OBJECT_POSITION)
 """The signals without which a grasp is not drawn."""
 
 IMPACT_WINDOW = 0.02
@@ -66,41 +66,42 @@ STEADY_WINDOW = 0.1
 SETTLED = 0.02
 """A force has settled once it stays so near to the steady one, as a share of that."""
 
-_found: list[Metric] = []
+_metrics: list[Metric] = []
 
 
-def of_grasp(name: str, unit: str | None, **more: Any) -> Callable[[Any], Metric]:
-    """Make the function below a metric of the grasp; `more` as for metrics.metric.metric."""
-    factor, shown = in_milli(unit)
-    how = {"factor": factor, "shown_unit": shown, "group": "grasp", **more}
+def of_grasp(name: str, unit: str | None, **arguments: Any) -> Callable[[Any], Metric]:
+    """Make the function below a metric of the grasp; arguments as for metrics.metric.metric."""
+    factor, shown_unit = in_milli(unit)
+    defaults = {"factor": factor, "shown_unit": shown_unit, "group": "grasp"}
 
-    def enter(function: Callable[[Signals], Any]) -> Metric:
-        made: Metric = metric(name, unit=unit, **how)(function)
-        _found.append(made)
-        return made
+    def register(function: Callable[[Signals], Any]) -> Metric:
+        grasp_metric: Metric = metric(name, unit=unit, **{**defaults, **arguments})(function)
+        _metrics.append(grasp_metric)
+        return grasp_metric
 
-    return enter
+    return register
 
 
 def of_fingers(
-    name: str, unit: str, **more: Any
+    name: str, unit: str, **arguments: Any
 ) -> Callable[[Callable[[Signals, int], Value]], Callable[[Signals, int], Value]]:
     """Make a function of signals and finger a metric with a value per finger, [right, left]."""
 
-    def enter(function: Callable[[Signals, int], Value]) -> Callable[[Signals, int], Value]:
-        @of_grasp(name, unit, entries=ENTRIES, **more)
+    def register(function: Callable[[Signals, int], Value]) -> Callable[[Signals, int], Value]:
+        @of_grasp(name, unit, entries=ENTRIES, **arguments)
         @wraps(function)
         def per_finger(signals: Signals) -> list[Value]:
             return [function(signals, j) for j in fingers_of(signals)]
 
         return function
 
-    return enter
+    return register
 
 
 class FirstContact(NamedTuple):
-    """When a finger first touches in s, how fast its gap closes then in m/s, the first row that
-    has it touching. There is no speed without a gap.
+    """When a finger first touches in s, and how fast its gap closes then in m/s.
+
+    `row` is the first row in which it touches. There is no speed without a gap.
     """
 
     time: float
@@ -108,10 +109,10 @@ class FirstContact(NamedTuple):
     row: int
 
 
-OF_CONTACT: Mapping[str, Any] = {"needs": TOUCH, "uses": MOMENT}
+FROM_CONTACT: Mapping[str, Any] = {"needs": TOUCH, "uses": CONTACT_SIGNALS}
 
 
-@of_fingers("time_to_contact", "s", none="nothing was touched", **OF_CONTACT)
+@of_fingers("time_to_contact", "s", none="nothing was touched", **FROM_CONTACT)
 def time_to_contact(signals: Signals, finger: int) -> float | None:
     """Moment where the gap of the last free sample runs out at its rate; None: never touches.
 
@@ -121,7 +122,7 @@ def time_to_contact(signals: Signals, finger: int) -> float | None:
     return contact.time if contact else None
 
 
-@of_grasp("time_difference", "s", **OF_CONTACT)
+@of_grasp("time_difference", "s", **FROM_CONTACT)
 def time_difference(signals: Signals) -> float | None:
     """Time from the first finger's contact to the last one's; None where one never touches."""
     contacts = [first_contact(signals, j) for j in fingers_of(signals)]
@@ -129,22 +130,22 @@ def time_difference(signals: Signals) -> float | None:
     return max(times) - min(times) if len(times) == len(contacts) else None
 
 
-OF_GAP: Mapping[str, Any] = {"needs": of_each("gap"), "uses": of_each("contact"), "reason": True}
+FROM_GAP: Mapping[str, Any] = {"needs": of_each("gap"), "uses": of_each("contact"), "reason": True}
 
 
-@of_fingers("remaining_gap", "m", label="gap left, no contact", **OF_GAP)
+@of_fingers("remaining_gap", "m", label="gap left, no contact", **FROM_GAP)
 def remaining_gap(signals: Signals, finger: int) -> float | None:
     """Gap at the end of a finger that never touches; None where it does."""
     return None if touching(signals, finger).any() else float(_gap(signals, finger)[-1])
 
 
-@of_fingers("smallest_gap", "m", label="smallest gap left", **OF_GAP)
+@of_fingers("smallest_gap", "m", label="smallest gap left", **FROM_GAP)
 def smallest_gap(signals: Signals, finger: int) -> float | None:
     """Smallest gap of a finger that never touches; None where it does."""
     return None if touching(signals, finger).any() else float(_gap(signals, finger).min())
 
 
-@of_fingers("impact_velocity", "m/s", needs=of_each("gap"), uses=MOMENT)
+@of_fingers("impact_velocity", "m/s", needs=of_each("gap"), uses=CONTACT_SIGNALS)
 def impact_velocity(signals: Signals, finger: int) -> float | None:
     """Rate at which the gap closes at first contact; None where it does not close.
 
@@ -155,41 +156,41 @@ def impact_velocity(signals: Signals, finger: int) -> float | None:
     return speed if speed is not None and speed > 0.0 else None
 
 
-OF_FORCE: Mapping[str, Any] = {"needs": of_each("contact_force")}
-OF_FORCE_SINCE_CONTACT: Mapping[str, Any] = {
+FROM_FORCE: Mapping[str, Any] = {"needs": of_each("contact_force")}
+FROM_FORCE_SINCE_CONTACT: Mapping[str, Any] = {
     "needs": {**TOUCH, **of_each("contact_force")},
-    "uses": MOMENT,
+    "uses": CONTACT_SIGNALS,
 }
 
 
-@of_fingers("impact_impulse", "N.s", **OF_FORCE_SINCE_CONTACT)
+@of_fingers("impact_impulse", "N.s", **FROM_FORCE_SINCE_CONTACT)
 def impact_impulse(signals: Signals, finger: int) -> float | None:
     """Impulse of the contact force over IMPACT_WINDOW from first contact, by trapezoids.
 
     Until the first sample the force is taken as it is there, as one that begins with a jump has it.
     None if the run ends sooner, or with fewer than two samples.
     """
-    after, force = since_contact(signals, finger)
-    if np.count_nonzero(after <= IMPACT_WINDOW) < 2 or after[-1] < IMPACT_WINDOW:
+    times, force = since_contact(signals, finger)
+    if np.count_nonzero(times <= IMPACT_WINDOW) < 2 or times[-1] < IMPACT_WINDOW:
         return None
-    inner = after[(after > 0.0) & (after < IMPACT_WINDOW)]
-    times = np.concatenate(([0.0], inner, [IMPACT_WINDOW]))
-    return float(np.trapezoid(np.interp(times, after, force), times))
+    samples = times[(times > 0.0) & (times < IMPACT_WINDOW)]
+    nodes = np.concatenate(([0.0], samples, [IMPACT_WINDOW]))
+    return float(np.trapezoid(np.interp(nodes, times, force), nodes))
 
 
-@of_fingers("peak_contact_force", "N", **OF_FORCE)
+@of_fingers("peak_contact_force", "N", **FROM_FORCE)
 def peak_contact_force(signals: Signals, finger: int) -> float:
     """Highest sample of the contact force."""
     return float(_force(signals, finger).max())
 
 
-@of_fingers("steady_contact_force", "N", **OF_FORCE)
+@of_fingers("steady_contact_force", "N", **FROM_FORCE)
 def steady_contact_force(signals: Signals, finger: int) -> float:
     """Mean contact force over the last STEADY_WINDOW."""
     return steady_force(signals, finger)
 
 
-@of_grasp("force_difference", "N", **OF_FORCE)
+@of_grasp("force_difference", "N", **FROM_FORCE)
 def force_difference(signals: Signals) -> float:
     """Largest difference between steady contact forces, of a hand each by the finger's weight."""
     forces = [
@@ -199,25 +200,29 @@ def force_difference(signals: Signals) -> float:
     return max(forces) - min(forces)
 
 
-@of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%", **OF_FORCE_SINCE_CONTACT)
+@of_fingers("force_overshoot", "1", factor=1e2, shown_unit="%", **FROM_FORCE_SINCE_CONTACT)
 def force_overshoot(signals: Signals, finger: int) -> float | None:
     """Share of the steady force by which the peak since contact exceeds it; 0 if never.
 
     None without a contact, or without a steady force.
     """
-    steady, (_, force) = held_force(signals, finger), since_contact(signals, finger)
-    return None if steady is None or not len(force) else max(0.0, float(force.max()) / steady - 1.0)
+    steady = held_force(signals, finger)
+    _, force = since_contact(signals, finger)
+    if steady is None or not len(force):
+        return None
+    return max(0.0, float(force.max()) / steady - 1.0)
 
 
-@of_fingers("settling_time", "s", **OF_FORCE_SINCE_CONTACT)
+@of_fingers("settling_time", "s", **FROM_FORCE_SINCE_CONTACT)
 def time_to_settle(signals: Signals, finger: int) -> float | None:
     """Time from first contact until the force stays within SETTLED of the steady one.
 
     None where it is not within throughout the last STEADY_WINDOW, without a contact, or without a
     steady force.
     """
-    steady, (after, force) = held_force(signals, finger), since_contact(signals, finger)
-    if steady is None or not len(after) or after[-1] < STEADY_WINDOW:
+    steady = held_force(signals, finger)
+    times, force = since_contact(signals, finger)
+    if steady is None or not len(times) or times[-1] < STEADY_WINDOW:
         return None
     error = force - steady
     band = SETTLED * steady
@@ -225,11 +230,11 @@ def time_to_settle(signals: Signals, finger: int) -> float | None:
     if not len(outside):
         return 0.0
     k = int(outside[-1])
-    if after[k] >= after[-1] - STEADY_WINDOW:
+    if times[k] >= times[-1] - STEADY_WINDOW:
         return None
     edge = copysign(band, error[k])
     fraction = (error[k] - edge) / (error[k] - error[k + 1])
-    return float(after[k] + fraction * (after[k + 1] - after[k]))
+    return float(times[k] + fraction * (times[k + 1] - times[k]))
 
 
 @of_grasp("target_position", "m", needs={TARGET_POSITION: "m"})
@@ -241,8 +246,9 @@ def target_position(signals: Signals) -> float:
 @of_grasp("object_shift", "m", needs=OBJECT_POSITION)
 def object_shift(signals: Signals) -> float:
     """Largest displacement of the object, either way."""
-    ways = [np.abs(x - x[0]) for x in _centre(signals)]
-    return float((ways[0] if len(ways) == 1 else np.hypot(*ways)).max())
+    shifts = [np.abs(x - x[0]) for x in _centre(signals)]
+    distances = shifts[0] if len(shifts) == 1 else np.hypot(*shifts)
+    return float(distances.max())
 
 
 @of_grasp("object_drift", "m/s", needs=OBJECT_POSITION)
@@ -251,20 +257,20 @@ def object_drift(signals: Signals) -> float | None:
     time = signals.time
     if time[-1] - time[0] < STEADY_WINDOW:
         return None
-    moment = time[-1] - STEADY_WINDOW
-    way = [float(x[-1]) - float(np.interp(moment, time, x)) for x in _centre(signals)]
-    return hypot(*way) / STEADY_WINDOW
+    begin = time[-1] - STEADY_WINDOW
+    shifts = [float(x[-1]) - float(np.interp(begin, time, x)) for x in _centre(signals)]
+    return hypot(*shifts) / STEADY_WINDOW
 
 
 def _of_object(name: str, unit: str | None, output: str, label: str, description: str) -> None:
     """A metric of plants with an output of that name: its largest value, or if it was ever true."""
-    key = f"plant.{output}"
-    how = {"label": label, "description": description, "optional": True}
+    signal = f"plant.{output}"
+    words = {"label": label, "description": description}
 
-    @of_grasp(name, unit, needs={key: unit}, **how)
+    @of_grasp(name, unit, needs={signal: unit}, optional=True, **words)
     def largest(signals: Signals) -> float | bool:
-        found = np.abs(signals[key]).max()
-        return bool(found) if unit is None else float(found)
+        maximum = np.abs(signals[signal]).max()
+        return bool(maximum) if unit is None else float(maximum)
 
 
 _of_object("object_tilt", "rad", "tilt", "object tilt", "Largest tilt of the object, either way.")
@@ -272,33 +278,37 @@ _of_object("toppled", None, "toppled", "object toppled", "True if the object fel
 _of_object("squeeze", "m", "squeeze", "object squeezed by", "Largest loss of width of the object.")
 _of_object("damaged", None, "damaged", "object damaged", "True if the object was squeezed too far.")
 
-METRICS = tuple(_found)
+METRICS = tuple(_metrics)
 """The metrics of a grasp, in the order in which they are shown."""
 
 
 def is_grasp(signals: Signals) -> bool:
     """True if there are the signals of a gripper plant and its object that a picture shows."""
-    return all(name in signals for name in SHOWN)
+    return all(name in signals for name in SCENE_SIGNALS)
 
 
 def fingers_of(signals: Signals) -> tuple[int, ...]:
-    """The numbers of the plant's fingers: FINGERS, or of a hand those that it tells of."""
-    return _listed(signals) if _is_of_hand(signals) else FINGERS
+    """The numbers of the plant's fingers: FINGERS, or of a hand those that have signals."""
+    return _recorded_fingers(signals) if _is_of_hand(signals) else FINGERS
 
 
 def _is_of_hand(signals: Signals) -> bool:
     """True if the plant has more fingers than a gripper, or an object that moves in the plane."""
-    in_plane = ("plant.object_position[1]", "plant.object_angle")
-    return any(name in signals for name in in_plane) or len(_listed(signals)) > len(FINGERS)
+    moves_in_plane = "plant.object_position[1]" in signals or "plant.object_angle" in signals
+    return moves_in_plane or len(_recorded_fingers(signals)) > len(FINGERS)
 
 
-def _listed(signals: Signals) -> tuple[int, ...]:
-    """The fingers, from 1 on, whose gaps the plant tells; else those of its contacts or forces."""
+def _recorded_fingers(signals: Signals) -> tuple[int, ...]:
+    """The fingers, from 1 on, whose gaps are recorded; else those of contacts or forces."""
+    for quantity in ("gap", "contact", "contact_force"):
+        if fingers := _fingers_with(signals, quantity):
+            return fingers
+    return ()
 
-    def there(quantity: str) -> tuple[int, ...]:
-        return tuple(takewhile(lambda j: f"plant.{quantity}[{j}]" in signals, count(1)))
 
-    return there("gap") or there("contact") or there("contact_force")
+def _fingers_with(signals: Signals, quantity: str) -> tuple[int, ...]:
+    """The fingers, from 1 on, of which a quantity is recorded."""
+    return tuple(takewhile(lambda j: f"plant.{quantity}[{j}]" in signals, count(1)))
 
 
 def _closing(signals: Signals, finger: int) -> float:
@@ -323,29 +333,31 @@ def _force(signals: Signals, finger: int) -> Floats:
     return force
 
 
-def _last(signals: Signals, finger: int) -> Floats:
+def _last_forces(signals: Signals, finger: int) -> Floats:
     """The contact force over the last STEADY_WINDOW, N."""
-    late = int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
-    return _force(signals, finger)[late:]
+    first_row = int(np.searchsorted(signals.time, signals.time[-1] - STEADY_WINDOW))
+    return _force(signals, finger)[first_row:]
 
 
 def steady_force(signals: Signals, finger: int) -> float:
     """The mean contact force over the last STEADY_WINDOW, N."""
-    return float(_last(signals, finger).mean())
+    return float(_last_forces(signals, finger).mean())
 
 
 def held_force(signals: Signals, finger: int) -> float | None:
     """The steady contact force, N; None where it is 0 at any time: the finger does not hold on."""
-    return steady_force(signals, finger) if _last(signals, finger).min() > 0.0 else None
+    return steady_force(signals, finger) if _last_forces(signals, finger).min() > 0.0 else None
 
 
 def since_contact(signals: Signals, finger: int) -> tuple[Floats, Floats]:
-    """Seconds since first contact and the contact force in N from its first row on; both empty
-    where the finger never touches.
+    """Seconds since first contact and the contact force in N, from its first row on.
+
+    Both are empty where the finger never touches.
     """
     contact = first_contact(signals, finger)
-    moment, row = (contact.time, contact.row) if contact else (0.0, len(signals.time))
-    return signals.time[row:] - moment, _force(signals, finger)[row:]
+    if contact is None:
+        return np.empty(0), np.empty(0)
+    return signals.time[contact.row :] - contact.time, _force(signals, finger)[contact.row :]
 
 
 def touching(signals: Signals, finger: int) -> Flags:
@@ -366,8 +378,8 @@ def first_contact(signals: Signals, finger: int) -> FirstContact | None:
     key = first_contact, finger
     if key not in signals.worked_out:
         signals.worked_out[key] = _first_contact(signals, finger)
-    found: FirstContact | None = signals.worked_out[key]
-    return found
+    contact: FirstContact | None = signals.worked_out[key]
+    return contact
 
 
 def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
@@ -399,8 +411,8 @@ def _closing_speed(signals: Signals, finger: int, k: int) -> float:
     if position not in signals or velocity not in signals:
         return -_rate(signals.time, gap, step)
     closing = _closing(signals, finger)
-    own = float(closing * signals[velocity][k])
-    return own - _rate(signals.time, closing * signals[position] + gap, step)
+    finger_speed = float(closing * signals[velocity][k])
+    return finger_speed - _rate(signals.time, closing * signals[position] + gap, step)
 
 
 def _rate(time: Floats, length: Floats, step: tuple[int, int] | None) -> float:
@@ -416,14 +428,18 @@ def _last_step(signals: Signals, k: int) -> tuple[int, int] | None:
 
     It may be longer than that of the system, and the plant holds its outputs in between.
     """
-    changed = np.zeros(k + 1, bool)  # the rows with other outputs of the plant than before
-    changed[0] = True
-    outputs = (f"plant.{name}[{j}]" for name in QUANTITIES for j in fingers_of(signals))
-    for values in (signals[name][: k + 1] for name in outputs if name in signals):
-        changed[1:] |= values[1:] != values[:-1]
-    given = np.flatnonzero(changed)
-    if len(given) < 2:
+    is_new = np.zeros(k + 1, bool)  # the rows in which an output differs from the row before
+    is_new[0] = True
+    for quantity in QUANTITIES:
+        for j in fingers_of(signals):
+            name = f"plant.{quantity}[{j}]"
+            if name in signals:
+                values = signals[name][: k + 1]
+                is_new[1:] |= values[1:] != values[:-1]
+    new_rows = np.flatnonzero(is_new)
+    if len(new_rows) < 2:
         return None
-    own = int(np.diff(given).min())
-    last = k - (k - int(given[-1])) % own  # it may have stepped since, and nothing moved
-    return last - own, last
+    rows_per_step = int(np.diff(new_rows).min())
+    # The plant may have stepped since the last new row, and nothing moved.
+    last = k - (k - int(new_rows[-1])) % rows_per_step
+    return last - rows_per_step, last

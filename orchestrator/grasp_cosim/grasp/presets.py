@@ -50,28 +50,31 @@ def case_of(settings: Mapping[str, Any]) -> str:
 
     What is not set is taken to be as in case 2, as the controller starts.
     """
-    presets, given = built_in_presets(), _given(settings)
-    values = {k: given(k, v) for k, v in presets["case_2"].items()}
+    presets = built_in_presets()
+    set_values = _values_by_role(settings)
+    values = {key: set_values(key, value) for key, value in presets["case_2"].items()}
     return next((str(case) for case in CASES if presets[f"case_{case}"] == values), "other")
 
 
 def words_of(settings: Mapping[str, Any]) -> list[str]:
     """What a grasp is in the words of a title: its case, the bench, the FMU of its controller."""
-    bench, given = built_in_presets()["bench"], _given(settings)
-    name = resolved("controller.", settings.get("roles", {}))[:-1]
-    fmu = str(settings["components"].get(name, {}).get("fmu", ""))
     case = case_of(settings)
-    return [
-        *(["no published case"] if case == "other" else [f"case {case}"]),
-        *(["bench"] if all(given(key) == value for key, value in bench.items()) else []),
-        *([fmu.removesuffix(".fmu")] if fmu else []),
-    ]
+    words = ["no published case" if case == "other" else f"case {case}"]
+    set_values = _values_by_role(settings)
+    bench = built_in_presets()["bench"]
+    if all(set_values(key) == value for key, value in bench.items()):
+        words.append("bench")
+    controller = resolved("controller.", settings.get("roles", {})).removesuffix(".")
+    fmu = str(settings["components"].get(controller, {}).get("fmu", ""))
+    if fmu:
+        words.append(fmu.removesuffix(".fmu"))
+    return words
 
 
-def _given(settings: Mapping[str, Any]) -> Callable[..., Any]:
-    """What a run sets a variable by role to, or otherwise: (key, otherwise=None)."""
-    roles, given = settings.get("roles", {}), given_values(settings)
-    return lambda key, otherwise=None: given.get(resolved(key, roles), otherwise)
+def _values_by_role(settings: Mapping[str, Any]) -> Callable[..., Any]:
+    """A function of a variable by role and a default, None: the value to which a run sets it."""
+    roles, values = settings.get("roles", {}), given_values(settings)
+    return lambda key, default=None: values.get(resolved(key, roles), default)
 
 
 def with_si_values(system: System, values: Mapping[str, Value], place: str) -> System:
@@ -80,12 +83,12 @@ def with_si_values(system: System, values: Mapping[str, Value], place: str) -> S
     They are converted where a component has another unit; InputError, naming the place, where that
     is not defined or there is no such variable.
     """
-    given: dict[str, Value] = {}
+    converted: dict[str, Value] = {}
     for key, value in values.items():
         port = _port(system, key)
         to_si = parameter_in_si(system, f"{place} {port}", port)
-        given[str(port)] = value if to_si == IDENTITY else to_si.back(float(value))
-    return system.with_overrides(as_overrides(given, f"{place} {PLACE}"))
+        converted[str(port)] = value if to_si == IDENTITY else to_si.back(float(value))
+    return system.with_overrides(as_overrides(converted, f"{place} {PLACE}"))
 
 
 def start_in_si(system: System, key: str) -> float:

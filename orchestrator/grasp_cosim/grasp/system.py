@@ -21,7 +21,7 @@ CONTROLLERS = {"published": "", "adaptive": "Adaptive"}
 names of their FMUs have behind GraspController, or HandController.
 """
 
-TANDEM = {"published": "Published", "adaptive": ""}
+TANDEM_CONTROLLERS = {"published": "Published", "adaptive": ""}
 """The same of a gripper in tandem, behind GraspControllerTandem."""
 
 WRIST_FORCE = "wrist_force"
@@ -47,39 +47,41 @@ def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> 
         )
     if name in swapped:
         raise InputError(f"{place}: cannot be used with another FMU for {name}")
-    now = system.component(name, place)
-    file, fingers = _file_of(now.interface.identifier, law)
-    beside = now.fmu.with_name(file)
-    fmu = beside if beside.is_file() else shipped_fmus(fingers) / file
-    if _TANDEM_FMU.fullmatch(now.interface.identifier):
-        return _in_tandem(system, name, fmu, place)
+    component = system.component(name, place)
+    identifier = component.interface.identifier
+    file, fingers = _fmu_file(identifier, law)
+    fmu = component.fmu.with_name(file)
+    if not fmu.is_file():
+        fmu = shipped_fmus(fingers) / file
+    if _TANDEM_FMU.fullmatch(identifier):
+        return _with_tandem_controller(system, name, fmu, place)
     return system.with_overrides([Override(f"components.{name}.fmu", fmu, place)])
 
 
-def _file_of(identifier: str, law: str) -> tuple[str, int | None]:
+def _fmu_file(identifier: str, law: str) -> tuple[str, int | None]:
     """The FMU of a law for the same kind of gripper as that of a controller, and its fingers."""
     if _TANDEM_FMU.fullmatch(identifier):
-        return f"GraspControllerTandem{TANDEM[law]}.fmu", None
-    ours = _FMU.fullmatch(identifier)
-    of, fingers = ours.groups() if ours else ("Grasp", "")
-    return f"{of}Controller{CONTROLLERS[law]}{fingers}.fmu", int(fingers) if fingers else None
+        return f"GraspControllerTandem{TANDEM_CONTROLLERS[law]}.fmu", None
+    match = _FMU.fullmatch(identifier)
+    gripper, fingers = match.groups() if match else ("Grasp", "")
+    file = f"{gripper}Controller{CONTROLLERS[law]}{fingers}.fmu"
+    return file, int(fingers) if fingers else None
 
 
-def _in_tandem(system: System, controller: str, fmu: Path, place: str) -> System:
+def _with_tandem_controller(system: System, controller: str, fmu: Path, place: str) -> System:
     """The system with another law of a gripper in tandem: one of them measures the wrist's force.
 
     On the way from one to the other that input has a value, so that it has a source at all times.
     """
     measured = Port(controller, WRIST_FORCE)
     source = Port(system.roles.get("plant", "plant"), WRIST_FORCE)
-    held = system
     if any(c.target == measured for c in system.connections):
-        held = _with_source(system, measured, 0.0)
+        system = _with_source(system, measured, 0.0)
     overrides = [Override(f"components.{controller}.fmu", fmu, place)]
-    if WRIST_FORCE in read_interface(fmu).by_name:
-        overrides.append(Override(str(measured), 0.0, place))
-        return _with_source(held.with_overrides(overrides), measured, source)
-    return held.with_overrides(overrides)
+    if WRIST_FORCE not in read_interface(fmu).by_name:
+        return system.with_overrides(overrides)
+    overrides.append(Override(str(measured), 0.0, place))
+    return _with_source(system.with_overrides(overrides), measured, source)
 
 
 def _with_source(system: System, target: Port, source: Port | float) -> System:
@@ -91,9 +93,9 @@ def _with_source(system: System, target: Port, source: Port | float) -> System:
         connections.append(Connection(source, target))
     else:
         values[target.variable] = source
-    changed = {c.name: c for c in system.components}
-    changed[component.name] = replace(component, values=values)
-    return replace(system, components=tuple(changed.values()), connections=tuple(connections))
+    components = {c.name: c for c in system.components}
+    components[component.name] = replace(component, values=values)
+    return replace(system, components=tuple(components.values()), connections=tuple(connections))
 
 
 def controller_name(system: System) -> str:
@@ -138,9 +140,9 @@ def built(folder: Path, fingers: int | None = None) -> Path:
         if fingers is not None:
             build_chosen(None, folder / FMU_FOLDER, fingers=fingers)
     except OSError as error:
-        where = f"below {folder}" if folder != Path() else "below the current folder"
+        folder_text = "the current folder" if folder == Path() else str(folder)
         raise InputError(
-            f"{error.filename}: {error.strerror}; the FMUs are built into {FMU_FOLDER} {where}, "
-            "which must be one that can be written to"
+            f"{error.filename}: {error.strerror}; the FMUs are built into {FMU_FOLDER} below "
+            f"{folder_text}, which must be one that can be written to"
         ) from error
     return folder / FMU_FOLDER

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..grasp.metrics import METRICS as OF_GRASP
-from ..grasp.metrics import QUANTITIES, SHOWN, fingers_of, steady_force
+from ..grasp.metrics import QUANTITIES, SCENE_SIGNALS, fingers_of, steady_force
 from ..grasp.presets import start_in_si
 from ..metrics.metric import ALL, Metric, Signals, expanded, metric, resolved
 from .weights import balance_weights, imbalance
@@ -110,6 +110,6 @@ METRICS = (
 
 def is_hand(signals: Signals) -> bool:
     """True if there are the signals of a hand and its object that a picture shows."""
-    signals_of_hand = [name for signal in SHOWN for name in as_of_hand(signal)]
+    signals_of_hand = [name for signal in SCENE_SIGNALS for name in as_of_hand(signal)]
     needed = [name.replace("*", str(k)) for name in signals_of_hand for k in fingers_of(signals)]
     return OBJECT_ANGLE in signals and all(name in signals for name in needed)

@@ -18,8 +18,8 @@ from grasp_cosim.grasp.identification.contact_times import (
     read_contacts,
     scatter,
 )
-from grasp_cosim.grasp.identification.identification import GROUPS, chosen
-from grasp_cosim.grasp.published.compared import Setting
+from grasp_cosim.grasp.identification.identification import GROUPS, parameters_of
+from grasp_cosim.grasp.published.published_figures import Setting
 from support import continuous
 
 TRUE = {"plant.friction.viscous[1]": 25.0, "plant.friction.viscous[2]": 8.0}
@@ -47,7 +47,7 @@ def contacts(times, grasps=GRASPS):
 
 
 def fitted(simulate, measured, group):
-    return fit_contacts(measured, chosen([group], tuple(GROUPS), "test"), simulate)
+    return fit_contacts(measured, parameters_of([group], tuple(GROUPS), "test"), simulate)
 
 
 @pytest.mark.slow
@@ -146,7 +146,7 @@ def test_a_wrong_table_is_one_line(tmp_path, text, message):
 @pytest.mark.slow
 def test_processes_give_the_same_fit(grasp):
     measured = contacts([[1.5, 3.2], [2.3, 2.5]])
-    parameters = chosen(["stribeck"], tuple(GROUPS), "test")
+    parameters = parameters_of(["stribeck"], tuple(GROUPS), "test")
     parallel = identify_from_times(grasp, measured, parameters, progress=False)
     here = fit_contacts(measured, parameters, simulator(grasp, STEP))
     assert parallel.residuals.tobytes() == here.residuals.tobytes()

@@ -75,6 +75,6 @@ def test_residuals_that_are_not_finite_are_refused(value):
 
 
 def test_a_fit_that_does_not_come_to_rest_says_so(monkeypatch):
-    monkeypatch.setattr("grasp_cosim.grasp.identification.fit.MOST", 1)
+    monkeypatch.setattr("grasp_cosim.grasp.identification.fit.MAX_FIT_STEPS", 1)
     with pytest.raises(SimulationError, match="has not come to rest after 1 steps"):
         fitted(decay(3.0, 0.7))

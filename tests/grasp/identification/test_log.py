@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError, simulate
 from grasp_cosim.grasp.identification.identification import (
-    OF_A_LOG,
-    chosen,
+    GROUPS_OF_A_LOG,
     identify,
-    identify_from_log,
+    parameters_of,
 )
+from grasp_cosim.grasp.identification.momentum_balance import identify_from_log
 from grasp_cosim.metrics.metric import Signals
 from grasp_cosim.recording.read_back import load_log
 from scipy.integrate import solve_ivp
@@ -47,7 +47,7 @@ def noisy(log, seed):
 
 
 def identified(grasp, log, *groups):
-    parameters = chosen(groups or ("coulomb", "viscous"), OF_A_LOG, "test")
+    parameters = parameters_of(groups or ("coulomb", "viscous"), GROUPS_OF_A_LOG, "test")
     return identify_from_log(grasp, log, parameters, "test")[1]
 
 
@@ -229,10 +229,12 @@ def test_a_window_with_a_sample_missing_does_not_count(grasp, recorded):
     kept = np.ones(len(recorded.time), dtype=bool)
     kept[100:400] = False
     gone = Signals(recorded.time[kept], {k: v[kept] for k, v in recorded.items()})
-    windows, _ = identify_from_log(grasp, gone, chosen(["coulomb"], OF_A_LOG, "test"), "test")
+    windows, _ = identify_from_log(
+        grasp, gone, parameters_of(["coulomb"], GROUPS_OF_A_LOG, "test"), "test"
+    )
     for w in windows:
-        assert not ((w.time > recorded.time[100] - 0.021) & (w.time < recorded.time[100])).any()
-        assert (w.time > recorded.time[400]).any()
+        assert not ((w.begin > recorded.time[100] - 0.021) & (w.begin < recorded.time[100])).any()
+        assert (w.begin > recorded.time[400]).any()
     for e in identified(grasp, gone).estimates:
         assert e.value == pytest.approx(TRUE[e.name], rel=5e-3, abs=5e-3), e.name
 

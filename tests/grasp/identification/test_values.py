@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from grasp_cosim import simulate
 from grasp_cosim.base.errors import InputError
-from grasp_cosim.grasp.identification.values import with_fitted
+from grasp_cosim.grasp.identification.fitted_values import with_fitted
 
 FITTED = """
 [values]

@@ -7,9 +7,10 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from grasp_cosim.grasp.published import compared as module
-from grasp_cosim.grasp.published.compared import Evidence, Run, Setting, deviations, published_rows
-from grasp_cosim.grasp.published.evaluation import as_report, check_claims
+from grasp_cosim.grasp.published import reproduction
+from grasp_cosim.grasp.published.evaluation import check_claims, evaluation_of
+from grasp_cosim.grasp.published.published_figures import Setting, published_figures
+from grasp_cosim.grasp.published.reproduction import Evidence, GraspRun, deviations
 
 SETTLED = 98.0 * 0.07 / 2.0
 """N; K_i·W/2 of the built-in grasp."""
@@ -17,7 +18,7 @@ SETTLED = 98.0 * 0.07 / 2.0
 EARLIER = (0.05, 0.07)
 """s by which the made fingers are at 0.37 mm before they touch."""
 
-PUBLISHED = published_rows("experiment")
+PUBLISHED = published_figures("experiment")
 NEAREST, NEAR, CENTRE, FAR = Setting(0.01), Setting(0.03), Setting(0.0), Setting(0.05)
 BROWN_WHITE, BLACK = Setting(0.03, 0.86, 1.0), Setting(0.03, 0.57, 0.57)
 TIMES, DIFFERENCES, SIMULTANEOUS, BALANCE, IMPACT, FORCE, TARGET = range(7)
@@ -29,7 +30,7 @@ def made(source):
     Of the experiment the colours are alike.
     """
     times = {}
-    for row in published_rows(source):
+    for row in published_figures(source):
         if row.finger:
             times.setdefault((row.setting, row.case), []).append(row.published)
     if source == "experiment":
@@ -48,7 +49,7 @@ def _run(setting, case, times):
     }
     first, second = (t - earlier for t, earlier in zip(times, EARLIER, strict=True))
     touch = (2.0, 1.0) if case else (20.0, 40.0)
-    return Run(setting, case, metrics, (first, second), 0.005, touch, None)
+    return GraspRun(setting, case, metrics, (first, second), 0.005, touch, None)
 
 
 @pytest.fixture
@@ -56,9 +57,11 @@ def evaluated(grasp, monkeypatch):
     """The report of an evaluation of made grasps of the simulation."""
 
     def report(runs, **values):
-        monkeypatch.setattr(module.Crew, "map", lambda *_: [*runs.values()])
+        monkeypatch.setattr(reproduction.Crew, "map", lambda *_: [*runs.values()])
         system = grasp.with_values({f"controller.contact_force.{k}": v for k, v in values.items()})
-        return as_report(module.compared(system, "simulation", 1, progress=False), "simulation")
+        return evaluation_of(
+            reproduction.reproduce(system, "simulation", 1, progress=False), "simulation"
+        )
 
     return report
 
@@ -216,9 +219,9 @@ SHARED = Path(__file__).parents[4] / "shared" / "paper"
 
 
 def test_the_rows_of_both_sources_are_there():
-    rows = published_rows("experiment")
+    rows = published_figures("experiment")
     figures = {(r.condition, r.case, r.finger): r.published for r in rows}
-    assert (len(rows), len(published_rows("simulation"))) == ((6 + 7) * 2 * 3, 36)
+    assert (len(rows), len(published_figures("simulation"))) == ((6 + 7) * 2 * 3, 36)
     assert (figures[0.05, 1, 2], figures["white/brown", 2, None]) == (4.81, 0.19)
     settings = {r.condition: r.setting for r in rows}
     assert settings["brown/white"] == Setting(0.03, 0.86, 1.0)
@@ -230,7 +233,7 @@ def test_the_rows_of_both_sources_are_there():
 
 @pytest.mark.parametrize("source", ["simulation", "experiment"])
 def test_a_difference_is_that_of_its_times(source):
-    rows = published_rows(source)
+    rows = published_figures(source)
     for first, second, apart in zip(rows[::3], rows[1::3], rows[2::3], strict=True):
         assert (first.finger, second.finger, apart.finger) == (1, 2, None)
         assert abs(second.published - first.published) == pytest.approx(apart.published, abs=0.011)

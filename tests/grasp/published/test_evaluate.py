@@ -11,8 +11,8 @@ import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.grasp.presets import SYSTEM, with_preset
 from grasp_cosim.grasp.published import evaluation
-from grasp_cosim.grasp.published.compared import LOOK, close, compared
-from grasp_cosim.grasp.published.evaluation import as_report
+from grasp_cosim.grasp.published.evaluation import evaluation_of
+from grasp_cosim.grasp.published.reproduction import TOUCH_CHECK_INTERVAL, reproduce, run_grasp
 from grasp_cosim.master.session import Session
 from support.grasps import CASES
 
@@ -34,8 +34,8 @@ def reports(natives, bench, made_once):
             ("simulation", System.load(SYSTEM, natives).with_experiment(step=5e-4)),
             ("experiment", bench.with_values(QUIET).with_experiment(step=2e-3)),
         ):
-            evidence = compared(system, source, workers=2, progress=False)
-            (folder / source).write_text(json.dumps(as_report(evidence, source)))
+            evidence = reproduce(system, source, workers=2, progress=False)
+            (folder / source).write_text(json.dumps(evaluation_of(evidence, source)))
 
     folder = made_once("evaluate", fill)
     return {path.name: json.loads(path.read_text()) for path in folder.iterdir()}
@@ -93,7 +93,7 @@ def test_a_system_that_the_preset_does_not_fit_is_refused(grasp):
 def test_noise_hardly_moves_a_contact_at_the_steps_of_the_bench(bench):
     values = {**CASES[2], "plant.initial_object_position": 0.05}
     noisy, quiet = (
-        close(bench.with_values({**values, **more}), after=0.0).metrics["time_to_contact"]
+        run_grasp(bench.with_values({**values, **more}), hold_time=0.0).metrics["time_to_contact"]
         for more in ({}, QUIET)
     )
     assert noisy != quiet
@@ -107,15 +107,17 @@ def quick(grasp):
 
 
 def test_a_grasp_ends_once_both_fingers_touch_and_is_the_same_until_then(quick):
-    short, whole = close(quick, after=0.0), simulate(quick)
+    short, whole = run_grasp(quick, hold_time=0.0), simulate(quick)
     second = max(whole.metrics["time_to_contact"])
-    assert second <= short.time[-1] <= second + LOOK + 2e-3
+    assert second <= short.time[-1] <= second + TOUCH_CHECK_INTERVAL + 2e-3
     for name, column in short.items():
         assert column.tobytes() == whole[name][: len(column)].tobytes(), name
     assert short.metrics["time_to_contact"] == whole.metrics["time_to_contact"]
-    assert close(quick, after=0.3).time[-1] == pytest.approx(second + 0.3, abs=2.0 * LOOK)
-    assert close(quick, after=9.0).time[-1] == 1.0
-    assert close(quick.with_experiment(stop=0.1), after=0.0).time[-1] == 0.1
+    assert run_grasp(quick, hold_time=0.3).time[-1] == pytest.approx(
+        second + 0.3, abs=2.0 * TOUCH_CHECK_INTERVAL
+    )
+    assert run_grasp(quick, hold_time=9.0).time[-1] == 1.0
+    assert run_grasp(quick.with_experiment(stop=0.1), hold_time=0.0).time[-1] == 0.1
 
 
 @pytest.mark.usefixtures("ctrl_c")
@@ -130,7 +132,7 @@ def test_ctrl_c_ends_a_grasp_between_two_steps(quick, monkeypatch):
     monkeypatch.setattr(Session, "step", interrupted)
     handler = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        close(quick, after=0.0)
+        run_grasp(quick, hold_time=0.0)
     assert taken == [True]
     assert signal.getsignal(signal.SIGINT) is handler
 
@@ -177,9 +179,9 @@ def test_a_claim_that_fails_is_exit_1(command, monkeypatch, holds, code):
         assert system.start("sensor_1.noise.enabled") == 1.0
         assert source == "experiment"
 
-    monkeypatch.setattr(evaluation, "compared", evaluated)
-    monkeypatch.setattr(evaluation, "as_report", lambda *_: made)
-    monkeypatch.setattr(evaluation, "write", lambda *_: None)
+    monkeypatch.setattr(evaluation, "reproduce", evaluated)
+    monkeypatch.setattr(evaluation, "evaluation_of", lambda *_: made)
+    monkeypatch.setattr(evaluation, "write_evaluation", lambda *_: None)
     found, out, _ = command("evaluate", "--bench")
     assert found == code
     assert out.startswith("holds  It.\n" if holds else "FAILS  It.\n")

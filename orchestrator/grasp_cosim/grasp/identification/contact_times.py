@@ -19,10 +19,12 @@ from ...base.parallel import Crew
 from ...base.progress import Progress
 from ...interface.units import IDENTITY
 from ...system.description import System
+from ...tables.column import Column
 from ...tables.read_table import names_in, read_table
 from ..metrics import FINGERS
 from ..presets import CASES, start_in_si, with_case, with_si_values
-from ..published.compared import Setting, close, published_rows
+from ..published.published_figures import Setting, published_figures
+from ..published.reproduction import run_grasp
 from .fit import Fit, Parameter, Vector, fit
 
 STEP, STOP = 1e-3, 10.0
@@ -32,8 +34,8 @@ RATIO = "sensor_2.reflectance"
 """One number for the bench: what the left sensor sees of a surface over what the right one does."""
 
 COLUMNS = ("x_m", "case", "finger", "time")
-OPTIONAL = ("alpha_1", "alpha_2")
-"""Of a table of contact times."""
+OPTIONAL_COLUMNS = ("alpha_1", "alpha_2")
+"""The columns of a table of contact times."""
 
 UNITS = {"x_m": "m", "case": "1", "finger": "1", "time": "s", "alpha_1": "1", "alpha_2": "1"}
 """The units of these columns, where the table names none."""
@@ -72,11 +74,13 @@ def published_contacts() -> list[Contact]:
 
     White on both sides is the row of x_m = 0.03 m once more, so it is left out.
     """
-    return [
-        Contact(f"x_m = {c} m" if table == "position" else str(c), setting, case, finger, time)
-        for table, c, setting, case, finger, time in published_rows("experiment")
-        if finger and setting.equal_colours and c != "white/white"
-    ]
+    contacts = []
+    for figure in published_figures("experiment"):
+        condition, finger = figure.condition, figure.finger
+        if finger and figure.setting.equal_colours and condition != "white/white":
+            label = f"x_m = {condition} m" if figure.table == "position" else str(condition)
+            contacts.append(Contact(label, figure.setting, figure.case, finger, figure.published))
+    return contacts
 
 
 def is_contacts(path: Path) -> bool:
@@ -88,30 +92,33 @@ def read_contacts(path: Path) -> list[Contact]:
     """A table of contact times: the columns x_m, case, finger, time, and, where the surfaces are
     not alike, alpha_1 and alpha_2; in m and s, or in the units behind their names.
 
-    Others are not used, which is said. InputError names the line that is wrong.
+    A warning names other columns, which are not used. InputError names the line that is wrong.
     """
     table = read_table(path)
     names = [column.name for column in table.columns if column.name]
     if missing := [name for name in COLUMNS if name not in names]:
         raise InputError(
             f"{path}: the columns are {choices(names)}, without {choices(missing)}; must be "
-            f"{choices(COLUMNS)}, and may be {choices(OPTIONAL)}"
+            f"{choices(COLUMNS)}, and may be {choices(OPTIONAL_COLUMNS)}"
         )
     if not table.row_count:
         raise InputError(f"{path}: has no line below its columns; must have contact times")
     used = [name for name in UNITS if name in names]
-    if others := [name for name in names if name not in used]:
-        LOGGER.warning("%s: not used: the columns %s", path, choices(others, 6))
+    if unused := [name for name in names if name not in used]:
+        LOGGER.warning("%s: not used: the columns %s", path, choices(unused, 6))
     columns = [table.column(name) for name in used]
-    changes = [column.to_unit(UNITS[column.name]) for column in columns]
-    numbers = [
-        [change(float(value)) if change != IDENTITY else float(value) for value in column.numbers()]
-        for column, change in zip(columns, changes, strict=True)
-    ]
+    numbers = [_numbers_in_si(column) for column in columns]
     return [
         _contact(columns[0].row_place(row), dict(zip(used, values, strict=True)))
         for row, values in enumerate(zip(*numbers, strict=True))
     ]
+
+
+def _numbers_in_si(column: Column) -> list[float]:
+    """The numbers of a column in the unit that UNITS has for it."""
+    change = column.to_unit(UNITS[column.name])
+    numbers = [float(value) for value in column.numbers()]
+    return numbers if change == IDENTITY else [change(number) for number in numbers]
 
 
 def identify_from_times(
@@ -139,19 +146,24 @@ def fit_contacts(
 ) -> Fit:
     """Fit the parameters to contact times with what simulates grasps; equal grasps run once."""
     measured = np.array([c.time for c in contacts])
-    known: dict[Grasp, Times] = {}
+    simulated: dict[Grasp, Times] = {}
 
     def residuals(points: Sequence[Vector]) -> list[Vector]:
-        wanted = [[_grasp(c, parameters, x) for c in contacts] for x in points]
-        new = list(dict.fromkeys(g for grasps in wanted for g in grasps if g not in known))
-        known.update(zip(new, simulate(new), strict=True))
+        grasps_at = [[_grasp(c, parameters, x) for c in contacts] for x in points]
+        grasps = [grasp for grasps_of_point in grasps_at for grasp in grasps_of_point]
+        new = list(dict.fromkeys(grasp for grasp in grasps if grasp not in simulated))
+        simulated.update(zip(new, simulate(new), strict=True))
         return [
-            np.array([known[g][c.finger - 1] for g, c in zip(grasps, contacts, strict=True)])
-            - measured
-            for grasps in wanted
+            _times_of(contacts, [simulated[grasp] for grasp in grasps_of_point]) - measured
+            for grasps_of_point in grasps_at
         ]
 
     return fit(residuals, parameters, "identify")
+
+
+def _times_of(contacts: Sequence[Contact], times: Sequence[Times]) -> Vector:
+    """The simulated time in s of each contact, from the times of all fingers in its grasp."""
+    return np.array([of_grasp[c.finger - 1] for c, of_grasp in zip(contacts, times, strict=True)])
 
 
 def scatter(contacts: Sequence[Contact]) -> float | None:
@@ -163,9 +175,9 @@ def scatter(contacts: Sequence[Contact]) -> float | None:
     equal: dict[tuple[Grasp, int], list[float]] = {}
     for c in contacts:
         equal.setdefault((_grasp(c, (), np.empty(0)), c.finger), []).append(c.time)
-    free = sum(len(times) - 1 for times in equal.values())
+    degrees_of_freedom = sum(len(times) - 1 for times in equal.values())
     squares = [np.sum((np.array(times) - np.mean(times)) ** 2) for times in equal.values()]
-    return math.sqrt(math.fsum(squares) / free) if free else None
+    return math.sqrt(math.fsum(squares) / degrees_of_freedom) if degrees_of_freedom else None
 
 
 def _grasp(c: Contact, parameters: Sequence[Parameter], x: Vector) -> Grasp:
@@ -177,11 +189,12 @@ def contact_times(job: tuple[System, Grasp]) -> Times:
     """When the fingers touch in a grasp with a system, in s; at STOP where one does not."""
     system, grasp = job
     values = dict(grasp.parameters)
-    own = values.get(RATIO, start_in_si(system, RATIO))
-    values |= {"plant.initial_object_position": grasp.x_m, RATIO: own * grasp.ratio}
+    ratio_of_sensors = values.get(RATIO, start_in_si(system, RATIO))
+    values["plant.initial_object_position"] = grasp.x_m
+    values[RATIO] = ratio_of_sensors * grasp.ratio
     try:
-        chosen = with_si_values(with_case(system, grasp.case), values, "identify:")
-        times: Any = close(chosen, after=0.0).metrics["time_to_contact"]
+        system = with_si_values(with_case(system, grasp.case), values, "identify:")
+        times: Any = run_grasp(system, hold_time=0.0).metrics["time_to_contact"]
     except (InputError, SimulationError) as error:
         error.args = (f"x_m = {grasp.x_m:g} m, Case {grasp.case}: {error}",)
         raise
@@ -196,7 +209,7 @@ def _contact(place: str, numbers: Mapping[str, float]) -> Contact:
                 f"{place}: {name} = {numbers[name]:g}: must be one of {choices(valid)}"
             )
     x_m, time = numbers["x_m"], numbers["time"]
-    alphas = [numbers.get(name, 1.0) for name in OPTIONAL]
+    alphas = [numbers.get(name, 1.0) for name in OPTIONAL_COLUMNS]
     if not (0.0 < time < STOP and min(alphas) > 0.0 and np.isfinite([x_m, *alphas]).all()):
         raise InputError(
             f"{place}: x_m = {x_m:g} m, time = {time:g} s, alpha = {choices(alphas)}: must be "

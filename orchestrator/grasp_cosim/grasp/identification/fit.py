@@ -22,14 +22,14 @@ from ...base.text import counted
 Vector = npt.NDArray[np.float64]
 
 Residuals = Callable[[Sequence[Vector]], Sequence[Vector]]
-"""The residuals at several points; they come together, so that they can be found in parallel."""
+"""The residuals at several points; they come together, so that they can be solution in parallel."""
 
 CONFIDENCE = 0.95
 
-STEP = 0.01
-"""Of the finite differences, as a share of a parameter's scale."""
+DIFFERENCE_STEP = 0.01
+"""The step of the finite differences, as a share of a parameter's scale."""
 
-MOST = 60
+MAX_FIT_STEPS = 60
 """Steps of the fit at most, a Jacobian each; a fit of four parameters takes about eight."""
 
 NEGLIGIBLE = 1e-6
@@ -82,9 +82,11 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
     start, low, high, scale = np.array([p[2:] for p in parameters]).T
 
     def jacobian(x: Vector) -> Vector:
-        steps = np.where(x + STEP * scale > high, -STEP, STEP) * scale
-        here, *moved = residuals([x, *(x + row for row in np.diag(steps))])
-        return np.column_stack([(m - here) / h for m, h in zip(moved, steps, strict=True)])
+        steps = np.where(x + DIFFERENCE_STEP * scale > high, -DIFFERENCE_STEP, DIFFERENCE_STEP)
+        steps *= scale
+        at_x, *at_moved = residuals([x, *(x + row for row in np.diag(steps))])
+        columns = [(moved - at_x) / h for moved, h in zip(at_moved, steps, strict=True)]
+        return np.column_stack(columns)
 
     (first,) = residuals([start])
     if len(first) <= len(parameters):
@@ -94,7 +96,7 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
         )
     if not np.isfinite(first).all():
         raise InputError(f"{place}: the residuals are not finite; must be figures of a grasp")
-    found = least_squares(
+    solution = least_squares(
         lambda x: residuals([x])[0],
         start,
         jac=jacobian,
@@ -103,15 +105,17 @@ def fit(residuals: Residuals, parameters: Sequence[Parameter], place: str) -> Fi
         ftol=1e-5,
         xtol=1e-4,
         gtol=1e-8,
-        max_nfev=MOST,
+        max_nfev=MAX_FIT_STEPS,
     )
-    if not found.success:
-        raise SimulationError(f"{place}: the fit has not come to rest after {MOST} steps")
-    free = np.flatnonzero(found.active_mask == 0)  # others are at a bound: -1 or 1
+    if not solution.success:
+        raise SimulationError(f"{place}: the fit has not come to rest after {MAX_FIT_STEPS} steps")
+    free = np.flatnonzero(solution.active_mask == 0)  # others are at a bound: -1 or 1
     widths = np.full(len(parameters), np.inf)
-    widths[free] = scale[free] * _half_widths((found.jac * scale)[:, free], found.fun)
-    estimates = map(_estimate, parameters, found.x.tolist(), found.active_mask, widths.tolist())
-    return Fit(tuple(estimates), found.fun, found.nfev + found.njev * len(parameters))
+    widths[free] = scale[free] * _half_widths((solution.jac * scale)[:, free], solution.fun)
+    estimates = map(
+        _estimate, parameters, solution.x.tolist(), solution.active_mask, widths.tolist()
+    )
+    return Fit(tuple(estimates), solution.fun, solution.nfev + solution.njev * len(parameters))
 
 
 def _estimate(p: Parameter, value: float, bound: int, width: float) -> Estimate:
@@ -131,8 +135,10 @@ def _half_widths(jacobian: Vector, residuals: Vector) -> Vector:
     if not k:
         return np.empty(0)
     _, singular, v = np.linalg.svd(jacobian, full_matrices=False)
-    lost = singular <= NEGLIGIBLE * max(singular.max(), np.finfo(float).tiny)
+    is_zero = singular <= NEGLIGIBLE * max(singular.max(), np.finfo(float).tiny)
     variance = float(residuals @ residuals) / (n - k)
-    kept = (v[~lost] / singular[~lost, None]) ** 2
-    widths = t.ppf(0.5 + 0.5 * CONFIDENCE, n - k) * np.sqrt(variance * kept.sum(axis=0))
-    return np.where((np.abs(v[lost]) > NEGLIGIBLE).any(axis=0), np.inf, widths)
+    inverse = (v[~is_zero] / singular[~is_zero, None]) ** 2
+    deviations = np.sqrt(variance * inverse.sum(axis=0))
+    widths = t.ppf(0.5 + 0.5 * CONFIDENCE, n - k) * deviations
+    is_undetermined = (np.abs(v[is_zero]) > NEGLIGIBLE).any(axis=0)
+    return np.where(is_undetermined, np.inf, widths)

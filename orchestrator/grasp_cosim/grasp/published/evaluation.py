@@ -19,8 +19,9 @@ from ...report.plot import new_figure
 from ..metrics import IMPACT_WINDOW, METRICS
 from ..presets import start_in_si, with_preset
 from ..system import grasp_system
-from .compared import REFLECTANCE_X_M, Evidence, Run, Setting, Source, compared, table_csv
-from .page import evaluation_html
+from .evaluation_page import evaluation_html
+from .published_figures import REFLECTANCE_X_M, Setting, Source, table_csv
+from .reproduction import Evidence, GraspRun, reproduce
 
 TIME_BAND = 0.10
 DIFFERENCE_BAND = 0.03
@@ -38,8 +39,8 @@ COLOUR_BAND = 0.1
 Claim = tuple[str, bool]
 """A statement, and True if it holds."""
 
-BOOKKEEPING = ("wall_time", "real_time_factor")
-"""What differs from one repetition of a grasp to the next."""
+NOT_REPEATABLE = ("wall_time", "real_time_factor")
+"""Metrics that differ from one repetition of a grasp to the next."""
 
 
 class Evaluation(dict[str, Any]):
@@ -85,14 +86,16 @@ def evaluate(
     with Progress("compiling the native FMUs, once for these sources", unit="", shown=progress):
         system = grasp_system(controller, native)
     system = with_preset(system, "bench") if bench else system
-    evidence = compared(system, source, os.cpu_count() or 1, progress)
-    report = as_report(evidence, source)
+    evidence = reproduce(system, source, os.cpu_count() or 1, progress)
+    report = evaluation_of(evidence, source)
     if folder:
-        write(folder, evidence, report, source)
+        write_evaluation(folder, evidence, report, source)
     return report
 
 
-def write(out: Path, evidence: Evidence, report: Mapping[str, Any], source: Source) -> None:
+def write_evaluation(
+    out: Path, evidence: Evidence, report: Mapping[str, Any], source: Source
+) -> None:
     """Write the page of a report, and its numbers, into a folder."""
     write_json(out / "evaluation.json", report)
     rows = [{**row, "finger": row["finger"] or "difference"} for row in evidence.rows]
@@ -100,39 +103,41 @@ def write(out: Path, evidence: Evidence, report: Mapping[str, Any], source: Sour
     write_text(out / "evaluation.html", evaluation_html(evidence, report["claims"], source))
 
 
-def as_report(evidence: Evidence, source: Source) -> Evaluation:
+def evaluation_of(evidence: Evidence, source: Source) -> Evaluation:
     """What evaluate() returns; a condition is a position in m, or names the colours."""
     return Evaluation(
         rows=evidence.rows,
         rms=evidence.rms,
         claims=check_claims(source, evidence),
-        runs=[
-            {
-                "condition": r.setting.x_m if source == "simulation" else r.setting.label,
-                "case": r.case,
-                **{k: v for k, v in r.metrics.items() if k not in BOOKKEEPING},
-            }
-            for r in evidence.runs.values()
-        ],
-        units={
-            **{m.name: m.unit for m in METRICS},
-            **{name: unit for name, unit in UNITS.items() if name not in BOOKKEEPING},
-            **{name: "s" for name, value in evidence.rows[0].items() if isinstance(value, float)},
-            "rms": "s",
-            "condition": "m",
-        },
+        runs=[_run_entry(run, source) for run in evidence.runs.values()],
+        units=_units(evidence),
     )
+
+
+def _run_entry(run: GraspRun, source: Source) -> dict[str, Any]:
+    """The condition, the case and the metrics of a grasp."""
+    condition = run.setting.x_m if source == "simulation" else run.setting.label
+    metrics = {name: value for name, value in run.metrics.items() if name not in NOT_REPEATABLE}
+    return {"condition": condition, "case": run.case, **metrics}
+
+
+def _units(evidence: Evidence) -> dict[str, str | None]:
+    """The units of the entries of an evaluation, by name."""
+    units = {metric.name: metric.unit for metric in METRICS}
+    units |= {name: unit for name, unit in UNITS.items() if name not in NOT_REPEATABLE}
+    units |= {name: "s" for name, value in evidence.rows[0].items() if isinstance(value, float)}
+    return {**units, "rms": "s", "condition": "m"}
 
 
 def verdict(report: Mapping[str, Any]) -> str:
     """The claims and the deviations of a report as lines for a terminal."""
-    rms = ", ".join(f"{name.replace('_', ' ')} {v:.3f}" for name, v in report["rms"].items())
-    return "\n".join(
-        [
-            *(f"{'holds' if c['holds'] else 'FAILS'}  {c['text']}" for c in report["claims"]),
-            f"root mean square of the differences in s: {rms}",
-        ]
+    lines = [
+        f"{'holds' if claim['holds'] else 'FAILS'}  {claim['text']}" for claim in report["claims"]
+    ]
+    rms = ", ".join(
+        f"{name.replace('_', ' ')} {deviation:.3f}" for name, deviation in report["rms"].items()
     )
+    return "\n".join([*lines, f"root mean square of the differences in s: {rms}"])
 
 
 # Claims
@@ -140,33 +145,27 @@ def verdict(report: Mapping[str, Any]) -> str:
 
 def check_claims(source: Source, evidence: Evidence) -> list[dict[str, Any]]:
     """The claims of `evaluate --json` about what the paper says of this source of figures."""
-    found = CLAIMS[source](evidence)
-    return [{"text": text, "holds": bool(holds)} for text, holds in found]
+    claims = CLAIMS[source](evidence)
+    return [{"text": text, "holds": bool(holds)} for text, holds in claims]
 
 
-def _of_simulation(e: Evidence) -> Iterator[Claim]:
-    for what, band, times in (
-        ("contact time", TIME_BAND, True),
-        ("time difference", DIFFERENCE_BAND, False),
-    ):
-        worst = max(abs(r["difference"]) for r in e.rows if bool(r["finger"]) is times)
-        yield (
-            f"Each {what} is within {band:.2f} s of the published one (largest deviation "
-            f"{worst:.3f} s).",
-            worst <= band,
-        )
+def _claims_on_simulation(e: Evidence) -> Iterator[Claim]:
+    of_fingers = [row["difference"] for row in e.rows if row["finger"]]
+    between = [row["difference"] for row in e.rows if not row["finger"]]
+    yield _near_published("contact time", TIME_BAND, of_fingers)
+    yield _near_published("time difference", DIFFERENCE_BAND, between)
     settings = _off_centre(e)
     yield _touching_together(e, settings, "wherever the object is off centre,")
     yield _balancing(e, settings)
-    soft = max(_each("impact_velocity", e, (1, 2)))
-    hard = min(_each("impact_velocity", e, (0,)))
+    soft = max(_of_fingers("impact_velocity", e, (1, 2)))
+    hard = min(_of_fingers("impact_velocity", e, (0,)))
     yield (
         f"Impact reduction: the fastest contact in Cases 1 and 2 ({1e3 * soft:.1f} mm/s) has "
         f"less than a tenth of the speed of the slowest in Case 0 ({1e3 * hard:.0f} mm/s).",
         soft < 0.1 * hard,
     )
     settled = _settled_force(e)
-    forces = _each("steady_contact_force", e, (0, 1, 2))
+    forces = _of_fingers("steady_contact_force", e, (0, 1, 2))
     worst = max(abs(force - settled) for force in forces)
     yield (
         f"Contact force control: every finger settles at K_i·W/2 = {settled:.2f} N within 1 % "
@@ -176,8 +175,9 @@ def _of_simulation(e: Evidence) -> Iterator[Claim]:
     yield _converging(e, settings, "off centre")
 
 
-def _of_experiments(e: Evidence) -> Iterator[Claim]:
-    rms, settings = e.rms["contact_times"], sorted({setting for setting, _ in e.runs})
+def _claims_on_experiments(e: Evidence) -> Iterator[Claim]:
+    rms = e.rms["contact_times"]
+    settings = sorted({setting for setting, _ in e.runs})
     yield (
         f"The contact times of the position rows and of equal colours are within {RMS_BAND:.2f} s "
         f"of the published ones in the root mean square ({rms:.3f} s).",
@@ -185,41 +185,29 @@ def _of_experiments(e: Evidence) -> Iterator[Claim]:
     )
     yield _touching_together(e, settings, "in every row")
     yield _balancing(e, _off_centre(e))
-    equal = [s for s in settings if s.x_m == REFLECTANCE_X_M and s.equal_colours]
-    worst = max(
-        (max(times) - min(times)) * len(times) / sum(times)
-        for case in (1, 2)
-        for times in zip(*(e.runs[s, case].times for s in equal), strict=True)
-    )
+    worst = max(_spreads_over_colours(e, settings))
     yield (
         "The contact times hardly depend on the colour where it is the same on both sides: each "
         f"differs by less than {100 * COLOUR_BAND:.0f} % of its mean (most: {100 * worst:.1f} %).",
         worst < COLOUR_BAND,
     )
-    apart = [e.runs[s, case].apart for s, case in e.runs if case == 2 and not s.equal_colours]
-    most = max(r.published for r in e.published if r.case == 2 and r.finger is None)
-    yield (
-        "Brown and white are still touched simultaneously in either order, in Case 2 "
-        f"{' s and '.join(f'{d:.3f}' for d in apart)} s apart: no more than the most in any "
-        f"published row, {most:.2f} s.",
-        max(apart) <= most,
-    )
+    yield _touching_mixed_colours_together(e)
     settled = _settled_force(e)
-    soft = max(max(r.touch_forces) for r in e.runs.values() if r.case > 0)
-    hard = min(min(r.touch_forces) for r in e.runs.values() if r.case == 0)
+    soft = max(max(run.touch_forces) for run in e.runs.values() if run.case > 0)
+    hard = min(min(run.touch_forces) for run in e.runs.values() if run.case == 0)
     yield (
         f"Case 0 has an impact, Cases 1 and 2 have none: within {1e3 * IMPACT_WINDOW:.0f} ms of "
         f"touching every contact force rises above the settled {settled:.2f} N in Case 0 (to "
         f"{hard:.1f} N or more) and none does in Cases 1 and 2 (to {soft:.1f} N or less).",
         soft < settled < hard,
     )
-    alike = [s for s in _off_centre(e) if s.equal_colours]
-    yield _converging(e, alike, "off centre, equal colours")
+    equal_colours = [setting for setting in _off_centre(e) if setting.equal_colours]
+    yield _converging(e, equal_colours, "off centre, equal colours")
 
 
 CLAIMS: Mapping[Source, Callable[[Evidence], Iterator[Claim]]] = {
-    "simulation": _of_simulation,
-    "experiment": _of_experiments,
+    "simulation": _claims_on_simulation,
+    "experiment": _claims_on_experiments,
 }
 
 
@@ -228,9 +216,43 @@ def _off_centre(e: Evidence) -> list[Setting]:
     return sorted({setting for setting, _ in e.runs if setting.x_m})
 
 
-def _each(metric: str, e: Evidence, cases: Sequence[int]) -> Iterator[float]:
+def _of_fingers(metric: str, e: Evidence, cases: Sequence[int]) -> Iterator[float]:
     """A metric of each finger in these cases."""
-    return chain.from_iterable(r.metrics[metric] for r in e.runs.values() if r.case in cases)
+    return chain.from_iterable(run.metrics[metric] for run in e.runs.values() if run.case in cases)
+
+
+def _near_published(figure: str, band: float, differences: Sequence[float]) -> Claim:
+    """The figures of one kind are as they were published, within a band in s."""
+    worst = max(map(abs, differences))
+    return (
+        f"Each {figure} is within {band:.2f} s of the published one (largest deviation "
+        f"{worst:.3f} s).",
+        worst <= band,
+    )
+
+
+def _spreads_over_colours(e: Evidence, settings: Sequence[Setting]) -> Iterator[float]:
+    """By how much a contact time differs between equal colours, as a share of its mean."""
+    equal = [s for s in settings if s.x_m == REFLECTANCE_X_M and s.equal_colours]
+    for case in (1, 2):
+        for times in zip(*(e.runs[setting, case].times for setting in equal), strict=True):
+            yield (max(times) - min(times)) * len(times) / sum(times)
+
+
+def _touching_mixed_colours_together(e: Evidence) -> Claim:
+    """Layer 3 brings the contacts together where the faces are of two colours, too."""
+    apart = [
+        run.apart
+        for (setting, case), run in e.runs.items()
+        if case == 2 and not setting.equal_colours
+    ]
+    most = max(row.published for row in e.published if row.case == 2 and row.finger is None)
+    times = " s and ".join(f"{time:.3f}" for time in apart)
+    return (
+        f"Brown and white are still touched simultaneously in either order, in Case 2 {times} s "
+        f"apart: no more than the most in any published row, {most:.2f} s.",
+        max(apart) <= most,
+    )
 
 
 def _settled_force(e: Evidence) -> float:
@@ -239,23 +261,24 @@ def _settled_force(e: Evidence) -> float:
     return 0.5 * stiffness * start_in_si(e.system, "plant.object_width")
 
 
-def _touching_together(e: Evidence, settings: Sequence[Setting], where: str) -> Claim:
+def _touching_together(e: Evidence, settings: Sequence[Setting], condition: str) -> Claim:
     """Layer 3 brings the contacts closer together."""
     closer = [s for s in settings if e.runs[s, 2].apart < e.runs[s, 1].apart]
     return (
-        f"Simultaneous contact: {where} the fingers touch closer together in time in Case 2 than "
-        f"in Case 1 ({len(closer)} of {len(settings)} settings).",
+        f"Simultaneous contact: {condition} the fingers touch closer together in time in Case 2 "
+        f"than in Case 1 ({len(closer)} of {len(settings)} settings).",
         closer == settings,
     )
 
 
 def _balancing(e: Evidence, settings: Sequence[Setting]) -> Claim:
     """Layer 3 delays the nearer finger, the first, and hastens the farther one."""
-
-    def balances(one: Run, two: Run) -> bool:
-        return two.times[0] > one.times[0] and two.times[1] < one.times[1]
-
-    balanced = [s for s in settings if balances(e.runs[s, 1], e.runs[s, 2])]
+    balanced = []
+    for setting in settings:
+        nearer_1, farther_1 = e.runs[setting, 1].times
+        nearer_2, farther_2 = e.runs[setting, 2].times
+        if nearer_2 > nearer_1 and farther_2 < farther_1:
+            balanced.append(setting)
     return (
         "Off centre, Case 2 makes the nearer finger touch later and the farther one earlier "
         f"({len(balanced)} of {len(settings)} settings).",
@@ -263,11 +286,13 @@ def _balancing(e: Evidence, settings: Sequence[Setting]) -> Claim:
     )
 
 
-def _converging(e: Evidence, settings: Sequence[Setting], where: str) -> Claim:
-    case_2 = [e.runs[s, 2] for s in settings]
-    least, rest = min(r.overshoot for r in case_2), max(r.off_target for r in case_2)
+def _converging(e: Evidence, settings: Sequence[Setting], condition: str) -> Claim:
+    """The target of Case 2 passes the centre of the object, and comes back to it."""
+    case_2 = [e.runs[setting, 2] for setting in settings]
+    overshoot = min(run.overshoot for run in case_2)
+    off_target = max(run.off_target for run in case_2)
     return (
-        f"In Case 2 the target overshoots the centre of the object (by {1e3 * least:.1f} mm or "
-        f"more {where}) and converges to it (to {1e3 * rest:.2f} mm).",
-        least > TARGET_TOLERANCE and rest < TARGET_TOLERANCE,
+        f"In Case 2 the target overshoots the centre of the object (by {1e3 * overshoot:.1f} mm or "
+        f"more {condition}) and converges to it (to {1e3 * off_target:.2f} mm).",
+        overshoot > TARGET_TOLERANCE and off_target < TARGET_TOLERANCE,
     )

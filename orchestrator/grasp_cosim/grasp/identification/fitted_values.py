@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from ...system.overrides import PLACE, as_overrides
 from ...system.parts import Connection, Fault, Port
 from ..metrics import FINGERS
 
-ENTRIES = (*(f"gain[{j}]" for j in FINGERS), "delay")
+DRIVE_ENTRIES = (*(f"gain[{j}]" for j in FINGERS), "delay")
 
 
 def with_fitted(system: System, path: Path) -> System:
@@ -26,26 +27,28 @@ def with_fitted(system: System, path: Path) -> System:
     values = as_table(f"{path.name}: [values]", file.get("values", {}))
     check_values(f"{path.name}: [values]", values)
     drives = as_table(f"{path.name}: [drives]", file.get("drives", {}))
-    check_keys(f"{path.name}: [drives]", drives, ENTRIES)
+    check_keys(f"{path.name}: [drives]", drives, DRIVE_ENTRIES)
     for name, value in drives.items():
         if not is_number(value):
             raise InputError(f"{path.name}: drives.{name} = {value!r}: must be a number")
-    changed = system.with_overrides(as_overrides(values, f"{path.name}: {PLACE}"))
-    if not drives:
-        return changed
+    system = system.with_overrides(as_overrides(values, f"{path.name}: {PLACE}"))
+    return _with_drives(system, drives, f"{path.name}: [drives]") if drives else system
+
+
+def _with_drives(system: System, drives: Mapping[str, float], place: str) -> System:
+    """The system with gains and a delay in s on the connections to the forces of the fingers."""
     targets = {j: Port(_plant(system), f"force[{j}]") for j in FINGERS}
-    connected = {c.target for c in changed.connections}
+    connected = {c.target for c in system.connections}
     for target in targets.values():
         if target not in connected:
-            raise InputError(f"{path.name}: [drives]: no connection ends at {target}; must be one")
-    gains = {targets[j]: float(drives.get(f"gain[{j}]", 1.0)) for j in FINGERS}
+            raise InputError(f"{place}: no connection ends at {target}; must be one")
+    gains = {target: float(drives.get(f"gain[{j}]", 1.0)) for j, target in targets.items()}
+    connections = [_with_gain(c, gains.get(c.target, 1.0)) for c in system.connections]
+    faults = list(system.faults)
     delay = float(drives.get("delay", 0.0))
-    late = tuple(Fault(t, "delay", {"time": delay}) for t in targets.values() if delay > 0.0)
-    return replace(
-        changed,
-        connections=tuple(_with_gain(c, gains.get(c.target, 1.0)) for c in changed.connections),
-        faults=(*changed.faults, *late),
-    )
+    if delay > 0.0:
+        faults += [Fault(target, "delay", {"time": delay}) for target in targets.values()]
+    return replace(system, connections=tuple(connections), faults=tuple(faults))
 
 
 def _plant(system: System) -> str:
