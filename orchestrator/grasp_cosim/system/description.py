@@ -282,11 +282,11 @@ class System(Structure):
         )
         return replace(self, components=components, connections=as_written(self))
 
-    def with_settings(self, overrides: Mapping[str, Any]) -> System:
+    def with_settings(self, settings: Mapping[str, Any]) -> System:
         """A copy with single values of its file changed, by their places in it.
 
         Args:
-            overrides: Values by places like "experiment.scheme", "components.plant.fmu" or
+            settings: Values by places like "experiment.scheme", "components.plant.fmu" or
                 "components.plant.rename.gap[1]"; "plant.object_width" is short for
                 "components.plant.values.object_width". A text stands for a number or a boolean
                 where there must be one. An FMU takes the place of another as by swap(), and values
@@ -298,7 +298,7 @@ class System(Structure):
         Raises:
             InputError: There is no such place, one is set twice, or a value does not fit it.
         """
-        return self.with_overrides(as_overrides(overrides, "with_settings {place}"))
+        return self.with_overrides(as_overrides(settings, "with_settings {place}"))
 
     def with_overrides(self, overrides: Iterable[Override]) -> System:
         """A copy as of with_settings(), for overrides that know where they come from.
