@@ -97,7 +97,7 @@ playground: .venv/run
 # What cannot be installed is said, and the tests that need it are skipped, by name.
 .venv/platforms: TOOLS := ziglang
 .venv/interop: TOOLS := pyssp-standard pythonfmu3 fmu-manipulation-toolbox
-.venv/mutants: TOOLS := cosmic-ray
+.venv/mutants: TOOLS := cosmic-ray pytest-cov
 .venv/platforms .venv/interop .venv/mutants: .venv/dev
 	@for tool in $(TOOLS); do $(PIP) $$tool || { echo "not installed: $$tool"; without=$$tool; }; done; \
 	[ -n "$$without" ] || touch $@
