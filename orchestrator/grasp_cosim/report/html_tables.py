@@ -83,13 +83,13 @@ def metrics_html(result: Result) -> str:
 
 def _metric_row(title: str, values: Sequence[Any], metric: Metric, columns: int) -> str:
     """A row: a cell per value; a single value takes all columns."""
-    attributes = ' class="n"'
-    if len(values) == 1:
-        attributes = f' class="both" colspan="{max(columns, 1)}"'
-    texts = [escape(scaled(value, metric.factor)) for value in values]
-    cells = "".join(f"<td{attributes}>{text}</td>" for text in texts)
-    note = f' title="{escape(metric.description)}"' if metric.description else ""
-    return f"<td{note}>{escape(title)}</td>{cells}<td>{escape(metric.display_unit)}</td>"
+    texts = [scaled(value, metric.factor) for value in values]
+    if len(texts) == 1:
+        cells = [cell(texts[0], class_="both", colspan=max(columns, 1))]
+    else:
+        cells = [cell(text, class_="n") for text in texts]
+    note = {"title": metric.description} if metric.description else {}
+    return "".join([cell(title, **note), *cells, cell(metric.display_unit)])
 
 
 def settings_html(result: Result) -> str:
@@ -111,26 +111,28 @@ def settings_html(result: Result) -> str:
 
 def _components_html(components: Mapping[str, Mapping[str, Any]]) -> str:
     """A row for each component: its FMU, its start values, and how it is run."""
-    rows = []
-    for name, component in components.items():
-        values = escape(entries(component["values"])) or "as the FMU starts"
-        rows.append(
-            f'<td>{escape(name)}</td><td data-head="FMU">{escape(component["fmu"])}</td>'
-            f'<td class="w" data-head="start values given">{values}</td>'
-            f"<td>{escape(_execution(component))}</td>"
+    rows = [
+        cell(name)
+        + cell(component["fmu"], data_head="FMU")
+        + cell(
+            entries(component["values"]) or "as the FMU starts",
+            class_="w",
+            data_head="start values given",
         )
+        + cell(_execution(component))
+        for name, component in components.items()
+    ]
     heads = "<th>component</th><th>FMU</th><th>start values given</th><th></th>"
     return table(heads, rows, "cards")
 
 
 def _experiment_html(run: Mapping[str, Any], origin: Mapping[str, Any]) -> str:
     """A row for each of EXPERIMENT, then when and with what the run was made."""
-    rows = []
-    for key in EXPERIMENT:
-        value = f"{escape(number(run[key]))} {_EXPERIMENT_UNITS.get(key, '')}"
-        rows.append(f"<td>{escape(key.replace('_', ' '))}</td><td>{value}</td>")
-    for key, text in origin_rows(origin):
-        rows.append(f"<td>{key}</td><td>{escape(text)}</td>")
+    rows = [
+        cell(key.replace("_", " ")) + cell(f"{number(run[key])} {_EXPERIMENT_UNITS.get(key, '')}")
+        for key in EXPERIMENT
+    ]
+    rows += [cell(key) + cell(text) for key, text in origin_rows(origin)]
     return table("", rows)
 
 
@@ -149,13 +151,12 @@ def _criteria_html(result: Result) -> str:
     """A row for each criterion: its limit, what was measured, and the verdict."""
     rows = []
     for criterion in result.verdict:
-        unit = escape(criterion.unit)
         verdict = "pass" if criterion.passed else "fail"
         rows.append(
-            f"<td>{escape(criterion.what)}</td>"
-            f'<td data-head="limit">at most {escape(number(criterion.limit))} {unit}</td>'
-            f'<td data-head="measured">{escape(number(criterion.measured))} {unit}</td>'
-            f'<td data-head="verdict" class="{verdict}">{verdict}</td>'
+            cell(criterion.what)
+            + cell(f"at most {number(criterion.limit)} {criterion.unit}", data_head="limit")
+            + cell(f"{number(criterion.measured)} {criterion.unit}", data_head="measured")
+            + cell(verdict, data_head="verdict", class_=verdict)
         )
     return table("<th>criterion</th><th>limit</th><th>measured</th><th>verdict</th>", rows, "cards")
 
@@ -166,10 +167,11 @@ def _tested_html(result: Result) -> str:
     for name, component in result.settings["components"].items():
         peer = result.peers.get(name, {})
         rows.append(
-            f'<td>{escape(name)}</td><td data-head="FMU">{escape(component["fmu"])}</td>'
-            f'<td data-head="SHA-256" class="w hash">{escape(_hash_of(result, name))}</td>'
-            f'<td data-head="peer">{escape(peer.get("name", ""))}</td>'
-            f'<td data-head="build of the peer" class="w hash">{escape(peer.get("build", ""))}</td>'
+            cell(name)
+            + cell(component["fmu"], data_head="FMU")
+            + cell(_hash_of(result, name), data_head="SHA-256", class_="w hash")
+            + cell(peer.get("name", ""), data_head="peer")
+            + cell(peer.get("build", ""), data_head="build of the peer", class_="w hash")
         )
     heads = "<th>component</th><th>FMU</th><th>SHA-256</th><th>peer</th><th>its build</th>"
     return table(heads, rows, "cards")
@@ -202,12 +204,23 @@ def table(heads: str, rows: Iterable[str], kind: str = "") -> str:
     return f'<div class="scroll"><table{attribute}>{head}<tbody>{body}</tbody></table></div>'
 
 
+def cell(text: str, **attributes: str | int) -> str:
+    """A cell of a table, its text and attributes escaped.
+
+    The attributes are named as in Python: class_ is class, data_head is data-head.
+    """
+    named = "".join(
+        f' {name.rstrip("_").replace("_", "-")}="{escape(str(value))}"'
+        for name, value in attributes.items()
+    )
+    return f"<td{named}>{escape(text)}</td>"
+
+
 def text_table(rows: Sequence[Sequence[str]]) -> str:
     """A table of texts, the first row its heads."""
     heads, *body = rows
     head_cells = "".join(f"<th>{escape(text)}</th>" for text in heads)
-    body_rows = ["".join(f"<td>{escape(text)}</td>" for text in row) for row in body]
-    return table(head_cells, body_rows)
+    return table(head_cells, ["".join(map(cell, row)) for row in body])
 
 
 def svg_button(selector: str, name: str) -> str:

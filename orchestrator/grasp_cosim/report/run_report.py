@@ -124,8 +124,6 @@ def _sections(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str
 
 def _state(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str, Any]:
     """Return the data for the scripts, without the values of the signals."""
-    marks = [*scene.marks] if scene else []
-    marks += [(time, "--fault") for time in log_times(result.log)]
     first_signals = list(scene.first_signals) if scene else []
     return {
         "rows": len(excerpt.time),
@@ -134,9 +132,16 @@ def _state(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str, A
         **signal_styles(scene),
         "header": ",".join(map(quoted, ("time", *result.signals))),
         "csv": "signals.csv" if excerpt.rows_per_pair is None else "signals_thinned.csv",
-        "marks": [{"t": time, "color": color} for time, color in marks],
+        "marks": _marks(result, scene),
         "scene": scene.state if scene else None,
     }
+
+
+def _marks(result: Result, scene: Scene | None) -> list[dict[str, Any]]:
+    """Return the moments that are marked in the traces: those of the scene, events and faults."""
+    marks = list(scene.marks) if scene else []
+    marks += [(time, "--fault") for time in log_times(result.log)]
+    return [{"t": time, "color": color} for time, color in marks]
 
 
 def _signal_state(result: Result, k: int, name: str) -> dict[str, Any]:

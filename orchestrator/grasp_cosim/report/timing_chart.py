@@ -18,7 +18,7 @@ from ..base.errors import InputError, choices
 from ..base.text import grouped
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
-from .html_tables import bullets, svg_button, table
+from .html_tables import bullets, cell, svg_button, table
 from .plot import (
     GREY,
     RED,
@@ -100,8 +100,8 @@ def timing_sentence(timing: Timing) -> str:
     if not timing.overruns:
         return f"All {steps} steps ended within their period of {period}."
     share = _percent(timing.overruns / timing.steps)
-    listed = len(timing.listed)
-    of_the_first = f" of the first {grouped(listed)}" if listed < timing.overruns else ""
+    recorded = len(timing.listed)
+    of_the_first = f" of the first {grouped(recorded)}" if recorded < timing.overruns else ""
     worst = duration(max(overrun.late for overrun in timing.listed))
     culprits = [f"{part_label(name)} ({grouped(n)})" for name, n in timing.culprits.items()]
     return (
@@ -130,9 +130,9 @@ def _percent(share: float) -> str:
 
 def part_styles(timing: Timing) -> dict[str, tuple[str, int]]:
     """The style of every part and culprit: its colour, and its number in DASHES and MARKERS."""
-    others = (*BLACK_PARTS, *GREY_PARTS)
+    not_components = (*BLACK_PARTS, *GREY_PARTS)
     names = dict.fromkeys((*timing.parts, *timing.culprits))
-    components = [name for name in names if name not in others]
+    components = [name for name in names if name not in not_components]
     styles = {}
     for k, name in enumerate(components):
         styles[name] = (COMPONENT_COLORS[k % len(COMPONENT_COLORS)], k % len(DASHES))
@@ -294,7 +294,7 @@ def _parts_html(timing: Timing) -> str:
     """The times that each part took and how often it was to blame; empty for a mere culprit."""
     rows = []
     for part in dict.fromkeys((*timing.parts, *timing.culprits)):
-        cells = [f"<td>{escape(part_label(part))}</td>", *_time_cells(timing, part)]
+        cells = [cell(part_label(part)), *_time_cells(timing, part)]
         overruns = grouped(timing.culprits[part]) if part in timing.culprits else ""
         rows.append("".join([*cells, _number_cell(overruns)]))
     heads = [
@@ -314,7 +314,7 @@ def _time_cells(timing: Timing, part: str) -> list[str]:
 
 
 def _number_cell(text: str, warn: bool = False) -> str:
-    return f'<td class="n{" warn" if warn else ""}">{text}</td>'
+    return cell(text, class_="n warn" if warn else "n")
 
 
 def _overruns_html(timing: Timing) -> str:
@@ -327,7 +327,7 @@ def _overruns_html(timing: Timing) -> str:
         _number_cell(number(overrun.time, 9))
         + _number_cell(grouped(overrun.step))
         + _number_cell(grouped(1e6 * overrun.late, 1))
-        + f"<td>{escape(part_label(overrun.culprit))}</td>"
+        + cell(part_label(overrun.culprit))
         + _number_cell(grouped(1e6 * overrun.took, 1))
         for overrun in overruns
     ]

@@ -8,7 +8,7 @@ from string import Template
 from typing import TYPE_CHECKING, Any
 
 from ...base.text import fixed
-from ...report.html_tables import table
+from ...report.html_tables import cell, table
 from ...report.plot import as_svg, legend_below, new_figure
 from ...report.traces_page import page_style
 from ...report.wording import about
@@ -133,8 +133,8 @@ def _claims_html(claims: Sequence[Mapping[str, Any]]) -> str:
     """A row for each claim: whether it holds, and its text."""
     rows = []
     for claim in claims:
-        verdict = "<td>holds</td>" if claim["holds"] else '<td class="warn">FAILS</td>'
-        rows.append(f"{verdict}<td>{escape(claim['text'])}</td>")
+        verdict = cell("holds") if claim["holds"] else cell("FAILS", class_="warn")
+        rows.append(verdict + cell(claim["text"]))
     return table("", rows, "claims")
 
 
@@ -199,9 +199,7 @@ def _heads(names: Sequence[str], texts: int = 1) -> str:
 
 def _cells(texts: Iterable[str], numbers: Iterable[str]) -> str:
     """The cells of a row."""
-    cells = [f"<td>{escape(text)}</td>" for text in texts]
-    cells += [f'<td class="n">{number}</td>' for number in numbers]
-    return "".join(cells)
+    return "".join([*map(cell, texts), *(cell(number, class_="n") for number in numbers)])
 
 
 def _number(value: float, decimals: int, sign: str = "") -> str:
