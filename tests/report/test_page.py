@@ -205,7 +205,7 @@ def test_what_a_page_says(name, snapshot):
 
 def test_a_long_comparison_is_thinned_and_hostile_notes_stay_text():
     found = replace(two_runs(), notes=("<script>alert(1)</script>",))
-    whole, thinned = (comparison_html(found, limit=n) for n in (10**9, 20_000))
+    whole, thinned = (comparison_html(found, max_values=n) for n in (10**9, 20_000))
     assert "this page keeps the lowest and the highest value" in thinned
     assert len(thinned) < len(whole)
     assert "<script>alert(1)" not in whole

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..base.files import write_text
 from ..base.text import counted, grouped
 from ..report.embed import MAX_VALUES, Excerpt, excerpt_of
-from ..report.html_tables import bullets, origin_rows, summary, table, text_table
+from ..report.html_tables import bullets, cell, origin_rows, summary, table, text_table
 from ..report.traces_page import (
     Scene,
     columns_html,
@@ -42,13 +42,14 @@ from .summary import (
 )
 from .tube import deviation, tube
 
-AT_FIRST = 4
-"""So many of the worst signals are shown first."""
+WORST_SIGNALS = 4
+"""So many of the worst signals are shown when the page opens."""
 
-AROUND = 0.02
-"""The share of the time in view before and after a worst moment that a button zooms to."""
+ZOOM_MARGIN = 0.02
+"""The share of the compared time before and after a worst moment that a button zooms to."""
 
-Columns = Mapping[str, npt.NDArray[Any]]
+MIN_ZOOM_MARGIN = 1e-3
+"""s; what takes the place of that where no time is compared."""
 
 
 def write_comparison(c: ComparisonData, path: Path) -> None:
@@ -71,145 +72,181 @@ def write_qualification(q: QualificationData, path: Path) -> bool:
     return True
 
 
-def comparison_html(c: ComparisonData, limit: int = MAX_VALUES) -> str:
-    """Return the page as text; of more than `limit` values the signals are thinned."""
-    return _html(c, limit, verdict(c), c.alike, [*absent_lines(c), *notes(c)])
+def comparison_html(c: ComparisonData, max_values: int = MAX_VALUES) -> str:
+    """Return the page as text; of more than `max_values` values the signals are thinned."""
+    return _html(c, max_values, verdict(c), c.alike, [*absent_lines(c), *notes(c)])
 
 
 def short_html(c: ComparisonData) -> str:
     """The verdict on two runs, what they are, and the worst signals and metrics, for a notebook."""
     sides = zip(c.names, (c.a, c.b), strict=True)
     runs = "<br>".join(escape(f"{name}: {side.name}") for name, side in sides)
-    return f"<p><b>{escape(verdict(c))}</b><br>{runs}</p>{_worst(c)}"
+    return f"<p><b>{escape(verdict(c))}</b><br>{runs}</p>{_worst_html(c)}"
 
 
 def short_qualification_html(q: QualificationData) -> str:
     """The verdict on a candidate and its reason, its interface, and the worst, for a notebook."""
     head = f"<p><b>{escape(qualification_verdict(q))}</b><br>{escape(reason(q))}</p>"
     interface = "<br>".join(map(escape, difference_lines(q.swap.differences)))
-    return f"{head}<p>{interface}</p>{'' if q.comparison is None else _worst(q.comparison)}"
+    worst = _worst_html(q.comparison) if q.comparison else ""
+    return f"{head}<p>{interface}</p>{worst}"
 
 
-def _worst(c: ComparisonData) -> str:
+def _worst_html(c: ComparisonData) -> str:
     """Tables of the signals and the metrics that are furthest out of their bands."""
-    return "".join(text_table(cells(kind, compared[:ROWS], c.names)) for kind, compared in kinds(c))
+    tables = [text_table(cells(kind, compared[:ROWS], c.names)) for kind, compared in kinds(c)]
+    return "".join(tables)
 
 
 def _html(
-    c: ComparisonData, limit: int, headline: str, is_good: bool, remarks: Sequence[str]
+    c: ComparisonData, max_values: int, headline: str, is_good: bool, remarks: Sequence[str]
 ) -> str:
     """Return the page as text, with the headline at its top, and remarks on the runs."""
-    time = np.union1d(*(run.part(c.begin, c.end).time for run in (c.a, c.b)))
-    embedded = excerpt_of(
-        time, {f"{s.name} {k}": v for s in c.signals for k, v in _drawn(c, s, time)}, limit
-    )
-    ids = {key: f"column{k}" for k, key in enumerate(embedded.signals)}
+    time = np.union1d(*(side.part(c.begin, c.end).time for side in (c.a, c.b)))
+    excerpt = _excerpt(c, time, max_values)
+    ids = {key: f"column{k}" for k, key in enumerate(excerpt.signals)}
     scene = c.a.result.view.scene(c.a.result) if c.a.result else None
-    units = {s.name: s.unit for s in sorted(c.signals, key=lambda s: [*c.curves[0]].index(s.name))}
-    texts = c.a.result.descriptions if c.a.result else {}
-    exact = (
-        f"{c.names[0]} solid and pale, {c.names[1]} dashed over it; the tube is the band around "
-        f"{c.names[0]}. {grouped(len(time))} rows of {counted(len(c.signals), 'signal')}."
-    )
-    if thinned := embedded.rows_per_pair:
-        exact += f" Of each {thinned} rows this page keeps the lowest and the highest value."
-    digits = partial(number, digits=4)
-    signals = table(_heads(c), [_compared(c, s, s.name, s.unit, digits) for s in c.signals])
-    sections = {
-        "runs": (" and ".join(c.names), _runs(c, remarks)),
-        "traces": ("Traces", traces_html(exact, units, texts, ())),
-        "metrics": ("Metrics", f'<div class="pairs">{_metrics(c)}</div>'),
-        "signals-table": ("Signals, the worst first", f'<div class="pairs">{signals}</div>'),
-    }
-    titles = [str((s.result and s.result.origin.get("title")) or s.name) for s in (c.a, c.b)]
+    kind = "" if is_good else "warn"
     return traces_page(
-        Caption(" and ".join(titles), about(None)),
-        f'<span class="{"" if is_good else "warn"}">{escape(headline)}</span>',
-        sections,
-        _state(c, embedded, ids, scene, texts),
-        columns_html(
-            embedded.time,
-            {ids[key]: values for key, values in embedded.signals.items()},
-        ),
+        Caption(" and ".join(_title(side) for side in (c.a, c.b)), about(None)),
+        f'<span class="{kind}">{escape(headline)}</span>',
+        _sections(c, len(time), excerpt.rows_per_pair, remarks),
+        _state(c, excerpt, ids, scene),
+        columns_html(excerpt.time, {ids[key]: values for key, values in excerpt.signals.items()}),
         [scripts("save", "pairs")],
         scene.style if scene else "",
     )
 
 
-def _drawn(
-    c: ComparisonData, s: Compared, time: npt.NDArray[np.float64]
+def _excerpt(c: ComparisonData, time: npt.NDArray[np.float64], max_values: int) -> Excerpt:
+    """The curves of all signals at these times, by the signal and the kind of curve."""
+    curves = {
+        f"{signal.name} {kind}": values
+        for signal in c.signals
+        for kind, values in _curves(c, signal, time)
+    }
+    return excerpt_of(time, curves, max_values)
+
+
+def _title(side: Side) -> str:
+    """The title of a run, or else its name."""
+    title = side.result.origin.get("title") if side.result else None
+    return str(title or side.name)
+
+
+def _sections(
+    c: ComparisonData, rows: int, rows_per_pair: int | None, remarks: Sequence[str]
+) -> dict[str, tuple[str, str]]:
+    """The sections of the page by their ids, each its head and its HTML."""
+    return {
+        "runs": (" and ".join(c.names), _runs_html(c, remarks)),
+        "traces": ("Traces", _traces_html(c, rows, rows_per_pair)),
+        "metrics": ("Metrics", f'<div class="pairs">{_metrics_html(c)}</div>'),
+        "signals-table": (
+            "Signals, the worst first",
+            f'<div class="pairs">{_signals_html(c)}</div>',
+        ),
+    }
+
+
+def _traces_html(c: ComparisonData, rows: int, rows_per_pair: int | None) -> str:
+    """The traces; of each `rows_per_pair` rows the extremes are kept, where it is None all rows."""
+    first, second = c.names
+    exactness = (
+        f"{first} solid and pale, {second} dashed over it; the tube is the band around {first}. "
+        f"{grouped(rows)} rows of {counted(len(c.signals), 'signal')}."
+    )
+    if rows_per_pair:
+        exactness += (
+            f" Of each {rows_per_pair} rows this page keeps the lowest and the highest value."
+        )
+    units = {signal.name: signal.unit for signal in c.signals}
+    in_order = {name: units[name] for name in c.curves[0] if name in units}
+    return traces_html(exactness, in_order, _descriptions(c), ())
+
+
+def _descriptions(c: ComparisonData) -> Mapping[str, str]:
+    """The descriptions of the signals of the first run, as far as there are any."""
+    return c.a.result.descriptions if c.a.result else {}
+
+
+def _curves(
+    c: ComparisonData, signal: Compared, time: npt.NDArray[np.float64]
 ) -> Iterator[tuple[str, npt.NDArray[Any]]]:
-    """The curves of a signal at these times by name: both runs, their deviation, the band."""
-    first, second = (run[s.name] for run in c.curves)
-    apart = deviation(first.until(float(second.time[-1])), second, s.band.time)
+    """The curves of a signal at these times by kind: both runs, their deviation, the band."""
+    first, second = (curves[signal.name] for curves in c.curves)
+    band = signal.band
+    apart = deviation(first.until(float(second.time[-1])), second, band.time)
     yield "a", first.at(time)
     yield "b", second.at(time)
     yield "apart", np.interp(time, apart.time, apart.values)
-    if isfinite(s.band.width):
-        low, high = tube(first, time, s.band.time)
-        yield "low", low - s.band.width
-        yield "high", high + s.band.width
+    if isfinite(band.width):
+        low, high = tube(first, time, band.time)
+        yield "low", low - band.width
+        yield "high", high + band.width
 
 
 def _state(
-    c: ComparisonData, embedded: Excerpt, ids: Mapping[str, str], scene: Scene | None,
-    texts: Mapping[str, str],
-) -> dict[str, Any]:  # fmt: skip
+    c: ComparisonData, excerpt: Excerpt, ids: Mapping[str, str], scene: Scene | None
+) -> dict[str, Any]:
     """Return the data for the scripts, without the values of the signals."""
-    logs = [run.result.log for run in (c.a, c.b) if run.result]
-    in_scene = [name for name in (scene.first_signals if scene else ()) if name in c.curves[0]]
-    worst = [s.name for s in c.signals[:AT_FIRST]]
+    logs = [side.result.log for side in (c.a, c.b) if side.result]
+    of_scene = scene.first_signals if scene else ()
+    first_signals = [name for name in of_scene if name in c.curves[0]]
+    first_signals += [signal.name for signal in c.signals[:WORST_SIGNALS]]
+    marks = [{"t": time, "color": "--fault"} for log in logs for time in log_times(log)]
     return {
-        "rows": len(embedded.time),
+        "rows": len(excerpt.time),
         "names": list(c.names),
-        "signals": [_signal_state(c, s, ids, texts) for s in c.signals],
-        "shown": list(dict.fromkeys([*in_scene, *worst])),
+        "signals": [_signal_state(c, signal, ids) for signal in c.signals],
+        "shown": list(dict.fromkeys(first_signals)),
         **signal_styles(scene),
         "about": about(None),
-        "marks": [{"t": t, "color": "--fault"} for log in logs for t in log_times(log)],
+        "marks": marks,
         "scene": None,
     }
 
 
-def _signal_state(
-    c: ComparisonData, s: Compared, ids: Mapping[str, str], texts: Mapping[str, str]
-) -> dict[str, Any]:
-    """What the scripts are told of a signal; `ids` are those of its columns."""
-    pair = {key: ids.get(f"{s.name} {key}") for key in ("b", "low", "high", "apart")}
-    width = s.band.width if isfinite(s.band.width) else None
+def _signal_state(c: ComparisonData, signal: Compared, ids: Mapping[str, str]) -> dict[str, Any]:
+    """Return the data on a signal for the scripts; `ids` are those of its columns."""
+    name, width = signal.name, signal.band.width
     return {
-        "name": s.name,
-        "unit": s.unit,
-        "steps": c.curves[0][s.name].held,
-        "text": texts.get(s.name, ""),
-        "id": ids[f"{s.name} a"],
+        "name": name,
+        "unit": signal.unit,
+        "steps": c.curves[0][name].held,
+        "text": _descriptions(c).get(name, ""),
+        "id": ids[f"{name} a"],
         "texts": None,
-        "pair": pair,
-        "width": width,
+        "pair": {kind: ids.get(f"{name} {kind}") for kind in ("b", "low", "high", "apart")},
+        "width": width if isfinite(width) else None,
     }
 
 
-def _runs(c: ComparisonData, remarks: Sequence[str]) -> str:
+def _runs_html(c: ComparisonData, remarks: Sequence[str]) -> str:
     """A table of the two runs and of the settings that differ; and what is not compared."""
-    sides, heads = (c.a, c.b), "".join(f"<th>{name}</th>" for name in ("", *c.names))
-    about = [_about(side) for side in sides]
-    always = ("from", "what", "changed", "run")
-    has_text = [key for key in (*always, "date", "command") if any(key in of for of in about)]
-    rows = [_row(key, [of.get(key, "") for of in about]) for key in has_text]
-    differ = [_row(d.setting, [escape(d.a), escape(d.b)]) for d in c.differences]
-    settings = f"<h3>The settings differ in</h3>{table(heads, differ)}" if differ else ""
-    if c.a.result and c.b.result and not differ:
+    heads = "".join(f"<th>{name}</th>" for name in ("", *c.names))
+    of_a, of_b = _about_html(c.a), _about_html(c.b)
+    rows = [
+        _row(key, [of_a.get(key, ""), of_b.get(key, "")])
+        for key in ("from", "what", "changed", "run", "date", "command")
+        if key in of_a or key in of_b
+    ]
+    different = [_row(d.setting, [escape(d.a), escape(d.b)]) for d in c.differences]
+    settings = ""
+    if different:
+        settings = f"<h3>The settings differ in</h3>{table(heads, different)}"
+    elif c.a.result and c.b.result:
         settings = "<p>The settings of the two runs are the same.</p>"
     return f"{table(heads, rows)}{settings}{bullets('Notes', remarks, 'None.')}"
 
 
-def _about(side: Side) -> dict[str, str]:
+def _about_html(side: Side) -> dict[str, str]:
     """What a run is, by heads, as HTML."""
     run = side.result
     if run is None:
-        span = " to ".join(number(float(side.time[row])) for row in (0, -1))
-        length = f"{grouped(len(side.time))} rows, {span} s"
-        return {"from": escape(side.name), "what": "", "changed": "", "run": length}
+        first, last = number(float(side.time[0])), number(float(side.time[-1]))
+        rows = f"{grouped(len(side.time))} rows, {first} to {last} s"
+        return {"from": escape(side.name), "what": "", "changed": "", "run": rows}
     changed = changes(run.settings["changed"]) if "changed" in run.settings else ""
     return {
         "from": escape(side.name),
@@ -220,21 +257,30 @@ def _about(side: Side) -> dict[str, str]:
     }
 
 
-def _row(head: str, cells: Iterable[str]) -> str:
+def _row(head: str, cells_html: Iterable[str]) -> str:
     """A row of cells that are HTML already."""
-    return f"<td>{escape(head)}</td>" + "".join(f'<td class="w">{cell}</td>' for cell in cells)
+    return cell(head) + "".join(f'<td class="w">{html}</td>' for html in cells_html)
 
 
-def _metrics(c: ComparisonData) -> str:
+def _signals_html(c: ComparisonData) -> str:
+    """The signals, the worst first."""
+    formatted = partial(number, digits=4)
+    rows = [_compared_row(c, signal, signal.name, signal.unit, formatted) for signal in c.signals]
+    return table(_heads(c), rows)
+
+
+def _metrics_html(c: ComparisonData) -> str:
     """The metrics, in the order in which they are worked out."""
     rows = []
     for metric in c.metric_definitions:
-        for m in sorted(c.metrics, key=lambda m: m.name):
-            if plain(m.name) == metric.name:
-                has_column, entry = m.name in metric.columns, m.name.removeprefix(metric.name)
-                title = metric.column_title(m.name) if has_column else f"{metric.title}{entry}"
-                in_display_unit = partial(scaled, factor=metric.factor)
-                rows.append(_compared(c, m, title, metric.display_unit, in_display_unit))
+        in_display_unit = partial(scaled, factor=metric.factor)
+        for compared in sorted(c.metrics, key=lambda compared: compared.name):
+            if plain(compared.name) == metric.name:
+                if compared.name in metric.columns:
+                    title = metric.column_title(compared.name)
+                else:
+                    title = f"{metric.title}{compared.name.removeprefix(metric.name)}"
+                rows.append(_compared_row(c, compared, title, metric.display_unit, in_display_unit))
     return table(_heads(c), rows) if rows else "<p>There are no metrics that both have.</p>"
 
 
@@ -243,7 +289,7 @@ def _heads(c: ComparisonData) -> str:
     return "<th></th>" + "".join(f'<th class="n">{head}</th>' for head in heads)
 
 
-def _compared(
+def _compared_row(
     c: ComparisonData,
     compared: Compared,
     title: str,
@@ -251,22 +297,31 @@ def _compared(
     formatted: Callable[[Any], str],
 ) -> str:
     """A row: how many widths of its band it is off; a button goes to the worst moment."""
-    state, at = "inside", ""
-    if not isfinite(compared.deviation):
-        state = "one has none"
-    elif not compared.inside:
-        state = f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "differ"
-    if compared.time is not None:
-        begin, end = (
-            compared.time + by * (AROUND * (c.end - c.begin) or 1e-3) for by in (-1.0, 1.0)
-        )
-        at = (
-            f'<button type="button" data-show="{escape(compared.name)}" data-from="{begin!r}" '
-            f'data-to="{end!r}">{number(compared.time)} s</button>'
-        )
-    values = map(
-        formatted, (compared.deviation, compared.band.width, compared.original, compared.candidate)
+    values = (compared.deviation, compared.band.width, compared.original, compared.candidate)
+    return (
+        cell(f"{title} in {unit}" if unit else title)
+        + cell(_judgement(compared), class_="n" if compared.inside else "n warn")
+        + f'<td class="n">{_zoom_button(c, compared)}</td>'
+        + "".join(cell(formatted(value), class_="n") for value in values)
     )
-    cells = "".join(f'<td class="n">{cell}</td>' for cell in (at, *map(escape, values)))
-    warn, of_unit = "" if compared.inside else " warn", f" in {escape(unit)}" if unit else ""
-    return f'<td>{escape(title)}{of_unit}</td><td class="n{warn}">{state}</td>{cells}'
+
+
+def _judgement(compared: Compared) -> str:
+    """Whether it is inside its band, or how far off in widths of it."""
+    if not isfinite(compared.deviation):
+        return "one has none"
+    if compared.inside:
+        return "inside"
+    return f"{compared.ratio:.3g} × band" if isfinite(compared.ratio) else "differ"
+
+
+def _zoom_button(c: ComparisonData, compared: Compared) -> str:
+    """A button that shows a signal at its worst moment; empty of a metric, which has no time."""
+    if compared.time is None:
+        return ""
+    margin = ZOOM_MARGIN * (c.end - c.begin) or MIN_ZOOM_MARGIN
+    begin, end = compared.time - margin, compared.time + margin
+    return (
+        f'<button type="button" data-show="{escape(compared.name)}" data-from="{begin!r}" '
+        f'data-to="{end!r}">{number(compared.time)} s</button>'
+    )
