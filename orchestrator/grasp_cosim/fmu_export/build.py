@@ -23,6 +23,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..base.c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
+from ..base.platforms import elf_processor, python_processor
 from .native.targets import Target, Version, folders, here, universal
 from .package import Built, write_file
 from .shipped import HANDS, PACKAGES, SHIPPED, card_file, of_fingers, package_folder, together
@@ -39,7 +40,8 @@ Members = Mapping[str, bytes]
 
 HERE = Path(__file__).parent
 
-SOURCES = HERE, HERE.parent / "base/c_compilers", HERE.parent / "base/si_units.py"
+_OF_BASE = ("c_compilers", "platforms.py", "si_units.py", "zip_files.py")
+SOURCES = (HERE, *(HERE.parent / "base" / name for name in _OF_BASE))
 """What decides what FMUs hold, besides the packages that a block may import: folders and files."""
 
 VERSIONS = ("grasp_cosim-", "latex2mathml-", "markdown_it_py-", "pythonfmu-")
@@ -379,10 +381,6 @@ def is_twin(fmu: Path, content: str) -> bool:
 
 def _runs_here(archive: zipfile.ZipFile) -> bool:
     """Return True if a binary is for this machine: linux64 may hold one for another processor."""
-    places = tuple(f"binaries/{name}/" for name in (here().folder, here().tuple))
-    heads = [archive.read(name)[:20] for name in archive.namelist() if name.startswith(places)]
-    with Path(sys.executable).open("rb") as python:
-        heads.append(python.read(20))
-    # The processor that an ELF file is for, of other files nothing
-    *found, ours = (head[18:] if head.startswith(b"\x7fELF") else b"" for head in heads)
-    return ours in found
+    folders_of_here = tuple(f"binaries/{name}/" for name in (here().folder, here().tuple))
+    binaries = [name for name in archive.namelist() if name.startswith(folders_of_here)]
+    return any(elf_processor(archive.read(name)) == python_processor() for name in binaries)

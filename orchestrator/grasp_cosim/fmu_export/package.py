@@ -126,15 +126,12 @@ def hashed(template: Mapping[str, bytes]) -> tuple[str, dict[str, bytes]]:
 
 def write_members(target: Path, files: Mapping[str, bytes]) -> Built:
     """Write an FMU that holds these files, unless it is there already and holds the same."""
-    import zipfile  # takes time to load, and mostly there is nothing to write
+    from ..base.zip_files import (
+        write_zip,  # takes time to load, and mostly nothing is to be written
+    )
 
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for name, data in sorted(files.items()):
-            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # the same whenever it is built
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, data)
+    write_zip(buffer, dict(sorted(files.items())), deflated=True)
     return write_file(target, buffer.getvalue())
 
 

@@ -306,7 +306,14 @@ class Slave:
     def _report(self, error: BaseException) -> NoReturn:
         """Raise what pythonfmu is to log of an exception that would leave the slave.
 
-        For that it gives up its references to class, instance and messages, but goes on using them.
+        The fault upstream: `handle_py_exception` in PySlaveInstance.cpp calls `cleanPyObject`. That
+        gives up the references to class, instance and messages, for an instance that lives on. The
+        pointers stay as they are, so the next call uses what may have been freed, and the
+        destructor gives the references up once more. It shows as a host that crashes some calls
+        after the first one that was refused. The function is in 0.5.0 and in 0.7.0, the newest.
+
+        So one reference is added for each that is given up. This may go with the first version that
+        gives up none: tests/fmus/test_pythonfmu.py fails then.
         """
         for used in (self.maker, self, _NO_MESSAGES):
             keep(used)
@@ -369,9 +376,17 @@ class Maker:
 def offer(block: Any, module: dict[str, Any]) -> None:
     """Called by the script of an FMU: have pythonfmu find a Maker in the names of its module.
 
-    pythonfmu imports the script, and runs it again at every instantiation. Of the classes that this
-    makes it keeps all that it learns, for good; there is none, so it takes what the module has
-    under the empty name. It also gives up a reference to the names, which it only borrowed.
+    Two faults upstream are in `findClass` in PySlaveInstance.cpp, which imports the script, runs it
+    again at every instantiation, and looks at the bases of all classes that this makes. It is in
+    0.6.4 to 0.7.0, the newest, and not in 0.6.3.
+
+    - It gives up a reference to the names of the module, which it only borrowed from
+      `PyModule_GetDict`. It shows as a crash at some later instantiation, when the names are freed.
+      So one reference is added each time. This may go with the first version that gives up none:
+      tests/fmus/test_pythonfmu.py fails then.
+    - It never gives up the lists and texts that it makes of the bases: a host that instantiates
+      often grows. Here the script makes no class, so it takes what the module has under the empty
+      name.
     """
     keep(module)
     module[""] = Maker(block, module["__name__"])
@@ -388,7 +403,11 @@ The files may be gone at the end; the system then knows a library that is loaded
 def let_go() -> None:
     """Have pythonfmu's binaries let go of Python while they can.
 
-    As the process ends they do it twice, the second time in memory that was freed.
+    The fault upstream: `finalizePythonInterpreter` in PySlaveInstance.cpp is called by the
+    destructor of the library, and sets a static `shared_ptr` that may have been destroyed by then,
+    as the process ends. It shows as a crash at the end of a host that did not unload the FMU. The
+    function is in 0.6.4 to 0.7.0, the newest, and not in 0.6.3. To find out whether this may go
+    with a later version, have this function do nothing, and run tests/fmus/test_hard_times.py.
     """
     for binary in _binaries:
         if hasattr(os, "RTLD_NOLOAD"):  # on Windows there is no need

@@ -13,10 +13,9 @@ from xml.parsers import expat
 
 from ..base.errors import InputError
 from ..base.files import check_fmu_file, not_its_fault
+from ..base.platforms import ELF_HEAD_BYTES
 
 NAME = "modelDescription.xml"
-ELF_HEAD_BYTES = 20
-"""Bytes of an ELF file that say which processor it is for."""
 MAX_DESCRIPTION_BYTES = 100_000_000
 """Bytes of a modelDescription.xml: some 300,000 variables, more than the largest FMUs have."""
 MAX_UNPACKED_BYTES, MAX_EXPANSION = 500_000_000, 50

@@ -3,20 +3,16 @@
 The one place that says so: reading a system, loading an instance and `inspect` ask it.
 """
 
-import platform
 import re
-import sys
 from collections.abc import Mapping
-from functools import cache
-from pathlib import Path
 from tempfile import gettempdir
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from ..base.errors import choices
+from ..base.platforms import platform_folder, platform_tuple, python_processor
 from .fmi_types import Value, typed
 from .interface import Interface
-from .model_description import ELF_HEAD_BYTES
 
 FMU_KINDS = {
     "CoSimulation": "co-simulation",
@@ -78,9 +74,6 @@ TIME_BASED_CLOCKS = ("constant", "fixed", "calculated", "tunable", "changing", "
 
 TIME_BASED = choices(TIME_BASED_CLOCKS, len(TIME_BASED_CLOCKS))
 
-_PROCESSORS = {3: "x86", 40: "ARM", 62: "x86-64", 183: "AArch64", 243: "RISC-V"}
-"""By their number in ELF."""
-
 _LICENCE = re.compile(r"licen[cs]|dongle|flexlm|activation|not activated", re.IGNORECASE)
 
 _SYMBOL = re.compile(r"undefined symbol:? \S+", re.IGNORECASE)
@@ -140,35 +133,22 @@ def _default(flag: str) -> Value | None:
 
 def this_machine(version: str) -> str:
     """The folder for binaries of this machine in an FMU of that version of FMI."""
-    if not version.startswith("3"):
-        return f"{'win' if sys.platform == 'win32' else sys.platform}{sys.maxsize.bit_length() + 1}"
-    processor = platform.machine().lower()
-    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(processor, processor)
-    return f"{processor}-{platform.system().lower()}"
+    return platform_tuple() if version.startswith("3") else platform_folder()
 
 
-def processor(head: bytes) -> str:
-    """The processor that an ELF file is for, by its first bytes; "" of another kind of file."""
-    if head[:4] != b"\x7fELF" or len(head) < ELF_HEAD_BYTES:
-        return ""
-    number = int.from_bytes(head[18:20], "little")
-    return _PROCESSORS.get(number, f"ELF machine {number}")
-
-
-def platform_of(folder: str, head: bytes) -> str:
+def platform_of(folder: str, processor: str) -> str:
     """The platform of a binary in a folder of an FMU, as others than x86-64 are told apart.
 
     FMI 2.0 has one folder for all processors of 64 bit.
     """
-    processor_name = processor(head) if folder == "linux64" else ""
-    return folder if processor_name in ("", "x86-64") else f"{folder} ({processor_name})"
+    if folder != "linux64" or processor in ("", "x86-64"):
+        return folder
+    return f"{folder} ({processor})"
 
 
-@cache
 def this_platform(version: str) -> str:
     """That of this Python."""
-    with Path(sys.executable).open("rb") as python:
-        return platform_of(this_machine(version), python.read(ELF_HEAD_BYTES))
+    return platform_of(this_machine(version), python_processor())
 
 
 def of_kind(fmu: Interface) -> Obstacle | None:

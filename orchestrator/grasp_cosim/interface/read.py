@@ -17,6 +17,7 @@ from xml.etree.ElementTree import Element
 from ..base.collector import without_collector
 from ..base.errors import InputError
 from ..base.files import check_fmu_file
+from ..base.platforms import elf_processor
 from ..base.si_units import Unit, known_unit
 from .attributes import (
     base_unit,
@@ -146,7 +147,7 @@ def _platforms(files: Mapping[str, bytes]) -> tuple[str, ...]:
     platforms = set()
     for name, head in files.items():
         if match := _BINARY.fullmatch(name):
-            platforms.add(platform_of(match[1], head))
+            platforms.add(platform_of(match[1], elf_processor(head)))
     return tuple(sorted(platforms))
 
 

@@ -17,12 +17,12 @@ from urllib.parse import unquote, urlsplit
 from ..base.errors import InputError, choices, nearest
 from ..base.one_piece import in_one_piece
 from ..base.scratch import ScratchFolder
+from ..base.zip_files import write_zip
 from ..interface.model_description import check_size
 
 SSD = ".ssd"
 STRUCTURE = f"SystemStructure{SSD}"
 RESOURCES = "resources/"
-_MODE = 0o644 << 16
 _OF_MACOS = {"__MACOSX/"}
 """What its archiver adds to a zip file."""
 
@@ -163,12 +163,8 @@ def _entries(names: Iterable[str], needs: str, place: str, notes: Notes) -> dict
 
 def write_archive(path: Path, entries: Mapping[str, bytes]) -> None:
     """Write the entries in the order given; the same entries give the same bytes."""
-    with in_one_piece(path) as part, zipfile.ZipFile(part, "w") as file:
-        for name, data in entries.items():
-            info = zipfile.ZipInfo(name)  # of 1980, uncompressed: the same at any time
-            info.external_attr = _MODE
-            info.create_system = 3  # Unix, on any system
-            file.writestr(info, data)
+    with in_one_piece(path) as part:
+        write_zip(part, entries)
 
 
 @cache

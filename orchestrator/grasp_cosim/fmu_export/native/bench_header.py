@@ -29,7 +29,7 @@ from ..link import (
     check_name,
     check_size,
 )
-from .text import WORDS, number, string
+from .text import WORDS, comment_text, number, string
 
 TEMPLATE = Path(__file__).with_name("link.h.in")
 WIRE = Path(__file__).with_name("wire.h.in")
@@ -79,7 +79,7 @@ def bench_header(
     sizes = {f"{group.causality}s_size": 8 * len(group.members) for group in groups}
     pairs = [*((g, _CHECK) for g in groups), *zip(groups, (_UNPACK, _UNPACK, _PACK), strict=True)]
     return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
-        title=comment(name),
+        title=comment_text(name),
         structs=structs(groups, _MEANINGS, starts or {}, descriptions or {}),
         wire=wire(prefix, signature),
         packing="\n".join(_function(group, *texts) for group, texts in pairs),
@@ -138,8 +138,10 @@ def structs(
     for group in groups:
         lines = []
         for v, name in group.members:
-            said = descriptions.get(v.name, "").replace("·", ".")
-            text = comment((f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}"))
+            said = descriptions.get(v.name, "")
+            text = comment_text(
+                (f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}")
+            )
             lines.append(f"    {f'{_TYPES[v.kind]} {name};':<40} /* {text} */")
         head = f"/* {meanings[group.causality]} */\ntypedef struct {{"
         none = f"    uint8_t none; /* the model has no {group.causality}s */"
@@ -148,7 +150,7 @@ def structs(
             values = [_literal(v, starts.get(v.name, _ZEROS[v.kind])) for v, _ in group.members]
             padded = [f"{value}," for value in values[:-1]] + values[-1:]
             pairs = zip(padded, group.members, strict=True)
-            lines = [f"    {value:<40} /* {comment(v.name)} */ \\" for value, (v, _) in pairs]
+            lines = [f"    {value:<40} /* {comment_text(v.name)} */ \\" for value, (v, _) in pairs]
             head = f"#define {group.struct.upper()}_DEFAULTS {{ \\"
             made += [head, *(lines or ["    0 \\"]), "}", ""]
     return "\n".join(made)
@@ -243,10 +245,3 @@ def _limiting(inputs: Group, limits: Mapping[str, Limit]) -> str:
 def _bounded(limit: float) -> float:
     """The limit as a number of C."""
     return math.copysign(min(abs(limit), sys.float_info.max), limit)
-
-
-def comment(text: str) -> str:
-    """Return the text for a comment in C, which it neither ends nor continues on another line."""
-    plain = text.encode("ascii", "backslashreplace").decode()
-    plain = "".join(c if c.isprintable() else "?" for c in plain)
-    return plain.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("??", "? ?")

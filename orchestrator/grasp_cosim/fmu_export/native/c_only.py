@@ -14,8 +14,9 @@ from ...base.c_compilers import BITS, LIBM
 from ..contract import Scalar
 from ..link import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file
-from .bench_header import Group, comment, lines_of, members, structs
+from .bench_header import Group, lines_of, members, structs
 from .blocks import translated
+from .text import comment_text
 
 FOLDER = Path(__file__).parent
 HELPERS = ("arithmetic.h", "variable.h")
@@ -61,7 +62,7 @@ def c_only(model: Model) -> dict[str, bytes]:
     starts: dict[str, Value] = {v.name: v.start for v in variables if v.start is not None}
     texts = {
         "name": name,
-        "summary": comment(model.description.summary),
+        "summary": comment_text(model.description.summary),
         "libm": ", ".join(libm) or "nothing",
         "structs": structs(groups, _MEANINGS, starts, {v.name: v.description for v in variables}),
         "state_size": str(max(1, int(re.findall(r"N_STATE = (\d+)", block)[0]))),

@@ -1,10 +1,10 @@
 """The platforms that a native FMU may have a binary for."""
 
-import platform
 import struct
-import sys
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
+
+from ...base.platforms import platform_folder, platform_tuple
 
 Version = Literal[2, 3]
 """Of FMI."""
@@ -43,58 +43,75 @@ NAMES: dict[str, tuple[Target, ...]] = {
 
 def targets(names: Iterable[str]) -> list[Target]:
     """Return the targets of these names, each once; ValueError for an unknown name."""
-    found: dict[Target, None] = {}
+    chosen: dict[Target, None] = {}
     for name in names:
         if name not in NAMES:
             valid = ", ".join(NAMES)
             raise ValueError(f"--target {name!r}: must be of {valid}, with commas between")
-        found |= dict.fromkeys(NAMES[name])
-    return list(found)
+        chosen |= dict.fromkeys(NAMES[name])
+    return list(chosen)
 
 
 def here() -> Target:
     """Return the platform of this Python."""
-    processor = platform.machine().lower()
-    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(processor, processor)
-    system = {"win32": "windows"}.get(sys.platform, sys.platform)
-    name = f"{processor}-{system}"
-    folder = f"{'win' if system == 'windows' else system}64"
-    return next((t for t in KNOWN if t.tuple == name), Target(name, folder, ""))
+    name = platform_tuple()
+    for target in KNOWN:
+        if target.tuple == name:
+            return target
+    return Target(name, platform_folder(), zig="")
 
 
-def folders(asked: Iterable[Target], fmi: Version) -> tuple[dict[Target, str], str]:
-    """Return the folder in binaries/ of each target, and what is to be said of it, or "".
+def folders(requested: Iterable[Target], fmi: Version) -> tuple[dict[Target, str], str]:
+    """Return the folder in binaries/ of each target, and a note for the user of it, or "".
 
     This machine's binary is in, too, unless a target takes its folder: FMI 2.0 has one for both
     processors of a system. On macOS one file serves both; of two for Linux x86-64 has linux64.
     """
-    wanted, ours = list(dict.fromkeys(asked)), here()
+    this_target = here()
+    targets = list(dict.fromkeys(requested))
     if fmi == 3:
-        return {t: t.tuple for t in dict.fromkeys((ours, *wanted))}, ""
-    if ours.folder not in {t.folder for t in wanted}:
-        wanted = [ours, *wanted]
-    places = {t: t.folder for t in wanted}
+        return {t: t.tuple for t in dict.fromkeys((this_target, *targets))}, ""
+    if this_target.folder not in {t.folder for t in targets}:
+        targets = [this_target, *targets]
+    places = {t: t.folder for t in targets}
     if {LINUX_X86, LINUX_ARM} <= places.keys():
         places[LINUX_ARM] = LINUX_ARM.tuple
         return places, (
             "FMI 2.0 has one folder for both, linux64: x86_64-linux is there, aarch64-linux in a "
             "folder of that name, which few hosts look at; must be without linux64, or --fmi 3"
         )
-    if ours not in places:
+    if this_target not in places:
         return places, (
-            f"{ours.folder} holds what was asked for, not {ours.tuple}, this machine's: FMI 2.0 "
+            f"{this_target.folder} holds what was asked for, not {this_target.tuple}, this "
+            "machine's: FMI 2.0 "
             "has one folder for both; --fmi 3 has two"
         )
     return places, ""
 
 
+# A universal binary of macOS (<mach-o/fat.h>, big-endian): a head, an entry for each library, and
+# the libraries, each from the beginning of a page on.
+_FAT_HEAD = struct.Struct(">II")
+"""Magic number, number of libraries."""
+_FAT_MAGIC = 0xCAFEBABE
+_FAT_ENTRY = struct.Struct(">IIIII")
+"""Type and subtype of the processor, offset and size in bytes, alignment as a power of two."""
+_PAGE_BITS = 14
+_PAGE_BYTES = 1 << _PAGE_BITS
+"""The pages of arm64, which are the larger ones."""
+_THIN_PROCESSOR = struct.Struct("<II")
+"""Type and subtype of the processor in a library for one (<mach-o/loader.h>, little-endian)."""
+_THIN_PROCESSOR_OFFSET = 4
+"""Bytes before them: the magic number."""
+
+
 def universal(thin: Sequence[bytes]) -> bytes:
     """Return libraries for processors of macOS as one that serves them all."""
-    page = 1 << 14
-    head, body, place = struct.pack(">II", 0xCAFEBABE, len(thin)), b"", page
+    head = _FAT_HEAD.pack(_FAT_MAGIC, len(thin))
+    body = b""
     for binary in thin:
-        processor = struct.unpack_from("<II", binary, 4)
-        head += struct.pack(">5I", *processor, place, len(binary), 14)
-        body += binary + bytes(-len(binary) % page)
-        place = page + len(body)
-    return head + bytes(page - len(head)) + body
+        cpu_type, cpu_subtype = _THIN_PROCESSOR.unpack_from(binary, _THIN_PROCESSOR_OFFSET)
+        offset = _PAGE_BYTES + len(body)
+        head += _FAT_ENTRY.pack(cpu_type, cpu_subtype, offset, len(binary), _PAGE_BITS)
+        body += binary + bytes(-len(binary) % _PAGE_BYTES)
+    return head.ljust(_PAGE_BYTES, b"\0") + body

@@ -64,10 +64,15 @@ def string(text: str) -> str:
 
 def comment(text: str) -> str:
     """A comment of C, of one or several lines."""
-    plain = text.strip().replace("·", "*").encode("ascii", "backslashreplace").decode()
-    rows = plain.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").split("\n")
-    lines = "\n".join(f"   {row}".rstrip() for row in rows)
+    lines = "\n".join(f"   {comment_text(line)}".rstrip() for line in text.strip().split("\n"))
     return f"/* {lines.strip()} */"
+
+
+def comment_text(line: str) -> str:
+    """A line of text for a comment in C, which it neither ends nor continues on another line."""
+    plain = line.replace("·", "*").encode("ascii", "backslashreplace").decode()
+    plain = "".join(c if c.isprintable() else "?" for c in plain)
+    return plain.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("??", "? ?")
 
 
 def wrapped(line: str, begin: str = "") -> str:
