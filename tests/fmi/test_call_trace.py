@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from fmi.test_event_mode import TICK, clock, sampled
@@ -191,6 +192,15 @@ def test_it_is_asked_for_in_a_file_and_on_the_command_line(tmp_path, monkeypatch
         f"first: trace: {tmp_path}/none/first.trace: cannot be written: No such file or directory"
     )
     assert error in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="NO device that is always full")
+def test_a_trace_for_which_there_is_no_room_is_an_error_in_one_line(tmp_path):
+    system = traced_system(tmp_path, "2.0")
+    first, second = system.components
+    full = replace(system, components=(first, replace(second, trace=Path("/dev/full"))))
+    with pytest.raises(InputError, match=r"^second: trace: /dev/full: cannot be written: No space"):
+        simulate(full)
 
 
 def test_what_has_no_trace_of_its_own_is_refused(tmp_path):

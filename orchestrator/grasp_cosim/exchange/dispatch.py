@@ -21,7 +21,7 @@ from ..system.validity import transforms
 from .divergence import Divergence, largest, to_open_ends
 from .energy import ExchangeEnergy, bonds
 from .inexact import InexactSignals
-from .listener import Experiment, Leisurely, Listener, Signal, Texts
+from .listener import Experiment, Floats, Leisurely, Listener, Signal, Steps, Texts
 
 CONTINUE_ADVICE = 'or let it go on: diverging = "continue"'
 
@@ -84,7 +84,7 @@ class Dispatcher:
         self.signals = tuple(recorded)
         self._recorded = _places(every_signal, self.signals)
         self._block = np.empty((len(every_signal), 0))
-        self.pending: tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]] | None = None
+        self.pending: tuple[Steps, Floats] | None = None
         """The last row, where decimation has left it out so far."""
         self.settings = run_settings(system)
         experiment = Experiment.of(self.settings)
@@ -101,7 +101,7 @@ class Dispatcher:
         """A line for each signal that ran away in a run that went on, or that is not as it was."""
         return [*self._runaways, *self._inexact.log]
 
-    def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+    def __call__(self, steps: Steps, rows: Floats) -> None:
         """Hand rows on; SimulationError at the first value that is not finite or has run away.
 
         Its row is the last that is kept.
@@ -144,9 +144,7 @@ class Dispatcher:
         self._inexact.restore(inexact)
         self._energy.restore(energy)
 
-    def _check(
-        self, steps: npt.NDArray[np.int64], outputs: npt.NDArray[np.float64]
-    ) -> tuple[int, str]:
+    def _check(self, steps: Steps, outputs: Floats) -> tuple[int, str]:
         """The number of rows to keep, and what is wrong in the last of them, if anything is."""
         valid_rows, sizes = len(steps), largest(outputs)
         if not np.isfinite(sizes).all():
@@ -190,7 +188,7 @@ class Dispatcher:
             if pending is not None:
                 self._hand_on(*pending)
 
-    def _hand_on(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+    def _hand_on(self, steps: Steps, rows: Floats) -> None:
         start = time.perf_counter()
         for listener in self._listeners:
             listener.block(steps, rows)
@@ -226,9 +224,9 @@ class Taps:
         changes = [tap.change for tap in by_name.values()]
         self._changes = [(i, change) for i, change in enumerate(changes) if change != IDENTITY]
 
-    def __call__(self, rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def __call__(self, rows: Floats) -> Floats:
         """The outputs in the order of the signals; not finite where a value is beyond a float64."""
-        values: npt.NDArray[np.float64] = rows[:, self._columns]
+        values: Floats = rows[:, self._columns]
         if self._changes:
             with np.errstate(over="ignore", invalid="ignore"):
                 for i, change in self._changes:
@@ -246,8 +244,6 @@ def _places(
     return np.array([place_of[signal.name] for signal in selected], np.intp)
 
 
-def _selected(
-    columns: npt.NDArray[np.float64], places: npt.NDArray[np.intp] | None
-) -> npt.NDArray[np.float64]:
+def _selected(columns: Floats, places: npt.NDArray[np.intp] | None) -> Floats:
     """The columns at these places, each of them in one piece."""
     return columns if places is None else columns.T[places].T

@@ -13,12 +13,11 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..system.description import System
 from ..system.parts import Port
 from ..system.times import in_seconds, seconds
-from .listener import Signal
+from .listener import Floats, Signal, Steps
 
 DECADES = 6
 """A signal is looked at from so many decades above its scale on; over as many it has to grow."""
@@ -49,11 +48,11 @@ def to_open_ends(system: System) -> frozenset[Port]:
     return frozenset(port for port, all_take_it in sources.items() if all_take_it)
 
 
-def largest(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def largest(rows: Floats) -> Floats:
     """The largest magnitude in each column; not finite where one of its values is not."""
     if not len(rows):
         return np.zeros(rows.shape[1])
-    highest: npt.NDArray[np.float64] = np.maximum(rows.max(axis=0), -rows.min(axis=0))
+    highest: Floats = np.maximum(rows.max(axis=0), -rows.min(axis=0))
     return highest
 
 
@@ -93,9 +92,9 @@ class Divergence:
 
     def __call__(
         self,
-        steps: npt.NDArray[np.int64],
-        rows: npt.NDArray[np.float64],
-        sizes: npt.NDArray[np.float64],
+        steps: Steps,
+        rows: Floats,
+        sizes: Floats,
     ) -> tuple[int, str] | None:
         """The first signal that runs away in a block of rows, (len(steps), len(outputs)).
 
@@ -127,9 +126,7 @@ class Divergence:
             text += f", ten times as much every {length:.2g} s"
         return row, f"{text}; look at the signs and gains, or try a shorter step"
 
-    def _follow(
-        self, i: int, steps: npt.NDArray[np.int64], column: npt.NDArray[np.float64]
-    ) -> int | None:
+    def _follow(self, i: int, steps: Steps, column: Floats) -> int | None:
         """Note the decades that a signal reaches; the row in which it has run away, if it has."""
         peaks = np.maximum.accumulate(np.abs(column))
         if not self._limits[i]:

@@ -15,7 +15,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..base.si_units import known_unit
 from ..interface.interface import Interface
@@ -23,9 +22,7 @@ from ..interface.variables import Variable
 from ..system.description import System
 from ..system.parts import Component, Port
 from ..system.record import ENERGY
-from .listener import Signal
-
-Floats = npt.NDArray[np.float64]
+from .listener import Floats, Signal
 
 IDENTITY = (1.0, 0.0)
 

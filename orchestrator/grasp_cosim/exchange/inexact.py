@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
 from ..base.checks import EXACT
 from ..interface.fmi_types import limits
@@ -11,7 +10,7 @@ from ..system.description import System
 from ..system.parts import Port
 from ..system.times import seconds
 from .divergence import largest
-from .listener import Signal
+from .listener import Floats, Signal, Steps
 
 
 class InexactSignals:
@@ -49,7 +48,7 @@ class InexactSignals:
         """A line for each of these signals, in the order of the system."""
         return [self._log[i] for i in sorted(self._log)]
 
-    def __call__(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+    def __call__(self, steps: Steps, rows: Floats) -> None:
         """Look at rows of all that is observed."""
         if not len(self._places):
             return

@@ -11,6 +11,12 @@ import numpy.typing as npt
 
 from ..system.times import Time, TimeGrid, nearest_time
 
+Steps = npt.NDArray[np.int64]
+"""Numbers of steps."""
+
+Floats = npt.NDArray[np.float64]
+"""Numbers; of rows as (rows, columns)."""
+
 
 class Texts:
     """The texts that a String has had so far, each once; rows hold their numbers in this list."""
@@ -26,7 +32,7 @@ class Texts:
             self.listed.append(text)
         return number
 
-    def column(self, numbers: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+    def column(self, numbers: Floats) -> npt.NDArray[Any]:
         """The texts of these numbers, as an array of str objects."""
         return np.array([self.listed[int(number)] for number in numbers], object)
 
@@ -74,7 +80,7 @@ class Experiment:
         """The number of communication steps from the start to the stop time."""
         return int((self.stop_ns - self.start_ns) // self.step_ns)
 
-    def times(self, steps: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    def times(self, steps: Steps) -> Floats:
         """The communication points in s."""
         return TimeGrid.of(self.start_ns, self.step_ns).times(steps)
 
@@ -85,7 +91,7 @@ class Listener(Protocol):
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
         """Called before the first row."""
 
-    def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
+    def block(self, steps: Steps, rows: Floats) -> None:
         """Rows as (len(steps), len(signals)); step k is at experiment.times(k).
 
         Booleans are 0.0 or 1.0, for Strings see Signal. The arrays are reused: copy what is kept.

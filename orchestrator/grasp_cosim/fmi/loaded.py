@@ -228,6 +228,8 @@ class LoadedInstance(ABC):
         current_folder = Path.cwd()
         try:
             self._slave = self._instantiate(folder)
+        except SimulationError as error:  # of the trace, whose file cannot be written
+            raise InputError(str(error)) from error
         except Exception as error:  # FMPy raises plain Exception
             reason = self._reason(error)
             if reason.startswith(FAILED_TO_INSTANTIATE):  # and the FMU logged nothing
@@ -246,19 +248,9 @@ class LoadedInstance(ABC):
     def close(self) -> None:
         """Terminate and free the FMU as far as it permits; remove what was extracted."""
         if self._inputs.running and self._worst_status < ERROR:
-            try:
-                self._slave.terminate()
-            except FMICallException as error:
-                self._worst_status = error.status
-                reason = as_reason(self._messages.reasons())
-                LOGGER.warning("%s: %s%s", self.name, error, reason)
+            self._terminate()
         if self._slave is not None:
-            if self._may_be_called:
-                if self._kept_states:
-                    self._kept_states.close()
-                self._free()
-            else:
-                _never_freed.append(self._slave)
+            self._release()
         if self._folder:
             resources = str(Path(self._folder.name, "resources"))
             if resources in sys.path:  # pythonfmu puts it there and leaves it
@@ -266,6 +258,24 @@ class LoadedInstance(ABC):
             self._folder.cleanup()
         if self._trace:
             self._trace.close()
+
+    def _terminate(self) -> None:
+        """Terminate the FMU; what it refuses is logged."""
+        try:
+            self._slave.terminate()
+        except FMICallException as error:
+            self._worst_status = error.status
+            reason = as_reason(self._messages.reasons())
+            LOGGER.warning("%s: %s%s", self.name, error, reason)
+
+    def _release(self) -> None:
+        """Free the FMU with the states that it keeps, or never if it must not be called."""
+        if not self._may_be_called:
+            _never_freed.append(self._slave)
+            return
+        if self._kept_states:
+            self._kept_states.close()
+        self._free()
 
     @property
     def _may_be_called(self) -> bool:

@@ -72,7 +72,14 @@ class StallError(Exception):
 
 
 class _State(ctypes.Structure):
-    """The state of a pacer, which compiled code goes on with: see master/loop.c."""
+    """The state of a pacer, which compiled code goes on with: see master/loop.c.
+
+    Times are in ns since the origin. Step k is due at base + (k - base_step) numerator/denominator;
+    base_step is -1 before the first one. It spins for the last `spin` before that. `slept` is when
+    it slept last, `breath` after how long without a sleep it needs one, 0 for never. An overrun
+    shifts the schedule, or stops the run beyond the tolerance. `arrived` is when the last step had
+    ended, `late` by how much after its deadline; more than `stall`, if that is not 0, is a stall.
+    """
 
     _fields_ = [
         (name, ctypes.c_int64)
@@ -122,13 +129,21 @@ class Pacer:
         """Does something that may wait within so many ns; False if there is nothing to do."""
         self._clock, self._sleep = clock or CLOCK_OF_THE_SYSTEM
         self._period = period.as_integer_ratio()
+        numerator, denominator = self._period
         self._state = _State(
-            self._clock(), 0, -1, *self._period, min(SPIN_NS, int(MAX_SPIN * period)), 0,
-            BREATH_NS if realtime.priority is not None else 0,
-            realtime.overrun == "continue", realtime.overrun == "stop", 0, 0,
-            round(realtime.tolerance * NANOSECONDS),
-            round(realtime.stall * NANOSECONDS) if proxies else 0,
-        )  # fmt: skip
+            origin=self._clock(),
+            base_step=-1,
+            numerator=numerator,
+            denominator=denominator,
+            spin=min(SPIN_NS, int(MAX_SPIN * period)),
+            shifts=realtime.overrun == "continue",
+            stops=realtime.overrun == "stop",
+            tolerance=round(realtime.tolerance * NANOSECONDS),
+        )
+        if realtime.priority is not None:
+            self._state.breath = BREATH_NS
+        if proxies:
+            self._state.stall = round(realtime.stall * NANOSECONDS)
         self._taken = self._recording = 0
         self.bind(np.zeros(self.width), lambda _: None)
 
