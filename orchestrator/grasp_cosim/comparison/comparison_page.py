@@ -106,15 +106,17 @@ def _html(
     excerpt = _excerpt(c, time, max_values)
     ids = {key: f"column{k}" for k, key in enumerate(excerpt.signals)}
     scene = c.a.result.view.scene(c.a.result) if c.a.result else None
+    title = f"{_title(c.a)} and {_title(c.b)}"
     kind = "" if is_good else "warn"
+    columns = {ids[key]: values for key, values in excerpt.signals.items()}
     return traces_page(
-        Caption(" and ".join(_title(side) for side in (c.a, c.b)), about(None)),
-        f'<span class="{kind}">{escape(headline)}</span>',
-        _sections(c, len(time), excerpt.rows_per_pair, remarks),
-        _state(c, excerpt, ids, scene),
-        columns_html(excerpt.time, {ids[key]: values for key, values in excerpt.signals.items()}),
-        [scripts("save", "pairs")],
-        scene.style if scene else "",
+        Caption(title, about(None)),
+        summary=f'<span class="{kind}">{escape(headline)}</span>',
+        sections=_sections(c, len(time), excerpt.rows_per_pair, remarks),
+        state=_state(c, excerpt, ids, scene),
+        data=columns_html(excerpt.time, columns),
+        script=[scripts("save", "pairs")],
+        style=scene.style if scene else "",
     )
 
 

@@ -91,8 +91,10 @@ def draw_grasp(run: Result, path: Path | None = None, *positions: Line) -> Figur
 
 def _close_ups(run: Result) -> list[tuple[Sequence[int], float, float]]:
     """Fingers, begin and end in s of the close-ups: one each, or one of both if they are near."""
-    contacts = {j: first_contact(run.by_role, j) for j in FINGERS}
-    times = {j: contact.time for j, contact in contacts.items() if contact}
+    times = {}
+    for j in FINGERS:
+        if contact := first_contact(run.by_role, j):
+            times[j] = contact.time
     if len(times) > 1:
         first, last = min(times.values()), max(times.values())
         if last - first < SHARED_CLOSE_UP:

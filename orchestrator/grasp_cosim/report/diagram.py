@@ -155,13 +155,17 @@ def _boxes(components: Mapping[str, str], arrows: Sequence[Arrow]) -> dict[str, 
     """The box of each component, with its ports and its column, without its place in px."""
     boxes: dict[str, _Box] = {}
     for name, line in components.items():
-        to_it = [arrow for arrow in arrows if arrow.target[0] == name]
-        from_it = [arrow for arrow in arrows if arrow.source[0] == name]
-        inputs = list(dict.fromkeys(arrow.target[1] for arrow in to_it))
-        outputs = list(dict.fromkeys(arrow.source[1] for arrow in from_it))
-        earlier = [boxes[a.source[0]] for a in to_it if a.source[0] in boxes]
-        column = max((box.column + 1 for box in earlier), default=0)
-        boxes[name] = _Box(name, line, column, inputs, outputs)
+        incoming = [arrow for arrow in arrows if arrow.target[0] == name]
+        outgoing = [arrow for arrow in arrows if arrow.source[0] == name]
+        sources = {arrow.source[0] for arrow in incoming}
+        columns = [box.column for source, box in boxes.items() if source in sources]
+        boxes[name] = _Box(
+            name,
+            line,
+            column=max(columns) + 1 if columns else 0,
+            inputs=list(dict.fromkeys(arrow.target[1] for arrow in incoming)),
+            outputs=list(dict.fromkeys(arrow.source[1] for arrow in outgoing)),
+        )
     return boxes
 
 

@@ -97,12 +97,12 @@ def page_html(result: Result, *, scene: Scene | None = None, max_values: int = M
     embedded = {f"signal{k}": values for k, values in enumerate(excerpt.signals.values())}
     return traces_page(
         heading,
-        summary(result.metrics),
-        _sections(result, excerpt, scene),
-        _state(result, excerpt, scene) | {"about": heading.about},
-        columns_html(excerpt.time, embedded),
-        [scripts("save", "panels"), scene.scripts if scene else ""],
-        scene.style if scene else "",
+        summary=summary(result.metrics),
+        sections=_sections(result, excerpt, scene),
+        state=_state(result, excerpt, scene) | {"about": heading.about},
+        data=columns_html(excerpt.time, embedded),
+        script=[scripts("save", "panels"), scene.scripts if scene else ""],
+        style=scene.style if scene else "",
     )
 
 
@@ -125,12 +125,13 @@ def _sections(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str
 def _state(result: Result, excerpt: Excerpt, scene: Scene | None) -> dict[str, Any]:
     """Return the data for the scripts, without the values of the signals."""
     first_signals = list(scene.first_signals) if scene else []
+    csv_header = ",".join(quoted(name) for name in ("time", *result.signals))
     return {
         "rows": len(excerpt.time),
         "signals": [_signal_state(result, k, name) for k, name in enumerate(result.signals)],
         "shown": first_signals or main_signals(result, MAX_FIRST_SIGNALS),
         **signal_styles(scene),
-        "header": ",".join(map(quoted, ("time", *result.signals))),
+        "header": csv_header,
         "csv": "signals.csv" if excerpt.rows_per_pair is None else "signals_thinned.csv",
         "marks": _marks(result, scene),
         "scene": scene.state if scene else None,
