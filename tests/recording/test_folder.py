@@ -10,6 +10,7 @@ from grasp_cosim import InputError, Realtime, SimulationError, simulate
 from grasp_cosim.exchange.listener import Experiment
 from grasp_cosim.recording.folder import FORMS, RunFolder
 from grasp_cosim.recording.read_back import load_log, load_run
+from grasp_cosim.recording.signals import read_signals
 from recording.rows import EXPERIMENT, SIGNALS, full_disk, rows
 from support.native_fmus import needs_gcc
 from support.native_systems import integrator
@@ -371,6 +372,13 @@ def test_a_run_json_that_is_damaged_is_refused_in_one_line(tmp_path, content, re
     assert message.startswith(f"{tmp_path / 'run.json'}: ")
     assert reason in message
     assert "\n" not in message
+
+
+def test_the_time_may_go_on_for_as_long_as_a_run(tmp_path):
+    csv = CSV.replace("0.1,", "1e9,")
+    assert load_log(written(tmp_path, csv) / "signals.csv").time.tolist() == [0.0, 1e9]
+    time, _ = read_signals(tmp_path / "signals.csv", ())
+    assert time.tolist() == [0.0, 1e9]
 
 
 @pytest.mark.parametrize("column", [[3.0, 1.5], [3.0, -1.5], [-2.0, 2.25]])

@@ -1,6 +1,7 @@
 """The verdict on a run, from figures of its proxies and its timing."""
 
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import pytest
 from grasp_cosim import simulate
@@ -52,6 +53,30 @@ def test_what_a_bench_may_not_do(figures, name, measured):
     assert found[name].measured == pytest.approx(measured)
     limits = {**asdict(Acceptance()), name: 1}
     assert failed(judged(figures, {}, acceptance=limits)) == set()
+
+
+@pytest.mark.parametrize(
+    ("overruns", "steps", "percent", "passed"),
+    [(0, 200, 0.0, True), (2, 200, 1.0, True), (3, 200, 1.5, False), (0, 0, 0.0, True),
+     (5, 0, 500.0, False)],
+)  # fmt: skip
+def test_overruns_are_a_share_of_the_steps_and_refusals_a_number(overruns, steps, percent, passed):
+    timing = SimpleNamespace(overruns=overruns, steps=steps, refused=("a", "b"))
+    found = judged({}, timing=timing)
+    assert found["overruns"].measured == percent
+    assert found["overruns"].passed is passed
+    assert (found["overruns"].limit, found["overruns"].unit) == (1.0, "%")
+    assert (found["refused"].measured, found["refused"].passed) == (2.0, False)
+    assert "overruns" not in judged(timing=timing)
+    assert judged(timing=timing)["refused"].measured == 2.0
+
+
+def test_a_run_that_did_not_come_to_its_end_fails_unless_that_is_permitted():
+    for permitted in (0, 1):
+        settings = {"acceptance": {"unfinished": permitted}}
+        criteria = judge(settings, 1000, {"p": QUIET}, None, 0, 0, finished=False)
+        assert (criteria[0].name, criteria[0].measured) == ("unfinished", 1.0)
+        assert criteria[0].passed is bool(permitted)
 
 
 def test_the_worst_of_several_shares_counts_and_all_losses():
