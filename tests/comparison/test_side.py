@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from grasp_cosim import InputError
 from grasp_cosim.comparison.bands import Bands, Given
+from grasp_cosim.comparison.compare import compare
 from grasp_cosim.comparison.judge import Judge, common_curves
 from grasp_cosim.comparison.side import Difference, Side, differences, read_side
+from grasp_cosim.comparison.tube import Curve
 from grasp_cosim.interface.units import Conversion
 from report.runs import grasp_run
 
@@ -182,3 +184,22 @@ def test_a_signal_of_a_log_must_be_finite(tmp_path):
         log.check_shared("a.x", side())
     with pytest.raises(InputError, match=r"log\.csv: line 2, column 3, a\.t = 'one'"):
         log.check_shared("a.t", side())
+
+
+def test_a_curve_that_is_far_everywhere_has_no_range():
+    assert Curve(TIME, np.full(5, 1e300)).range == (0.0, 0.0)
+    assert Curve(TIME, np.array([1e300, -3.0, -1e300, 2.0, 1.0])).range == (-3.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("begin", "common"), [(1.0, True), (0.99, True), (1.0 + 1e-8, False), (1.5, False)]
+)
+def test_one_time_in_common_is_enough(begin, common):
+    run = grasp_run()
+    end = float(run.time[-1])
+    late = replace(run, time=run.time + end * begin, complete=True)
+    if common:
+        assert compare(run, late).begin == pytest.approx(end * begin)
+    else:
+        with pytest.raises(InputError, match="must have some time in common"):
+            compare(run, late)

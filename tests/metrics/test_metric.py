@@ -3,6 +3,7 @@
 import pickle
 import re
 import sys
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -423,6 +424,42 @@ def test_a_metric_that_cannot_go_to_another_process_is_refused(monkeypatch):
 def widest(run):
     """The gap at its widest."""
     return float(run["plant.gap[1]"].max())
+
+
+def test_a_metric_of_a_file_comes_back_by_the_text_of_the_file(file):
+    zeta, alpha = load_metrics(file(FILE))
+    for own in (zeta, alpha):
+        back = pickle.loads(pickle.dumps(own))
+        assert (back.name, back.unit, back.description) == (own.name, own.unit, own.description)
+        assert measure(signals(), [back]).flat() == measure(signals(), [own]).flat()
+
+
+def test_what_a_file_imports_is_none_of_its_metrics_whatever_the_module(file, monkeypatch):
+    for name in ("aaa", "zzz"):
+        module = ModuleType(name)
+        exec(
+            "from grasp_cosim import metric\n@metric('theirs')\ndef theirs(run):\n    return 1.0\n",
+            module.__dict__,
+        )
+        monkeypatch.setitem(sys.modules, name, module)
+    (own,) = load_metrics(
+        file(
+            "from aaa import theirs as a\nfrom zzz import theirs as z\n"
+            "from grasp_cosim import metric\n@metric('own')\ndef own(run):\n    return 2.0\n"
+        )
+    )
+    assert own.name == "own"
+
+
+def test_what_a_metric_does_not_say():
+    plain = metric("way")(lambda run: 1.0)
+    assert (plain.unit, plain.factor, plain.shown_unit, plain.columns) == (
+        None,
+        1.0,
+        None,
+        ("way",),
+    )
+    assert (plain.optional, plain.reason, plain.group, plain.entries) == (False, False, "", ())
 
 
 def test_a_function_is_a_metric_of_its_name_and_docstring():

@@ -1,11 +1,28 @@
 """The parts of a system refuse what is out of range, in one line that says what is valid."""
 
 import math
+from dataclasses import FrozenInstanceError
+from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from comparison.made import PLANT, write_fmu
 from grasp_cosim import InputError, Realtime
-from grasp_cosim.system.parts import Acceptance, Component, Initialisation, Solver
+from grasp_cosim.system.parts import (
+    Acceptance,
+    Component,
+    Condition,
+    Connection,
+    Event,
+    Fault,
+    Initialisation,
+    Limit,
+    Link,
+    Port,
+    Solver,
+    SystemInput,
+    SystemOutput,
+)
 
 YEARS = 1e9
 """The longest time in s."""
@@ -63,11 +80,27 @@ def test_what_is_not_said_is_as_the_pages_say():
 
 
 @pytest.mark.parametrize(
+    "part",
+    [
+        Solver(), Realtime(), Initialisation(), Acceptance(), Component("a", Path("a.fmu"), {}),
+        Port("a", "x"), Connection(Port("a", "x"), Port("b", "u")), Link(Port("a", "x")),
+        SystemInput(()), SystemOutput(Link(Port("a", "x"))), Condition(Port("a", "x"), "<", 1.0),
+        Event({}, 0), Fault(Port("b", "u"), "lost", {}),
+        Limit(Condition(Port("a", "x"), "<", 1.0)),
+    ],
+    ids=lambda part: type(part).__name__,
+)  # fmt: skip
+def test_a_part_cannot_be_changed(part):
+    """Systems share them."""
+    (name, *_) = part.__dataclass_fields__
+    with pytest.raises(FrozenInstanceError):
+        setattr(part, name, None)
+
+
+@pytest.mark.parametrize(
     ("factor", "period"), [(1.0, 1e6), (0.1, 1e7), (0.3, "10000000/3"), (1e6, 1.0), (4.0, 250_000)]
 )
 def test_the_wall_time_of_a_step_is_not_rounded(factor, period):
-    from fractions import Fraction
-
     assert Realtime(factor).period(1_000_000) == Fraction(period)
 
 

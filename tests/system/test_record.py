@@ -123,6 +123,19 @@ def test_what_records_nothing_is_refused_with_the_nearest_names(load, record, me
     assert str(caught.value).replace('["', "['").replace('"]', "']").startswith(message)
 
 
+@pytest.mark.parametrize(
+    ("both", "see"), [(True, "`grasp-cosim inspect FMU`"), (False, "`grasp-cosim inspect b.fmu`")]
+)
+def test_the_command_that_lists_the_variables_is_named(load, folder, both, see):
+    """Where there is one FMU, with its path."""
+    load()
+    text = SYSTEM if both else SYSTEM.partition("[components.a]")[0]
+    (folder / "one.toml").write_text(f'{text}[record]\nsignals = ["zzzzzzzz"]\n', "utf-8")
+    with pytest.raises(InputError) as caught:
+        System.load(folder / "one.toml")
+    assert see in str(caught.value).replace(f"{folder}/", "")
+
+
 def test_with_record_refuses_by_name(load):
     with pytest.raises(InputError, match=r"^record: 'b.gab\[1\]' matches no signal; did you mean"):
         load().with_record("b.gab[1]")

@@ -1,5 +1,6 @@
 """The CSV file of stimuli: what is read from it, and the line for each mistake."""
 
+import math
 import re
 from array import array
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim import InputError, System, simulate
 from grasp_cosim.system.parts import Port
-from grasp_cosim.system.stimuli import read_stimuli
+from grasp_cosim.system.stimuli import Stimuli, Stimulus, read_stimuli
 from grasp_cosim.system.validity import samples_of
 from hypothesis import given
 from hypothesis import strategies as st
@@ -185,3 +186,35 @@ def test_a_file_given_goes_before_the_one_that_is_named(tmp_path):
     assert list(samples_of(other, FORCE)) == [7.0]
     with pytest.raises(InputError, match=r"no source for a.u_Real.*--input"):
         other.with_input(None)
+
+
+COLUMN = Stimulus(array("d", [1.0, 2.0]))
+
+
+@pytest.mark.parametrize(
+    ("times", "columns", "lines", "good"),
+    [
+        ([0, 1], {FORCE: COLUMN}, [], True),
+        ([0, 1], {FORCE: COLUMN}, [2, 3], True),
+        ([1, 1], {FORCE: COLUMN}, [2, 3], True),
+        ([0, 1], {}, [], True),
+        ([], {}, [], False),
+        ([0, 1, 2], {FORCE: COLUMN}, [], False),
+        ([0, 1], {FORCE: COLUMN}, [2], False),
+        ([1, 0], {FORCE: COLUMN}, [2, 3], False),
+        ([0, 1], {FORCE: Stimulus(array("d", [1.0, math.nan]))}, [], False),
+        ([0, 1], {FORCE: Stimulus(array("d", [1.0, math.inf]))}, [2, 3], False),
+        ([0, 1], {FORCE: Stimulus(array("d", [0.0, 1.0]), texts=("a", "b"))}, [], True),
+        ([0, 1], {FORCE: Stimulus(array("d", [0.0, 2.0]), texts=("a", "b"))}, [2, 3], False),
+        ([0, 1], {FORCE: Stimulus(array("d", [0.5, 1.0]), texts=("a", "b"))}, [], False),
+    ],
+)
+def test_times_and_samples_that_no_file_could_have_are_refused(times, columns, lines, good):
+    def made():
+        return Stimuli("drive.csv", array("q", times), columns, lines=array("q", lines))
+
+    if good:
+        assert [*made().times] == times
+    else:
+        with pytest.raises(ValueError, match=r"drive\.csv: times and samples do not go together"):
+            made()
