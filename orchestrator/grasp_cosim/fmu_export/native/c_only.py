@@ -6,12 +6,12 @@ the structs of both are the same.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
 
 from ...base.c_compilers import BITS, LIBM
-from ..contract import Scalar
+from ..contract import Scalar, Variable
 from ..link import ORDER, Causality, Kind, LinkVariable, Signature, Value
 from ..package import Model, write_file
 from .bench_header import Group, lines_of, members, structs
@@ -31,6 +31,14 @@ _MEANINGS: dict[Causality, str] = {
     "parameter": "What it is set up with",
     "output": "What it gives",
 }
+_TEMPLATES = {
+    "NAME.h": "c_only.h.in",
+    "NAME.c": "c_only.c.in",
+    "NAME_text.c": "c_only_text.c.in",
+    "given.h": "c_only_given.h.in",
+    "main.c": "c_only_main.c.in",
+}
+"""The files that are made from a template, with the name of the block for NAME."""
 _KINDS: dict[type[Scalar], Kind] = {float: "Real", int: "Integer", bool: "Boolean"}
 
 
@@ -44,42 +52,65 @@ def c_only(model: Model) -> dict[str, bytes]:
     """
     name, variables = model.description.name, model.description.variables
     block = translated(name, model.block, model.file)
-    helpers = {file: (FOLDER / "c" / file).read_text("utf-8") for file in HELPERS}
-    links = (LinkVariable(v.name, _KINDS[v.kind], v.causality, v.unit or None) for v in variables)
-    signature = Signature(tuple(links))
-    groups = [Group(name, c, f"{name}_{c.title()}s", members(signature, c)) for c in ORDER]
-    inputs, parameters, outputs = groups
-    first = len(variables) - len(parameters.members)
-    lines = {
-        "get_inputs": lines_of(inputs, "    v[{i}] = u->{name}{number};", "(void)u, (void)v;"),
-        "get_parameters": lines_of(
-            parameters, "    v[{i}] = p->{name}{number};", "(void)p, (void)v;", first
-        ),
-        "put_outputs": lines_of(outputs, "    y->{name} = v[{i}]{truth};", "(void)v, (void)y;"),
-    }
-    libm = called_of_libm(block)
-    flags = (*BITS, *(f"-fno-builtin-{f}" for f in libm if f in LIBM))
+    groups = _groups(name, variables)
     starts: dict[str, Value] = {v.name: v.start for v in variables if v.start is not None}
+    descriptions = {v.name: v.description for v in variables}
+    libm = called_of_libm(block)
     texts = {
         "name": name,
         "summary": comment_text(model.description.summary),
         "libm": ", ".join(libm) or "nothing",
-        "structs": structs(groups, _MEANINGS, starts, {v.name: v.description for v in variables}),
-        "state_size": str(max(1, int(re.findall(r"N_STATE = (\d+)", block)[0]))),
-        **{function: "\n".join(body) for function, body in lines.items()},
+        "structs": structs(groups, _MEANINGS, starts, descriptions),
+        "state_size": str(_state_size(block)),
+        **_copying(*groups),
+        **_example(name, libm, groups[-1]),
+    }
+    files = {"block.h": block}
+    for file in HELPERS:
+        files[file] = (FOLDER / "c" / file).read_text("utf-8")
+    for file, template in _TEMPLATES.items():
+        files[file.replace("NAME", name)] = _filled(FOLDER / template, texts)
+    return {file: text.encode() for file, text in files.items()}
+
+
+def _groups(name: str, variables: Sequence[Variable]) -> list[Group]:
+    """Return the inputs, the parameters and the outputs of a block, with their names in C."""
+    links = (LinkVariable(v.name, _KINDS[v.kind], v.causality, v.unit or None) for v in variables)
+    signature = Signature(tuple(links))
+    return [Group(name, c, f"{name}_{c.title()}s", members(signature, c)) for c in ORDER]
+
+
+def _state_size(block: str) -> int:
+    """Return how many numbers a state in C has; 1 for none, as C has no empty array."""
+    size = re.search(r"N_STATE = (\d+)", block)
+    assert size is not None  # noqa: S101 - the translator writes it
+    return max(1, int(size[1]))
+
+
+def _copying(inputs: Group, parameters: Group, outputs: Group) -> dict[str, str]:
+    """Return the C that copies structs to the block's values and back, by placeholder.
+
+    The values are in the order of their references: inputs, outputs, parameters.
+    """
+    first_parameter = len(inputs.members) + len(outputs.members)
+    bodies = {
+        "get_inputs": lines_of(inputs, "    v[{i}] = u->{name}{number};", "(void)u, (void)v;"),
+        "get_parameters": lines_of(
+            parameters, "    v[{i}] = p->{name}{number};", "(void)p, (void)v;", first_parameter
+        ),
+        "put_outputs": lines_of(outputs, "    y->{name} = v[{i}]{truth};", "(void)v, (void)y;"),
+    }
+    return {function: "\n".join(lines) for function, lines in bodies.items()}
+
+
+def _example(name: str, libm: Sequence[str], outputs: Group) -> dict[str, str]:
+    """Return what main.c has of a block, by placeholder: the command for it, and what it prints."""
+    flags = [*BITS, *(f"-fno-builtin-{function}" for function in libm if function in LIBM)]
+    return {
         "command": f"cc {' '.join(flags)} -o {name} main.c {name}.c {name}_text.c -lm",
         "format": " %.17g" * len(outputs.members),
         "arguments": "".join(f", (double)y->{member}" for _, member in outputs.members),
     }
-    files = {
-        f"{name}.h": "c_only.h.in",
-        f"{name}.c": "c_only.c.in",
-        f"{name}_text.c": "c_only_text.c.in",
-        "given.h": "c_only_given.h.in",
-        "main.c": "c_only_main.c.in",
-    }
-    written = {file: _filled(FOLDER / template, texts) for file, template in files.items()}
-    return {file: text.encode() for file, text in {"block.h": block, **helpers, **written}.items()}
 
 
 def write_c(folder: Path, model: Model) -> list[Path]:
