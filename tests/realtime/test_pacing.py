@@ -18,13 +18,29 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from grasp_cosim import InputError, Realtime, RunInterruptedError, SimulationError, simulate
+from comparison.made import write_fmu
+from grasp_cosim import (
+    InputError,
+    Realtime,
+    RunInterruptedError,
+    SimulationError,
+    System,
+    simulate,
+)
 from grasp_cosim.exchange.dispatch import Dispatcher
 from grasp_cosim.master.master import CHUNK
 from grasp_cosim.master.paced import PacedMaster
 from grasp_cosim.master.plan import Planner
-from grasp_cosim.realtime.pacer import MIN_ROWS, SPIN_NS, Pacer, permitted_share, privileges
+from grasp_cosim.realtime.pacer import (
+    MIN_ROWS,
+    SPIN_NS,
+    Pacer,
+    StallError,
+    permitted_share,
+    privileges,
+)
 from grasp_cosim.recording.memory import MemoryListener
+from grasp_cosim.system.parts import Component
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from support.marks import ENGINES, engines, examples
@@ -250,10 +266,72 @@ def test_a_machine_that_wakes_us_late_is_to_blame(tmp_path):
     run.fake.oversleep = 120 * MS
     timing = run.to_the_end()
     assert culprits(timing) == [(3, "start"), (4, "backlog")]
+    assert [o.took for o in timing.listed] == pytest.approx([0.1198, 0.0698], abs=3 * NEAR)
+    assert [o.late for o in timing.listed] == pytest.approx([0.0698, 0.0198], abs=3 * NEAR)
     start = timing.parts["start"]
     assert start.worst == pytest.approx(0.1198, abs=NEAR)
     assert start.worst_at == 0.3
     assert timing.parts["step"].worst == pytest.approx(0.05, abs=NEAR)
+
+
+def test_the_last_of_several_overruns_ends_a_run_that_tolerates_some(tmp_path, engine):
+    """The step at 0.2 s ends 40 ms late, which is tolerated; that at 0.6 s ends 250 ms late."""
+    costs = {"a": {-1: 10 * MS, 2: 140 * MS, 6: 350 * MS}}
+    run = Paced(tmp_path, costs, Realtime(overrun="stop", tolerance=0.05), engine)
+    line = (
+        r"^mock\.toml: the step at t = 0\.6 s ended 250 ms late: a took 350 ms; must end within "
+        "100 ms$"
+    )
+    with pytest.raises(SimulationError, match=line):
+        run.to_the_end()
+    assert run.pacer.meter.live() == "0.737x, worst step 350 ms, 2 overruns"
+    assert [o.step for o in run.timing().listed] == [2, 6]
+
+
+def test_a_delay_that_is_tolerated_to_the_last_ends_no_run(tmp_path, engine):
+    costs = {"a": {-1: 10 * MS, 2: 140 * MS}}
+    for tolerance, ends in ((0.039, True), (0.042, False)):
+        run = Paced(tmp_path, costs, Realtime(overrun="stop", tolerance=tolerance), engine)
+        if ends:
+            with pytest.raises(SimulationError, match=r"at t = 0\.2 s ended 40 ms late"):
+                run.to_the_end()
+        else:
+            assert run.to_the_end().overruns == 1
+
+
+def test_each_duration_is_counted_in_a_bar_of_a_sixteenth_of_an_octave(tmp_path):
+    costs = {"a": {-1: 10 * MS, 3: 20 * MS, 5: 20 * MS, 7: 80 * MS}}
+    histogram = Paced(tmp_path, costs).to_the_end().histograms["a"]
+    edges, counts = np.array(histogram.edges), np.array(histogram.counts)
+    assert counts[counts > 0].tolist() == [7, 2, 1]
+    for seconds, count in ((0.01, 7), (0.02, 2), (0.08, 1)):
+        (bar,) = np.flatnonzero((edges[:-1] <= seconds + 2e-6) & (seconds + 2e-6 < edges[1:]))
+        assert counts[bar] == count
+        assert edges[bar + 1] / edges[bar] == pytest.approx(2.0 ** (1 / 16))
+    assert edges[0] <= 0.01
+    assert 0.08 < edges[-1] < 0.084
+
+
+@pytest.mark.parametrize(
+    ("stall", "late", "stalled"),
+    [(0.1, 90, False), (0.1, 110, True), (0.5, 490, False), (0.5, 510, True)],
+)
+def test_a_delay_from_which_on_a_bench_counts_as_lost(tmp_path, stall, late, stalled):
+    """Of a component that has a peer; of others there is none."""
+    variables = {"proxy.state": 'causality="output" variability="discrete" | Integer'}
+    bench = write_fmu(tmp_path / "bench.fmu", variables, {})
+    peers = System("bench", (Component("bench", bench, {}),), (), PERIOD, 10 * PERIOD, "sequential")
+    plain = make_system([Mock(tmp_path, "a", lambda u, t: t)], [], 10, PERIOD)
+    for system, counts in ((peers, stalled), (plain, False)):
+        fake = Fake()
+        pace = Pacer(system, Realtime(stall=stall), clock=fake.clock)
+        pace(0)
+        fake.time += PERIOD + late * MS
+        if counts:
+            with pytest.raises(StallError):
+                pace(1)
+        else:
+            pace(1)
 
 
 def test_recording_is_to_blame_where_it_takes_too_long(tmp_path):
