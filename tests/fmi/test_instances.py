@@ -20,8 +20,9 @@ from grasp_cosim import InputError, SimulationError, System, simulate
 from grasp_cosim.fmi.co_simulation import SharedInstance
 from grasp_cosim.fmi.fmi2_logger import CONVENTION, formatted, logger_type
 from grasp_cosim.fmi.instance import DISCARD, OK, Inputs, dtype
-from grasp_cosim.fmi.load import load
+from grasp_cosim.fmi.load import load, load_here
 from grasp_cosim.interface.obstacles import this_platform
+from grasp_cosim.interface.read import read_interface
 from grasp_cosim.interface.variables import Variable
 from grasp_cosim.system.parts import Component, Connection, Port
 from support.compiled import shared_library
@@ -452,3 +453,17 @@ def test_threads_that_load_fmus_together_keep_the_current_folder(tmp_path, monke
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(life, range(12)))
     assert Path.cwd() == tmp_path
+
+
+@pytest.mark.parametrize("capabilities", [CAPABLE, {**CAPABLE, "canGetAndSetFMUState": "true"}])
+def test_the_states_of_an_fmu_of_others_are_not_known_one_by_one(tmp_path, capabilities):
+    fmu = build(tmp_path, capabilities=capabilities)
+    instance = load_here("part", read_interface(fmu))
+    said = r"^part: the states of native\.fmu are not known one by one; must be an FMU that grasp-c"
+    try:
+        with pytest.raises(InputError, match=said):
+            instance.numbers()
+        with pytest.raises(InputError, match=said):
+            instance.take_numbers(np.zeros(1))
+    finally:
+        instance.close()

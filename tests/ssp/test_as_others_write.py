@@ -155,3 +155,26 @@ def test_an_archive_in_an_archive_may_go_without_its_type(tmp_path):
     assert [c.name for c in loaded.components] == ["sub_a", "sub_b"]
     said = "names no type; resources/sub.ssp is taken as application/x-ssp-package"
     assert any(note.endswith(said) for note in loaded.notes)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        *((f"{sign}Int{bits}", "n") for sign in ("", "U") for bits in (8, 16, 32, 64)),
+        *((f"Float{bits}", "u") for bits in (32, 64)),
+    ],
+)
+def test_types_of_ssp_2_are_those_of_ssp_1(tmp_path, kind, name):
+    """In a connector, in a value, and in a connector of the system."""
+    described = fmu("input Real u 0.5", "input Integer n 3")
+    value = bind(parameter_set(f"{name} {kind} 7"))
+    top = system("top", component("a", f"input {name} {kind}", value))
+    loaded = System.load(archive(tmp_path, structure(top), {"a": described}))
+    assert loaded.start(f"a.{name}") == 7
+    outer = system(
+        "top", component("a"), connect("In", f"a/{name}"), f"input In {kind}",
+        bind(parameter_set(f"In {kind} 9")),
+    )  # fmt: skip
+    assert (
+        System.load(archive(tmp_path, structure(outer), {"a": described})).start(f"a.{name}") == 9
+    )
