@@ -207,18 +207,20 @@ class Master:
         self._advance_until(first + steps)
         for instance in self.instances:
             instance.quieten()
-        waiting = self._rows.waiting(self.steps_done)
-        fresh = waiting[max(first - self._rows.handed_on, 0) :]
-        wrapped = self._rows.is_wrapped(self.steps_done)
-        if wrapped or self._are_enough(len(waiting)) or not all_finite(fresh):
+        rows, steps_done = self._rows, self.steps_done
+        waiting = rows.waiting(steps_done)
+        fresh = waiting[max(first - rows.handed_on, 0) :]
+        is_wrapped = len(waiting) < steps_done - rows.handed_on  # some are at the beginning again
+        if is_wrapped or self._are_enough(len(waiting)) or not all_finite(fresh):
             self.hand_on()
-        return self.steps_done - first
+        return steps_done - first
 
     def _advance_until(self, steps: int) -> None:
         """Run the loop until so many steps are done, or the end of the run."""
-        while self.steps_done < (stop := min(steps, self.total_steps)):
+        end = self.end
+        while self.steps_done < (stop := min(steps, end.total_steps)):
             self._run_chunk(stop)
-            if self.steps_done == self.end.pause:
+            if self.steps_done == end.pause:
                 self.hand_on()
                 self.end.go_on()
                 self._begin_anew("a lost peer is back")
@@ -236,17 +238,18 @@ class Master:
     def _run_loop(self, stop: int) -> None:
         """Run the loop until stop, or a pause; finish the steps that it leaves unfinished."""
         step, operation = self.steps_done, 0
+        rows, end = self._rows, self.end
         try:
-            while step < (until := min(stop, self.total_steps, self.end.pause)):
+            while step < (until := min(stop, end.total_steps, end.pause)):
                 step, operation, status = self._loop(
-                    self._rows.rows, operation, step, until, *self._grid, row=self._rows.place(step)
+                    rows.rows, operation, step, until, *self._grid, row=rows.place(step)
                 )
                 if status:
                     self.steps_done = step
                     self._resolve(step, operation, status)
                     operation += 1
         finally:  # an interruption of the loop does not say how far it came; the pacer knows more
-            self.steps_done = max(step, self._rows.handed_on)
+            self.steps_done = max(step, rows.handed_on)
 
     def saved(self) -> Any:
         """All that decides what comes, and the rows that wait, for restore().

@@ -37,12 +37,8 @@ class RowBuffer:
 
     def waiting(self, steps_done: int) -> npt.NDArray[np.float64]:
         """Rows that wait to be handed on, as far as they are in one piece."""
-        first = self.place(self.handed_on)
+        first = (self.handed_on - self._origin) % len(self.rows)
         return self.rows[first : first + steps_done - self.handed_on]
-
-    def is_wrapped(self, steps_done: int) -> bool:
-        """True if more rows wait than waiting() has, as some are at the beginning again."""
-        return len(self.waiting(steps_done)) < steps_done - self.handed_on
 
     def take(self, steps_done: int) -> Iterator[Piece]:
         """The steps and the rows that wait, in pieces; each counts as handed on as it is given."""
