@@ -12,7 +12,7 @@ from grasp_cosim.base import c_compilers
 from grasp_cosim.base.c_compilers import CompilerError
 from grasp_cosim.fmu_export import package
 from grasp_cosim.fmu_export.build import build_block, planned
-from grasp_cosim.fmu_export.native.targets import here
+from grasp_cosim.fmu_export.native.targets import this_target
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.inspection.block_templates import TEMPLATE_FOLDER
 from grasp_cosim.interface.obstacles import this_platform
@@ -66,7 +66,7 @@ def test_what_is_built_is_said_before_the_compiler_runs(command, monkeypatch):
 
     monkeypatch.setattr("grasp_cosim.base.progress.EVERY", 0.0)
     monkeypatch.setattr("grasp_cosim.fmu_export.build.build_native", ended)
-    line = f"building for {here().tuple}, 00:00\ngrasp-cosim: out of patience\n"
+    line = f"building for {this_target().tuple}, 00:00\ngrasp-cosim: out of patience\n"
     assert command("build", "--native") == (3, "", line)
 
 

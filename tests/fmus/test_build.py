@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from grasp_cosim.fmu_export import build as builds
 from grasp_cosim.fmu_export.build import build, build_block, build_native, planned, sources_key
-from grasp_cosim.fmu_export.native.targets import here
+from grasp_cosim.fmu_export.native.targets import this_target
 from grasp_cosim.fmu_export.package import HASH, Built
 from grasp_cosim.fmu_export.page import icon
 from grasp_cosim.fmu_export.shipped import PACKAGES, SHIPPED, package_folder
@@ -21,7 +21,7 @@ from support.marks import slow
 from support.native_fmus import needs_gcc
 
 ENDS = ("_in.csv", "_ref.csv", "_ref.opt")
-BINARY = f"binaries/{here().folder}/{{}}{here().suffix}"
+BINARY = f"binaries/{this_target().folder}/{{}}{this_target().suffix}"
 
 
 def contents(folder):
@@ -188,9 +188,9 @@ def made_once(folder):
 
 
 def test_of_what_is_kept_the_newest_stay(own_cache, monkeypatch):
-    monkeypatch.setattr(builds, "MOST_KEPT", 2)
+    monkeypatch.setattr(builds, "MAX_KEPT", 2)
     for k, part in enumerate("abc"):
-        os.utime(builds._made(made_once, f"fmus/{part}"), (k, k))
+        os.utime(builds._build_kept(made_once, f"fmus/{part}"), (k, k))
     assert sorted(folder.name for folder in (own_cache / "fmus").iterdir()) == ["b", "c"]
 
 
@@ -220,5 +220,5 @@ def test_a_block_of_ones_own(fmi, tmp_path):
     assert build_block(OWN["SpringPlant"], tmp_path, plan).status == "unchanged"
     found = read_members(built.path)
     assert f'fmiVersion="{fmi}.0"' in found["modelDescription.xml"].decode()
-    place = here().folder if fmi == 2 else here().tuple
-    assert f"binaries/{place}/SpringPlant{here().suffix}" in found
+    place = this_target().folder if fmi == 2 else this_target().tuple
+    assert f"binaries/{place}/SpringPlant{this_target().suffix}" in found

@@ -212,7 +212,7 @@ def test_no_compiler_outlives_us(number, code, tmp_path):
 @pytest.mark.parametrize("target", [LINUX_X86, LINUX_ARM, MAC_X86, MAC_ARM])
 def test_zig_compiles_for_others(target, tmp_path):
     magic = b"\x7fELF" if target.suffix == ".so" else struct.pack("<I", 0xFEEDFACF)
-    task = job("Sum", SOURCES, target, compiler_for(target, asked=True))
+    task = job("Sum", SOURCES, target, compiler_for(target, requested=True))
     assert compile_all([task], tmp_path)[0].read_bytes()[:4] == magic
 
 

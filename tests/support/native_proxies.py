@@ -12,7 +12,7 @@ import pytest
 from grasp_cosim.base.c_compilers import Compiler, compile_all
 from grasp_cosim.fmu_export.build import compiler_for, job
 from grasp_cosim.fmu_export.description import Description
-from grasp_cosim.fmu_export.native.targets import here
+from grasp_cosim.fmu_export.native.targets import this_target
 from grasp_cosim.fmu_export.package import write_file
 from grasp_cosim.fmu_export.proxy import proxy_members
 
@@ -54,14 +54,14 @@ def _fmu():
     files = proxy_members(Path(f"{NAME}.fmu"), original(), 2)
     if not shutil.which("gcc"):
         pytest.skip("NO gcc")
-    compiler = compiler_for(here(), asked=False)
+    compiler = compiler_for(this_target(), requested=False)
     shimmed = Compiler((*compiler.command, *STRICT, "-include", SHIM.name))
     sources = {**_sources(files), SHIM.name: SHIM.read_bytes()}
     folder = Path(tempfile.mkdtemp(prefix="native_proxy_"))
-    made = compile_all([job(NAME, sources, here(), shimmed, networked=True)], folder)
+    made = compile_all([job(NAME, sources, this_target(), shimmed, networked=True)], folder)
     with zipfile.ZipFile(folder / f"{NAME}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", files["modelDescription.xml"])
-    write_file(folder / f"u/binaries/{here().folder}/{NAME}.so", made[0].read_bytes())
+    write_file(folder / f"u/binaries/{this_target().folder}/{NAME}.so", made[0].read_bytes())
     return Fmu(folder / f"{NAME}.fmu", folder / "u")
 
 

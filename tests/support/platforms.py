@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from grasp_cosim.base.c_compilers import Compiler, compile_all
 from grasp_cosim.fmu_export.build import compiler_for, job
-from grasp_cosim.fmu_export.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, here
+from grasp_cosim.fmu_export.native.targets import LINUX_ARM, LINUX_X86, WINDOWS, Target, this_target
 
 from .c_host import HEADERS, SOURCE, Host, Part
 from .compiled import compile_c
@@ -47,7 +47,7 @@ class Platform:
         """The library of an FMU in a folder, made from its sources alone."""
         library = folder / f"{fmu.name}{self.target.suffix}"
         if self.compiler == ZIG:
-            zig = compiler_for(self.target, asked=True)
+            zig = compiler_for(self.target, requested=True)
             sources = {f.name: f.read_bytes() for f in (fmu.folder / "sources").iterdir()}
             (made,) = compile_all([job(fmu.name, sources, self.target, zig)], folder)
             library.write_bytes(made.read_bytes())
@@ -105,13 +105,13 @@ def host_of(target, folder, options=()):
     program = folder / ("host.exe" if target == WINDOWS else "host")
     if target == WINDOWS:
         mingw = shutil.which(MINGW)
-        command = [mingw] if mingw else [*compiler_for(WINDOWS, asked=True).command]
+        command = [mingw] if mingw else [*compiler_for(WINDOWS, requested=True).command]
         subprocess.run([*command, *strict, SOURCE, "-o", program], check=True)
         return Host(program, ("wine",), windows())
-    compiler = "gcc" if target == here() else "aarch64-linux-gnu-gcc"
+    compiler = "gcc" if target == this_target() else "aarch64-linux-gnu-gcc"
     posix = ["-D_POSIX_C_SOURCE=200809L", "-pthread", "-ldl"]
     compile_c([compiler, *strict, SOURCE, *posix], program)
-    if target == here():
+    if target == this_target():
         return Host(program)
     return Host(program, ("qemu-aarch64", "-L", str(ARM_LIBRARIES)))
 
@@ -187,7 +187,7 @@ def host(host_for):
     """The host for this machine."""
     if not shutil.which("gcc"):
         pytest.skip("NO gcc")
-    return host_for(here())
+    return host_for(this_target())
 
 
 @pytest.fixture(scope="session")

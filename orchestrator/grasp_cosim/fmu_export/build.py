@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..base.c_compilers import Compiler, CompilerError, Job, cache, compile_all, find_compiler
 from ..base.platforms import elf_processor, python_processor
-from .native.targets import Target, Version, folders, here, universal
+from .native.targets import Target, Version, folders, this_target, universal
 from .package import Built, write_file
 from .shipped import HANDS, PACKAGES, SHIPPED, card_file, of_fingers, package_folder, together
 
@@ -47,7 +47,7 @@ SOURCES = (HERE, *(HERE.parent / "base" / name for name in _OF_BASE))
 VERSIONS = ("grasp_cosim-", "latex2mathml-", "markdown_it_py-", "pythonfmu-")
 """Of distributions whose versions are in FMUs, or decide what is: so their metadata is called."""
 
-MOST_KEPT = 16
+MAX_KEPT = 16
 """Builds in the cache, those used last: every change of a source makes one."""
 
 NOT_KEPT = "%s: cannot be written to, so each process builds the FMUs; XDG_CACHE_HOME names another"
@@ -85,21 +85,21 @@ class Plan(NamedTuple):
         return cache.key([repr((self.fmi, *self.places.items(), *identities))])
 
 
-def planned(asked: Sequence[Target] = (), fmi: Version = 2) -> Plan:
+def planned(requested: Sequence[Target] = (), fmi: Version = 2) -> Plan:
     """Return the plan for this machine and the targets asked for.
 
     ValueError, one line, where there is no compiler for one of them.
     """
-    places, note = folders(asked, fmi)
-    return Plan(fmi, places, {t: compiler_for(t, t in asked) for t in places}, note)
+    places, note = folders(requested, fmi)
+    return Plan(fmi, places, {t: compiler_for(t, t in requested) for t in places}, note)
 
 
-def compiler_for(target: Target, asked: bool) -> Compiler:
+def compiler_for(target: Target, requested: bool) -> Compiler:
     """Return the compiler for a target; ValueError where there is none, with what to install.
 
     Where the target was asked for by name, to go to machines with an older libc, it is zig.
     """
-    return find_compiler("" if target == here() and not asked else target.zig)
+    return find_compiler("" if target == this_target() and not requested else target.zig)
 
 
 def build(out: Path) -> list[Built]:
@@ -116,7 +116,7 @@ def build_native(out: Path, plan: Plan | None = None, names: Sequence[str] = ())
     ValueError, one line, for a name that is none, or where a compiler is missing;
     CompilerError where one fails.
     """
-    return _brought(out, _kept(chosen_names(names), plan or planned()))
+    return _brought(out, _cached(chosen_names(names), plan or planned()))
 
 
 def build_block(file: Path, out: Path, plan: Plan | None = None) -> Built:
@@ -141,7 +141,7 @@ def kept_block(file: Path) -> Path:
         build_block(file, folder)
 
     with _building:
-        folder = cache.kept(name) or _until_the_end.get(name) or _made(make, name)
+        folder = cache.kept(name) or _until_the_end.get(name) or _build_kept(make, name)
     return next(folder.glob("*.fmu"))
 
 
@@ -235,14 +235,14 @@ def with_binaries(
                 yield job(name, sources, target, compiler, networked)
 
     with TemporaryDirectory(prefix="fmu_export_") as scratch:
-        made = iter([library.read_bytes() for library in compile_all(jobs(), Path(scratch))])
+        libraries = iter([library.read_bytes() for library in compile_all(jobs(), Path(scratch))])
     for name, files in complete.items():
-        thin: dict[str, list[bytes]] = {}
+        binaries_by_place: dict[str, list[bytes]] = {}
         for target in plan.compilers:
             place = f"binaries/{plan.places[target]}/{name}{target.suffix}"
-            thin.setdefault(place, []).append(next(made))
-        binaries = {place: several[0] if len(several) == 1 else universal(several)
-                    for place, several in thin.items()}  # fmt: skip
+            binaries_by_place.setdefault(place, []).append(next(libraries))
+        binaries = {place: parts[0] if len(parts) == 1 else universal(parts)
+                    for place, parts in binaries_by_place.items()}  # fmt: skip
         complete[name] = {**files, **binaries}
     return complete
 
@@ -274,14 +274,14 @@ def sources_key() -> str:
 
 def _below(folder: Path) -> list[Path]:
     """Return the files below a folder, but for what Python makes there."""
-    found = []
+    files = []
     for place, below, names in os.walk(folder):
         below[:] = sorted(name for name in below if name != "__pycache__")
-        found += [Path(place, name) for name in sorted(names)]
-    return found
+        files += [Path(place, name) for name in sorted(names)]
+    return files
 
 
-def _kept(names: Sequence[str], plan: Plan | None = None) -> Path:
+def _cached(names: Sequence[str], plan: Plan | None = None) -> Path:
     """Return the folder with these FMUs, from the cache where they were built of the same parts.
 
     Where nothing can be kept it ends with this process, which a warning says.
@@ -293,7 +293,7 @@ def _kept(names: Sequence[str], plan: Plan | None = None) -> Path:
             with suppress(OSError):  # of another user
                 os.utime(kept)
             return kept
-        return _until_the_end.get(name) or _made(partial(_fill, names, plan), name)
+        return _until_the_end.get(name) or _build_kept(partial(_fill, names, plan), name)
 
 
 def _fill(names: Sequence[str], plan: Plan | None, folder: Path) -> None:
@@ -310,27 +310,29 @@ def _fill(names: Sequence[str], plan: Plan | None, folder: Path) -> None:
         write_members(folder / f"{name}.fmu", files)
 
 
-def _made(make: Callable[[Path], None], name: str) -> Path:
+def _build_kept(make: Callable[[Path], None], name: str) -> Path:
     with ExitStack() as stack:
-        made = Path(stack.enter_context(TemporaryDirectory(prefix="fmu_export_")))
-        make(made)
-        kept = cache.keep(made, name)
-        if kept == made:
+        scratch = Path(stack.enter_context(TemporaryDirectory(prefix="fmu_export_")))
+        make(scratch)
+        folder = cache.keep(scratch, name)
+        if folder == scratch:
             if not _until_the_end:  # said once
                 LOGGER.warning(NOT_KEPT, cache.folder() or "the user's cache")
             atexit.register(stack.pop_all().close)
-            _until_the_end[name] = made
-            return made
+            _until_the_end[name] = scratch
+            return scratch
     with suppress(OSError):  # another process does so, too
-        for old in sorted(kept.parent.iterdir(), key=lambda f: f.stat().st_mtime)[:-MOST_KEPT]:
-            shutil.rmtree(old)
-    return kept
+        for outdated in sorted(folder.parent.iterdir(), key=lambda f: f.stat().st_mtime)[
+            :-MAX_KEPT
+        ]:
+            shutil.rmtree(outdated)
+    return folder
 
 
-def _brought(out: Path, made: Path, names: Sequence[str] = ()) -> list[Built]:
+def _brought(out: Path, source: Path, names: Sequence[str] = ()) -> list[Built]:
     """Bring the folder `out` up to date with one that was made; return its FMUs, or these names."""
     built = []
-    for file in sorted(made.iterdir()):
+    for file in sorted(source.iterdir()):
         if names and not re.fullmatch(rf"({'|'.join(names)})[._].*", file.name):
             continue
         brought = write_file(out / file.name, file.read_bytes())
@@ -348,7 +350,7 @@ def shipped_fmus(fingers: int | None = None) -> Path:
     at the same time. ValueError for a number of fingers that there is not.
     """
     names = [*SHIPPED, *(of_fingers(fingers) if fingers is not None else ())]
-    return _kept(names)
+    return _cached(names)
 
 
 @functools.cache
@@ -358,7 +360,7 @@ def shipped_twins(names: tuple[str, ...]) -> Path:
     NoTwinsError where they cannot be built.
     """
     try:
-        return _kept(names, planned())
+        return _cached(names, planned())
     except (ValueError, CompilerError) as error:
         raise NoTwinsError(str(error)) from error
     except OSError as error:
@@ -373,14 +375,16 @@ def is_twin(fmu: Path, content: str) -> bool:
     import zipfile
 
     with suppress(Exception), zipfile.ZipFile(fmu) as archive:  # it may be damaged in any way
-        said = f'#define CONTENT "{content}"'.encode()
+        definition = f'#define CONTENT "{content}"'.encode()
         sources = [n for n in archive.namelist() if n.startswith("sources/") and n.endswith(".c")]
-        return any(said in archive.read(name) for name in sources) and _runs_here(archive)
+        return any(definition in archive.read(name) for name in sources) and _runs_here(archive)
     return False
 
 
 def _runs_here(archive: zipfile.ZipFile) -> bool:
     """Return True if a binary is for this machine: linux64 may hold one for another processor."""
-    folders_of_here = tuple(f"binaries/{name}/" for name in (here().folder, here().tuple))
+    folders_of_here = tuple(
+        f"binaries/{name}/" for name in (this_target().folder, this_target().tuple)
+    )
     binaries = [name for name in archive.namelist() if name.startswith(folders_of_here)]
     return any(elf_processor(archive.read(name)) == python_processor() for name in binaries)

@@ -140,8 +140,10 @@ def declared(block: Block) -> list[Field]:
         valid = {i.name for i in inputs}
         valid |= {f"{i.name}[j]" for i in inputs if f.size and i.size == f.size}
         if unknown := {*f.dependencies, *f.initial_dependencies} - valid:
-            known = ", ".join(sorted(valid)) or "nothing, there are no inputs"
-            raise TypeError(f"{f.name}: depends on {', '.join(sorted(unknown))}; valid: {known}")
+            valid_names = ", ".join(sorted(valid)) or "nothing, there are no inputs"
+            raise TypeError(
+                f"{f.name}: depends on {', '.join(sorted(unknown))}; valid: {valid_names}"
+            )
     return [*inputs, *outputs, *_parameters(block.Params(), "")]
 
 
@@ -160,16 +162,16 @@ def variables(fields: list[Field]) -> list[Variable]:
             elif f"{f.name}[j]" in sources:
                 yield f.names[index]
 
-    found = []
+    scalars = []
     for f in fields:
         always = parameters if f.causality == "output" else ()
         for index, (name, start) in enumerate(zip(f.names, f.starts, strict=True)):
-            now = tuple(chosen(f.dependencies, index))
+            directly = tuple(chosen(f.dependencies, index))
             initially = *chosen(f.initial_dependencies, index), *always
-            about = f.variability, f.limits, f.description, f.nominal, False, now, initially
-            more = f.enumeration, f.infinite
-            found.append(Variable(name, f.kind, f.causality, f.unit, start, *about, *more))
-    return found
+            about = f.variability, f.limits, f.description, f.nominal, False, directly, initially
+            last = f.enumeration, f.infinite
+            scalars.append(Variable(name, f.kind, f.causality, f.unit, start, *about, *last))
+    return scalars
 
 
 def packer(cls: type[Any], fields: list[Field]) -> Callable[[list[Any]], Any]:
@@ -193,8 +195,8 @@ def _shape(fields: list[Field], causality: Causality, name: str) -> tuple[str, s
     for f in fields:
         if f.causality != causality:
             continue
-        own = "".join(f"{name.format(next(number))}, " for _ in f.names)
-        items += own if f.size is None else f"({own}), "
+        names = "".join(f"{name.format(next(number))}, " for _ in f.names)
+        items += names if f.size is None else f"({names}), "
     return items, "".join(f"{name.format(i)}, " for i in range(next(number)))
 
 
@@ -206,21 +208,23 @@ def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
 
 def build_params(block: Block, fields: list[Field], values: list[Any]) -> Any:
     """Params from the list of all values; ValueError as the block raises it."""
-    rest = iter(values)
-    by_name = {f.name: next(rest) if f.size is None else (*islice(rest, f.size),) for f in fields}
+    remaining = iter(values)
+    by_name = {
+        f.name: next(remaining) if f.size is None else (*islice(remaining, f.size),) for f in fields
+    }
     return _build(block.Params, "", by_name)
 
 
 def _build(cls: type[Any], above: str, values: dict[str, Any]) -> Any:
-    made: dict[str, Any] = {}
+    arguments: dict[str, Any] = {}
     for name, kind in _types(cls).items():  # type: ignore[arg-type]  # any type can be hashed
         if hasattr(kind, "__dataclass_fields__"):
-            made[name] = _build(kind, f"{above}{name}.", values)
+            arguments[name] = _build(kind, f"{above}{name}.", values)
         else:
             is_enum = isinstance(kind, type) and issubclass(kind, IntEnum)
             value = values[above + name]
-            made[name] = kind(value) if is_enum else value
-    return cls(**made)
+            arguments[name] = kind(value) if is_enum else value
+    return cls(**arguments)
 
 
 _types = cache(get_type_hints)
@@ -250,8 +254,9 @@ def _kind(name: str, causality: Causality, base: Any) -> type[Any]:
     if is_parameter and isinstance(base, type) and issubclass(base, IntEnum):
         return base
     got = base.__name__ if isinstance(base, type) else base
-    whole, besides = (", int", ", or an IntEnum") if is_parameter else ("", "")
-    raise TypeError(f"{name} is {got}: must be float, bool{whole}, a tuple of one of them{besides}")
+    integer, enumeration = (", int", ", or an IntEnum") if is_parameter else ("", "")
+    must = f"must be float, bool{integer}, a tuple of one of them{enumeration}"
+    raise TypeError(f"{name} is {got}: {must}")
 
 
 DECLARED = {
@@ -272,8 +277,8 @@ def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
     kind = _kind(name, causality, base)
     variability = "continuous" if kind is float else "discrete"
     limits = enumeration = nominal = None
-    now: tuple[str, ...] = ()
-    initially = now
+    directly: tuple[str, ...] = ()
+    initially = directly
     if isinstance(declared, Parameter):
         variability = "tunable" if declared.tunable else "fixed"
         if (declared.low, declared.high) != (-inf, inf):
@@ -293,12 +298,12 @@ def _field(name: str, causality: Causality, hint: Any, start: Any) -> Field:
             must = "must have the inputs that reach it without a step, depends_on={...}"
             raise TypeError(f"{name}: {must}")
         later = declared.depends_initially_on
-        now = tuple(sorted(declared.depends_on))
-        initially = now if later is None else tuple(sorted(later))
+        directly = tuple(sorted(declared.depends_on))
+        initially = directly if later is None else tuple(sorted(later))
     if issubclass(kind, IntEnum):
         items = tuple((member.name.lower(), int(member)) for member in kind)
         enumeration = Enumeration(kind.__name__, items)
         limits, kind, start = (min(kind), max(kind)), int, int(start)
-    about = variability, limits, declared.description, nominal, False, now, initially
-    more = enumeration, infinite
-    return Field(name, kind, causality, declared.unit, start, *about, *more, size)
+    about = variability, limits, declared.description, nominal, False, directly, initially
+    last = enumeration, infinite
+    return Field(name, kind, causality, declared.unit, start, *about, *last, size)

@@ -168,9 +168,9 @@ def _add_infinite(annotation: Element, names: Sequence[str]) -> None:
         SubElement(annotation, "Infinite", variable=name)
 
 
-def _add_units(root: Element, d: Description, *more: str) -> None:
+def _add_units(root: Element, d: Description, *extra: str) -> None:
     """Add the units of the variables, and more, with what is known of them."""
-    names = dict.fromkeys([*(v.unit for v in d.variables if v.unit), *more])
+    names = dict.fromkeys([*(v.unit for v in d.variables if v.unit), *extra])
     definitions = SubElement(root, "UnitDefinitions") if names else root
     for name in names:
         element = SubElement(definitions, "Unit", name=name)
@@ -232,12 +232,12 @@ def _add_structure(root: Element, variables: Sequence[Variable], fmi: Version) -
     structure = SubElement(root, "ModelStructure")
     number = {v.name: str(i) for i, v in enumerate(variables, 1 if fmi == 2 else 0)}
     outputs = [v for v in variables if v.causality == "output"]
-    now = [(v.name, v.dependencies) for v in outputs]
+    directly = [(v.name, v.dependencies) for v in outputs]
     initially = [(v.name, v.initial_dependencies) for v in outputs if _initial(v) != "exact"]
-    for section, unknowns in (("Output", now), ("InitialUnknown", initially)):
+    for section, unknowns in (("Output", directly), ("InitialUnknown", initially)):
         parent, tag, key = structure, section, "valueReference"
         if fmi == 2 and unknowns:
             parent, tag, key = SubElement(structure, f"{section}s"), "Unknown", "index"
         for name, sources in unknowns:
-            known = " ".join(number[source] for source in sources)
-            SubElement(parent, tag, {key: number[name], "dependencies": known})
+            dependencies = " ".join(number[source] for source in sources)
+            SubElement(parent, tag, {key: number[name], "dependencies": dependencies})

@@ -56,12 +56,12 @@ def own_model(file: Path) -> Iterator[Model]:
     _check_slaves(file, tree)
     _check_imports(file, text, tree)
     with _run(file, tree) as block:
-        summary, _, rest = inspect.cleandoc(block.__doc__ or "").partition("\n")
+        summary, _, details = inspect.cleandoc(block.__doc__ or "").partition("\n")
         if not summary:
             raise ValueError(f"{file}: must begin with a docstring; its first line says what it is")
         yield Model(
             Description(name, summary.rstrip("."), _variables(file, block)),
-            f"{rest.strip()}\n\n{BEGIN}{variable_tables({name: block})}",
+            f"{details.strip()}\n\n{BEGIN}{variable_tables({name: block})}",
             {
                 f"{name}.py": script(f"import {file.stem}_block_{HASH} as block"),
                 f"{file.stem}_block.py": text.encode(),
@@ -81,9 +81,11 @@ def fmu_name(file: Path) -> str:
         must = "must be NAME.py, NAME of letters, digits and _, a letter first"
         raise ValueError(f"{file}: {must}{native}")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))
-    for ours in (*SHIPPED, *(hand for n in range(FEWEST, MOST + 1) for hand in of_fingers(n))):
-        if ours.lower() == name.lower():  # the same file on Windows
-            raise ValueError(f"{file}: {ours}.fmu is one of the FMUs that come with this package")
+    for shipped in (*SHIPPED, *(hand for n in range(FEWEST, MOST + 1) for hand in of_fingers(n))):
+        if shipped.lower() == name.lower():  # the same file on Windows
+            raise ValueError(
+                f"{file}: {shipped}.fmu is one of the FMUs that come with this package"
+            )
     return name
 
 
@@ -158,7 +160,7 @@ def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
     """The module of a file, which is among the imported ones meanwhile: annotations need that."""
     name = f"{file.stem}_block"
     module = module_from_spec(ModuleSpec(name, SourceFileLoader(name, str(file))))
-    before = sys.modules.get(name)
+    earlier = sys.modules.get(name)
     sys.modules[name] = module
     try:
         with redirect_stdout(sys.stderr):
@@ -171,14 +173,14 @@ def _run(file: Path, tree: ast.Module) -> Iterator[Any]:
             yield module
     finally:
         del sys.modules[name]
-        if before:
-            sys.modules[name] = before
+        if earlier:
+            sys.modules[name] = earlier
 
 
 def _check_parts(file: Path, block: Any) -> None:
     """ValueError where a class of a block is not of its kind, or a function takes other things."""
-    made = getattr(block.Params, "__dataclass_params__", None)
-    if made is None or not made.frozen:
+    options = getattr(block.Params, "__dataclass_params__", None)
+    if options is None or not options.frozen:
         raise ValueError(f"{file}: Params: must be a frozen dataclass: @dataclass(frozen=True)")
     for name in ("Inputs", "Outputs"):
         if not hasattr(getattr(block, name), "_fields"):
@@ -200,22 +202,27 @@ def _variables(file: Path, block: Any) -> list[Variable]:
         u = block.Inputs()
     with _tried(file, "declaration"):
         declaration = declared(block)
-        found = variables(declaration)
-        _check_declaration(found)
+        scalars = variables(declaration)
+        _check_declaration(scalars)
         longest_step(block)
     with _tried(file, "initial_state()"):
         first = block.initial_state(p, u)
-        before = _kinds(first)
+        kinds_at_start = _kinds(first)
     with _tried(file, "step()"):
         second = block.step(p, first, u, 1e-3)
         kinds = _kinds(second)
-        for name in {**before, **kinds}:  # or a saved state would come back as another: 0.5 as 0
-            kind, like = (k[name].__name__ if name in k else "not there" for k in (kinds, before))
+        for name in {
+            **kinds_at_start,
+            **kinds,
+        }:  # or a saved state would come back as another: 0.5 as 0
+            kind, like = (
+                k[name].__name__ if name in k else "not there" for k in (kinds, kinds_at_start)
+            )
             if kind != like:
                 zero = "; write 0.0 for 0 there" if (kind, like) == ("float", "int") else ""
                 must = f"must be as initial_state() makes it, {like}{zero}"
                 raise ValueError(f"{name} is {kind}: {must}")
-    outputs = [v for v in found if v.causality == "output"]
+    outputs = [v for v in scalars if v.causality == "output"]
     with _tried(file, "outputs()"):
         for x in (first, second):
             y = block.outputs(p, x, u)
@@ -227,17 +234,17 @@ def _variables(file: Path, block: Any) -> list[Variable]:
                 _check_type(v, value, *([int] if v.kind is float else []))
                 if not isfinite(value):
                     raise ValueError(f"{v.name} = {value!r}{v.in_unit}: must be finite")
-    return found
+    return scalars
 
 
-def _check_type(v: Variable, value: Any, *more: type[Any]) -> None:
-    if type(value) not in (v.kind, *more):
+def _check_type(v: Variable, value: Any, *accepted: type[Any]) -> None:
+    if type(value) not in (v.kind, *accepted):
         raise ValueError(f"{v.name} = {value!r}: must be of type {v.kind.__name__}")
 
 
-def _check_declaration(found: list[Variable]) -> None:
-    names = [v.name for v in found]
-    for v in found:
+def _check_declaration(scalars: list[Variable]) -> None:
+    names = [v.name for v in scalars]
+    for v in scalars:
         if names.count(v.name) > 1:
             share = "inputs, outputs and parameters share their names"
             raise ValueError(f"{v.name}: appears twice; {share}")
@@ -270,7 +277,7 @@ def _kinds(state: Any, name: str = "State") -> dict[str, type[Any]]:
 
 
 @contextmanager
-def _tried(file: Path, what: str) -> Iterator[None]:
+def _tried(file: Path, activity: str) -> Iterator[None]:
     """Raise what goes wrong in the user's code as a ValueError that says what and where.
 
     So it is if that takes longer than LONGEST_TRIAL.
@@ -282,22 +289,24 @@ def _tried(file: Path, what: str) -> Iterator[None]:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(file)]
         place = f" line {lines[-1]}:" if lines else ""
-        raise ValueError(f"{file}:{place} {what}: {_reason(error)}") from error
+        raise ValueError(f"{file}:{place} {activity}: {_reason(error)}") from error
 
 
 def _reason(error: BaseException) -> str:
     """What a user's code raised, and what helps, in one line."""
     if isinstance(error, _EndlessError):
-        way = "must end; for a loop with a bound write for ... in range(n), with break"
-        return f"was not done after {LONGEST_TRIAL:g} s; {way}"
-    said = f"{type(error).__name__}: {' '.join(str(error).splitlines())}"
+        remedy = "must end; for a loop with a bound write for ... in range(n), with break"
+        return f"was not done after {LONGEST_TRIAL:g} s; {remedy}"
+    message = f"{type(error).__name__}: {' '.join(str(error).splitlines())}"
     if isinstance(error, ModuleNotFoundError) and error.name:
-        return f"{said}; it may be had by: python -m pip install {error.name.partition('.')[0]}"
-    made = re.match(r"(Input|Output|Parameter)\.__init__\(\)", str(error))
-    if made and isinstance(error, TypeError):
-        valid = [f"{f.name}=..." for f in fields(getattr(block_variables, made[1])) if f.kw_only]
-        return f"{said}; valid: {made[1]}(meaning, {', '.join(valid)})"
-    return said
+        return f"{message}; it may be had by: python -m pip install {error.name.partition('.')[0]}"
+    constructor = re.match(r"(Input|Output|Parameter)\.__init__\(\)", str(error))
+    if constructor and isinstance(error, TypeError):
+        valid = [
+            f"{f.name}=..." for f in fields(getattr(block_variables, constructor[1])) if f.kw_only
+        ]
+        return f"{message}; valid: {constructor[1]}(meaning, {', '.join(valid)})"
+    return message
 
 
 class _EndlessError(BaseException):

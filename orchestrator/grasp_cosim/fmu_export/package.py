@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..base.one_piece import in_one_piece
-from .shipped import block_of, card_file, found, package_folder, sized_source
+from .shipped import block_of, card_file, entry_of, package_folder, sized_source
 
 if TYPE_CHECKING:
     from .description import Description
@@ -69,7 +69,7 @@ def shipped_model(name: str) -> Model:
     from .description import Description
     from .page import icon
 
-    shipped, fingers = found(name)
+    shipped, fingers = entry_of(name)
     block = block_of(name)
     package, _, module = shipped.module.rpartition(".")
     summary = f"{shipped.summary}: {fingers} fingers" if fingers else shipped.summary
@@ -140,12 +140,12 @@ def write_file(target: Path, data: bytes) -> Built:
 
     OSError names the target.
     """
-    before = target.read_bytes() if target.is_file() else None
-    if data == before:
+    old_data = target.read_bytes() if target.is_file() else None
+    if data == old_data:
         return Built(target, "unchanged")
     with in_one_piece(target) as part:
         part.write_bytes(data)
-    return Built(target, "new" if before is None else "changed")
+    return Built(target, "new" if old_data is None else "changed")
 
 
 def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -154,29 +154,29 @@ def _renamed(sources: Mapping[str, bytes]) -> dict[str, bytes]:
     imports = re.compile(rf"^from ({'|'.join(packages)})\b".encode(), re.MULTILINE)
     packed = {}
     for name, data in sources.items():
-        package, _, rest = name.partition("/")
-        place = f"{package}_{HASH}/{rest}" if rest else f"{Path(name).stem}_{HASH}.py"
+        package, _, module = name.partition("/")
+        place = f"{package}_{HASH}/{module}" if module else f"{Path(name).stem}_{HASH}.py"
         packed[f"resources/{place}"] = imports.sub(rf"from \1_{HASH}".encode(), data)
     return packed
 
 
 def with_imports(sources: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return `sources` and all modules they import, by path in the FMU without the content hash."""
-    found = dict(sources)
+    packed = dict(sources)
     paths = list(sources)
     for path in paths:  # which grow
-        for module in _imported(path, found[path]):
+        for module in _imported(path, packed[path]):
             for name, file in _files(module):
-                if name not in found:
-                    found[name] = file.read_bytes()
+                if name not in packed:
+                    packed[name] = file.read_bytes()
                     paths.append(name)
-    return found
+    return packed
 
 
 @cache
 def _imported(path: str, source: bytes) -> list[str]:
     """Return the modules to pack that a source imports, and names in them that may be modules."""
-    found: list[str] = []
+    modules: list[str] = []
     *package, _ = path.split("/")
     for node in ast.walk(ast.parse(source, path)):
         if not isinstance(node, ast.ImportFrom):
@@ -185,17 +185,17 @@ def _imported(path: str, source: bytes) -> list[str]:
         module = ".".join([*above, *filter(None, [node.module])])
         outside = node.col_offset or module.partition(".")[0] in sys.stdlib_module_names
         if node.level or not outside:
-            found += [module, *(f"{module}.{alias.name}" for alias in node.names)]
-    return found
+            modules += [module, *(f"{module}.{alias.name}" for alias in node.names)]
+    return modules
 
 
 def _files(module: str) -> Iterator[tuple[str, Path]]:
     """Yield the files that importing a module runs, with their paths in the FMU."""
-    package, *rest = module.split(".")
+    package, *names = module.split(".")
     folder = Path(__file__).parent if package == PACKED_AS else package_folder(package)
-    place = folder.joinpath(*rest)
-    own = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
-    if own.is_file():
-        above = (folder.joinpath(*rest[:i]) / "__init__.py" for i in range(len(rest)))
-        for file in (*above, own):
+    place = folder.joinpath(*names)
+    source = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    if source.is_file():
+        above = (folder.joinpath(*names[:i]) / "__init__.py" for i in range(len(names)))
+        for file in (*above, source):
             yield f"{package}/{file.relative_to(folder).as_posix()}", file

@@ -94,8 +94,8 @@ def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages:
     pictures of the card point to nothing in an FMU and come out as their text, HTML in it as it is
     written. The result is XML as well.
     """
-    theirs = ", the binary of pythonfmu as well: documentation/licenses/pythonfmu.txt"
-    licence = f"MIT: documentation/licenses/license.txt{theirs if about is PYTHON else ''}."
+    of_pythonfmu = ", the binary of pythonfmu as well: documentation/licenses/pythonfmu.txt"
+    licence = f"MIT: documentation/licenses/license.txt{of_pythonfmu if about is PYTHON else ''}."
     states = "Not supported: the state is that of the peer." if about is PROXY else _STATES
     override = f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
     sections = Template(f"{about}\n## States\n\n{states}\n\n## Licence\n\n{licence}\n").substitute(
@@ -113,8 +113,8 @@ def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages:
 
 def needed(packages: Sequence[str]) -> str:
     """Say which packages must be installed in the Python of the host."""
-    named = ", ".join(f"`{name}`" for name in packages)
-    return f"That Python must have {named}." if named else "No packages need to be installed."
+    names = ", ".join(f"`{name}`" for name in packages)
+    return f"That Python must have {names}." if names else "No packages need to be installed."
 
 
 def licences(*distributions: str) -> dict[str, bytes]:
@@ -124,15 +124,15 @@ def licences(*distributions: str) -> dict[str, bytes]:
     """
     from importlib import metadata  # takes time to load
 
-    found = {}
+    files = {}
     for name in distributions:
         text = metadata.distribution(name).read_text("licenses/LICENSE")
         if not text:
-            said = "no licenses/LICENSE among its metadata; install it with pip"
-            raise FileNotFoundError(f"{name}: {said}")
+            reason = "no licenses/LICENSE among its metadata; install it with pip"
+            raise FileNotFoundError(f"{name}: {reason}")
         file = "license" if name == "grasp-cosim" else name
-        found[f"documentation/licenses/{file}.txt"] = text.encode()
-    return found
+        files[f"documentation/licenses/{file}.txt"] = text.encode()
+    return files
 
 
 def icon(name: str) -> bytes | None:
@@ -157,7 +157,9 @@ def _rendered(text: str, down: int) -> str:
     markdown.add_render_rule("image", lambda _, tokens, index, *__: escape(tokens[index].content))
     renderer: Any = markdown.renderer
     code = renderer.rules["fence"]
-    markdown.add_render_rule("fence", lambda _, *given: _equation(*given) or code(*given))
+    markdown.add_render_rule(
+        "fence", lambda _, *arguments: _equation(*arguments) or code(*arguments)
+    )
     tokens = markdown.parse(text)
     heads: list[str] = []
     cells = cycle([""])
@@ -183,10 +185,10 @@ def _equation(tokens: Sequence[Any], index: int, *_: object) -> str:
     from latex2mathml.converter import convert  # takes time to load
 
     tag = r"\\tag\{(.*?)\}"
-    said = search(tag, tokens[index].content)
+    number_tag = search(tag, tokens[index].content)
     # An element of HTML: it needs no namespace.
     math = sub(' xmlns="[^"]*"', "", convert(sub(tag, "", tokens[index].content), display="block"))
-    number = f"<span>({escape(said[1])})</span>" if said else ""
+    number = f"<span>({escape(number_tag[1])})</span>" if number_tag else ""
     return f'<div class="equation"><div>{math}</div>{number}</div>\n'
 
 
@@ -198,11 +200,11 @@ def updated(card: str, blocks: Mapping[str, Block]) -> str:
 
     ValueError without the marks.
     """
-    before, begin, rest = card.partition(BEGIN)
-    _, end, after = rest.partition(END)
+    head, begin, remainder = card.partition(BEGIN)
+    _, end, tail = remainder.partition(END)
     if not (begin and end):
         raise ValueError(f"a card must have {BEGIN.strip()} and {END.strip()} around its table")
-    return f"{before}{BEGIN}{variable_tables(blocks)}{END}{after}"
+    return f"{head}{BEGIN}{variable_tables(blocks)}{END}{tail}"
 
 
 def variable_tables(blocks: Mapping[str, Block]) -> str:
@@ -214,32 +216,43 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
     rows = {name: [_row(f) for f in declared(block)] for name, block in blocks.items()}
     if len(rows) == 1:
         return _table(*rows.values())
-    tandems = {name: own for name, own in rows.items() if name.startswith("tandem")}
-    hands = {name: own for name, own in rows.items() if name.startswith("hand")}
-    others = {name: own for name, own in rows.items() if name not in tandems | hands}
+    tandems = {
+        name: rows_of_block for name, rows_of_block in rows.items() if name.startswith("tandem")
+    }
+    hands = {name: rows_of_block for name, rows_of_block in rows.items() if name.startswith("hand")}
+    grippers = {
+        name: rows_of_block for name, rows_of_block in rows.items() if name not in tandems | hands
+    }
     kinds = {
-        "all have": others,
+        "all have": grippers,
         "those of a gripper in tandem have": tandems,
         "all of a hand of three fingers have": hands,
     }
     parts: dict[str, list[str]] = {}
     for who, group in kinds.items():
-        first, *rest = group.values() or [[]]
-        common = [row for row in first if all(row in own for own in rest)]
-        added = {f"`{n}` adds": [r for r in own if r not in common] for n, own in group.items()}
-        parts |= {title: own for title, own in {who: common, **added}.items() if own}
-    seen: set[str] = set()
+        first, *remaining = group.values() or [[]]
+        common = [row for row in first if all(row in rows_of_block for rows_of_block in remaining)]
+        added = {
+            f"`{n}` adds": [r for r in rows_of_block if r not in common]
+            for n, rows_of_block in group.items()
+        }
+        parts |= {
+            title: rows_of_block
+            for title, rows_of_block in {who: common, **added}.items()
+            if rows_of_block
+        }
+    shown_rows: set[str] = set()
     text = []
-    for title, own in parts.items():
-        names = (row.split("`")[1].partition("[")[0] for row in own if row in seen)
+    for title, rows_of_block in parts.items():
+        names = (row.split("`")[1].partition("[")[0] for row in rows_of_block if row in shown_rows)
         groups = (f"`{name.partition('.')[0]}{'.*' if '.' in name else ''}`" for name in names)
-        named = ", ".join(dict.fromkeys(groups))
-        again = f", besides {named} as above" if named else ""
-        fresh = [row for row in own if row not in seen]
+        families = ", ".join(dict.fromkeys(groups))
+        again = f", besides {families} as above" if families else ""
+        fresh = [row for row in rows_of_block if row not in shown_rows]
         text.append(
             f"What {title}{again}:\n\n{_table(fresh)}" if fresh else f"What {title}{again}.\n"
         )
-        seen |= {*own}
+        shown_rows |= {*rows_of_block}
     return "\n".join(text)
 
 

@@ -145,14 +145,14 @@ def proxy_members(
 
     description = _description(target, original, settings, limits)
     signature = shared_signature(original.variables)
-    own = {
+    generated = {
         "wire.h": f"{_LICENCE}#ifndef WIRE_H\n#define WIRE_H\n\n{_INCLUDED}\n"
         f"{wire('wire', signature)}\n#endif\n",
         "variables.h": _table(signature, description.variables),
     }
     card = _card(description.variables[len(original.variables) :])
     model = Model(description, card, {}, picture=icon("Proxy"))
-    sources = proxy_sources(description.name, original.name, own, HASH, fmi)
+    sources = proxy_sources(description.name, original.name, generated, HASH, fmi)
     return with_description(model, sources, fmi)
 
 
@@ -171,9 +171,9 @@ def own_variables(
             raise ValueError(f"limit of {name}: must be of a Real input or output of the FMU")
 
     def add(name: str, kind: type[Scalar], unit: str, start: Scalar, *about: Any) -> None:
-        own.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", *about))
+        added.append(Variable(f"proxy.{name}", kind, "parameter", unit, start, "fixed", *about))
 
-    own: list[Variable] = []
+    added: list[Variable] = []
     for name, hint in get_type_hints(Settings, include_extras=True).items():
         kind, unit, valid, text = get_args(hint)
         add(name, kind, unit, getattr(settings, name), valid, text)
@@ -183,7 +183,7 @@ def own_variables(
     for v in outputs:
         text = f"value of {v.name} while the peer is lost"
         add(f"failsafe.{v.name}", v.kind, v.unit, v.kind(), None, text, None, v.relative)
-    for group, names, what in (
+    for group, names, property_text in (
         (sent, ("min", "max", "rate"), "that is sent"),
         (measured, ("lowest", "highest", "fastest"), "that is plausible"),
     ):
@@ -192,14 +192,32 @@ def own_variables(
             low, high = max(limit.low, -LARGEST_REAL), min(limit.high, LARGEST_REAL)
             rate = limit.rate if isfinite(limit.rate) else 0.0
             lowest, highest, fastest = (f"{name}.{v.name}" for name in names)
-            add(lowest, float, v.unit, low, None, f"lowest {v.name} {what}", None, v.relative)
-            add(highest, float, v.unit, high, None, f"highest {v.name} {what}", None, v.relative)
-            text = f"fastest change of {v.name} {what}, {v.unit or '1'}/s; 0: any"
+            add(
+                lowest,
+                float,
+                v.unit,
+                low,
+                None,
+                f"lowest {v.name} {property_text}",
+                None,
+                v.relative,
+            )
+            add(
+                highest,
+                float,
+                v.unit,
+                high,
+                None,
+                f"highest {v.name} {property_text}",
+                None,
+                v.relative,
+            )
+            text = f"fastest change of {v.name} {property_text}, {v.unit or '1'}/s; 0: any"
             add(fastest, float, "", rate, (0.0, LARGEST_REAL), text)
     for name, (kind, unit, text) in _DIAGNOSTICS.items():
         variability = "continuous" if kind is float else "discrete"
-        own.append(Variable(f"proxy.{name}", kind, "output", unit, None, variability, None, text))
-    return own
+        added.append(Variable(f"proxy.{name}", kind, "output", unit, None, variability, None, text))
+    return added
 
 
 def reals(variables: Sequence[Variable], causality: str) -> list[Variable]:
@@ -222,25 +240,25 @@ def _description(
         raise ValueError(f"{target}: {must}")
     if taken := [v.name for v in original.variables if v.name.startswith("proxy.")]:
         raise ValueError(f"{file}: {taken[0]}: proxy. begins the names of a proxy's own")
-    own = own_variables(original.variables, settings, limits)
-    for v in own:
+    added = own_variables(original.variables, settings, limits)
+    for v in added:
         if v.start is not None:
             v.check(v.start)
     return replace(
         original,
         name=name,
         summary=f"Proxy of {file}: a peer has its outputs, over UDP",
-        variables=[*original.variables, *own],
+        variables=[*original.variables, *added],
         units={"s": SECOND, **(original.units or {})},
         has_states=False,
         statuses=(WARNING, ERROR),
     )
 
 
-def _card(own: Sequence[Variable]) -> str:
+def _card(added: Sequence[Variable]) -> str:
     """Return the proxy's own variables and the protocol, in Markdown."""
     rows = []
-    for v in own:
+    for v in added:
         start = "" if v.start is None else str(v.start).lower()
         limits = f"{v.limits[0]:g} to {v.limits[1]:g}" if v.limits and v.kind is not str else ""
         cells = (f"`{v.name}`", v.causality, v.type, v.unit, start, limits, v.description)

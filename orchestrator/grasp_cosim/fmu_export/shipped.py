@@ -105,33 +105,33 @@ def of_fingers(fingers: int) -> list[str]:
     return [f"{name}{fingers}" for name, shipped in SHIPPED.items() if shipped.of_hand]
 
 
-def found(name: str) -> tuple[Shipped, int | None]:
+def entry_of(name: str) -> tuple[Shipped, int | None]:
     """Return the entry of an FMU, and how many fingers its name asks for; KeyError without one."""
-    if asked := _NAME.fullmatch(name):
-        return SHIPPED[asked[1]], int(asked[2])
+    if match := _NAME.fullmatch(name):
+        return SHIPPED[match[1]], int(match[2])
     return SHIPPED[name], None
 
 
 def together(name: str) -> tuple[str, ...] | None:
     """Return the names of the FMUs that are built together with one of ours; None for others."""
     try:
-        shipped, fingers = found(name)
+        shipped, fingers = entry_of(name)
     except KeyError:
         return None
     if fingers:
         return tuple(of_fingers(fingers))
-    return tuple(other for other, s in SHIPPED.items() if s.of_hand == shipped.of_hand)
+    return tuple(name_beside for name_beside, s in SHIPPED.items() if s.of_hand == shipped.of_hand)
 
 
 def block_of(name: str) -> Any:
     """Return the block of an FMU, a module."""
-    shipped, fingers = found(name)
+    shipped, fingers = entry_of(name)
     return _of_size(shipped, fingers) if fingers else import_module(shipped.module)
 
 
 def sized_source(name: str) -> dict[str, bytes]:
     """Return the module HAND_SIZE where a number of fingers is asked for, by its path."""
-    shipped, fingers = found(name)
+    shipped, fingers = entry_of(name)
     package = shipped.module.partition(".")[0]
     return {f"{package}/{HAND_SIZE}.py": b"FINGERS = %d\n" % fingers} if fingers else {}
 

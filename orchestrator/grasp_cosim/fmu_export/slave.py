@@ -264,7 +264,7 @@ class Slave:
 
     @reported
     def _set_fmu_state(self, snapshot: object) -> None:
-        phase, self._time, settable, self._state = self._ours(snapshot)
+        phase, self._time, settable, self._state = self._own_snapshot(snapshot)
         for vr, value in zip(self._settable, settable, strict=True):
             self._values[vr] = value
         self._params = self._inputs = None
@@ -273,7 +273,7 @@ class Slave:
     @reported
     def state_to_bytes(self, snapshot: object) -> bytes:
         """A state of this FMU, serialised: States in fmus/README.md."""
-        numbers = [*_scalars(self._ours(snapshot))]
+        numbers = [*_scalars(self._own_snapshot(snapshot))]
         head = MAGIC + self.maker.content.encode()
         return head + struct.pack(f"<{len(numbers)}d", *numbers)
 
@@ -286,14 +286,16 @@ class Slave:
             raise ValueError(f"state of another FMU: must be of this one, {content}")
         if len(data) != size:
             raise ValueError(f"state of {len(data)} bytes: must have {size}")
-        found: Snapshot = _shaped(like, iter(struct.unpack(f"<{size // 8 - 3}d", data[HEAD:])))
-        if found.phase not in range(len(PHASES)) or not isfinite(found.time):
-            raise ValueError(f"state in phase {found.phase} at {found.time} s: must be of a run")
-        for vr, value in zip(self._settable, found.settable, strict=True):
+        snapshot: Snapshot = _shaped(like, iter(struct.unpack(f"<{size // 8 - 3}d", data[HEAD:])))
+        if snapshot.phase not in range(len(PHASES)) or not isfinite(snapshot.time):
+            raise ValueError(
+                f"state in phase {snapshot.phase} at {snapshot.time} s: must be of a run"
+            )
+        for vr, value in zip(self._settable, snapshot.settable, strict=True):
             self._variables[vr].check(value)
-        return found
+        return snapshot
 
-    def _ours(self, snapshot: object) -> Snapshot:
+    def _own_snapshot(self, snapshot: object) -> Snapshot:
         if not isinstance(snapshot, Snapshot):
             raise ValueError(f"state of another FMU: must be of this one, {self.maker.content}")
         return snapshot

@@ -4,7 +4,14 @@ import platform
 import sys
 
 import pytest
-from grasp_cosim.fmu_export.native.targets import KNOWN, NAMES, Target, folders, here, targets
+from grasp_cosim.fmu_export.native.targets import (
+    KNOWN,
+    NAMES,
+    Target,
+    folders,
+    targets,
+    this_target,
+)
 
 LINUX_X86, WINDOWS, LINUX_ARM, MAC_X86, MAC_ARM = KNOWN
 LINUX = ("linux", "x86_64")
@@ -32,7 +39,7 @@ def on(machine, monkeypatch):
 )
 def test_this_machine(machine, target, suffix, monkeypatch):
     on(machine, monkeypatch)
-    assert (here(), here().suffix) == (target, suffix)
+    assert (this_target(), this_target().suffix) == (target, suffix)
 
 
 @pytest.mark.parametrize(
@@ -76,4 +83,4 @@ def test_fmi_2_has_a_folder_for_each_system_and_fmi_3_one_for_each_platform(
     assert places == expected
     assert said in note
     assert len(note.splitlines()) == bool(said)
-    assert folders(asked, 3) == ({t: t.tuple for t in (here(), *asked)}, "")
+    assert folders(asked, 3) == ({t: t.tuple for t in (this_target(), *asked)}, "")

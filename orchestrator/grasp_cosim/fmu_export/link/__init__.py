@@ -53,10 +53,10 @@ class Limit(NamedTuple):
         if len(parts) not in (2, 3):
             raise ValueError(must)
         try:
-            given = [float(part) if part.strip() else None for part in parts]
+            numbers = [float(part) if part.strip() else None for part in parts]
         except ValueError:
             raise ValueError(must) from None
-        pairs = zip(given, cls(), strict=False)
+        pairs = zip(numbers, cls(), strict=False)
         limit = cls(*(default if value is None else value for value, default in pairs))
         if limit == cls():
             raise ValueError(must)
@@ -75,14 +75,14 @@ class Signature:
     """
 
     def __init__(self, variables: Sequence[LinkVariable]) -> None:
-        seen = set()
+        names = set()
         for v in variables:
             if set("\t\n\r\0") & set(f"{v.name}{v.unit or ''}"):
                 must = "must be without tabs and line ends"
                 raise ValueError(f"variable {v.name!r} [{v.unit}]: {must}")
-            if v.name in seen:
+            if v.name in names:
                 raise ValueError(f"variable {v.name!r}: appears twice; must have one name each")
-            seen.add(v.name)
+            names.add(v.name)
         self.variables = tuple(sorted(variables, key=lambda v: ORDER.index(v.causality)))
         self.request = tuple(v for v in self.variables if v.causality != "output")
         self.answer = self.variables[len(self.request) :]
@@ -96,14 +96,14 @@ class Signature:
 
     def parts(self) -> list["Part"]:
         """Return the text in the parts that a HELLO can carry, each of whole lines."""
-        whole = self.text.encode()
-        parts = [Part(0, len(whole), b"")]
-        for line in whole.splitlines(keepends=True):
+        text = self.text.encode()
+        parts = [Part(0, len(text), b"")]
+        for line in text.splitlines(keepends=True):
             last = parts[-1]
             if len(last.text) + len(line) <= LARGEST_PART:
                 parts[-1] = last._replace(text=last.text + line)
             else:
-                parts.append(Part(last.offset + len(last.text), len(whole), line))
+                parts.append(Part(last.offset + len(last.text), len(text), line))
         return parts
 
     def difference(self, part: "Part") -> str:
@@ -111,20 +111,20 @@ class Signature:
 
         Empty where all is equal so far and the proxy has more. The part may be any bytes.
         """
-        own = self.text.encode()[part.offset :].splitlines(keepends=True)
+        own_lines = self.text.encode()[part.offset :].splitlines(keepends=True)
         if part.offset and self.text.encode()[part.offset - 1 : part.offset] != b"\n":
-            own = []
-        theirs = part.text.splitlines(keepends=True)
+            own_lines = []
+        proxy_lines = part.text.splitlines(keepends=True)
         is_last = part.offset + len(part.text) >= part.whole
         if not is_last:
-            own = own[: len(theirs)]
-        pairs = zip_longest(theirs, own, fillvalue=b"no more")
+            own_lines = own_lines[: len(proxy_lines)]
+        pairs = zip_longest(proxy_lines, own_lines, fillvalue=b"no more")
         differ = (pair for pair in pairs if pair[0] != pair[1])
-        found = next(differ, (b"no more", b"no more") if is_last else None)
-        if found is None:
+        different = next(differ, (b"no more", b"no more") if is_last else None)
+        if different is None:
             return ""
-        first, ours = (_ascii(line.strip(b"\n")).decode() for line in found)
-        return f"the proxy has {first}, the peer {ours}"
+        of_proxy, of_peer = (_ascii(line.strip(b"\n")).decode() for line in different)
+        return f"the proxy has {of_proxy}, the peer {of_peer}"
 
 
 class Part(NamedTuple):
@@ -242,9 +242,9 @@ class Sealer:
                 return FORGED
         _, version, *fields, size, count = HEAD.unpack_from(datagram)
         m = Message._make((*fields, datagram[HEAD.size : end], version, count))
-        known = HELLO <= m.kind <= END and isfinite(m.time + m.step)
-        counted = not count or m.kind in (INITIALISE, STEP, OUTPUTS)
-        return m if known and counted and size == len(m.body) else MALFORMED
+        is_known = HELLO <= m.kind <= END and isfinite(m.time + m.step)
+        is_counted = not count or m.kind in (INITIALISE, STEP, OUTPUTS)
+        return m if is_known and is_counted and size == len(m.body) else MALFORMED
 
 
 def check_name(name: str) -> str:
@@ -266,11 +266,11 @@ def unpack_hello(body: bytes) -> tuple[str, Part] | None:
     """Return name and part in the body of a HELLO; None where it is none."""
     if len(body) != HELLO_SIZE:
         return None
-    name, offset, size, whole, zero = HELLO_HEAD.unpack_from(body)
+    name, offset, size, text_size, zero = HELLO_HEAD.unpack_from(body)
     text = unpack_text(name)
     if text is None or size > LARGEST_PART or zero:
         return None
-    return text, Part(offset, whole, body[HELLO_HEAD.size :][:size])
+    return text, Part(offset, text_size, body[HELLO_HEAD.size :][:size])
 
 
 def unpack_text(padded: bytes) -> str | None:
@@ -329,14 +329,14 @@ def exposed(path: Path) -> str:
 def check_size(signature: Signature) -> None:
     """ValueError where the variables do not fit into a datagram, or one not into a HELLO."""
     for name, variables in (("a request", signature.request), ("an answer", signature.answer)):
-        whole = HEAD.size + 8 * len(variables) + TAG_SIZE
-        if whole > LARGEST:
-            said = f"{name} with {len(variables)} variables has {whole} bytes"
-            raise ValueError(f"{said}: must be {LARGEST} at most")
+        size = HEAD.size + 8 * len(variables) + TAG_SIZE
+        if size > LARGEST:
+            length = f"{name} with {len(variables)} variables has {size} bytes"
+            raise ValueError(f"{length}: must be {LARGEST} at most")
     for line in signature.text.encode().splitlines(keepends=True):
         if len(line) > LARGEST_PART:
-            said = f"variable {line[:40].decode(errors='replace')!r}...: its line has {len(line)}"
-            raise ValueError(f"{said} bytes in a HELLO: must be {LARGEST_PART} at most")
+            length = f"variable {line[:40].decode(errors='replace')!r}...: its line has {len(line)}"
+            raise ValueError(f"{length} bytes in a HELLO: must be {LARGEST_PART} at most")
 
 
 ALIVE = 1_000_000_000
@@ -433,9 +433,9 @@ class Peer:
         """Latch the safe state until the next session begins: every answer tells of it."""
         self.trips += 1
 
-    def expire(self, now: int, silence: int) -> bool:
+    def expire(self, time_ns: int, silence: int) -> bool:
         """End the session where nothing new came for so many ns; True where that is so."""
-        over = self.in_session and now - self.heard_at >= silence
+        over = self.in_session and time_ns - self.heard_at >= silence
         if over:
             self._live = self._last = None
         return over
@@ -445,7 +445,7 @@ class Peer:
         """True from the first INITIALISE of a session to its end."""
         return self._live is not None
 
-    def receive(self, datagram: bytes, now: int) -> Action:
+    def receive(self, datagram: bytes, time_ns: int) -> Action:
         """Return what to do about a datagram; `now` in ns of a monotonic clock."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
@@ -456,10 +456,10 @@ class Peer:
             answer = self._refuse(m, OTHER_VERSION) if m.kind == HELLO else None
             return self._count("other_version", answer)
         if m.kind == HELLO:
-            return self._hello(m, now)
+            return self._hello(m, time_ns)
         if m.interface != self.signature.hash:
             return self._count("foreign")
-        return self._in_session(m, now)
+        return self._in_session(m, time_ns)
 
     def outputs(self, values: list[Value], time: float) -> bytes:
         """Return the answer to the last request: outputs, and the time in s they belong to."""
@@ -480,11 +480,11 @@ class Peer:
         setattr(self.counters, counter, getattr(self.counters, counter) + 1)
         return answer
 
-    def _busy(self, session: int, now: int) -> bool:
-        other = self._live is not None and self._live[0] != session
-        return other and now - self.heard_at < ALIVE
+    def _busy(self, session: int, time_ns: int) -> bool:
+        is_other = self._live is not None and self._live[0] != session
+        return is_other and time_ns - self.heard_at < ALIVE
 
-    def _hello(self, m: Message, now: int) -> Action:
+    def _hello(self, m: Message, time_ns: int) -> Action:
         hello = unpack_hello(m.body)
         if m.sequence or m.cookie or hello is None:
             return self._count(MALFORMED)
@@ -495,7 +495,7 @@ class Peer:
         if name and self.name and name != self.name:
             reason = f"the peer is {self.name}, the proxy wants {name}"
             return self._count("other_name", self._refuse(m, OTHER_NAME, reason))
-        if self._busy(m.session, now):
+        if self._busy(m.session, time_ns):
             return self._count("busy", self._refuse(m, BUSY))
         session, cookie = self._live or (None, 0)
         cookie = cookie if session == m.session else self._cookie(m.session)
@@ -504,12 +504,12 @@ class Peer:
     def _cookie(self, session: int) -> int:
         """That of a session that may begin now: another one once any session has begun."""
         numbers = session.to_bytes(8, "little") + self._begun.to_bytes(8, "little")
-        made = hmac.digest(self._random, numbers, "sha256")
-        return int.from_bytes(made[:8], "little") | 1
+        digest = hmac.digest(self._random, numbers, "sha256")
+        return int.from_bytes(digest[:8], "little") | 1
 
-    def _in_session(self, m: Message, now: int) -> Action:
+    def _in_session(self, m: Message, time_ns: int) -> Action:
         if self._live != (m.session, m.cookie):
-            return self._begin(m, now)
+            return self._begin(m, time_ns)
         if m.kind == END:
             self._live = self._last = None
             return Request(END, m.time, 0.0, [], fresh=False)
@@ -517,29 +517,29 @@ class Peer:
         if m.sequence < last:
             return self._count("stale")
         if m.sequence > last:
-            return self._do(m, now, fresh=False)
+            return self._do(m, time_ns, fresh=False)
         if m.kind == STEP or self._last_answer is None:
             return self._count("duplicated")
         return self._count("repeated", self._last_answer)
 
-    def _begin(self, m: Message, now: int) -> Action:
+    def _begin(self, m: Message, time_ns: int) -> Action:
         """Make the session of the first INITIALISE the one under way."""
         begins = m.kind == INITIALISE
         if begins and self._refused == (m.session, m.cookie, m.sequence):
-            again = self._refuse(m, FAILED, self._reason, len(m.body))
-            return self._count("repeated", again)
-        if begins and self._busy(m.session, now):
+            refusal = self._refuse(m, FAILED, self._reason, len(m.body))
+            return self._count("repeated", refusal)
+        if begins and self._busy(m.session, time_ns):
             return self._count("busy", self._refuse(m, BUSY))
         if not begins or m.cookie != self._cookie(m.session):
             self.unknown += 1
             return self._count("foreign", None if m.kind == END else self._refuse(m, UNKNOWN))
-        request = self._do(m, now, fresh=True)
+        request = self._do(m, time_ns, fresh=True)
         if isinstance(request, Request):
             self._live = m.session, m.cookie
             self._begun += 1
         return request
 
-    def _do(self, m: Message, now: int, fresh: bool) -> Action:
+    def _do(self, m: Message, time_ns: int, fresh: bool) -> Action:
         values = self._request.unpack(m.body)
         stepping = not fresh and self._last is not None and self._last.kind == STEP
         too_late = m.kind == INITIALISE and stepping
@@ -550,17 +550,17 @@ class Peer:
             self.trips = self._acknowledged = 0
         acknowledged = m.sequence - 1 - m.counted
         if fresh or acknowledged > self._acknowledged:
-            self._acknowledged, self.acknowledged_at = acknowledged, now
+            self._acknowledged, self.acknowledged_at = acknowledged, time_ns
         # Only what is new counts as heard: who repeats a recorded datagram keeps nobody away
-        self.heard_at = now
+        self.heard_at = time_ns
         self._last, self._last_answer, self._refused = m, None, None
         if m.step > LONGEST_STEP:
             return self.failed(TOO_LONG)
-        done = "steps" if m.kind == STEP else "initialisations"
-        return self._count(done, Request(m.kind, m.time, m.step, values, fresh))
+        counter = "steps" if m.kind == STEP else "initialisations"
+        return self._count(counter, Request(m.kind, m.time, m.step, values, fresh))
 
-    def _refuse(self, m: Message, code: int, reason: str = "", most: int = LARGEST) -> bytes:
-        words = _ascii(reason.encode(errors="replace"))[: min(most, LARGEST_REASON)]
+    def _refuse(self, m: Message, code: int, reason: str = "", max_size: int = LARGEST) -> bytes:
+        words = _ascii(reason.encode(errors="replace"))[: min(max_size, LARGEST_REASON)]
         return self._pack(m, REFUSE, code, words)
 
     def _pack(

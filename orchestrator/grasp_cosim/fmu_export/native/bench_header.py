@@ -78,7 +78,7 @@ def bench_header(
     groups = [Group(prefix, c, f"{prefix}_{c}s", members(signature, c)) for c in ORDER]
     sizes = {f"{group.causality}s_size": 8 * len(group.members) for group in groups}
     pairs = [*((g, _CHECK) for g in groups), *zip(groups, (_UNPACK, _UNPACK, _PACK), strict=True)]
-    return Template(_named(TEMPLATE.read_text("utf-8"), prefix)).substitute(
+    return Template(_with_prefix(TEMPLATE.read_text("utf-8"), prefix)).substitute(
         title=comment_text(name),
         structs=structs(groups, _MEANINGS, starts or {}, descriptions or {}),
         wire=wire(prefix, signature),
@@ -95,7 +95,7 @@ def wire(prefix: str, signature: Signature) -> str:
     """Return the part of the protocol that both sides need, in C; names begin with the prefix."""
     lines = [string(f"{line}\n") for line in signature.text.split("\n")[:-1]]
     octets = [f"0x{octet:02x}" for octet in signature.hash]
-    return Template(_named(WIRE.read_text("utf-8"), prefix)).substitute(
+    return Template(_with_prefix(WIRE.read_text("utf-8"), prefix)).substitute(
         first_half_of_the_hash=", ".join(octets[:8]),
         second_half_of_the_hash=", ".join(octets[8:]),
         signature_lines="".join(f"        {line},\n" for line in lines),
@@ -121,7 +121,7 @@ def _identifier(name: str, otherwise: str) -> str:
     return words if words[:1].isalpha() else f"{otherwise}_{words}".rstrip("_")
 
 
-def _named(template: str, prefix: str) -> str:
+def _with_prefix(template: str, prefix: str) -> str:
     template = template.replace('"model.h"', f'"{prefix}.h"')
     template = re.sub(r"\bMODEL_", f"{prefix.upper()}_", template)
     return re.sub(r"\bmodel_", f"{prefix}_", template)
@@ -134,39 +134,41 @@ def structs(
     descriptions: Mapping[str, str],
 ) -> str:
     """Return the structs of groups in C, those that are set with a macro of their start values."""
-    made = []
+    definitions = []
     for group in groups:
         lines = []
         for v, name in group.members:
-            said = descriptions.get(v.name, "")
+            description = descriptions.get(v.name, "")
             text = comment_text(
-                (f"{v.name}, {v.unit}" if v.unit else v.name) + (said and f": {said}")
+                (f"{v.name}, {v.unit}" if v.unit else v.name) + (description and f": {description}")
             )
             lines.append(f"    {f'{_TYPES[v.kind]} {name};':<40} /* {text} */")
         head = f"/* {meanings[group.causality]} */\ntypedef struct {{"
         none = f"    uint8_t none; /* the model has no {group.causality}s */"
-        made += [head, *(lines or [none]), f"}} {group.struct};", ""]
+        definitions += [head, *(lines or [none]), f"}} {group.struct};", ""]
         if group.causality != "output":
             values = [_literal(v, starts.get(v.name, _ZEROS[v.kind])) for v, _ in group.members]
             padded = [f"{value}," for value in values[:-1]] + values[-1:]
             pairs = zip(padded, group.members, strict=True)
             lines = [f"    {value:<40} /* {comment_text(v.name)} */ \\" for value, (v, _) in pairs]
             head = f"#define {group.struct.upper()}_DEFAULTS {{ \\"
-            made += [head, *(lines or ["    0 \\"]), "}", ""]
-    return "\n".join(made)
+            definitions += [head, *(lines or ["    0 \\"]), "}", ""]
+    return "\n".join(definitions)
 
 
 def members(signature: Signature, causality: Causality) -> list[tuple[LinkVariable, str]]:
     """Return the variables of a causality, with their identifiers in C."""
-    found = []
+    identifiers = []
     taken = set(WORDS)
     for variable in signature.of(causality):
-        wanted = _identifier(variable.name, "v")
-        endings = chain(["_"] if wanted in WORDS else [""], (f"_{i}" for i in count(2)))
-        identifier = next(n for n in (f"{wanted}{ending}" for ending in endings) if n not in taken)
+        base_name = _identifier(variable.name, "v")
+        endings = chain(["_"] if base_name in WORDS else [""], (f"_{i}" for i in count(2)))
+        identifier = next(
+            n for n in (f"{base_name}{ending}" for ending in endings) if n not in taken
+        )
         taken.add(identifier)
-        found.append((variable, identifier))
-    return found
+        identifiers.append((variable, identifier))
+    return identifiers
 
 
 def _literal(v: LinkVariable, value: Value) -> str:
@@ -210,13 +212,13 @@ def lines_of(group: Group, line: str, unused: str, first: int = 0) -> list[str]:
 
     In it `at` is where the variable begins in a body, in bytes, `i` its place, counted from first.
     """
-    found = []
+    lines = []
     for i, (v, name) in enumerate(group.members):
         kind, text = v.kind.lower(), string(v.name)
         number, truth = (" ? 1.0 : 0.0", " != 0.0") if v.kind == "Boolean" else ("", "")
-        known = {"prefix": group.prefix, "kind": kind, "name": name, "text": text, "at": 8 * i}
-        found.append(line.format(**known, i=first + i, number=number, truth=truth))
-    return found or [f"    {unused}"]
+        places = {"prefix": group.prefix, "kind": kind, "name": name, "text": text, "at": 8 * i}
+        lines.append(line.format(**places, i=first + i, number=number, truth=truth))
+    return lines or [f"    {unused}"]
 
 
 def _limiting(inputs: Group, limits: Mapping[str, Limit]) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from ..contract import Field, declared, input_check, longest_step, variables
 from .statements import Check, translated_function
 from .text import UntranslatableError, comment, identifier, number, string, wrapped
-from .types import BOOLEAN, REAL, SCALARS, Function, Program, Type, fields, parts, said
+from .types import BOOLEAN, REAL, SCALARS, Function, Program, Type, fields, in_words, parts
 
 HEAD = """\
 {title}
@@ -51,8 +51,8 @@ def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
     types["Outputs"] = evaluate.returns
     yield HEAD.format(title=comment(f"{name}: {block.__doc__ or ''}"))
     yield _table(block, described, len(scalars))
-    named = "".join(f"typedef {program.c(t)} Block{kind};\n" for kind, t in types.items())
-    yield from (program.structs(), "".join(program.constants.values()), *program.bodies, named)
+    aliases = "".join(f"typedef {program.c(t)} Block{kind};\n" for kind, t in types.items())
+    yield from (program.structs(), "".join(program.constants.values()), *program.bodies, aliases)
     yield from _conversions(program, described)
     yield _function("int block_check(const BlockParams *p, Text *why)", [*checks, "return 1;"])
     head = "int block_check_inputs(const BlockParams *p, const BlockInputs *u, Text *why)"
@@ -63,7 +63,7 @@ def _parts_of(program: Program, name: str, block: Any) -> Iterator[str]:
     yield _function(head, [f"*after = {_call(step, 'pxuh')};"])
     head = f"void block_outputs({PXU}, BlockOutputs *y)"
     yield _function(head, [f"*y = {_call(evaluate, 'pxu')};"])
-    truth = [" != 0.0" * (kind == BOOLEAN) for _, kind in scalars]
+    truth = [" != 0.0" if kind == BOOLEAN else "" for _, kind in scalars]
     save = [f"numbers[{i}] = {path};" for i, (path, _) in enumerate(scalars)]
     load = [f"{path} = numbers[{i}]{truth[i]};" for i, (path, _) in enumerate(scalars)]
     yield _function("void block_save(const BlockState *x, double *numbers)", save)
@@ -76,19 +76,19 @@ def _part(
 ) -> Function:
     function = getattr(block, name)
     code = function.__code__
-    where = program.source(code.co_filename)
+    source = program.source(code.co_filename)
     if code.co_argcount != len(types):
-        raise where.error(code.co_firstlineno, f"{name}: must have {len(types)} parameters")
-    made = translated_function(program, function, types)
-    if must is not None and made.returns != must:
-        reason = f"{name}: returns {said(made.returns)}; must be {said(must)}"
-        raise where.error(code.co_firstlineno, reason)
-    return made
+        raise source.error(code.co_firstlineno, f"{name}: must have {len(types)} parameters")
+    translated = translated_function(program, function, types)
+    if must is not None and translated.returns != must:
+        reason = f"{name}: returns {in_words(translated.returns)}; must be {in_words(must)}"
+        raise source.error(code.co_firstlineno, reason)
+    return translated
 
 
-def _call(made: Function, names: str) -> str:
-    given = zip(names, made.by_address, strict=True)
-    return f"{made.name}({', '.join(n if b or n in 'ph' else f'*{n}' for n, b in given)})"
+def _call(function: Function, names: str) -> str:
+    arguments = zip(names, function.by_address, strict=True)
+    return f"{function.name}({', '.join(n if b or n in 'ph' else f'*{n}' for n, b in arguments)})"
 
 
 def _function(head: str, lines: list[str]) -> str:
@@ -101,12 +101,12 @@ def _function(head: str, lines: list[str]) -> str:
 
 def _table(block: Any, described: list[Field], states: int) -> str:
     """The variables: inputs, outputs, parameters; value references are places in this table."""
-    found = variables(described)
+    scalars = variables(described)
     kinds = ("input", "output", "parameter")
-    counts = {f"{kind}s": sum(v.causality == kind for v in found) for kind in kinds}
-    counts |= {"state": states, "variables": len(found)}
+    counts = {f"{kind}s": sum(v.causality == kind for v in scalars) for kind in kinds}
+    counts |= {"state": states, "variables": len(scalars)}
     rows = []
-    for v in found:
+    for v in scalars:
         kind = "INTEGER" if v.enumeration else v.type.upper()
         cells = [string(v.name), string(v.in_unit), f"KIND_{kind}", v.causality.upper()]
         limited = "INFINITE" if v.infinite else str(int(v.limits is not None))
@@ -134,7 +134,10 @@ def _conversions(program: Program, described: list[Field]) -> Iterator[str]:
                 inputs.append(f"u->{member} = {value};")
             else:
                 params.append(f"p->{member} = {value};")
-    params += [f"p->{identifier(name)} = {made.name}(p);" for name, made in program.kept.items()]
+    params += [
+        f"p->{identifier(name)} = {prop.name}(p);"
+        for name, prop in program.cached_properties.items()
+    ]
     yield _function("void block_params(const double *values, BlockParams *p)", params)
     yield _function("void block_inputs(const double *values, BlockInputs *u)", inputs)
     yield _function("void block_outputs_to(const BlockOutputs *y, double *values)", outputs)

@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 from . import types
 from .advice import ADVICE
 from .text import Source, UntranslatableError, identifier, number
-from .types import BOOLEAN, REAL, SCALARS, WHOLE, Function, Program, Type, Value, said
+from .types import BOOLEAN, REAL, SCALARS, WHOLE, Function, Program, Type, Value, in_words
 
 CHOICE, OR, AND, EQUAL, LESS, SUM, PRODUCT, SIGN, WORD = range(1, 10)
 """How tightly operators bind in C; WORD is what needs no parentheses."""
@@ -69,14 +69,16 @@ class Expressions:
     def _say(self, line: str) -> None:
         self.lines.append(f"{'    ' * (1 + len(self._inside))}{line}")
 
-    def fresh(self, name: str, own: bool = False) -> str:
+    def fresh(self, name: str, is_own: bool = False) -> str:
         """A name for a variable of C: the block's own, or one for what C cannot say at once."""
-        found, count = identifier(name), 1
-        while found in {*self._used, *self.program.names} or (found in self.locals and not own):
+        unused, count = identifier(name), 1
+        while unused in {*self._used, *self.program.names} or (
+            unused in self.locals and not is_own
+        ):
             count += 1
-            found = f"{name}_{count}"
-        self._used.add(found)
-        return found
+            unused = f"{name}_{count}"
+        self._used.add(unused)
+        return unused
 
     def simple(self, value: Value, name: str = "value") -> Value:
         """The value where it may stand several times: what is more than a name gets a variable."""
@@ -95,30 +97,30 @@ class Expressions:
         """The text of a value where an operator of this level takes it."""
         return value.text if value.level >= level else f"({value.text})"
 
-    def known(self, node: ast.expr) -> Any:
+    def named_object(self, node: ast.expr) -> Any:
         """The object of Python that an expression names, whatever the inputs are."""
         if isinstance(node, ast.Name) and node.id not in self.locals:
-            found = self.names.get(node.id, getattr(builtins, node.id, _UNKNOWN))
-            if found is _UNKNOWN:
+            named = self.names.get(node.id, getattr(builtins, node.id, _UNKNOWN))
+            if named is _UNKNOWN:
                 self.refuse(node, f"{node.id}: there is no such name")
-            return found
+            return named
         if isinstance(node, ast.Attribute):
-            of = self.known(node.value)
+            of = self.named_object(node.value)
             if isinstance(of, ModuleType | type):
                 return getattr(of, node.attr, _UNKNOWN)
         return _UNKNOWN
 
-    def constant(self, node: ast.expr, found: Any) -> Value:
+    def constant(self, node: ast.expr, value: Any) -> Value:
         """A constant of a module; a number that has a name in capitals keeps it."""
-        kind = types.of_value(found)
+        kind = types.of_value(value)
         if kind is None or is_dataclass(kind):
-            self.refuse(node, f"{ast.unparse(node)}: {type(found).__name__} is not in the subset")
+            self.refuse(node, f"{ast.unparse(node)}: {type(value).__name__} is not in the subset")
         names, name = self.names, getattr(node, "attr", getattr(node, "id", ""))
         if isinstance(node, ast.Attribute):
-            names = vars(self.known(node.value))
-        if kind in SCALARS and (isinstance(found, IntEnum) or not name.isupper()):
-            return self._number_of(found)
-        return Value(self.program.constant(dict(names), name, found), kind)
+            names = vars(self.named_object(node.value))
+        if kind in SCALARS and (isinstance(value, IntEnum) or not name.isupper()):
+            return self._number_of(value)
+        return Value(self.program.constant(dict(names), name, value), kind)
 
     def _number_of(self, value: Any) -> Value:
         if isinstance(value, bool):
@@ -128,19 +130,19 @@ class Expressions:
         return Value(text, kind, SIGN if text[0] == "-" else WORD)
 
     def _value(self, node: ast.expr) -> Value:
-        found = self.known(node)
-        if found is not _UNKNOWN:
-            return self.constant(node, found)
-        translate = getattr(self, f"_on_{type(node).__name__.lower()}", self._other)
+        named = self.named_object(node)
+        if named is not _UNKNOWN:
+            return self.constant(node, named)
+        translate = getattr(self, f"_on_{type(node).__name__.lower()}", self._refuse_kind)
         try:
-            made: Value = translate(node)
+            value: Value = translate(node)
         except UntranslatableError:
             raise
         except (TypeError, ValueError, LookupError) as error:
             self.refuse(node, f"{ast.unparse(node)}: {error}")
-        return made
+        return value
 
-    def _other(self, node: ast.AST, kind: Any = None) -> NoReturn:
+    def _refuse_kind(self, node: ast.AST, kind: Any = None) -> NoReturn:
         text = ast.unparse(node).partition("\n")[0]
         otherwise = f"{text}: is not in the subset; {VALID}"
         self.refuse(node, ADVICE.get(kind or type(node).__name__, otherwise))
@@ -150,7 +152,7 @@ class Expressions:
 
     def _as_number(self, value: Value, node: ast.AST) -> Value:
         if value.type not in SCALARS:
-            self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a number")
+            self.refuse(node, f"{ast.unparse(node)} is {in_words(value.type)}: must be a number")
         return value._replace(type=WHOLE) if value.type == BOOLEAN else value
 
     def _condition(self, node: ast.expr) -> Value:
@@ -158,7 +160,7 @@ class Expressions:
         if value.type in (REAL, WHOLE):
             return Value(f"{self._at(value, SUM)} != 0.0", BOOLEAN, EQUAL)
         if value.type != BOOLEAN:
-            self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a condition")
+            self.refuse(node, f"{ast.unparse(node)} is {in_words(value.type)}: must be a condition")
         return value
 
     def _on_constant(self, node: ast.Constant) -> Value:
@@ -178,17 +180,17 @@ class Expressions:
         return self.bound[node.id]
 
     def _on_binop(self, node: ast.BinOp) -> Value:
-        left, right = self._value(node.left), self._value(node.right)
-        if isinstance(left.type, GenericAlias) and isinstance(node.op, ast.Mult):
-            items = [self.simple(item) for item in self._items(left, node.left)]
+        multiplicand, right = self._value(node.left), self._value(node.right)
+        if isinstance(multiplicand.type, GenericAlias) and isinstance(node.op, ast.Mult):
+            items = [self.simple(item) for item in self._items(multiplicand, node.left)]
             return self._display(items * self._index(node.right))
-        a, b = self._as_number(left, node.left), self._as_number(right, node.right)
+        a, b = self._as_number(multiplicand, node.left), self._as_number(right, node.right)
         if isinstance(node.op, ast.Pow):
             if a.type == b.type == WHOLE:
                 self.refuse(node, f"{ast.unparse(node)}: of two ints; write float(...)")
             return Value(f"pow({a.text}, {b.text})", REAL)
         if type(node.op) not in OPERATORS:
-            self._other(node, type(node.op).__name__)
+            self._refuse_kind(node, type(node.op).__name__)
         symbol, level = OPERATORS[type(node.op)]
         text = f"{self._at(a, level)} {symbol} {self._at(b, level + 1)}"
         if a.type == b.type == WHOLE and symbol != "/":  # the zero of an int has no sign
@@ -220,14 +222,16 @@ class Expressions:
     def _on_compare(self, node: ast.Compare) -> Value:
         for op in node.ops:
             if type(op) not in COMPARISONS:
-                self._other(node, type(op).__name__)
+                self._refuse_kind(node, type(op).__name__)
         values = [self._number(item) for item in (node.left, *node.comparators)]
         values[1:-1] = [self.simple(v) for v in values[1:-1]]
-        found = []
+        comparisons = []
         for a, op, b in zip(values, node.ops, values[1:], strict=False):
             symbol, level = COMPARISONS[type(op)]
-            found.append(Value(f"{self._at(a, SUM)} {symbol} {self._at(b, SUM)}", BOOLEAN, level))
-        return self._all(found, "&&", AND)
+            comparisons.append(
+                Value(f"{self._at(a, SUM)} {symbol} {self._at(b, SUM)}", BOOLEAN, level)
+            )
+        return self._all(comparisons, "&&", AND)
 
     def _on_ifexp(self, node: ast.IfExp) -> Value:
         test = self._at(self._condition(node.test), OR)
@@ -238,7 +242,9 @@ class Expressions:
     def _common(self, a: Type, b: Type, node: ast.AST) -> Type:
         """The type of what may be of either; refused where there is none."""
         if a != b:
-            self.refuse(node, f"{ast.unparse(node)} is {said(a)} or {said(b)}: must be one of them")
+            self.refuse(
+                node, f"{ast.unparse(node)} is {in_words(a)} or {in_words(b)}: must be one of them"
+            )
         return a
 
     def _display(self, items: Sequence[Value], kind: Type | None = None) -> Value:
@@ -253,15 +259,15 @@ class Expressions:
 
     def _starred(self, nodes: Sequence[ast.expr]) -> list[Value]:
         """Expressions, with all items of those that have a star."""
-        found: list[Value] = []
+        items: list[Value] = []
         for node in nodes:
             star = isinstance(node, ast.Starred)
-            found += self._items(self._value(node.value), node) if star else [self._value(node)]  # type: ignore[attr-defined]
-        return found
+            items += self._items(self._value(node.value), node) if star else [self._value(node)]  # type: ignore[attr-defined]
+        return items
 
     def _items(self, value: Value, node: ast.AST) -> list[Value]:
         if not isinstance(value.type, GenericAlias) and not types.is_record(value.type):
-            self.refuse(node, f"{ast.unparse(node)} is {said(value.type)}: must be a tuple")
+            self.refuse(node, f"{ast.unparse(node)} is {in_words(value.type)}: must be a tuple")
         if value.items is not None:
             return list(value.items)
         of = self.simple(value).text
@@ -286,7 +292,7 @@ class Expressions:
         try:
             place = ast.literal_eval(node)
         except ValueError:
-            place = self.known(node)
+            place = self.named_object(node)
         if not isinstance(place, int):
             loop = "to go through a tuple write for x in items, or for x, y in zip(a, b)"
             self.refuse(node, f"[{ast.unparse(node)}]: an index must be a constant; {loop}")
@@ -297,21 +303,23 @@ class Expressions:
         value, name = self._value(node.value), node.attr
         t = value.type
         if t in SCALARS or isinstance(t, GenericAlias):
-            self.refuse(node, f"{ast.unparse(node)}: {said(t)} has no {name}")
-        known = types.fields(t)
-        if name in known:
+            self.refuse(node, f"{ast.unparse(node)}: {in_words(t)} has no {name}")
+        kinds = types.fields(t)
+        if name in kinds:
             if types.is_record(t):
-                return self._items(value, node)[[*known].index(name)]
-            kind = known[name]
+                return self._items(value, node)[[*kinds].index(name)]
+            kind = kinds[name]
             address = "&" if is_dataclass(kind) else ""
             return Value(f"{address}{self._arrow(value)}{identifier(name)}", kind)
-        found = inspect.getattr_static(t, name, None)
-        if isinstance(found, cached_property) and t == self.program.params:
-            if name not in self.program.kept:
-                self.program.kept[name] = self.translate(found.func, [t])
-            return Value(self._arrow(value) + identifier(name), self.program.kept[name].returns)
-        if isinstance(found, property | cached_property):
-            getter = found.fget if isinstance(found, property) else found.func
+        member = inspect.getattr_static(t, name, None)
+        if isinstance(member, cached_property) and t == self.program.params:
+            if name not in self.program.cached_properties:
+                self.program.cached_properties[name] = self.translate(member.func, [t])
+            return Value(
+                self._arrow(value) + identifier(name), self.program.cached_properties[name].returns
+            )
+        if isinstance(member, property | cached_property):
+            getter = member.fget if isinstance(member, property) else member.func
             return self._call(getter, [value], {}, node)
         return self.refuse(node, f"{ast.unparse(node)}: {t.__name__} has no {name}")
 
@@ -319,7 +327,7 @@ class Expressions:
         return f"{value.text[1:]}." if value.text[0] == "&" else f"{value.text}->"
 
     def _on_call(self, node: ast.Call) -> Value:
-        function = self.known(node.func)
+        function = self.named_object(node.func)
         function = getattr(function, "__wrapped__", function)  # an lru_cache only saves time
         if isinstance(node.func, ast.Attribute) and function is _UNKNOWN:
             return self._method(node, node.func)
@@ -330,44 +338,48 @@ class Expressions:
         if function in (min, max, abs, float, len) or function in TO_WHOLE:
             return self._builtin(node, function)
         if function in FUNCTIONS:
-            given = [self._number(a).text for a in node.args]
-            if len(given) != (2 if function in OF_TWO else 1):
+            operands = [self._number(a).text for a in node.args]
+            if len(operands) != (2 if function in OF_TWO else 1):
                 self.refuse(node, f"{ast.unparse(node)}: has another number of arguments in C")
-            return Value(f"{FUNCTIONS[function]}({', '.join(given)})", REAL)
+            return Value(f"{FUNCTIONS[function]}({', '.join(operands)})", REAL)
         if function in ADVICE:
-            self._other(node, function)
+            self._refuse_kind(node, function)
         arguments = self._starred(node.args)
-        named = {k.arg: self._value(k.value) for k in node.keywords if k.arg}
+        keywords = {k.arg: self._value(k.value) for k in node.keywords if k.arg}
         if types.is_record(function):
-            found = self._matched(function, arguments, named, node)
-            for value, kind in zip(found, types.parts(function), strict=True):
+            items = self._matched(function, arguments, keywords, node)
+            for value, kind in zip(items, types.parts(function), strict=True):
                 self._common(value.type, kind, node)
-            return self._display(found, function)
+            return self._display(items, function)
         if not isinstance(function, FunctionType):
-            self._other(node.func)
-        return self._call(function, arguments, named, node)
+            self._refuse_kind(node.func)
+        return self._call(function, arguments, keywords, node)
 
     def _call(
-        self, function: Any, given: Sequence[Value], named: Mapping[str, Value], node: ast.AST
+        self,
+        function: Any,
+        positional: Sequence[Value],
+        keywords: Mapping[str, Value],
+        node: ast.AST,
     ) -> Value:
-        arguments = self._matched(function, given, named, node)
-        made = self.translate(function, [a.type for a in arguments])
+        arguments = self._matched(function, positional, keywords, node)
+        translated = self.translate(function, [a.type for a in arguments])
         texts = [a.text for a in arguments]
-        for i in (i for i, by_address in enumerate(made.by_address) if by_address):
+        for i in (i for i, by_address in enumerate(translated.by_address) if by_address):
             text = self.simple(arguments[i]).text
             texts[i] = text[1:] if text[0] == "*" else f"&{text}"
-        return Value(f"{made.name}({', '.join(texts)})", made.returns)
+        return Value(f"{translated.name}({', '.join(texts)})", translated.returns)
 
-    def _matched(self, function: Any, given: Any, named: Any, node: ast.AST) -> list[Value]:
+    def _matched(self, function: Any, positional: Any, keywords: Any, node: ast.AST) -> list[Value]:
         signature = inspect.signature(function)
         if any(p.kind != p.POSITIONAL_OR_KEYWORD for p in signature.parameters.values()):
             self.refuse(node, "*args, **kwargs and keywords alone are not in the subset")
-        bound = signature.bind(*given, **named)
+        bound = signature.bind(*positional, **keywords)
         bound.apply_defaults()
         return [v if isinstance(v, Value) else self._number_of(v) for v in bound.arguments.values()]
 
     def _method(self, node: ast.Call, of: ast.Attribute) -> Value:
-        table = self.known(of.value)
+        table = self.named_object(of.value)
         if isinstance(table, Mapping) and of.attr == "get":
             key, default = (self._number(a) for a in node.args)
             at = self.simple(key).text
@@ -375,8 +387,8 @@ class Expressions:
             return Value(text + self._at(default, CHOICE), default.type, CHOICE)
         value = self._value(of.value)
         if of.attr != "_replace" or not types.is_record(value.type):
-            said = f"{ast.unparse(of)}: is not in the subset"
-            self.refuse(node, f"{said}; use a function of the module")
+            reason = f"{ast.unparse(of)}: is not in the subset"
+            self.refuse(node, f"{reason}; use a function of the module")
         new = [(identifier(str(k.arg)), self._value(k.value).text) for k in node.keywords]
         copy = self._copied(value, "changed")
         for name, text in new:
@@ -384,17 +396,17 @@ class Expressions:
         return copy
 
     def _builtin(self, node: ast.Call, function: Any) -> Value:
-        given = self._starred(node.args)
-        if len(given) == 1 and isinstance(given[0].type, GenericAlias):
-            given = self._items(given[0], node)
+        arguments = self._starred(node.args)
+        if len(arguments) == 1 and isinstance(arguments[0].type, GenericAlias):
+            arguments = self._items(arguments[0], node)
             if function is len:
-                return self._number_of(len(given))
-        value, *others = [self._as_number(a, node) for a in given]
+                return self._number_of(len(arguments))
+        value, *remaining = [self._as_number(a, node) for a in arguments]
         if function in (min, max):
-            for other in others:
-                kind = self._common(value.type, other.type, node)
+            for operand in remaining:
+                kind = self._common(value.type, operand.type, node)
                 name = "smaller" if function is min else "larger"
-                value = Value(f"{name}({value.text}, {other.text})", kind)
+                value = Value(f"{name}({value.text}, {operand.text})", kind)
             return value
         if function is float:
             return value._replace(type=REAL)
@@ -409,21 +421,23 @@ class Expressions:
         loop = over.generators[0]
         if len(over.generators) > 1 or loop.ifs:
             self.refuse(over, "a generator must have one for, and no if")
-        before, hidden, found = dict(self.bound), self.locals, []
-        self.locals = hidden | {n.id for n in ast.walk(loop.target) if isinstance(n, ast.Name)}
+        bound, outer_locals, items = dict(self.bound), self.locals, []
+        self.locals = outer_locals | {
+            n.id for n in ast.walk(loop.target) if isinstance(n, ast.Name)
+        }
         for row in self._rows(loop.iter):
             self._bind(loop.target, row)
             if function is tuple:
-                found.append(self.simple(self._value(over.elt), "item"))
+                items.append(self.simple(self._value(over.elt), "item"))
             else:
-                found.append(self._condition(over.elt))
-        self.bound, self.locals = before, hidden
+                items.append(self._condition(over.elt))
+        self.bound, self.locals = bound, outer_locals
         if function is tuple:
-            return self._display(found)
-        return self._all(found, *(("||", OR) if function is any else ("&&", AND)))
+            return self._display(items)
+        return self._all(items, *(("||", OR) if function is any else ("&&", AND)))
 
     def _rows(self, node: ast.expr) -> list[Value]:
-        if isinstance(node, ast.Call) and self.known(node.func) is zip:
+        if isinstance(node, ast.Call) and self.named_object(node.func) is zip:
             columns = [self._items(self._value(a), a) for a in node.args]
             return [self._display(row) for row in zip(*columns, strict=False)]
         return self._items(self._value(node), node)

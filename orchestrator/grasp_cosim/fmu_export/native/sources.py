@@ -83,27 +83,32 @@ def native_sources(
 
 
 def proxy_sources(
-    name: str, original: str, own: Mapping[str, str], guid: str, fmi: Version
+    name: str, original: str, generated: Mapping[str, str], guid: str, fmi: Version
 ) -> dict[str, bytes]:
     """Return the same of a proxy of the FMU with the file name `original`.
 
     `own` are the files that only this proxy has: the wire with its signature, its variables.
     """
     texts = {"how": _PROXY, "system": _SYSTEM, "defined": f"PROXY_ORIGINAL {string(original)}"}
-    return _sources(name, guid, fmi, own, OF_PROXY, texts)
+    return _sources(name, guid, fmi, generated, OF_PROXY, texts)
 
 
 def _sources(
-    name: str, guid: str, fmi: Version, own: Mapping[str, str], kind: Sequence[str], texts: Any
+    name: str,
+    guid: str,
+    fmi: Version,
+    generated: Mapping[str, str],
+    kind: Sequence[str],
+    texts: Any,
 ) -> dict[str, bytes]:
     """Return NAME.c, own files, those that are the same in every FMU of a kind, and in all."""
-    included = "\n".join(f'#include "{file}"' for file in own)
-    more = {"name": name, "fmi": fmi, "guid": guid, "slave": kind[-1], "included": included}
+    included = "\n".join(f'#include "{file}"' for file in generated)
+    common = {"name": name, "fmi": fmi, "guid": guid, "slave": kind[-1], "included": included}
     files = [C / file for file in ("variable.h", "slave.h", *kind, f"fmi{fmi}.h")]
     files += sorted((C / "headers").glob(f"fmi{fmi}*.h"))  # of the FMI standard
     return {
-        f"{name}.c": Template(_MAIN).substitute(texts, **more).encode(),
-        **{file: text.encode() for file, text in own.items()},
+        f"{name}.c": Template(_MAIN).substitute(texts, **common).encode(),
+        **{file: text.encode() for file, text in generated.items()},
         **{file.name: file.read_bytes() for file in files},
     }
 

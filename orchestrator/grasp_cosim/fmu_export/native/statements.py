@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from .expressions import SIGN, WORD, Expressions
 from .text import comment, string, wrapped
-from .types import REAL, WHOLE, Function, Program, Type, Value, is_record, said, size
+from .types import REAL, WHOLE, Function, Program, Type, Value, in_words, is_record, size
 
 LARGE = 30
 """A NamedTuple of more numbers goes by its address, unless the function changes it."""
@@ -48,7 +48,7 @@ class Body(Expressions):
         heads, arguments = [], self.node.args.args
         changed = {*_names(self.node, ast.Store)}
         for argument, kind, name in zip(arguments, types, names, strict=True):
-            c_name, is_copy = self.fresh(name, own=True), argument.arg in changed
+            c_name, is_copy = self.fresh(name, is_own=True), argument.arg in changed
             large = is_record(kind) and size(kind) > LARGE and not is_copy
             self.by_address += (large,)
             text, level = (f"*{c_name}", SIGN) if large else (c_name, WORD)
@@ -62,10 +62,10 @@ class Body(Expressions):
         late = [f"    {kind} {', '.join(names)};" for kind, names in self._late.items()]
         names = [head.split()[-1].lstrip("*") for head in heads]
         unused = [f"    (void){n};" for n in names if not re.search(rf"\b{n}\b", text)]
-        said = ast.get_docstring(self.node)
+        docstring = ast.get_docstring(self.node)
         head = wrapped(f"static {returns} {name}({', '.join(heads) or 'void'})")
         lines = [head, "{", *map(wrapped, [*late, *unused, *self.lines]), "}", ""]
-        return "\n".join([comment(said), *lines] if said else lines)
+        return "\n".join([comment(docstring), *lines] if docstring else lines)
 
     def block(self, body: Sequence[ast.stmt], inner: bool = False) -> None:
         """The statements of a block, with the comments before and behind them."""
@@ -75,7 +75,7 @@ class Body(Expressions):
         for statement in body:
             for line in range(end, statement.lineno):
                 self._remark(line, alone=True)
-            getattr(self, f"_on_{type(statement).__name__.lower()}", self._other)(statement)
+            getattr(self, f"_on_{type(statement).__name__.lower()}", self._refuse_kind)(statement)
             self._remark(statement.lineno, alone=False)
             end = statement.lineno + 1
         if inner:
@@ -145,43 +145,46 @@ class Body(Expressions):
             return
         old = self._variables.get(name) or self.bound.get(name)
         if old and value.type not in (old.type, WHOLE if old.type == REAL else old.type):
-            kinds = f"{said(old.type)}, then {said(value.type)}"
+            kinds = f"{in_words(old.type)}, then {in_words(value.type)}"
             self.refuse(node, f"{name} is {kinds}; use another name, or write 0.0 for 0")
-        stored = old or Value(self.fresh(name, own=True), value.type)
+        stored = old or Value(self.fresh(name, is_own=True), value.type)
         self.bound[name] = self._variables[name] = stored
         begin, kind = "", self.program.c(value.type, self.names)
         if not old and self._inside and self._inside[-1][name] < self._uses[name]:
             # Other blocks use it, too. A compiler does not see that a loop runs: see _go_on()
             start = {"double": " = 0.0", "int": " = 0"}.get(kind, " = {0}")
-            self._late.setdefault(kind, []).append(stored.text + start * bool(self._exits))
+            self._late.setdefault(kind, []).append(
+                f"{stored.text}{start}" if self._exits else stored.text
+            )
         elif not old:
             begin = f"{kind} "
         self._say(f"{begin}{stored.text} = {value.text};")
 
     def _on_if(self, node: ast.If) -> None:
-        branches, rest = [(self._condition(node.test).text, node.body)], node.orelse
-        while len(rest) == 1 and isinstance(rest[0], ast.If):
-            branches.append((self._condition(rest[0].test).text, rest[0].body))
-            rest = rest[0].orelse
-        before, after = dict(self.bound), [] if rest else [{*self.bound}]
-        for i, (test, body) in enumerate([*branches, *([("", rest)] if rest else [])]):
+        branches, otherwise = [(self._condition(node.test).text, node.body)], node.orelse
+        while len(otherwise) == 1 and isinstance(otherwise[0], ast.If):
+            branches.append((self._condition(otherwise[0].test).text, otherwise[0].body))
+            otherwise = otherwise[0].orelse
+        bound, exits = dict(self.bound), [] if otherwise else [{*self.bound}]
+        for i, (test, body) in enumerate([*branches, *([("", otherwise)] if otherwise else [])]):
             head = f"if ({test}) {{" if test else "{"
             self._say(f"}} else {head}" if i else head)
-            self.bound = dict(before)
+            self.bound = dict(bound)
             self.block(body, inner=True)
-            after += [] if _leaves(body) else [{*self.bound}]
+            if not _leaves(body):
+                exits.append({*self.bound})
         self._say("}")
-        self._go_on(before, after)
+        self._go_on(bound, exits)
 
-    def _go_on(self, before: dict[str, Value], ways: list[set[str]]) -> None:
+    def _go_on(self, bound: dict[str, Value], exits: list[set[str]]) -> None:
         """Go on with what has a value on all ways."""
-        everywhere = set[str].intersection(*ways) if ways else set()
-        self.bound = {n: self._variables[n] for n in everywhere if n in self._variables} | before
+        everywhere = set[str].intersection(*exits) if exits else set()
+        self.bound = {n: self._variables[n] for n in everywhere if n in self._variables} | bound
 
     def _on_for(self, node: ast.For) -> None:
         call, name = node.iter, ast.unparse(node.target)
         changed = {n for s in node.body for n in _names(s, ast.Store)}
-        is_range = isinstance(call, ast.Call) and self.known(call.func) is range
+        is_range = isinstance(call, ast.Call) and self.named_object(call.func) is range
         if node.orelse or {*_names(node.target)} & changed - {"_"}:
             self.refuse(node, f"{name}: must not be changed in its loop, which has no else")
         if not isinstance(call, ast.Call) or not is_range:
@@ -198,7 +201,7 @@ class Body(Expressions):
         counter = self.fresh("i" if name == "_" else name)
         constant = isinstance(call.args[-1], ast.Constant) and name == "_"
         self._late.setdefault("int" if constant else "double", []).append(counter)
-        before = dict(self.bound)
+        bound = dict(self.bound)
         if name != "_":
             self.bound[name] = Value(counter, WHOLE)
         last = last.removesuffix(".0") if constant else last
@@ -206,11 +209,11 @@ class Body(Expressions):
         self._exits.append([])
         self.block(node.body, inner=True)
         self._say("}")
-        ways = self._exits.pop() + ([] if _leaves(node.body) else [{*self.bound} - {name}])
+        exits = self._exits.pop() + ([] if _leaves(node.body) else [{*self.bound} - {name}])
         count = call.args[0]
-        fixed = count.value if isinstance(count, ast.Constant) else self.known(count)
+        fixed = count.value if isinstance(count, ast.Constant) else self.named_object(count)
         runs = len(call.args) == 1 and isinstance(fixed, int) and fixed > 0
-        self._go_on(before, ways if runs and ways else [{*before}])
+        self._go_on(bound, exits if runs and exits else [{*bound}])
 
     def _on_each(self, node: ast.For, changed: set[str]) -> None:
         """A loop over a tuple, or zip() of tuples, item by item."""
@@ -241,7 +244,7 @@ class Check(Body):
         call = node.value
         if isinstance(call, ast.Constant):
             return
-        function = self.known(call.func) if isinstance(call, ast.Call) else None
+        function = self.named_object(call.func) if isinstance(call, ast.Call) else None
         if getattr(function, "__name__", "") not in ("check", "__post_init__"):
             self.refuse(node, f"{ast.unparse(node)}: has no effect; leave it out")
 
@@ -280,11 +283,11 @@ def translated_function(program: Program, function: Any, types: Sequence[Type]) 
         text = body.definition(name, types)
         program.functions[key] = Function(name, cast(Type, body.returns), body.by_address)
         program.bodies.append(text)
-    if made := program.functions[key]:
-        return made
-    where = program.source(key[0].co_filename)
+    if translated := program.functions[key]:
+        return translated
+    source = program.source(key[0].co_filename)
     reason = f"{function.__name__}: calls itself; use a loop"
-    raise where.error(key[0].co_firstlineno, reason)
+    raise source.error(key[0].co_firstlineno, reason)
 
 
 def _leaves(body: Sequence[ast.stmt], *by: type[ast.stmt]) -> bool:
@@ -296,5 +299,5 @@ def _leaves(body: Sequence[ast.stmt], *by: type[ast.stmt]) -> bool:
 
 
 def _names(node: ast.AST, context: type[ast.expr_context] = ast.expr_context) -> list[str]:
-    found = (n for n in ast.walk(node) if isinstance(n, ast.Name))
-    return [n.id for n in found if isinstance(n.ctx, context)]
+    nodes = (n for n in ast.walk(node) if isinstance(n, ast.Name))
+    return [n.id for n in nodes if isinstance(n.ctx, context)]

@@ -52,7 +52,7 @@ def targets(names: Iterable[str]) -> list[Target]:
     return list(chosen)
 
 
-def here() -> Target:
+def this_target() -> Target:
     """Return the platform of this Python."""
     name = platform_tuple()
     for target in KNOWN:
@@ -67,12 +67,12 @@ def folders(requested: Iterable[Target], fmi: Version) -> tuple[dict[Target, str
     This machine's binary is in, too, unless a target takes its folder: FMI 2.0 has one for both
     processors of a system. On macOS one file serves both; of two for Linux x86-64 has linux64.
     """
-    this_target = here()
+    target_here = this_target()
     targets = list(dict.fromkeys(requested))
     if fmi == 3:
-        return {t: t.tuple for t in dict.fromkeys((this_target, *targets))}, ""
-    if this_target.folder not in {t.folder for t in targets}:
-        targets = [this_target, *targets]
+        return {t: t.tuple for t in dict.fromkeys((target_here, *targets))}, ""
+    if target_here.folder not in {t.folder for t in targets}:
+        targets = [target_here, *targets]
     places = {t: t.folder for t in targets}
     if {LINUX_X86, LINUX_ARM} <= places.keys():
         places[LINUX_ARM] = LINUX_ARM.tuple
@@ -80,9 +80,9 @@ def folders(requested: Iterable[Target], fmi: Version) -> tuple[dict[Target, str
             "FMI 2.0 has one folder for both, linux64: x86_64-linux is there, aarch64-linux in a "
             "folder of that name, which few hosts look at; must be without linux64, or --fmi 3"
         )
-    if this_target not in places:
+    if target_here not in places:
         return places, (
-            f"{this_target.folder} holds what was asked for, not {this_target.tuple}, this "
+            f"{target_here.folder} holds what was asked for, not {target_here.tuple}, this "
             "machine's: FMI 2.0 "
             "has one folder for both; --fmi 3 has two"
         )

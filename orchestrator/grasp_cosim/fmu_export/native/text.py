@@ -87,15 +87,15 @@ def wrapped(line: str, begin: str = "") -> str:
 class Source:
     """A Python file: its functions by their first line, its comments, what is said of members."""
 
-    def __init__(self, file: str, shown: str) -> None:
-        self.shown, self.text = shown, Path(file).read_text("utf-8")
+    def __init__(self, file: str, label: str) -> None:
+        self.shown, self.text = label, Path(file).read_text("utf-8")
         self.tree = ast.parse(self.text, file)
 
     @cached_property
     def functions(self) -> dict[int, ast.FunctionDef]:
         """Each function by the line that its code object begins at."""
-        found = (n for n in ast.walk(self.tree) if isinstance(n, ast.FunctionDef))
-        return {min([n.lineno, *(d.lineno for d in n.decorator_list)]): n for n in found}
+        nodes = (n for n in ast.walk(self.tree) if isinstance(n, ast.FunctionDef))
+        return {min([n.lineno, *(d.lineno for d in n.decorator_list)]): n for n in nodes}
 
     @cached_property
     def comments(self) -> dict[int, tuple[str, bool]]:

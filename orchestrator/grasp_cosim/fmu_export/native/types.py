@@ -47,8 +47,8 @@ def of_value(value: Any) -> Type | None:
 
 
 def _tuple_of(items: Iterable[Type | None]) -> Type | None:
-    known = [*items]
-    return GenericAlias(tuple, tuple(known)) if all(known) else None
+    types = [*items]
+    return GenericAlias(tuple, tuple(types)) if all(types) else None
 
 
 def is_record(cls: Any) -> bool:
@@ -58,13 +58,13 @@ def is_record(cls: Any) -> bool:
 
 def fields(t: Any) -> dict[str, Type]:
     """The fields of a class with their types; TypeError for one that C cannot have."""
-    found = {}
+    kinds = {}
     for name, hint in get_type_hints(t, include_extras=True).items():
         kind = of_hint(hint)
         if kind is None:
             raise TypeError(f"{t.__name__}.{name}: must be a number, a tuple or a NamedTuple")
-        found[name] = kind
-    return found
+        kinds[name] = kind
+    return kinds
 
 
 def parts(t: Type) -> tuple[Type, ...]:
@@ -86,9 +86,9 @@ def plain(t: Type) -> Type:
     return REAL if t == WHOLE else t
 
 
-def said(t: Type) -> str:
+def in_words(t: Type) -> str:
     """A type in words."""
-    name = f"tuple[{', '.join(map(said, parts(t)))}]"
+    name = f"tuple[{', '.join(map(in_words, parts(t)))}]"
     return name if isinstance(t, GenericAlias) else t.__name__
 
 
@@ -109,7 +109,7 @@ class Program:
         self._source = cache(Source)
         self.functions: dict[Any, Function | None] = {}
         """By code and the types of the arguments; None while it is being translated."""
-        self.kept: dict[str, Function] = {}
+        self.cached_properties: dict[str, Function] = {}
         """The cached properties of the parameters, which are worked out when those are read."""
         self.bodies: list[str] = []
         self.names: dict[str, Any] = {}
@@ -119,19 +119,19 @@ class Program:
 
     def source(self, file: str) -> Source:
         """The source in a file."""
-        own = self.file is not None and Path(file).name == self.file.name
-        return self._source(file, str(self.file) if own else Path(file).name)
+        is_own = self.file is not None and Path(file).name == self.file.name
+        return self._source(file, str(self.file) if is_own else Path(file).name)
 
     def unique(self, module: str, name: str, key: Any) -> str:
         """The name in C of what a module has, behind the module's own name."""
         short = module.rpartition(".")[2].removesuffix("_block")
         short = f"{short}_py" if short in ("block", "text", "slave") else short
-        wanted = "_".join([short, *(part.lstrip("_") for part in name.split("."))])
-        found, count = wanted, 1
-        while self.names.setdefault(found, key) != key:
+        base_name = "_".join([short, *(part.lstrip("_") for part in name.split("."))])
+        unused, count = base_name, 1
+        while self.names.setdefault(unused, key) != key:
             count += 1
-            found = f"{wanted}_{count}"
-        return found
+            unused = f"{base_name}_{count}"
+        return unused
 
     def c(self, t: Type, near: dict[str, Any] | None = None) -> str:
         """A type in C; `near` are the names of the module that asks, one of which a tuple gets."""
@@ -178,8 +178,8 @@ class Program:
         lines.append("typedef struct {")
         for name, kind, meaning in self._members(t):
             self._define(kind, done)
-            said = f" {comment(meaning)}" if meaning else ""
-            lines.append(f"    {self.c(kind)} {name};{said}")
+            meaning_comment = f" {comment(meaning)}" if meaning else ""
+            lines.append(f"    {self.c(kind)} {name};{meaning_comment}")
         done[t] = "\n".join([*lines, f"}} {self.c(t)};", ""])
 
     def _members(self, t: Type) -> Iterator[tuple[str, Type, str]]:
@@ -190,13 +190,14 @@ class Program:
             yield f"at[{len(parts(t))}]", parts(t)[0], ""
         else:
             yield from ((f"at_{i}", kind, "") for i, kind in enumerate(parts(t)))
-        for name, made in self.kept.items() if t == self.params else ():
-            yield identifier(name), made.returns, "worked out from the others"
+        for name, prop in self.cached_properties.items() if t == self.params else ():
+            yield identifier(name), prop.returns, "worked out from the others"
 
     def _meaning(self, cls: type[Any], name: str) -> str:
         hint = get_type_hints(cls, include_extras=True)[name]
         for declared in getattr(hint, "__metadata__", ())[:1]:
-            return str(declared.description) + f", {declared.unit}" * bool(declared.unit)
+            unit = f", {declared.unit}" if declared.unit else ""
+            return f"{declared.description}{unit}"
         spec: Any = sys.modules[cls.__module__].__spec__
         return re.sub(r"\s+", " ", self.source(spec.loader.path).member(cls.__name__, name))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from grasp_cosim.fmu_export.native.targets import here
+from grasp_cosim.fmu_export.native.targets import this_target
 from support.c_host import Grasp, Host, Part, Script, bits, good
 from support.direct import BENCH, rows_in_python
 from support.marks import platforms, slow
@@ -75,7 +75,7 @@ def test_where_a_decimal_point_is_a_comma(grasp, host, tmp_path):
 
 def test_memory_is_asked_for_at_the_start_and_for_states_alone(grasp, tmp_path):
     """Counted in malloc itself: a real-time target needs it so. Refusals ask for none, either."""
-    host = host_of(here(), tmp_path, ["-DCOUNT_ALLOCATIONS"])
+    host = host_of(this_target(), tmp_path, ["-DCOUNT_ALLOCATIONS"])
     script = started(grasp)
     grasp.record(script, tmp_path / "rows")
     script.add("memory").add("loop", 0, 20, bits(H)).add("memory").add("loop", 20, 1000, bits(H))
@@ -108,7 +108,7 @@ SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 @pytest.mark.slow
 @fmi_2_first
 def test_sanitizers_find_nothing(parts, tmp_path):
-    everything(_sanitized(parts, tmp_path), host_of(here(), tmp_path, SANITIZERS), tmp_path)
+    everything(_sanitized(parts, tmp_path), host_of(this_target(), tmp_path, SANITIZERS), tmp_path)
 
 
 def _sanitized(parts, folder):

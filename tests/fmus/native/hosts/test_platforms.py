@@ -28,7 +28,7 @@ from grasp_cosim.fmu_export.native.targets import (
     MAC_X86,
     WINDOWS,
     Target,
-    here,
+    this_target,
 )
 from grasp_cosim.grasp.presets import SYSTEM
 from grasp_cosim.hil.served import Service
@@ -106,10 +106,10 @@ def test_a_state_goes_from_machine_to_machine_and_back(
     """As bytes, here, there, here again; the first bytes that there are made are those of here."""
     there = Grasp(parts_on(platform, fmi), BENCH)
     ours = Grasp(parts_of(fmi), BENCH)
-    whole = run(host_for(here()), ours, tmp_path, 300, H)
-    first, states = leg(host_for(here()), ours, tmp_path, None, 0)
+    whole = run(host_for(this_target()), ours, tmp_path, 300, H)
+    first, states = leg(host_for(this_target()), ours, tmp_path, None, 0)
     second, states = leg(host_for(platform.target), there, tmp_path, states, 100)
-    third, _ = leg(host_for(here()), ours, tmp_path, states, 200)
+    third, _ = leg(host_for(this_target()), ours, tmp_path, states, 200)
     found = np.vstack([first[:-1], second[:-1], third])
     if platform.same_bits:
         assert np.array_equal(found.view(np.uint64), whole.view(np.uint64))
