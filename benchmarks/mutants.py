@@ -305,6 +305,8 @@ class Trial:
         ]
         if not items:
             return None
+        if sys.platform == "win32":
+            raise SystemExit("mutants meet tests in forks, which Windows does not have")
         process = os.fork()
         if not process:
             os.setpgid(0, 0)
