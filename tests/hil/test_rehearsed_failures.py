@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 from grasp_cosim import simulate
 from grasp_cosim.base.errors import InputError, SimulationError
-from grasp_cosim.hil.rehearsal import FAILURES, MEANINGS, Rehearsal, Rehearsed
+from grasp_cosim.hil.rehearsal import FAILURES, MEANINGS, Rehearsal, Rehearsed, end_at_once
 from grasp_cosim.hil.served import Service
 from support.proxies import ANY_PORT, build_proxy, serving
 
@@ -122,3 +122,10 @@ def test_a_bench_that_was_replaced_gets_no_commands(grasp, tmp_path):
     assert result.initialised_anew == ()
     assert counts["other_name"] > 0
     assert counts["steps"] <= 2
+
+
+def test_one_that_is_killed_ends_as_by_sigkill(monkeypatch):
+    codes = []
+    monkeypatch.setattr("os._exit", codes.append)
+    end_at_once()
+    assert codes == [137]

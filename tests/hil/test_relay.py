@@ -23,7 +23,7 @@ from grasp_cosim.base.errors import InputError
 from grasp_cosim.hil import traffic as traffic_module
 from grasp_cosim.hil.network_conditions import DIRECTIONS, Conditions, Network, Outage, damaged
 from grasp_cosim.hil.relay import MAX_CLIENTS, Relay
-from grasp_cosim.hil.traffic import Counters, Entry, Traffic
+from grasp_cosim.hil.traffic import MAX_HELD, Counters, Entry, Traffic
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
@@ -432,3 +432,24 @@ def test_wrong_input_is_one_line(tmp_path, arguments, said, capsys):
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert err.startswith(f"grasp-cosim: {said.format(missing)}")
+
+
+@pytest.mark.parametrize("counted", [(0, 0, 0, 0), (1, 2, 3, 4), (0, 5, 7, 0), (3, 0, 0, 2)])
+def test_what_is_dropped_is_all_that_does_not_get_through(counted):
+    lost, outage, overflow, unsent = counted
+    counters = Counters(9, 9, 9, 9, 9, lost, outage, overflow, unsent, 9)
+    assert counters.dropped == sum(counted)
+
+
+def test_of_more_than_can_be_under_way_the_newest_are_dropped():
+    traffic, sent = Traffic(Network(dict.fromkeys(DIRECTIONS, Conditions(delay=1.0)))), []
+    for number in range(MAX_HELD + 3):
+        traffic.receive("request", str(number).encode(), lambda d: sent.append(d) or True, 0)
+    counters = traffic.counters["request"]
+    assert (counters.held, counters.overflow, counters.received) == (MAX_HELD, 3, MAX_HELD + 3)
+    assert traffic.next_due() == 10**9
+    traffic.send_due(10**9 - 1)
+    assert sent == []
+    traffic.send_due(10**9)
+    assert sent == [str(number).encode() for number in range(MAX_HELD)]
+    assert (traffic.next_due(), counters.held, counters.delivered) == (None, 0, MAX_HELD)
