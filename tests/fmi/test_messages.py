@@ -198,6 +198,51 @@ def test_an_error_has_the_messages_of_its_step():
     assert messages.reasons() == ["slower", "stuck"]
 
 
+def test_what_pythonfmu_says_of_an_exception_is_told_where_there_is_nothing_else():
+    messages = Messages("a", False, lambda: 0.5)
+    fatal = b"Fatal py exception encountered: [do_step] step\n"
+    messages.take(ERROR, fatal + b"ValueError: no")
+    messages.take(ERROR, b"a, t = 0.5 s: the lamp is broken")
+    assert messages.reasons() == ["the lamp is broken"]
+    messages.take(ERROR, fatal + b"ValueError: no")
+    assert messages.reasons() == ["ValueError: no"]
+
+
+@pytest.mark.parametrize(
+    ("logged", "returned", "lines"),
+    [
+        (0, 0, []),
+        (0, 1, ["a: a call returned a warning at t = 0.75 s"]),
+        (0, 2, ["a: a call returned a warning at t = 0.75 s; 1 more followed"]),
+        (1, 1, ["a: warning at t = 0.5 s: w"]),
+        (2, 1, ["a: warning at t = 0.5 s: w; 1 more followed"]),
+        (1, 3, ["a: warning at t = 0.5 s: w",
+                "a: a call returned a warning at t = 0.75 s; 2 more followed"]),
+    ],
+)  # fmt: skip
+def test_warnings_that_are_returned_are_told_where_fewer_were_logged(logged, returned, lines):
+    messages = Messages("a", False, lambda: 0.5)
+    for _ in range(logged):
+        messages.take(WARNING, b"w")
+    assert messages.remarks(returned, 0.75) == lines
+
+
+def test_a_warning_that_a_function_returns_is_kept_where_it_logged_none():
+    messages = Messages("a", False, lambda: 0.5)
+    messages.returned("fmi2GetReal", messages.count)
+    assert messages.remarks() == ["a: warning at t = 0.5 s: fmi2GetReal returned a warning"]
+    since = messages.count
+    messages.take(WARNING, b"w")
+    messages.returned("fmi2GetReal", since)
+    assert messages.count == 2
+    saved = messages.saved()
+    messages.take(ERROR, b"e")
+    messages.restore(saved)
+    assert (messages.count, len(messages.remarks())) == (2, 1)
+    messages.forget()
+    assert (messages.count, messages.remarks()) == (0, [])
+
+
 def test_an_error_after_which_the_run_goes_on_is_a_remark():
     messages = Messages("a", False, lambda: 0.5)
     messages.keep(Message(ERROR, "no  disk", 0.25))
