@@ -12,12 +12,11 @@ from grasp_cosim.report.plot import RED
 from grasp_cosim.report.terminal import timing_lines
 from grasp_cosim.report.timing_chart import (
     decade_limits,
-    duration,
     exceedance,
     part_styles,
     timing_html,
-    timing_sentence,
 )
+from grasp_cosim.report.timing_words import duration, part_label, timing_sentence
 from grasp_cosim.report.wording import Caption
 from matplotlib.colors import same_color
 from report.runs import PERIOD, paced
@@ -96,7 +95,7 @@ def test_curves_of_parts_a_red_period_and_overruns_in_the_colours_of_their_culpr
     above, below = figure_of(timing)
     lines = {line.get_label().partition(":")[0].strip(): line for line in above.lines}
     for part, spread in timing.parts.items():
-        line = lines[timing_chart.part_label(part)]
+        line = lines[part_label(part)]
         assert same_color(line.get_color(), part_styles(timing)[part][0])
         assert points(line)[-1] == [spread.worst, 1.0 / timing.steps]
     limits = [line for line in above.lines if same_color(line.get_color(), RED)]

@@ -12,7 +12,6 @@ from ..recording.folder import FORMS, Form, RunFolder
 from ..recording.mdf import check_mdf
 from ..recording.result import Result
 from ..report import terminal
-from ..report.timing_chart import draw_pictures
 from ..system.structure import SCHEMES
 from .frame import (
     INTERRUPTED,
@@ -151,6 +150,8 @@ def _write(
     if out and mdf and result.signals:
         result.to_mdf(out / "signals.mf4")
     if plot and result.numbers:
+        from ..report.timing_chart import draw_pictures  # only here: most runs draw nothing
+
         with waiting("drawing"):
             for picture in draw_pictures(result, out or Path(), "png"):
                 say(f"drew {picture}")

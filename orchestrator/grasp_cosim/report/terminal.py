@@ -6,7 +6,7 @@ from typing import Any
 from ..base.text import counted, fixed, significant
 from ..realtime.timing import Timing
 from ..recording.result import Result
-from .timing_chart import timing_sentence
+from .timing_words import timing_sentence
 
 
 def run_json(result: Result) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from math import ceil, floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import InputError, choices
+from ..base.errors import InputError
 from ..base.text import grouped
 from ..realtime.timing import Histogram, Spread, Timing
 from ..recording.result import Result
@@ -29,6 +29,7 @@ from .plot import (
     new_figure,
     save_figure,
 )
+from .timing_words import duration, part_label, percent, timing_sentence
 from .wording import Caption, caption, number
 
 if TYPE_CHECKING:
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
 
 QUANTILES = {"median": 0.5, "p99": 0.01, "p99.9": 0.001}
 """The share of the steps that took longer, by the name of a quantile."""
-
-PART_LABELS = {"step": "whole step", "start": "late start", "between": "between steps"}
-"""Labels of the parts of a step whose name does not say enough."""
 
 COMPONENT_COLORS = (
     "#1b7f79", "#b26b00", "#7a4fa3", "#4c7a1f", "#a83279", "#5b6470", "#2f6fb3", "#8c4a2f",
@@ -60,9 +58,6 @@ SHORTEST_TIME = 1e-7
 
 TIMING_STEM = "timing"
 """The stem of the file of the chart."""
-
-MAX_CULPRITS = 4
-"""So many culprits are in the sentence."""
 
 MAX_OVERRUN_ROWS = 50
 """So many overruns are in the table."""
@@ -92,40 +87,6 @@ def draw_timing(timing: Timing, end: float, path: Path, heading: Caption) -> Non
     titled = heading._replace(title=f"{heading.title}: timing")
     add_heading(figure, titled, timing_sentence(timing))
     save_figure(figure, path)
-
-
-def timing_sentence(timing: Timing) -> str:
-    """A sentence: the period was kept, or how often it was not, by how much, and through what."""
-    steps, period = grouped(timing.steps), duration(timing.period)
-    if not timing.overruns:
-        return f"All {steps} steps ended within their period of {period}."
-    share = _percent(timing.overruns / timing.steps)
-    recorded = len(timing.listed)
-    of_the_first = f" of the first {grouped(recorded)}" if recorded < timing.overruns else ""
-    worst = duration(max(overrun.late for overrun in timing.listed))
-    culprits = [f"{part_label(name)} ({grouped(n)})" for name, n in timing.culprits.items()]
-    return (
-        f"{grouped(timing.overruns)} of {steps} steps ({share}) "
-        f"ended after their period of {period}. The worst{of_the_first} was "
-        f"{worst} late; to blame: {choices(culprits, MAX_CULPRITS)}."
-    )
-
-
-def part_label(part: str) -> str:
-    """The label of a part of a step: a component is called by its name."""
-    return PART_LABELS.get(part, part)
-
-
-def duration(seconds: float) -> str:
-    """A time for the eye, with three figures: like 41.2 µs or 1.1 ms."""
-    for factor, unit in ((1e9, "ns"), (1e6, "µs"), (1e3, "ms")):
-        if factor * abs(seconds) < 999.5 and seconds:
-            return f"{factor * seconds:.3g} {unit}"
-    return f"{seconds:.3g} s" if abs(seconds) < 999.5 else f"{seconds:.0f} s"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
 
 
 def part_styles(timing: Timing) -> dict[str, tuple[str, int]]:
@@ -197,7 +158,7 @@ def _draw_distributions(axes: Axes, timing: Timing) -> None:
             axes.text(left, share, f" {name}", va="bottom", fontsize=9, color=GREY)
     _finish_logarithmic(axes, "share that took longer")
     axes.xaxis.set_major_formatter(lambda seconds, _: duration(seconds))
-    axes.yaxis.set_major_formatter(lambda share, _: _percent(share))
+    axes.yaxis.set_major_formatter(lambda share, _: percent(share))
 
 
 def _draw_exceedance(axes: Axes, timing: Timing, part: str) -> tuple[float, float]:
