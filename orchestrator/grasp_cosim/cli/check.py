@@ -11,12 +11,10 @@ from ..base.files import check_file
 from ..comparison import summary
 from ..comparison.bands import read_bands
 from ..comparison.compare import compare as compare_runs
-from ..comparison.comparison_page import write_comparison, write_qualification
 from ..comparison.qualify import component_of
 from ..comparison.qualify import qualify as run_qualification
 from ..interface.read import check_runs
 from ..recording.log_names import LogNames
-from ..report.run_report import write_report
 from ..system.description import FILES
 from ..system.overrides import SECTIONS, Override
 from .frame import (
@@ -109,6 +107,10 @@ def qualify(
         metrics=chosen_metrics(metric_files),
     )
     if out:
+        from ..comparison.comparison_page import (
+            write_qualification,  # only here: pages take long to import
+        )
+
         wrote = write_qualification(qualification, out)
         say(f"wrote {out}" if wrote else f"no page {out}: there were no two runs")
     show(
@@ -155,6 +157,8 @@ def report(run: Path, out: Path | None, title: str | None, as_json: bool) -> int
     Example: grasp-cosim report results
     """
     with waiting(f"drawing {out or run / 'report.html'}"):
+        from ..report.run_report import write_report  # only here: pages take long to import
+
         page, *drawn = write_report(run, out, title or "")
     size, pictures = page.stat().st_size, [str(picture) for picture in drawn]
     written = {"page": str(page), "bytes": size, "pictures": pictures}
@@ -202,6 +206,10 @@ def compare(
     with waiting(f"comparing {a} and {b}"):
         comparison = compare_runs(a, b, bands=own_bands, metrics=metrics, names=names)
         if out:
+            from ..comparison.comparison_page import (
+                write_comparison,  # only here: pages take long to import
+            )
+
             write_comparison(comparison, out)
     if out:
         say(f"wrote {out}: {out.stat().st_size / 1e6:.1f} MB")
