@@ -1,5 +1,7 @@
 """By how much a clock is off is found to a part of a sample, or nothing is said to be found."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from grasp_cosim import InputError
@@ -51,3 +53,18 @@ def test_it_is_believed_from_a_correlation_of_7_tenths_on(share, found):
     else:
         with pytest.raises(InputError, match=r"at no offset, the best correlation is 0\.[1-6]"):
             fit_offset(log, RUN)
+
+
+@pytest.mark.parametrize(("seconds", "enough"), [(1.6, False), (2.2, True)])
+def test_a_third_of_the_shorter_one_has_to_overlap(seconds, enough):
+    """Here the log, of 6 s, of which the run has seen so many."""
+    rng, step = np.random.default_rng(3), 5e-3
+    known = np.arange(0.0, 6.0, step)
+    seen = np.arange(6.0 - seconds, 12.0 - seconds, step)
+    values = np.cumsum(rng.normal(size=len(known) + len(seen)))
+    log = side("log", seen - 50.0, x=values[len(known) - round(seconds / step) :][: len(seen)])
+    run = side("run", known, x=values[: len(known)])
+    found = None
+    with suppress(InputError):
+        found = fit_offset(log, run)
+    assert (found == pytest.approx(50.0, abs=2e-3)) is enough

@@ -238,6 +238,34 @@ def test_a_candidate_that_ends_on_the_way(loop, tmp_path, what, text):
 
 
 @needs_gcc
+def test_a_candidate_that_asks_for_the_end_ends_sooner(loop, tmp_path):
+    found = going_wrong(loop, tmp_path, "terminate_at", "none")
+    (end,) = (m for m in found.metrics if m.name == "end_of_run")
+    assert (end.original, end.unit, end.inside) == (1.0, "s", False)
+    assert end.candidate == pytest.approx(0.505, abs=0.011)
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("start", "stop", "shift", "numerics"),
+    [
+        (0.0, 0.08, 0.02, ["step 0.02 s", "scheme jacobi"]),
+        (0.01, 0.09, 0.02, ["step 0.02 s", "scheme jacobi"]),
+        (0.01, 0.08, 0.02, ["scheme jacobi"]),
+        (30.0, 30.04, 0.02, ["step 0.02 s", "scheme jacobi"]),
+    ],
+)
+def test_the_numerics_and_the_shift_are_those_of_the_span(loop, start, stop, shift, numerics):
+    """Which is from the start to the stop, wherever that is on the clock."""
+    system = loop.with_settings({"experiment.start": start, "experiment.stop": stop})
+    found = qualify(system, "plant", loop.component("plant", "").fmu, isolation="none")
+    assert found.qualified
+    assert [n for n in found.comparison.numerics if n.startswith(("step", "scheme"))] == numerics
+    (signal,) = (s for s in found.signals if s.name == "plant.x")
+    assert signal.band.time == pytest.approx(shift)
+
+
+@needs_gcc
 def test_a_step_that_the_candidate_rejects_is_told(loop, tmp_path):
     found = going_wrong(loop, tmp_path, "discard_at", "none")
     assert not found.qualified

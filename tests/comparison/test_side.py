@@ -203,3 +203,13 @@ def test_one_time_in_common_is_enough(begin, common):
     else:
         with pytest.raises(InputError, match="must have some time in common"):
             compare(run, late)
+
+
+@pytest.mark.parametrize(
+    ("held", "values"),
+    [(False, [0.0, 0.0, 0.5, 1.0, 12.5, 16.0]), (True, [0.0, 0.0, 0.0, 1.0, 9.0, 16.0])],
+)
+def test_a_curve_between_its_samples_is_a_line_or_held(held, values):
+    time = np.array([-1.0, 0.0, 0.05, 0.1, 0.35, 9.0])
+    assert Curve(TIME, X, held).at(time).tolist() == pytest.approx(values)
+    assert Curve(TIME, X, held).at(TIME - 0.4e-9).tolist() == pytest.approx(X, abs=1e-6)
