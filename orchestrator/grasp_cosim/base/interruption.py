@@ -152,7 +152,7 @@ def _is_first(number: int) -> bool:
 def _noting_what_is_lost(
     writer: socket.socket, previous_hook: Callable[["sys.UnraisableHookArgs"], object]
 ) -> Callable[["sys.UnraisableHookArgs"], None]:
-    """What Python calls for an exception that nothing can take; of others it calls `before`."""
+    """What Python calls for an exception that nothing can take; others go to the hook before."""
 
     def note(unraisable: "sys.UnraisableHookArgs") -> None:
         if not issubclass(unraisable.exc_type, KeyboardInterrupt):

@@ -231,7 +231,7 @@ def load_system(
 
 
 def chosen_system(options: SystemOptions) -> System:
-    """The system of a command, as its options have it; what is left out of it is said.
+    """The system of a command, as its options have it; notes tell what is left out of it.
 
     These are its controller, then presets, that of the case last, then what was fitted, then
     overrides of single values, and what is recorded.

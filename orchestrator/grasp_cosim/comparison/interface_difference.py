@@ -109,8 +109,8 @@ def interface_differences(
 ) -> list[Difference]:
     """All differences, in the order of the original's variables, then those of capabilities.
 
-    Both are under the system's names. given are values, in the candidate's unit, for variables
-    that only the candidate has.
+    Both are under the system's names. values_of_new are values, in the candidate's unit, for
+    variables that only the candidate has.
     """
     differences: list[Difference] = []
     for old in original.of(*COMPARED):

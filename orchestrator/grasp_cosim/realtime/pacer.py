@@ -199,7 +199,7 @@ class Pacer:
         head[DUE], head[BEGIN] = due, now_ns
 
     def finish(self, step: int, now_ns: int | None = None) -> None:
-        """The last step has just ended, or did at `now`; OverrunError where it stops at that."""
+        """The last step has just ended, or did at now_ns; OverrunError where it stops at that."""
         self.meter.end(self._arrive(step, now_ns), self._state.late)
 
     def overrun(self) -> OverrunError:

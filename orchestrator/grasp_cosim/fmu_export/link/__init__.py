@@ -446,7 +446,7 @@ class Peer:
         return self._live is not None
 
     def receive(self, datagram: bytes, time_ns: int) -> Action:
-        """Return what to do about a datagram; `now` in ns of a monotonic clock."""
+        """Return what to do about a datagram; the time is that of a monotonic clock."""
         m = self._sealer.open(datagram)
         if isinstance(m, str):
             return self._count(m)

@@ -87,7 +87,7 @@ def proxy_sources(
 ) -> dict[str, bytes]:
     """Return the same of a proxy of the FMU with the file name `original`.
 
-    `own` are the files that only this proxy has: the wire with its signature, its variables.
+    `generated` are the files that only this proxy has: the wire with its signature, its variables.
     """
     texts = {"how": _PROXY, "system": _SYSTEM, "defined": f"PROXY_ORIGINAL {string(original)}"}
     return _sources(name, guid, fmi, generated, OF_PROXY, texts)
