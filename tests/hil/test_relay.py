@@ -453,3 +453,11 @@ def test_of_more_than_can_be_under_way_the_newest_are_dropped():
     traffic.send_due(10**9)
     assert sent == [str(number).encode() for number in range(MAX_HELD)]
     assert (traffic.next_due(), counters.held, counters.delivered) == (None, 0, MAX_HELD)
+
+
+@pytest.mark.parametrize(("start", "until"), [(1.5, 2.0), (1.0, 2.5), (0.5, math.inf)])
+def test_requests_are_counted_in_whole_numbers(start, until):
+    with pytest.raises(InputError, match=r"^outage from .* requests: must be whole numbers$"):
+        Outage(start, until)
+    assert Outage(start, until, "s").until == until
+    assert Outage(1.0, math.inf).is_of("request", 10**9, 0.0)
