@@ -75,7 +75,7 @@ class CallTrace:
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         except OSError as error:
-            raise InputError(self._cannot_write(error)) from error
+            raise InputError(_cannot_write(component, path, error)) from error
 
     def call(self, name: str, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
         """Call a function of FMI by its full name, and write the call.
@@ -112,10 +112,7 @@ class CallTrace:
         try:
             os.write(self._file, text.encode())
         except OSError as error:
-            raise SimulationError(self._cannot_write(error)) from error
-
-    def _cannot_write(self, error: OSError) -> str:
-        return f"{self._component}: trace: {self._path}: cannot be written: {error.strerror}"
+            raise SimulationError(_cannot_write(self._component, self._path, error)) from error
 
 
 def begin_trace(component: str, path: Path) -> None:
@@ -123,9 +120,11 @@ def begin_trace(component: str, path: Path) -> None:
     try:
         path.write_bytes(b"")
     except OSError as error:
-        raise InputError(
-            f"{component}: trace: {path}: cannot be written: {error.strerror}"
-        ) from error
+        raise InputError(_cannot_write(component, path, error)) from error
+
+
+def _cannot_write(component: str, path: Path, error: OSError) -> str:
+    return f"{component}: trace: {path}: cannot be written: {error.strerror}"
 
 
 @cache

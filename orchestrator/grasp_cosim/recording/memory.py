@@ -57,19 +57,19 @@ class Batch:
         return steps, rows
 
 
-Place = TypeVar("Place")
+Medium = TypeVar("Medium")
 
 
 @dataclass(slots=True, weakref_slot=True, eq=False)
-class _Kept(Generic[Place]):
-    """Where rows are, and how many of them are referred to elsewhere, and stay as they are."""
+class _Storage(Generic[Medium]):
+    """A table or a file with rows; the first, to which saved states refer, stay as they are."""
 
-    of: Place
-    rows: int = 0
+    medium: Medium
+    shared_rows: int = 0
 
-    def give(self, rows: int) -> None:
-        """Refer to so many of them from elsewhere."""
-        self.rows = max(self.rows, rows)
+    def share(self, rows: int) -> None:
+        """Have a saved state refer to the first so many rows."""
+        self.shared_rows = max(self.shared_rows, rows)
 
 
 class MemoryListener:
@@ -91,7 +91,7 @@ class MemoryListener:
             self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
             in_shared_memory = self._paced and signals
             buffer = memory(8 * len(signals) * rows) if in_shared_memory else None
-            self._kept = _Kept(np.ndarray(shape, np.float64, buffer))
+            self._storage = _Storage(np.ndarray(shape, np.float64, buffer))
         except (MemoryError, ValueError, OverflowError, OSError):  # more bytes than there can be
             raise InputError(
                 f"{experiment.name}: {total} steps do not fit into memory; "
@@ -102,24 +102,24 @@ class MemoryListener:
         """Copy the rows."""
         end = self._rows + len(steps)
         self._steps[self._rows : end] = steps
-        self._kept.of[:, self._rows : end] = rows.T
+        self._storage.medium[:, self._rows : end] = rows.T
         self._rows = end
 
     def end(self, complete: bool) -> None:
         """Nothing is left to do."""
 
-    def saved(self) -> "tuple[_Kept[npt.NDArray[np.float64]], int]":
+    def saved(self) -> "tuple[_Storage[npt.NDArray[np.float64]], int]":
         """What was recorded until now, for restore()."""
-        self._kept.give(self._rows)
-        return self._kept, self._rows
+        self._storage.share(self._rows)
+        return self._storage, self._rows
 
-    def restore(self, saved: "tuple[_Kept[npt.NDArray[np.float64]], int]") -> None:
+    def restore(self, saved: "tuple[_Storage[npt.NDArray[np.float64]], int]") -> None:
         """Go back to what was saved; other states, and columns that were given out, stay."""
-        self._kept, self._rows = saved
-        if self._rows < self._kept.rows:
-            table = np.empty_like(self._kept.of)
-            table[:, : self._rows] = self._kept.of[:, : self._rows]
-            self._kept = _Kept(table, self._rows)
+        self._storage, self._rows = saved
+        if self._rows < self._storage.shared_rows:
+            table = np.empty_like(self._storage.medium)
+            table[:, : self._rows] = self._storage.medium[:, : self._rows]
+            self._storage = _Storage(table, self._rows)
 
     def columns(self, next_row: Rows | None = None) -> Columns:
         """The recorded communication points in s and the columns by name, so far.
@@ -128,8 +128,8 @@ class MemoryListener:
         objects. An Integer is exact up to 2**53, as the rows are float64. With the step and values
         of a row that is not recorded, it is their last.
         """
-        steps, table = self._steps[: self._rows], self._kept.of[:, : self._rows]
-        self._kept.give(self._rows)
+        steps, table = self._steps[: self._rows], self._storage.medium[:, : self._rows]
+        self._storage.share(self._rows)
         if next_row:
             steps, table = np.append(steps, next_row[0]), np.append(table, next_row[1].T, axis=1)
         by_signal = zip(self._signals, table, strict=True)
@@ -154,46 +154,46 @@ class EveryRow:
 
     def _open(self, rows: int = 0) -> None:
         file = TemporaryFile(prefix="grasp_rows_", buffering=0)  # noqa: SIM115 - open as long as this
-        self._kept = _Kept(file, rows)
-        finalize(self._kept, file.close)
+        self._storage = _Storage(file, rows)
+        finalize(self._storage, file.close)
 
     def block(self, steps: npt.NDArray[np.int64], rows: npt.NDArray[np.float64]) -> None:
         """Write what these rows have of the signals."""
         unwritten = memoryview(b"" if self.lost else rows[:, self._places].tobytes())
         try:
             while unwritten:
-                unwritten = unwritten[self._kept.of.write(unwritten) :]
+                unwritten = unwritten[self._storage.medium.write(unwritten) :]
         except OSError as error:
             self.lost = unwritable(Path(gettempdir()), error)
-            self._kept.of.truncate(0)
+            self._storage.medium.truncate(0)
         self._rows += len(steps)
 
     def end(self, complete: bool) -> None:
         """The file goes with the last name of it."""
 
-    def saved(self) -> "tuple[_Kept[Any], int]":
+    def saved(self) -> "tuple[_Storage[Any], int]":
         """What was kept until now, for restore()."""
-        self._kept.give(self._rows)
-        return self._kept, self._rows
+        self._storage.share(self._rows)
+        return self._storage, self._rows
 
-    def restore(self, saved: "tuple[_Kept[Any], int]") -> None:
+    def restore(self, saved: "tuple[_Storage[Any], int]") -> None:
         """Go back to what was saved; other states stay."""
-        self._kept, self._rows = saved
+        self._storage, self._rows = saved
         size = 8 * self._rows * len(self._places)
         if self.lost:
             return
-        if self._rows < self._kept.rows:
-            self._kept.of.seek(0)
-            rows = self._kept.of.read(size)
+        if self._rows < self._storage.shared_rows:
+            self._storage.medium.seek(0)
+            rows = self._storage.medium.read(size)
             self._open(self._rows)
-            self._kept.of.write(rows)
-        self._kept.of.seek(size)
+            self._storage.medium.write(rows)
+        self._storage.medium.seek(size)
 
     def columns(self) -> Columns:
         """All communication points in s so far, and the columns, mapped from the file."""
         shape = self._rows, len(self._places)
         table = (
-            np.memmap(self._kept.of, np.float64, "r", shape=shape)
+            np.memmap(self._storage.medium, np.float64, "r", shape=shape)
             if all(shape)
             else np.empty(shape)
         )
