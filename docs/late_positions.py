@@ -1,7 +1,7 @@
 """Positions that come late: between the encoders of a gripper on an arm and its controller.
 
-A block of one's own, docs/tandem.md: `grasp-cosim build docs/late_positions.py`. In a system it is
-after the plant, so that what it puts out is as many communication steps old as it says.
+An example of docs/how_to/tandem.md: `grasp-cosim build docs/late_positions.py`. In a system it
+comes after the plant: its outputs are as many communication steps old as its parameter asks for.
 """
 
 from dataclasses import dataclass

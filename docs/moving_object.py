@@ -1,4 +1,6 @@
-"""GripperPlant with an object that moves at a constant speed, whatever pushes it: docs/limits.md.
+"""GripperPlant with an object that moves at a constant speed, whatever pushes it.
+
+docs/explanation/limits.md uses this example.
 
 Seen from the object it is at rest, and the fingers have the same forces and accelerations, Eq. (1):
 the plant of the package does it, in the frame of the object. Friction of the fingers would not, as

@@ -120,15 +120,15 @@ def draw_evaluation(folder: Path) -> None:
 
 
 def draw_map(folder: Path) -> None:
-    """The first example of docs/studies.md."""
-    page = (HERE / "studies.md").read_text("utf-8")
+    """The first example of docs/how_to/sweep.md."""
+    page = (HERE / "how_to/sweep.md").read_text("utf-8")
     example = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0]
     exec(example.replace('"map.png"', repr(str(folder / "reflectance_map.png"))), {})  # noqa: S102
 
 
 def draw_layer_2(folder: Path) -> None:
-    """layer_2_loop.png: the models of the example of docs/linear_analysis.md as a Bode plot."""
-    page = (HERE / "linear_analysis.md").read_text("utf-8")
+    """layer_2_loop.png: the example of docs/how_to/linear_analysis.md as a Bode plot."""
+    page = (HERE / "how_to/linear_analysis.md").read_text("utf-8")
     names: dict[str, Any] = {}
     exec(re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0], names)  # noqa: S102
     omega = np.geomspace(1.0, 3e3, 600)
@@ -163,10 +163,10 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "maps": (draw_map, ["reflectance_map.png"]),
     "layer_2": (draw_layer_2, ["layer_2_loop.png"]),
     "limits": (
-        partial(tutorials.update, "limits"),
+        partial(tutorials.update, "explanation/limits"),
         ["layers.png", "objects.png", "limits.png", "colour.png"],
     ),
-    "your_plant": (partial(tutorials.update, "your_plant"), ["your_plant.png"]),
+    "your_plant": (partial(tutorials.update, "how_to/python_block"), ["your_plant.png"]),
 }
 """What draws into a folder, and the files there."""
 

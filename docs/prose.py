@@ -73,10 +73,10 @@ WORDING: dict[str, re.Pattern[str]] = {
         r"\b(?:rooms?|equation cards?|Cards?:)(?!\w)"
     ),
     "put the subject first": re.compile(
-        r"(?:^|(?<=[.!?] ))(?:Not )?(?:Known|Fixed|Given|Shown|Left|[A-Z]\w{2,}ed) (?:is|are|was|were)\b"
+        r"(?:^|(?<=[.!?] ))(?:Not )?(?:Known|Given|Shown|Left|[A-Z]\w{2,}ed) (?:is|are|was|were)\b"
     ),
 }
-"""Words that a reader of English as a second language reads twice, and those that take their place."""
+"""Words that a reader of English as a second language reads twice, by the words to write."""
 
 PAGE_WORDING: dict[str, re.Pattern[str]] = {
     "name the thing instead of 'what'": re.compile(r"\bwhat\b(?![^.!?]*\?)", re.I),
@@ -97,7 +97,9 @@ def words_of(text: str) -> int:
 def sentences(text: str) -> list[str]:
     """The sentences of a passage; abbreviations such as "Eq." end none."""
     guarded = re.sub(r"\b(e\.g|i\.e|Eqs?|Fig|cf|vs|etc|al)\.", r"\1", text)
-    return [part for part in re.split(r"(?<=[.!?])[)\"*]*\s+(?=[\"`(\[*]*[A-Z0-9`])", guarded) if part]
+    return [
+        part for part in re.split(r"(?<=[.!?])[)\"*]*\s+(?=[\"`(\[*]*[A-Z0-9`])", guarded) if part
+    ]
 
 
 def without_code(text: str) -> str:
@@ -126,7 +128,7 @@ def long_sentences(path: Path, passage: Passage) -> Iterator[Finding]:
 
 
 def plain(token: Token) -> str:
-    """The text of an inline token as a reader sees it, without pictures; code keeps its backticks."""
+    """The text of an inline token without pictures; code keeps its backticks."""
     parts = []
     for child in token.children or []:
         if child.type == "code_inline":
@@ -178,7 +180,7 @@ def code_lines(path: Path, line: int, token: Token) -> Iterator[Finding]:
 
 
 def docstrings(tree: ast.Module) -> Iterator[Passage]:
-    """The docstrings of a module, also those below a constant or a field, without their examples."""
+    """The docstrings of a module, also those below a constant or a field."""
     for node in ast.walk(tree):
         for statement in getattr(node, "body", []) if isinstance(node, Scope) else []:
             match statement:

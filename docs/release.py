@@ -186,14 +186,14 @@ def _link(out: Path, path: Path, text: str = "") -> str:
 
 def into_your_tool() -> str:
     """That page as HTML; of pages that it links to, which are in the sources, it says so."""
-    text = (ROOT / "docs/into_your_tool.md").read_text("utf-8")
+    text = (ROOT / "docs/how_to/your_tool.md").read_text("utf-8")
     text = text.replace("# Into", "## Into", 1).replace(MADE_BY, OF_THE_SOURCES)
     alone = re.sub(r"\[([^]]*)\]\(([^)#]*)[^)]*\)", _in_the_sources, text)
     return str(MarkdownIt().enable("table").render(alone))
 
 
 def _in_the_sources(link: re.Match[str]) -> str:
-    path = (ROOT / "docs" / link[2]).resolve().relative_to(ROOT)
+    path = (ROOT / "docs/how_to" / link[2]).resolve().relative_to(ROOT)
     return f"{link[1]} (`{path.as_posix()}`)"
 
 

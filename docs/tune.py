@@ -1,4 +1,4 @@
-"""Gains that grasp faster, by SciPy's differential evolution: what docs/limits.md tells of.
+"""Gains that grasp faster, by SciPy's differential evolution: docs/explanation/limits.md.
 
     .venv/bin/python docs/tune.py [GENERATIONS]
 

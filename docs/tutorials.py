@@ -363,8 +363,8 @@ def draw_your_plant(tables: Sequence[Runs], folder: Path) -> None:
 
 
 PAGES: Mapping[str, Callable[[Sequence[Runs], Path], None]] = {
-    "limits": draw_limits,
-    "your_plant": draw_your_plant,
+    "explanation/limits": draw_limits,
+    "how_to/python_block": draw_your_plant,
 }
 
 BLOCKS = (TEMPLATE_FOLDER / "spring_plant.py", HERE / "moving_object.py")

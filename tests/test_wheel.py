@@ -88,7 +88,7 @@ def test_the_page_on_a_plant_of_ones_own_runs_as_it_is_written(python, tmp_path)
         return python("-m", "grasp_cosim", *shlex.split(line)[1:], cwd=tmp_path, code=code)
 
     (folder,) = re.findall("Pages, examples and a notebook: (.*)", command("grasp-cosim --help"))
-    page = (Path(folder) / "your_plant.md").read_text("utf-8")
+    page = (Path(folder) / "how_to/foreign_fmu.md").read_text("utf-8")
     assert "/env/lib/" in folder
     for line in INDENTED.findall(page):
         command(line)

@@ -32,7 +32,7 @@ def test_a_command_has_an_example_and_a_text_for_all_it_takes(name):
 def test_the_group_lists_every_command_once(snapshot):
     text = CliRunner().invoke(cli, ["--help"], terminal_width=80).output
     assert text.replace(str(pages()), "PAGES") == snapshot
-    assert (pages() / "your_plant.md").is_file()
+    assert (pages() / "how_to/foreign_fmu.md").is_file()
 
 
 def test_no_command_and_one_that_is_none(command):

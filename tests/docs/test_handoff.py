@@ -1,4 +1,4 @@
-"""The steps of docs/handoff.md, rehearsed on one machine with the commands of the page."""
+"""The steps of docs/how_to/hardware.md, rehearsed on one machine with the commands of the page."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ from support import native_fmus
 from support.processes import kept_port
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")
+PAGE = (ROOT / "docs/how_to/hardware.md").read_text("utf-8")
 BLOCKS = re.findall(r"```(console|toml)\n(.*?)```", PAGE, re.DOTALL)
 READY = re.compile(r"serving |relaying |listening on ")
 STOP = "0.3"

@@ -1,4 +1,4 @@
-"""What docs/interoperability.md says of other tools is what happens with them, where they are."""
+"""What docs/results/tools.md says of other tools is what happens with them, where they are."""
 
 import csv
 import json
@@ -32,7 +32,7 @@ from support.foreign_tools import (
 from support.marks import interop, slow
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs/interoperability.md").read_text("utf-8")
+PAGE = (ROOT / "docs/results/tools.md").read_text("utf-8")
 STEP = 1e-3  # s
 FORCE = "plant.contact_force[1]"
 PUSH = {"force[1]": -2.0, "force[2]": 2.0}  # N

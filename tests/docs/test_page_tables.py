@@ -1,4 +1,4 @@
-"""The tables and pictures of limits.md and your_plant.md are what their commands give."""
+"""The tables and pictures of limits.md and python_block.md are what their commands give."""
 
 import importlib.util
 import re
@@ -39,7 +39,7 @@ def checked(name, checkout):
         assert found == text, "run: docs/pictures.py"
         tutorials.PAGES[name](tables, drawn)
     pictures = sorted(p.name for p in drawn.iterdir())
-    assert sorted(set(re.findall(r"!\[.*?\]\((.*?)\)", text))) == pictures
+    assert sorted({Path(p).name for p in re.findall(r"!\[.*?\]\((.*?)\)", text)}) == pictures
     for picture in pictures:
         assert_same_picture(drawn / picture, DOCS / picture, "docs/pictures.py")
     return tables
@@ -47,7 +47,7 @@ def checked(name, checkout):
 
 @pytest.mark.slow
 def test_the_commands_at_the_beginnings_work(checkout):
-    commands = INDENTED.findall(page("limits") + page("your_plant"))
+    commands = INDENTED.findall(page("explanation/limits") + page("how_to/python_block"))
     assert {command.split()[1] for command in commands} == {"init", "build", "run"}
     for command in commands:
         short = ["--stop", "0.01"] if command.split()[1] == "run" else []
@@ -60,7 +60,9 @@ def test_the_commands_at_the_beginnings_work(checkout):
 def test_limits(checkout):
     """And what a few of its formulas give, worked out here once more."""
     assert cli.main(["build", "docs/moving_object.py"]) == 0
-    cases, _, _, cup, colours, _, laws, _, converter, _, friction, *_ = checked("limits", checkout)
+    cases, _, _, cup, colours, _, laws, _, converter, _, friction, *_ = checked(
+        "explanation/limits", checkout
+    )
     force = 98.0 * 0.035  # layer 1's spring over half the width
     steady = cases["--case 0"].metrics["steady_contact_force"]
     assert steady == pytest.approx([force, force], abs=1e-6)
@@ -80,10 +82,10 @@ def test_limits(checkout):
 
 @pytest.mark.slow
 def test_your_plant(checkout, capsys):
-    assert cli.main(shlex.split(INDENTED.findall(page("your_plant"))[0])[1:]) == 0
+    assert cli.main(shlex.split(INDENTED.findall(page("how_to/python_block"))[0])[1:]) == 0
     source = (TEMPLATE_FOLDER / "spring_plant.py").read_text("utf-8")
     excerpts = 0
-    for kind, block in BLOCKS.findall(page("your_plant").partition("## b.")[0]):
+    for kind, block in BLOCKS.findall(page("how_to/python_block")):
         if kind == "python":
             assert block in source
             excerpts += 1
@@ -93,7 +95,7 @@ def test_your_plant(checkout, capsys):
             assert block.startswith("[signals]")
             (checkout / "bands.toml").write_text(block, encoding="utf-8")
     assert excerpts == 2
-    (cases,) = checked("your_plant", checkout)
+    (cases,) = checked("how_to/python_block", checkout)
     case_1 = cases["1"]
     k = int(np.flatnonzero(case_1.signals["plant.contact[2]"])[0])
     before = slice(k - 2, k)  # both free: how fast the gap closes is the impact, whoever moves
@@ -106,7 +108,7 @@ def test_your_plant(checkout, capsys):
 @pytest.mark.slow
 def test_an_fmu_from_elsewhere(checkout, grasp, capsys):
     """From the file of a vendor to QUALIFIED, by the page alone."""
-    page_b = page("your_plant").partition("## b.")[2]
+    page_b = page("how_to/foreign_fmu")
     for kind, block in BLOCKS.findall(page_b):
         if kind == "console":
             try_commands(block, capsys)
@@ -135,10 +137,10 @@ def try_commands(block, capsys):
 
 
 def test_the_parameters_that_are_no_numbers_are_counted():
-    """Those of the FMUs that come with the package, as into_your_tool.md tells."""
+    """Those of the FMUs that come with the package, as your_tool.md tells."""
     fields = [f for block in blocks().values() for f in declared(block)]
     parameters = [f for f in fields if f.causality == "parameter"]
     booleans = sum(f.kind is bool for f in parameters)
     enumerations = sum(f.enumeration is not None for f in parameters)
     said = f"of ours {booleans} are Booleans, .*, and {enumerations} enumerations"
-    assert re.search(said, page("into_your_tool"))
+    assert re.search(said, page("how_to/your_tool"))

@@ -39,7 +39,7 @@ def blocks(page, kind):
 
 
 METRIC, FROM_PYTHON = blocks("docs/guide.md", "python")
-MAP, SOBOL, NOISE = blocks("docs/studies.md", "python")
+MAP, SOBOL, NOISE = blocks("docs/how_to/sweep.md", "python")
 
 
 @pytest.fixture(scope="session")
@@ -102,23 +102,24 @@ def as_script(text, folder):
 
 
 @needs_compiler
-@pytest.mark.parametrize("page", ["docs/hand.md", "docs/tandem.md"])
+@pytest.mark.parametrize("page", ["docs/how_to/hand.md", "docs/how_to/tandem.md"])
 def test_the_examples_of_another_gripper_hold(page, tmp_path):
     assert as_script("".join(blocks(page, "python")), tmp_path)
 
 
 @needs_compiler
 def test_the_loops_of_linear_analysis_are_as_shown(capsys):
-    (example,) = blocks("docs/linear_analysis.md", "python")
+    (example,) = blocks("docs/how_to/linear_analysis.md", "python")
     exec(example, names := {})
     printed = capsys.readouterr().out
-    assert f"```\n{printed}```\n" in PAGES["docs/linear_analysis.md"]
+    assert f"```\n{printed}```\n" in PAGES["docs/how_to/linear_analysis.md"]
     assert len(names["models"]) == printed.count("\n")
 
 
 @needs_compiler
 @pytest.mark.parametrize(
-    "row", re.findall(r"^\| ([\d.]+) \| (\w+) \| (.*) \|$", PAGES["docs/linear_analysis.md"], re.M)
+    "row",
+    re.findall(r"^\| ([\d.]+) \| (\w+) \| (.*) \|$", PAGES["docs/how_to/linear_analysis.md"], re.M),
 )
 def test_the_margins_at_the_surface_are_as_shown(row):
     milliseconds, scheme, shown = row
@@ -236,7 +237,10 @@ def test_from_the_readme_one_comes_to_every_page():
 
 
 def test_each_word_is_in_the_glossary_once():
-    rows = [row.split(" | ")[0] for row in re.findall(r"^\| (.*)", PAGES["docs/glossary.md"], re.M)]
+    rows = [
+        row.split(" | ")[0]
+        for row in re.findall(r"^\| (.*)", PAGES["docs/reference/glossary.md"], re.M)
+    ]
     words = [word for row in rows if row != "word" for word in row.split(", ")]
     assert len(set(words)) == len(words)
     asked = {"O-RLI", "case", "layer", "bench", "proxy", "Jacobi", "SSP", "sequential", "role"}

@@ -32,7 +32,7 @@ def test_each_picture_has_a_command(pictures):
 
 
 def test_each_picture_is_shown_somewhere():
-    pages = [DOCS.parent / "README.md", *DOCS.glob("*.md")]
+    pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md")]
     shown = {
         (page.parent / link).resolve()
         for page in pages

@@ -47,7 +47,7 @@ def test_what_the_page_tells_of_tools_links_nowhere_and_names_the_sources():
     assert "href=" not in text
     assert "make dist" not in text
     named = set(re.findall(r"\(<code>([^<]*\.(?:md|svg))</code>\)", text))
-    assert {"docs/handoff.md", "docs/loop.svg", "plant/README.md"} <= named
+    assert {"docs/how_to/hardware.md", "docs/loop.svg", "plant/README.md"} <= named
     assert [name for name in named if not (SCRIPT.parents[1] / name).is_file()] == []
 
 

@@ -15,7 +15,7 @@ def test_the_page_on_sessions(natives, monkeypatch):
 
     monkeypatch.setattr(grasp_cosim, "grasp_system", lambda: System.load(SYSTEM, natives))
     names = {}
-    for block in blocks("docs/sessions.md", "python"):
+    for block in blocks("docs/how_to/step_by_hand.md", "python"):
         exec(block, names)
     assert names["result"].ended_at is not None
     assert names["terminated"].shape == (3,)

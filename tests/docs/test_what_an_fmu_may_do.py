@@ -8,7 +8,7 @@ import pytest
 from grasp_cosim.cli import main
 from support.native_fmus import TYPES, build, library_of, needs_gcc
 
-PAGE = (Path(__file__).parents[2] / "docs/what_an_fmu_may_do.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[2] / "docs/how_to/untrusted_fmu.md").read_text("utf-8")
 STARTS = {"Boolean": "false", "String": "''", "Enumeration": "1"}
 TELL_TALE = """
 #include <stdio.h>

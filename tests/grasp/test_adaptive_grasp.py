@@ -1,8 +1,8 @@
 """The adaptive grasp as a whole: where there is little to see, over hypercubes, layer 3's own lag.
 
-What it must reach is in docs/limits.md: faces of reflectance 0.3 to 1.2 each, an object 50 mm to
-either side, and what a row of the table names besides. Other seeds draw other grasps. The FMUs are
-native ones, with the bits of Python's and a run in milliseconds.
+docs/explanation/adaptive_law.md has what it must reach: faces of reflectance 0.3 to 1.2 each, an
+object 50 mm to either side, and what a row of the table names besides. Other seeds draw other
+grasps. The FMUs are native ones, with the bits of Python's and a run in milliseconds.
 
 The lag: with equal faces, gaps l = d - l_0 and a target off the middle by little, the middle of the
 fingers obeys Eqs. (1), (3), (6) and (7), all linear, with f_s = -K_s·n·z and a mean

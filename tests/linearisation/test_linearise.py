@@ -104,7 +104,7 @@ def test_a_model_of_python_fmus_is_that_of_their_twins():
 
 
 def test_a_loop_that_swings_in_a_run_is_not_stable_in_its_model():
-    """docs/limits.md: at 40 ms the virtual force of layer 2 swings from step to step."""
+    """At 40 ms the virtual force of layer 2 swings at each step: docs/explanation/limits.md."""
     swings = []
     for step in (0.02, 0.04):
         poles = linearise(grasp_system(), 1.0, step=step).poles

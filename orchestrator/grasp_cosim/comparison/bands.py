@@ -1,7 +1,7 @@
 """Each signal and metric of two runs in its band, given in a file or derived from the reference.
 
-How they are derived: docs/studies.md. A file overrides that where it names a signal or metric, in
-the unit of the original:
+docs/explanation/tolerance_bands.md explains them. A file overrides that for the signals and metrics
+that it names, in the unit of the original:
 
     [signals]
     "plant.gap[1]" = { absolute = 1e-5, relative = 1e-3, time = 2e-3 }

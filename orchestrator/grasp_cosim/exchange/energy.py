@@ -5,7 +5,7 @@
 F_held is the input of the component after its step, x its position, F the output of the source and
 s the position the source has received. Positive: energy was created, and the loop is that much less
 damped than its equations; negative: lost. The reasons, the sources and the limits are in
-docs/studies.md.
+docs/how_to/sweep.md.
 """
 
 import re

@@ -3,7 +3,7 @@
 Stepping is here; a run by the clock is in paced.py, the start in start.py, a step that an FMU
 rejects or has events in in step_completion.py, where a run ends in end.py.
 
-The schemes, components with a longer step and time are in docs/system_files.md.
+The schemes, components with a longer step and time are in docs/reference/system_file.md.
 """
 
 import math

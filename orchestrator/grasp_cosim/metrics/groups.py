@@ -1,7 +1,7 @@
 """Groups: what is worked out, checked and shown of one kind of system, under the name it has.
 
 A system file asks for them by name, `metrics = ["grasp"]`. How one of a user's own is made and
-registered: docs/system_files.md, "Metrics".
+registered: docs/reference/system_file.md, "Metrics".
 """
 
 from __future__ import annotations

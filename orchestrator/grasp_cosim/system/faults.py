@@ -1,6 +1,6 @@
 """The kinds of faults of a connection: what each makes of a value, and its parameters.
 
-FAULTS is the one table of them; what a kind makes of a value: docs/system_files.md.
+FAULTS is the one table of them; what a kind makes of a value: docs/reference/system_file.md.
 
 At run time a fault gets each value that its connection passes, units converted, with the number of
 the base step in which it does so, INITIAL in initialisation mode, and whether the fault acts in it.

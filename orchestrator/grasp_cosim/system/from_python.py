@@ -1,7 +1,7 @@
 """A system from Python: what a system file has, with Python objects in the place of texts.
 
-Its sections are those of a file, docs/system_files.md, under the same names. A component is more
-than the path of an FMU: see component_from().
+Its sections are those of a file, under the same names: docs/reference/system_file.md. A component
+is more than the path of an FMU: see component_from().
 """
 
 from __future__ import annotations

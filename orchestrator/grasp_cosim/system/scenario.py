@@ -1,5 +1,5 @@
 """Events, faults and limits as entries of the system file, and back; and their checks: they act on
-what exists, in a way that it permits. The format: docs/system_files.md.
+what exists, in a way that it permits. The format: docs/reference/system_file.md.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Reading a system file, docs/system_files.md: its entries are overrides of the defaults."""
+"""Read a system file: its entries override the defaults. docs/reference/system_file.md."""
 
 from __future__ import annotations
 

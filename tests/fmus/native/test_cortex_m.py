@@ -12,7 +12,7 @@ from support.compiled import compile_c
 from support.direct import closed_loop
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs/handoff.md").read_text("utf-8")
+PAGE = (ROOT / "docs/how_to/hardware.md").read_text("utf-8")
 SECTION = PAGE.partition("## The controller on a Cortex-M\n")[2].partition("\n## ")[0]
 COMMANDS = re.findall(r"^ {4}(.+)", SECTION, re.MULTILINE)
 (COMPILE,) = (c for c in COMMANDS if c.startswith("arm-none-eabi-gcc"))
