@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tokenize
 from collections.abc import Iterator, Sequence
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -85,6 +87,17 @@ PAGE_WORDING: dict[str, re.Pattern[str]] = {
 }
 """The same, for pages."""
 
+EVERYDAY = frozenset(
+    [
+        "API", "ARM", "ARM64", "ASCII", "C99", "CPU", "CSV", "END", "GB", "HTML", "HTTP", "II",
+        "IV", "JSON", "LED", "MB", "MIT", "OK", "PI", "README", "ROS", "SHA256", "SI", "TODO", "TOML",
+        "UDP", "URL", "USB", "UTF", "XML",
+    ]
+)  # fmt: skip
+"""Abbreviations that every reader of these pages knows, and names that look like one."""
+
+ABBREVIATION = re.compile(r"(?<![\w.-])[A-Z][A-Z0-9]+(?![\w-])")
+
 VERBS_AS_HEADS = {"is", "are", "of", "does", "do", "means", "by", "has", "gives", "with", ""}
 
 
@@ -126,6 +139,39 @@ def long_sentences(path: Path, passage: Passage) -> Iterator[Finding]:
 
 # Pages
 
+MARKDOWN = MarkdownIt("commonmark").enable("table")
+
+
+@cache
+def glossary() -> frozenset[str]:
+    """The words that the glossary explains, from the first column of its tables."""
+    words: set[str] = set()
+    tokens = MARKDOWN.parse((ROOT / "docs/reference/glossary.md").read_text("utf-8"))
+    for before, token in pairwise(tokens):
+        if before.type == "td_open" and token.content:
+            words.update(re.split(r"[ ,()]+", plain(token)))
+    return frozenset(words)
+
+
+def undefined_abbreviations(path: Path, tokens: Sequence[Token]) -> Iterator[Finding]:
+    """The first use of each abbreviation that neither the page nor the glossary explains.
+
+    An abbreviation is explained by a use in parentheses after its words. Placeholders, which occur
+    in a code block of the page in the same letters, are none.
+    """
+    code = " ".join(token.content for token in tokens if token.type in ("fence", "code_block"))
+    whole = " ".join(plain(token) for token in tokens if token.type == "inline")
+    known = {*EVERYDAY, *glossary(), *ABBREVIATION.findall(code)}
+    known |= {*re.findall(r"\(([A-Z][A-Z0-9]+)\)", whole)}
+    for token in tokens:
+        if token.type != "inline" or token.map is None:
+            continue
+        for word in ABBREVIATION.findall(without_code(plain(token))):
+            if word not in known and not (word.endswith("S") and word[:-1] in known):
+                known.add(word)
+                rule = "explain the abbreviation in the glossary, or write it out"
+                yield Finding(path, token.map[0] + 1, rule, word)
+
 
 def plain(token: Token) -> str:
     """The text of an inline token without pictures; code keeps its backticks."""
@@ -148,14 +194,15 @@ def begins_bold(token: Token) -> bool:
 
 def page_findings(path: Path, text: str) -> Iterator[Finding]:
     """All findings on one page of Markdown."""
-    tokens = MarkdownIt("commonmark").enable("table").parse(text)
+    tokens = MARKDOWN.parse(text)
+    yield from undefined_abbreviations(path, tokens)
     line, in_list = 1, 0
-    for before, token in zip([None, *tokens], tokens, strict=False):
+    for before, token in pairwise([Token("", "", 0), *tokens]):
         line = token.map[0] + 1 if token.map else line
         in_list += token.nesting * (token.type in ("list_item_open", "list_item_close"))
         if token.type in ("fence", "code_block"):
             yield from code_lines(path, line, token)
-        if token.type != "inline" or before is None:
+        if token.type != "inline":
             continue
         passage = Passage(line, plain(token))
         yield from wording(path, passage, WORDING)
@@ -193,7 +240,8 @@ Scope = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 def comments(source: str) -> Iterator[Passage]:
     """The comments of a module; lines that follow each other are one passage."""
-    first, lines, last = 0, [], 0
+    first, last = 0, 0
+    lines: list[str] = []
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type != tokenize.COMMENT:
             continue
