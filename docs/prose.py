@@ -90,8 +90,8 @@ PAGE_WORDING: dict[str, re.Pattern[str]] = {
 EVERYDAY = frozenset(
     [
         "API", "ARM", "ARM64", "ASCII", "C99", "CPU", "CSV", "END", "GB", "HTML", "HTTP", "II",
-        "IV", "JSON", "LED", "MB", "MIT", "OK", "PI", "README", "ROS", "SHA256", "SI", "TODO", "TOML",
-        "UDP", "URL", "USB", "UTF", "XML",
+        "IV", "JSON", "LED", "MB", "MIT", "OK", "PI", "README", "ROS", "SHA256", "SI", "TODO",
+        "TOML", "UDP", "URL", "USB", "UTF", "XML",
     ]
 )  # fmt: skip
 """Abbreviations that every reader of these pages knows, and names that look like one."""
