@@ -1,29 +1,39 @@
-"""Makes the site of all pages and of the Python interface, by MkDocs: make docs.
+"""Makes the site of all pages, of the commands and of the Python interface, by Sphinx: make docs.
 
     .venv/bin/python docs/website.py [FOLDER]     # by default results/site; begin with index.html
 
-Pages stay where they belong in the checkout; they are copied beside what they link to. Any warning
-is an error: a link that leads nowhere, a name without a docstring.
+docs/README.md lists the pages in their groups: it is the navigation. The pages stay where they
+belong in the checkout. They are copied into a temporary folder, together with the files that they
+link to. Sphinx was chosen because its search works from a file, and because it documents click
+commands and Python functions: MkDocs 1 with Material is no longer developed, and Zensical, which
+follows it, has no pages of click yet. Each warning of Sphinx is an error.
 """
 
-import json
+import io
 import os
 import re
 import shutil
-import subprocess
 import sys
+import tomllib
+from collections.abc import Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
-from latex2mathml.converter import convert
+import grasp_cosim
+from grasp_cosim.cli.group import MODULE_OF_COMMAND
+from sphinx.application import Sphinx
+from sphinx.errors import SphinxError
 
 ROOT = Path(__file__).parents[1]
-LINK = re.compile(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)")
-MATH = re.compile(r"^```math\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+MAP = Path("docs/README.md")
+"""The page that lists all others."""
 
-API = (
-    "grasp_cosim",
+LINK = re.compile(r"\]\(([^)#\s:]+)(#[^)\s]*)?\)")
+FENCED = re.compile(r"^(```|~~~).*?^\1", re.DOTALL | re.MULTILINE)
+
+MODULES = (
     "grasp_cosim.master.simulation",
     "grasp_cosim.metrics.metric",
     "grasp_cosim.exchange.listener",
@@ -36,84 +46,230 @@ API = (
     "grasp_cosim.comparison.qualify",
     "grasp_cosim.comparison.bands",
 )
-"""What users import; the names of `grasp_cosim` itself are all that most need."""
+"""Modules that users import, behind the names of `grasp_cosim` itself."""
 
-ROOTS = ("plant", "sensor", "controller", "fmus", "orchestrator")
+COMMANDS, PYTHON = "docs/reference/commands", "docs/reference/python"
+"""The folders of the pages that are generated."""
 
 
-def pages() -> list[Path]:
-    """All pages that one comes to from the README, from the top of the checkout."""
-    found = [Path("README.md")]
-    for page in found:
-        for link in LINK.findall((ROOT / page).read_text("utf-8")):
-            target = (ROOT / page.parent / link).resolve().relative_to(ROOT)
-            if target.suffix == ".md" and target not in found:
-                found.append(target)
+class Group(NamedTuple):
+    """A group of pages in the navigation."""
+
+    title: str
+    pages: list[Path]
+
+
+def groups() -> list[Group]:
+    """The groups of docs/README.md with their pages, from the top of the checkout, in order."""
+    found: list[Group] = []
+    for line in (ROOT / MAP).read_text("utf-8").splitlines():
+        if line.startswith("## "):
+            found.append(Group(line[3:].strip(), []))
+        elif found and line.startswith("- "):
+            links = LINK.findall(line)
+            found[-1].pages.extend(from_top(MAP, link) for link, _ in links)
     return found
 
 
-def copy(folder: Path) -> None:
-    """Put the pages and what they link to into a folder, equations as MathML."""
-    for page in pages():
-        text = (ROOT / page).read_text("utf-8")
-        for link in LINK.findall(text):
-            if (source := ROOT / page.parent / link).is_file() and source.suffix != ".md":
-                target = folder / source.resolve().relative_to(ROOT)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(source, target)
-        (folder / page).parent.mkdir(parents=True, exist_ok=True)
-        (folder / page).write_text(
-            MATH.sub(lambda m: convert(m[1], display="block"), text), "utf-8"
-        )
-    for name in API:
-        path = folder / "api" / f"{name}.md"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(f"# {name}\n\n::: {name}\n", "utf-8")
+def from_top(page: Path, link: str) -> Path:
+    """The file that a link of a page leads to, from the top of the checkout."""
+    return Path(os.path.normpath(page.parent / link))
 
 
-def navigation() -> list[Any]:
-    """The pages in groups, in the order in which one comes to them."""
-    names = [page.as_posix() for page in pages()]
-    cards = [name for name in names if name.partition("/")[0] in ROOTS[:3]]
-    docs = [name for name in names if name.startswith("docs/")]
-    rest = [name for name in names if name not in (names[0], *cards, *docs)]
-    api = [f"api/{name}.md" for name in API]
-    groups = {"Pages": docs, "Equations": cards, "Inside": rest, "Python": api}
-    return [{"grasp-cosim": names[0]}, *({title: group} for title, group in groups.items())]
+def pages() -> list[Path]:
+    """All pages: the README, the map, those of the groups and those below them."""
+    listed = [Path("README.md"), MAP, *(page for group in groups() for page in group.pages)]
+    return [*listed, *(page for packages in below().values() for page in packages)]
 
 
-def config(source: Path, site: Path) -> str:
-    """What MkDocs is to do, as JSON, which is YAML, too."""
-    python = {
-        "paths": [str(ROOT / root) for root in ROOTS],
-        "options": {"show_root_heading": False, "show_source": False, "members_order": "source"},
+def below() -> dict[Path, list[Path]]:
+    """The pages of the packages, below the page of the orchestrator."""
+    top = Path("orchestrator/README.md")
+    links = [from_top(top, link) for link, _ in LINK.findall((ROOT / top).read_text("utf-8"))]
+    return {
+        top: sorted({p for p in links if p.name == "README.md" and p.is_relative_to(top.parent)})
     }
-    return json.dumps(
-        {
-            "site_name": "grasp-cosim",
-            "docs_dir": str(source),
-            "site_dir": str(site),
-            "use_directory_urls": False,
-            "nav": navigation(),
-            "theme": {"name": "material", "font": False},
-            "plugins": ["search", {"mkdocstrings": {"handlers": {"python": python}}}],
-            "markdown_extensions": ["tables", "fenced_code", "md_in_html"],
-            "validation": {"anchors": "warn", "unrecognized_links": "warn"},
-        }
+
+
+def copy(folder: Path) -> None:
+    """Put the pages into a folder, with all that they link to, and the pages that are generated."""
+    for page in pages():
+        target = folder / ("index.md" if page == Path("README.md") else page)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if page.suffix != ".md":
+            shutil.copyfile(ROOT / page, target)
+            continue
+        text = (ROOT / page).read_text("utf-8")
+        for link, _ in LINK.findall(FENCED.sub("", text)):
+            source = from_top(page, link)
+            if (ROOT / source).is_file() and source.suffix not in (".md", ".ipynb"):
+                (folder / source).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(ROOT / source, folder / source)
+        target.write_text(f"{adapted(page, text)}{contents(page)}", "utf-8")
+    for name, text in generated():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, "utf-8")
+
+
+def adapted(page: Path, text: str) -> str:
+    """The text of a page with links as the site has them.
+
+    The README is the index of the site; a page of HTML is opened, where Sphinx would offer it for
+    download; a folder is its README.
+    """
+
+    def link(match: re.Match[str]) -> str:
+        source = from_top(page, match[1])
+        anchor = match[2] or ""
+        if source == Path("README.md"):
+            return f"]({os.path.relpath('index.md', page.parent)}{anchor})"
+        if (ROOT / source).is_dir():
+            return f"]({match[1].rstrip('/')}/README.md{anchor})"
+        return match[0]
+
+    text = LINK.sub(link, text)
+    opened = re.compile(r"(?<!!)\[([^]]*)\]\(([^)\s:]+\.html)(#[^)]*)?\)")
+    return opened.sub(r'<a href="\2\3">\1</a>', text)
+
+
+def contents(page: Path) -> str:
+    """The hidden tables of contents that a page ends with: the navigation of the site."""
+    if page == Path("README.md"):
+        trees = [tree("", ["docs/README"])]
+        for group in groups():
+            names = [path.with_suffix("").as_posix() for path in group.pages]
+            if group.title == "Reference":
+                names += [f"{COMMANDS}/index", f"{PYTHON}/index"]
+            trees.append(tree(group.title, names))
+        return "".join(trees)
+    names = [os.path.relpath(path.with_suffix(""), page.parent) for path in below().get(page, [])]
+    return tree("", names) if names else ""
+
+
+def tree(title: str, names: list[str]) -> str:
+    """A hidden table of contents."""
+    caption = f":caption: {title}\n" if title else ""
+    return "\n```{toctree}\n:hidden:\n" + caption + "\n" + "\n".join(names) + "\n```\n"
+
+
+def generated() -> Iterator[tuple[str, str]]:
+    """The pages of the commands and of the Python interface, by file name."""
+    yield f"{COMMANDS}/index.md", command_index()
+    for name, module in MODULE_OF_COMMAND.items():
+        directive = f".. click:: grasp_cosim.cli.{module}:{name}\n   :prog: grasp-cosim {name}\n"
+        codes = "[Exit codes](../files_and_exit_codes.md) are the same for all commands.\n"
+        yield f"{COMMANDS}/{name}.md", f"# {name}\n\n{codes}\n{restructured(directive)}"
+    yield f"{PYTHON}/index.md", python_index()
+    for name in grasp_cosim.__all__:
+        kind = "autoclass" if isinstance(getattr(grasp_cosim, name), type) else "autofunction"
+        members = "   :members:\n   :member-order: bysource\n" if kind == "autoclass" else ""
+        directive = f".. {kind}:: grasp_cosim.{name}\n{members}"
+        yield f"{PYTHON}/{name}.md", f"# {name}\n\n{restructured(directive)}"
+    for module in MODULES:
+        directive = (
+            f".. automodule:: {module}\n   :no-index:\n   :members:\n   :member-order: bysource\n"
+        )
+        title = module.removeprefix("grasp_cosim.")
+        yield f"{PYTHON}/{module}.md", f"# {title}\n\n{restructured(directive)}"
+
+
+def restructured(directive: str) -> str:
+    """A directive that has to be written in reStructuredText, on a page of Markdown."""
+    return f"```{{eval-rst}}\n{directive}```\n"
+
+
+def command_index() -> str:
+    """The page that lists all commands with their first sentences."""
+    rows = []
+    for name in MODULE_OF_COMMAND:
+        module = import_module(f"grasp_cosim.cli.{MODULE_OF_COMMAND[name]}")
+        purpose = getattr(module, name).get_short_help_str(200)
+        rows.append(f"| [`{name}`]({name}.md) | {purpose} |\n")
+    return (
+        "# Commands\n\n`grasp-cosim COMMAND --help` prints the same text.\n\n"
+        f"| command | purpose |\n|---|---|\n{''.join(rows)}{tree('', list(MODULE_OF_COMMAND))}"
     )
 
 
+def python_index() -> str:
+    """The page that lists all public names with the first sentences of their docstrings."""
+    rows = []
+    for name in grasp_cosim.__all__:
+        first = (getattr(grasp_cosim, name).__doc__ or "").strip().splitlines()[0]
+        rows.append(f"| [`{name}`]({name}.md) | {first} |\n")
+    names = [*grasp_cosim.__all__, *MODULES]
+    return (
+        "# Python\n\nUsers import these names from `grasp_cosim`.\n\n"
+        f"| name | purpose |\n|---|---|\n{''.join(rows)}\n"
+        "## Modules\n\nFew users need more than the names above.\n\n"
+        + "".join(f"- [`{module}`]({module}.md)\n" for module in MODULES)
+        + tree("", names)
+    )
+
+
+def settings() -> Mapping[str, Any]:
+    """The configuration of Sphinx."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    repository = project.get("urls", {}).get("Repository")
+    return {
+        "project": "grasp-cosim",
+        "html_title": f"grasp-cosim {project['version']}",
+        "extensions": [
+            "myst_nb",
+            "sphinx.ext.autodoc",
+            "sphinx.ext.napoleon",
+            "sphinx_click",
+            "sphinx_copybutton",
+            "website_extension",
+        ],
+        "nb_execution_mode": "off",
+        "myst_enable_extensions": ["dollarmath"],
+        "myst_fence_as_directive": ["math"],
+        "myst_heading_anchors": 5,
+        "html_math_renderer": "mathml",
+        "default_role": "code",
+        "autodoc_typehints": "description",
+        "autodoc_typehints_description_target": "documented",
+        "copybutton_prompt_text": r"\w*\$ |>>> |\.\.\. ",
+        "copybutton_prompt_is_regexp": True,
+        "html_theme": "furo",
+        "html_theme_options": {"source_repository": repository} if repository else {},
+        "html_static_path": [str(ROOT / "docs/website.css")],
+        "html_css_files": ["website.css"],
+        "html_extra_path": [],
+        "html_copy_source": False,
+        "pygments_style": "friendly",
+        "exclude_patterns": ["**/.ipynb_checkpoints"],
+    }
+
+
 def main(site: Path) -> None:
-    """Write the site; SystemExit with MkDocs' exit code where there is a warning."""
+    """Write the site; SystemExit with the warnings of Sphinx if there are any."""
+    warnings = io.StringIO()
+    sys.path.insert(0, str(Path(__file__).parent))
     with TemporaryDirectory(prefix="grasp_site_") as name:
         source = Path(name, "pages")
+        source.mkdir()
         copy(source)
-        (settings := Path(name, "mkdocs.yml")).write_text(config(source, site.resolve()), "utf-8")
-        command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(settings)]
-        env = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
-        done = subprocess.run(command, env=env, capture_output=True, text=True)  # noqa: S603
-        if done.returncode:
-            raise SystemExit(done.stderr)
+        try:
+            app = Sphinx(
+                source,
+                confdir=None,
+                outdir=site.resolve(),
+                doctreedir=Path(name, "doctrees"),
+                buildername="html",
+                confoverrides=dict(settings()),
+                status=None,
+                warning=warnings,
+                freshenv=True,
+            )
+            app.build()
+        except SphinxError as error:
+            raise SystemExit(f"{warnings.getvalue()}{error}") from error
+    if text := warnings.getvalue():
+        raise SystemExit(text)
+    for page in ROOT.glob("docs/*.html"):
+        shutil.copyfile(page, site / "docs" / page.name)
     print(site / "index.html")
 
 

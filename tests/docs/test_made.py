@@ -1,4 +1,4 @@
-"""What is made of the sources is of them: variable tables, the notebook, the site of all pages."""
+"""Variable tables, the notebook and the site of all pages are made of the sources at hand."""
 
 import copy
 import json
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import grasp_cosim
 import pytest
+from grasp_cosim.cli.group import MODULE_OF_COMMAND
 from grasp_cosim.fmu_export.page import blocks_by_card, updated
 from grasp_cosim.fmu_export.shipped import SHIPPED
 
@@ -74,21 +75,83 @@ def test_it_is_a_valid_notebook_of_a_modest_size():
     assert all(cell["outputs"] for cell in CODE)
 
 
+# The site
+
+
 @pytest.fixture(scope="module")
 def website():
-    pytest.importorskip("mkdocstrings", reason="mkdocstrings is not installed")
-    return pytest.importorskip("website", reason="mkdocs is not installed")
+    for package in ("furo", "myst_nb", "sphinx_click", "sphinx_copybutton", "ziamath"):
+        pytest.importorskip(package, reason=f"{package} is not installed")
+    return pytest.importorskip("website", reason="sphinx is not installed")
+
+
+@pytest.fixture(scope="module")
+def site(website, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    website.main(folder)
+    return folder
+
+
+def html(site, name):
+    return (site / name).with_suffix(".html").read_text("utf-8")
 
 
 @pytest.mark.slow
-def test_every_page_and_every_public_name_is_there(website, tmp_path):
-    website.main(tmp_path / "site")
+def test_the_site_has_every_page_every_command_and_every_public_name(website, site):
     for page in website.pages():
-        there = page.with_name("index.html" if page.name == "README.md" else f"{page.stem}.html")
-        assert (tmp_path / "site" / there).is_file()
-    names = (tmp_path / "site/api/grasp_cosim.html").read_text("utf-8")
-    assert {*grasp_cosim.__all__} <= {*re.findall(r'id="grasp_cosim\.(\w+)"', names)}
-    assert "<math" in (tmp_path / "site/plant/index.html").read_text("utf-8")
+        name = "index" if page == Path("README.md") else page
+        assert "<h1>" in html(site, name)
+    for name in grasp_cosim.__all__:
+        page = html(site, f"docs/reference/python/{name}")
+        assert f'id="grasp_cosim.{name}"' in page or f'.{name}"' in page
+        assert "Example" in page
+    for name in MODULE_OF_COMMAND:
+        assert f"grasp-cosim {name}" in html(site, f"docs/reference/commands/{name}")
+
+
+@pytest.mark.slow
+def test_every_page_of_the_site_is_in_its_navigation(site):
+    index = html(site, "index")
+    for page in site.rglob("*.html"):
+        name = page.relative_to(site).as_posix()
+        if name not in ("genindex.html", "py-modindex.html", "search.html", "docs/playground.html"):
+            assert f'href="{name}"' in index or name == "index.html", name
+
+
+@pytest.mark.slow
+def test_the_site_needs_no_network(site):
+    """Nothing but a link leads out of it: no script, style, font or picture."""
+    for page in site.rglob("*.html"):
+        if page.name == "playground.html":
+            continue
+        text = page.read_text("utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe|source)[^>]* src=\"([^\"]*)\"", text)
+        loaded += re.findall(r"<link[^>]* href=\"([^\"]*)\"", text)
+        assert [address for address in loaded if re.match(r"(https?:)?//", address)] == [], page
+
+
+@pytest.mark.slow
+def test_links_within_the_site_lead_to_files_of_it(site):
+    for page in site.rglob("*.html"):
+        for link in re.findall(r"<a [^>]*href=\"([^\"#:]+)(?:#[^\"]*)?\"", page.read_text("utf-8")):
+            assert (page.parent / link).is_file(), (page, link)
+
+
+@pytest.mark.slow
+def test_equations_notebook_search_and_glossary_are_there(site):
+    assert html(site, "plant/README").count('<math xmlns="http://www.w3.org/1998/Math') > 5
+    assert (site / "_static/STIXTwoMath-Regular.ttf").stat().st_size > 100_000
+    assert "data:image/png;base64" in html(site, "docs/from_python") or list(
+        (site / "_images").glob("*.png")
+    )
+    assert "simultaneous" in (site / "searchindex.js").read_text("utf-8")
+    link = re.search(r'class="word reference internal" href="([^"#]*)#([^"]*)"', html(site, PAGE))
+    assert link is not None
+    assert f'id="{link[2]}"' in html(site, "docs/reference/glossary")
+
+
+PAGE = "docs/how_to/hardware"
+"""A page that uses words of the glossary."""
 
 
 @pytest.mark.slow
@@ -97,8 +160,9 @@ def test_a_link_that_leads_nowhere_is_an_error(website, tmp_path, monkeypatch):
 
     def broken(folder):
         copy(folder)
-        (folder / "README.md").write_text("[a](docs/guide.md#nowhere)\n", "utf-8")
+        page = folder / "docs/results/speed.md"
+        page.write_text("# Speed\n\n[a](systems.md#nowhere)\n", "utf-8")
 
     monkeypatch.setattr(website, "copy", broken)
-    with pytest.raises(SystemExit, match="does not contain an anchor '#nowhere'"):
+    with pytest.raises(SystemExit, match=r"target not found: 'systems\.md#nowhere'"):
         website.main(tmp_path / "site")

@@ -6,18 +6,47 @@ from typing import Any
 
 
 class InputError(Exception):
-    """The input is wrong. The message is one line: what, where, the value, what would be valid."""
+    """The input is wrong. The message is one line: what, where, the value, what would be valid.
+
+    Example:
+        >>> from grasp_cosim import InputError, grasp_system
+        >>> try:
+        ...     grasp_system().with_values({"plant.object_widht": 0.05})
+        ... except InputError as error:
+        ...     print(str(error).partition(":")[0])
+        with_values plant.object_widht
+    """
 
 
 class SimulationError(Exception):
-    """An FMU failed in a running simulation. The message is one line."""
+    """An FMU failed in a running simulation. The message is one line.
+
+    Example:
+        >>> from grasp_cosim import SimulationError, grasp_system, simulate
+        >>> try:
+        ...     result = simulate(grasp_system(), step=1e-3, stop=0.1)
+        ... except SimulationError as error:
+        ...     print(error)  # the component, the time and the reason
+        >>> result.came_to_its_end
+        True
+    """
 
     result: Any = None
     """What was recorded until then, a recording.result.Result; None where there is nothing."""
 
 
 class RunInterruptedError(KeyboardInterrupt):
-    """Ctrl-C ended a run in good order: result is what was recorded, a recording.result.Result."""
+    """Ctrl-C ended a run in good order: result is what was recorded, a recording.result.Result.
+
+    Example:
+        >>> from grasp_cosim import RunInterruptedError, grasp_system, simulate
+        >>> try:
+        ...     result = simulate(grasp_system(), step=1e-3, stop=0.1)
+        ... except RunInterruptedError as interrupted:
+        ...     result = interrupted.result  # the rows up to the interrupt
+        >>> len(result.time)
+        101
+    """
 
     def __init__(self, result: Any) -> None:
         super().__init__("the run was interrupted; what was recorded is the result of this error")

@@ -24,6 +24,12 @@ class Quantity:
 
     Raises:
         InputError: It is no number with a unit.
+
+    Example:
+        >>> from grasp_cosim import Quantity, grasp_system
+        >>> system = grasp_system().with_values({"plant.object_width": Quantity("50 mm")})
+        >>> system.start("plant.object_width")
+        0.05
     """
 
     value: Any

@@ -72,6 +72,15 @@ def compare(
     Raises:
         InputError: A run cannot be read, or the two have no time or no signal in common.
         SimulationError: A system file was given, and its run fails.
+
+    Example:
+        >>> from grasp_cosim import compare, grasp_system, simulate
+        >>> white = simulate(grasp_system(), step=1e-3, stop=0.5)
+        >>> dark = simulate(
+        ...     grasp_system().with_values({"sensor_1.reflectance": 0.5}), step=1e-3, stop=0.5
+        ... )
+        >>> bool(compare(white, white)), bool(compare(white, dark))
+        (True, False)
     """
     first, second = (_recorded(run, called, names) for run, called in ((a, "A"), (b, "B")))
     first, second = first or _ran(a, second), second or _ran(b, first)

@@ -113,6 +113,12 @@ def qualify(
         InputError: An argument is wrong, or the original refuses.
         SimulationError: The original fails.
         KeyboardInterrupt: Ctrl-C.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, qualify
+        >>> system = grasp_system(native=False).with_experiment(step=2e-3, stop=0.1)
+        >>> bool(qualify(system, "plant", system.by_name["plant"].fmu))
+        True
     """
     choice("isolation", isolation, ISOLATIONS)
     system = as_system(system, "qualify")

@@ -117,6 +117,11 @@ def grasp_system(controller: str = "published", native: bool | None = None) -> S
 
     Raises:
         InputError: There is no such law, or the FMUs cannot be built.
+
+    Example:
+        >>> from grasp_cosim import grasp_system
+        >>> sorted(grasp_system().by_name)
+        ['controller', 'plant', 'sensor_1', 'sensor_2']
     """
     system = as_named()
     chosen = system if controller == "published" else with_controller(system, controller)

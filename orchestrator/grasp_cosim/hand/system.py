@@ -56,6 +56,11 @@ def hand_system(
     Raises:
         InputError: The fingers cannot hold an object, there is no such law, or the FMUs cannot be
             built.
+
+    Example:
+        >>> from grasp_cosim import hand_system
+        >>> len(hand_system(3).by_name)
+        5
     """
     directions = directions_of(fingers, angles)
     if note := faint(directions):

@@ -42,6 +42,11 @@ def inspect_fmu(path: str | Path) -> Declarations:
 
     Raises:
         InputError: There is no FMU.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, inspect_fmu
+        >>> path = grasp_system(native=False).by_name["plant"].fmu
+        >>> declarations = inspect_fmu(path)
     """
     interface = describe(Path(path))
     return Declarations(

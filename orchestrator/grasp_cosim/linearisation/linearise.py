@@ -58,6 +58,14 @@ def linearise(
         InputError: There is no such input, output or moment; or the states of an FMU are not known
             one by one, as those of blocks are.
         SimulationError: The run fails.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, linearise
+        >>> model = linearise(
+        ...     grasp_system(), 0.2, ["plant.force[1]"], ["plant.position[1]"], step=1e-3
+        ... )
+        >>> model.A.shape[0] == len(model.states)
+        True
     """
     system = as_system(system, "linearise").with_experiment(step=step, scheme=scheme)
     for i, fault in enumerate(system.faults):

@@ -38,7 +38,7 @@ class Margins(NamedTuple):
     """
 
     crossover: float
-    """The frequency in rad/s at which |L| is 1 and the delay margin the smallest."""
+    """The frequency in rad/s at which the gain is 1 and the delay margin the smallest."""
     phase_margin: float
     """The lag in degrees that the loop bears there."""
     delay_margin: float
@@ -66,6 +66,13 @@ class StateSpace:
         x[k+1] = A x[k] + B u[k],    y[k] = C x[k] + D u[k]
 
     Values are in the units of the signals.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, linearise
+        >>> loop = "controller.intensity[1]"
+        >>> model = linearise(grasp_system(), 0.5, [loop], [loop], step=1e-3)
+        >>> model.D.shape, model.margins().phase_margin > 60.0
+        ((1, 1), True)
     """
 
     A: Matrix

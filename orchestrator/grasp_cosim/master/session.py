@@ -77,6 +77,15 @@ class Session:
         with simulate.session(system, stop=2.0) as session:
             while session.step(100):
                 print(session.time, session["plant.gap[1]"])
+
+    Example:
+        >>> from grasp_cosim import grasp_system, simulate
+        >>> with simulate.session(grasp_system(), step=1e-3, stop=0.1) as session:
+        ...     more = session.step(50)
+        ...     session.set("sensor_2.reflectance", 0.6)
+        ...     time = session.time
+        >>> more, time
+        (True, 0.05)
     """
 
     def __init__(

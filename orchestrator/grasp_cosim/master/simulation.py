@@ -109,6 +109,12 @@ def simulate(
             what was recorded until then.
         RunInterruptedError: Ctrl-C once the FMUs were loaded, a KeyboardInterrupt. Its attribute
             `result` is what was recorded until then.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, simulate
+        >>> result = simulate(grasp_system(), step=1e-3, stop=2.5)
+        >>> round(result.metrics["time_difference"], 2)
+        0.01
     """
     if until is not None and not callable(until):
         raise InputError(f"until = {until!r}: must be a function of the session")

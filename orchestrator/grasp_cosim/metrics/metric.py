@@ -51,6 +51,14 @@ class AnyOf:
 
     Args:
         names: The names of the signals.
+
+    Example:
+        >>> from grasp_cosim import AnyOf, metric
+        >>> @metric("touched", needs=[AnyOf(("plant.contact[1]", "plant.gap[1]"))])
+        ... def touched(run):
+        ...     return "plant.contact[1]" in run
+        >>> touched.needs[0].names
+        ('plant.contact[1]', 'plant.gap[1]')
     """
 
     names: tuple[str, ...]
@@ -127,7 +135,7 @@ class Metric:
 
     A metric of a system has a value where the signals that it needs are recorded, whatever others
     of its group lack; why it has none is said once for all that lack the same. As an argument or an
-    entry, "plant.gap[*]" stands for all elements of an array, and "finger *" for one name each.
+    entry, `plant.gap[*]` stands for all elements of an array, and `finger *` for one name each.
 
     Args:
         name: An identifier, the name of its column.
@@ -150,6 +158,15 @@ class Metric:
         none: What having no value means: "nothing was touched".
         origin: The name and the text of the file that it is from, by which it travels to other
             processes.
+
+    Example:
+        >>> from grasp_cosim import Metric, grasp_system, simulate
+        >>> def final_gap(run):
+        ...     return float(run["plant.gap[1]"][-1])
+        >>> gap = Metric("final_gap", final_gap, unit="m", needs=["plant.gap[1]"])
+        >>> result = simulate(grasp_system(), step=1e-3, stop=0.1, metrics=[gap])
+        >>> bool(result.metrics["final_gap"] == result["plant.gap[1]"][-1])
+        True
     """
 
     name: str
@@ -223,7 +240,7 @@ class Metric:
             roles: The component by role, where its name does not say it.
 
         Returns:
-            The metric without [*] and *.
+            The metric without `[*]` and `*`.
         """
         if not self.arrays:
             return self
@@ -302,11 +319,6 @@ def _elements(array: str, names: Collection[str], roles: Mapping[str, str]) -> i
 def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
     """Make a Metric of the function below.
 
-        @metric("peak_force", unit="N", needs={"plant.contact_force[1]": "N"})
-        def peak_force(run):
-            "The largest contact force of finger 1."
-            return float(run["plant.contact_force[1]"].max())
-
     Args:
         name: An identifier, the name of the metric and of its column.
         **more: The other arguments of Metric by name. Without `description` it is the first line of
@@ -317,6 +329,17 @@ def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
 
     Raises:
         InputError: The name is no identifier, or is RESERVED; or a unit is none of SI.
+
+    Example:
+        >>> import numpy as np
+        >>> from grasp_cosim import metric, simulate, grasp_system
+        >>> @metric("peak_force", unit="N", needs={"plant.contact_force[1]": "N"})
+        ... def peak_force(run):
+        ...     "The largest contact force of finger 1."
+        ...     return float(np.max(run["plant.contact_force[1]"]))
+        >>> result = simulate(grasp_system(), step=1e-3, stop=2.0, metrics=[peak_force])
+        >>> round(result.metrics["peak_force"], 2)
+        1.22
     """
     if not name.isidentifier():
         raise InputError(f"metric {name!r}: must be a name of letters, digits and _")

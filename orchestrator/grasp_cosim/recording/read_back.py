@@ -56,6 +56,12 @@ def load_run(folder: str | Path) -> Result:
 
     Raises:
         InputError: A file is missing or damaged, or the two files are not of the same run.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, load_run, simulate
+        >>> simulate(grasp_system(), step=1e-3, stop=0.1).save("results")
+        >>> float(load_run("results").time[-1])
+        0.1
     """
     folder = run_folder(Path(folder))
     path, arrow, signals = folder / SETTINGS, folder / ARROW, folder / SIGNALS

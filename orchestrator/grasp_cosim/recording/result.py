@@ -57,6 +57,14 @@ class Result(RecordedRun):
 
     Signals are by name, like result["plant.gap[1]"], on result.time in s; all that is known of the
     run is as of a RecordedRun.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, simulate
+        >>> result = simulate(grasp_system(), step=1e-3, stop=0.1)
+        >>> float(result.time[-1]), result.units["plant.gap[1]"]
+        (0.1, 'm')
+        >>> bool(result["plant.gap[1]"].min() > 0.0)
+        True
     """
 
     def __repr__(self) -> str:

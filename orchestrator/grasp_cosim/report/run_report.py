@@ -59,6 +59,12 @@ def write_report(
 
     Raises:
         InputError: The folder has no run, or the page cannot be written.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, simulate, write_report
+        >>> result = simulate(grasp_system(), step=1e-3, stop=0.1)
+        >>> [path.name for path in write_report(result, "page.html")]
+        ['page.html', 'grasp.png']
     """
     result = run if isinstance(run, Result) else load_run(run)
     result = result.titled(title)

@@ -59,6 +59,12 @@ def write_ssp(system: System | str | Path, path: str | Path) -> Written:
 
     Raises:
         InputError: The path is no .ssp file, cannot be written, or a component is Python code.
+
+    Example:
+        >>> from grasp_cosim import System, grasp_system, write_ssp
+        >>> written = write_ssp(grasp_system(), "grasp.ssp")
+        >>> sorted(System.load("grasp.ssp").by_name)
+        ['controller', 'plant', 'sensor_1', 'sensor_2']
     """
     system, path = as_system(system, "write_ssp"), Path(path)
     if path.suffix.lower() != ".ssp" or path.is_dir():

@@ -76,6 +76,14 @@ def sweep(
             another process, or `out` has runs of something else.
         SimulationError: Processes do not start, or a run cannot be kept.
         KeyboardInterrupt: Ctrl-C.
+
+    Example:
+        >>> from grasp_cosim import grasp_system, sweep
+        >>> system = grasp_system().with_experiment(step=1e-3, stop=3.0)
+        >>> rows = [{"plant.object_width": width} for width in (0.05, 0.07)]
+        >>> table = sweep(system, rows)
+        >>> [round(float(force), 2) for force in table["steady_contact_force[1]"]]
+        [2.09, 3.39]
     """
     system = as_system(system, "sweep")
     for component in system.components:

@@ -48,7 +48,26 @@ class System(Structure):
     """A checked system: every name exists, every input has one source or keeps a value.
 
     It is made by System(...) in Python, by System.load() of a file, or by grasp_system(),
-    hand_system() and tandem_system(). It does not change: each with_...() returns a copy.
+    hand_system() and tandem_system(). It does not change: methods such as `with_values()` return
+    a copy.
+
+    Example:
+        >>> from grasp_cosim import System
+        >>> class Ramp:
+        ...     outputs = {"y": (0.0, "m")}
+        ...     def step(self, t, inputs):
+        ...         return {"y": 2.0 * t}
+        >>> class Follower:
+        ...     inputs = {"u": (0.0, "m")}
+        ...     def step(self, t, inputs):
+        ...         return {"copy": inputs["u"]}
+        >>> system = System(
+        ...     components={"ramp": Ramp, "follower": Follower},
+        ...     connections=["ramp.y -> follower.u"],
+        ...     experiment={"step": 0.1, "stop": 1.0},
+        ... )
+        >>> sorted(system.by_name)
+        ['follower', 'ramp']
     """
 
     @overload

@@ -402,6 +402,11 @@ class Realtime:
 
     Raises:
         InputError: A value is none of these.
+
+    Example:
+        >>> from grasp_cosim import Realtime
+        >>> Realtime(factor=2.0).factor
+        2.0
     """
 
     factor: float = 1.0

@@ -25,6 +25,12 @@ def tandem_system(controller: str = "adaptive", native: bool | None = None) -> S
 
     Raises:
         InputError: There is no such law, or the FMUs cannot be built.
+
+    Example:
+        >>> from grasp_cosim import simulate, tandem_system
+        >>> result = simulate(tandem_system(), stop=0.1)
+        >>> result.came_to_its_end
+        True
     """
     system = System.load(SYSTEM, shipped_fmus())
     chosen = system if controller == "adaptive" else with_controller(system, controller)

@@ -174,6 +174,10 @@ def identify(
     Raises:
         InputError: The log, or a name of `fit`, is wrong.
         SimulationError: The fit does not come to rest.
+
+    Example:
+        >>> from grasp_cosim import identify
+        >>> fitted = identify(fit=["coulomb"])  # from the published contact times  # doctest: +SKIP
     """
     system = grasp_system() if system is None else as_system(system, "identify")
     log = None if log is None else Path(log)

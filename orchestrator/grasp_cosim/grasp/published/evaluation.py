@@ -77,6 +77,11 @@ def evaluate(
             that draws its pictures.
         SimulationError: A run fails.
         KeyboardInterrupt: Ctrl-C.
+
+    Example:
+        >>> from grasp_cosim import evaluate
+        >>> evaluation = evaluate()  # about 10 s  # doctest: +SKIP
+        >>> evaluation.write("results")  # doctest: +SKIP
     """
     folder = None if out is None else Path(out)
     if folder:

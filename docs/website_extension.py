@@ -1,0 +1,110 @@
+"""An extension of Sphinx for docs/website.py: equations as MathML, links to the glossary."""
+
+import re
+from collections.abc import Iterator
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from latex2mathml.converter import convert
+from sphinx.application import Sphinx
+from sphinx.util.fileutil import copy_asset
+from sphinx.writers.html5 import HTML5Translator
+
+GLOSSARY = "docs/reference/glossary"
+
+NOT_IN = (nodes.reference, nodes.literal, nodes.title, nodes.raw, nodes.literal_block, nodes.term)
+"""Kinds of text in which no word becomes a link."""
+
+
+def equation(display: str, translator: HTML5Translator, node: nodes.math) -> None:
+    """Write an equation as MathML, which browsers set with the font of website.css."""
+    translator.body.append(convert(node.astext(), display=display))
+    raise nodes.SkipNode
+
+
+def copy_font(app: Sphinx, error: Exception | None) -> None:
+    """Put STIX Two Math into the site; the package ziamath has it."""
+    package = find_spec("ziamath")
+    if error is None and package is not None and package.origin is not None:
+        font = Path(package.origin).parent / "fonts/STIXTwoMath-Regular.ttf"
+        copy_asset(font, app.outdir / "_static")
+
+
+# Links to the glossary
+
+
+def words_of(glossary: nodes.document) -> dict[str, str]:
+    """The words that the glossary explains, with the anchors of their rows, which this sets.
+
+    The code has words with a meaning among its authors: that section is left out.
+    """
+    anchors: dict[str, str] = {}
+    for section in glossary.findall(nodes.section):
+        if "the-code" in section["ids"]:
+            continue
+        for row in section.findall(nodes.row):
+            cell = next(row.findall(nodes.entry), None)
+            if cell is None or row.parent is None or isinstance(row.parent, nodes.thead):
+                continue
+            words = [word.strip() for word in cell.astext().split(",")]
+            anchor = f"word-{nodes.make_id(words[0])}"
+            if cell.children and anchor not in cell.children[0]["ids"]:
+                cell.children[0].insert(0, nodes.target("", "", ids=[anchor]))
+            anchors |= dict.fromkeys(words, anchor)
+    return anchors
+
+
+def link_words(app: Sphinx, document: nodes.document, name: str) -> None:
+    """Make the first use of each word of the glossary on a page a link to it."""
+    words = words_of(app.env.get_doctree(GLOSSARY))
+    if name == GLOSSARY:
+        words_of(document)
+        return
+    if not name.startswith("docs/") or "/python/" in name or not words:
+        return
+    longest_first = sorted(words, key=len, reverse=True)
+    pattern = re.compile(
+        rf"(?<![\w-])({'|'.join(map(re.escape, longest_first))})(?=s?(?![\w-]))", re.I
+    )
+    known = {word.lower(): word for word in words}
+    address = app.builder.get_relative_uri(name, GLOSSARY)
+    linked: set[str] = set()
+    for text in list(texts(document)):
+        parts: list[nodes.Node] = []
+        end = 0
+        for match in pattern.finditer(text):
+            word = known[match[0].lower()]
+            if words[word] in linked:
+                continue
+            linked.add(words[word])
+            parts.append(nodes.Text(text[end : match.start()]))
+            uri = f"{address}#{words[word]}"
+            parts.append(nodes.reference(match[0], match[0], refuri=uri, classes=["word"]))
+            end = match.end()
+        if parts and text.parent is not None:
+            text.parent.replace(text, [*parts, nodes.Text(text[end:])])
+
+
+def texts(document: nodes.document) -> Iterator[nodes.Text]:
+    """The texts of a page in which a word may become a link."""
+    for text in document.findall(nodes.Text):
+        parent: Any = text.parent
+        while parent is not None and not isinstance(parent, NOT_IN):
+            parent = parent.parent
+        if parent is None:
+            yield text
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register all of it; called by Sphinx."""
+    app.add_html_math_renderer(
+        "mathml",
+        (partial(equation, "inline"), None),
+        (partial(equation, "block"), None),
+    )
+    app.connect("build-finished", copy_font)
+    app.connect("doctree-resolved", link_words)
+    return {"parallel_read_safe": True}
