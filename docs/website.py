@@ -157,8 +157,8 @@ def generated() -> Iterator[tuple[str, str]]:
     yield f"{COMMANDS}/index.md", command_index()
     for name, module in MODULE_OF_COMMAND.items():
         directive = f".. click:: grasp_cosim.cli.{module}:{name}\n   :prog: grasp-cosim {name}\n"
-        codes = "[Exit codes](../files_and_exit_codes.md) are the same for all commands.\n"
-        yield f"{COMMANDS}/{name}.md", f"# {name}\n\n{codes}\n{restructured(directive)}"
+        codes = "All commands have the same [exit codes](../files_and_exit_codes.md).\n"
+        yield f"{COMMANDS}/{name}.md", f"{restructured(directive)}\n{codes}"
     yield f"{PYTHON}/index.md", python_index()
     for name in grasp_cosim.__all__:
         kind = "autoclass" if isinstance(getattr(grasp_cosim, name), type) else "autofunction"
@@ -228,6 +228,7 @@ def settings() -> Mapping[str, Any]:
         "myst_heading_anchors": 5,
         "html_math_renderer": "mathml",
         "default_role": "code",
+        "smartquotes": False,
         "autodoc_typehints": "description",
         "autodoc_typehints_description_target": "documented",
         "copybutton_prompt_text": r"\w*\$ |>>> |\.\.\. ",

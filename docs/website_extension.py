@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Iterator
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import click
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
@@ -14,15 +14,46 @@ from sphinx.util.fileutil import copy_asset
 from sphinx.writers.html5 import HTML5Translator
 
 GLOSSARY = "docs/reference/glossary"
+GENERATED = re.compile("docs/reference/(commands|python)/")
 
 NOT_IN = (nodes.reference, nodes.literal, nodes.title, nodes.raw, nodes.literal_block, nodes.term)
 """Kinds of text in which no word becomes a link."""
 
 
-def equation(display: str, translator: HTML5Translator, node: nodes.math) -> None:
-    """Write an equation as MathML, which browsers set with the font of website.css."""
-    translator.body.append(convert(node.astext(), display=display))
+TAG = re.compile(r"\s*\\tag\{(.*?)\}")
+
+
+def symbols(translator: HTML5Translator, node: nodes.math) -> None:
+    """Write the symbols in a line as MathML, which browsers set with the font of website.css."""
+    translator.body.append(convert(node.astext()))
     raise nodes.SkipNode
+
+
+def equation(translator: HTML5Translator, node: nodes.math_block) -> None:
+    """Write an equation as MathML, with its number at the right margin."""
+    text = node.astext()
+    tag = TAG.search(text)
+    mathml = convert(TAG.sub("", text), display="block")
+    number = f'<span class="number">({tag[1]})</span>' if tag else ""
+    translator.body.append(f'<div class="equation">{mathml}{number}</div>\n')
+    raise nodes.SkipNode
+
+
+def show_examples(_: Sphinx, __: click.Context, lines: list[str]) -> None:
+    """Make blocks of code of the commands in the help of a command.
+
+    A paragraph of the help that click does not wrap begins with a backspace.
+    """
+    shown: list[str] = []
+    for line in lines:
+        words = line.replace("\b", "").lstrip("| ")
+        text, command, rest = words.partition("grasp-cosim ")
+        if not line.startswith(("\b", "| ")) or not command:
+            shown.append(words if line.startswith("| ") else line)
+            continue
+        shown += [text.strip() or "Example:", "", ".. code-block:: bash", ""]
+        shown += [f"   {command}{rest}", ""]
+    lines[:] = shown
 
 
 def copy_font(app: Sphinx, error: Exception | None) -> None:
@@ -63,7 +94,7 @@ def link_words(app: Sphinx, document: nodes.document, name: str) -> None:
     if name == GLOSSARY:
         words_of(document)
         return
-    if not name.startswith("docs/") or "/python/" in name or not words:
+    if not name.startswith("docs/") or GENERATED.match(name) or not words:
         return
     longest_first = sorted(words, key=len, reverse=True)
     pattern = re.compile(
@@ -102,9 +133,10 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Register all of it; called by Sphinx."""
     app.add_html_math_renderer(
         "mathml",
-        (partial(equation, "inline"), None),
-        (partial(equation, "block"), None),
+        (symbols, None),
+        (equation, None),
     )
     app.connect("build-finished", copy_font)
+    app.connect("sphinx-click-process-description", show_examples)
     app.connect("doctree-resolved", link_words)
     return {"parallel_read_safe": True}

@@ -306,7 +306,7 @@ class Session:
             steps: How many, at least 1.
 
         Returns:
-            False if no step was done: the end was reached before, be it the stop time or one that
+            False if the run had already ended. That is the stop time or one that
             an FMU asked for, or `halt` ended the wait for the first step in real time.
 
         Raises:

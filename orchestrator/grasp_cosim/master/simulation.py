@@ -100,8 +100,8 @@ def simulate(
             system file does the same for a condition that is known before, in the loop itself.
 
     Returns:
-        The result: signals of the shape (rows,) by name, in the units of their FMUs, on result.time
-        in s; with metrics, log and settings.
+        The result with signals of the shape (rows,) by name, in the units of their FMUs, on
+        result.time in s. It has metrics, log and settings, too.
 
     Raises:
         InputError: An argument is wrong, or an FMU does not load or refuses its parameters.

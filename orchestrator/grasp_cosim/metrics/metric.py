@@ -325,7 +325,7 @@ def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
             the docstring of the function.
 
     Returns:
-        The decorator: it takes the function, and returns the Metric.
+        The decorator, which takes the function and returns the Metric.
 
     Raises:
         InputError: The name is no identifier, or is RESERVED; or a unit is none of SI.

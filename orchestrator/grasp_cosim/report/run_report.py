@@ -54,8 +54,8 @@ def write_report(
         title: The title; "" for that of the run.
 
     Returns:
-        The files: the page, and with matplotlib a picture beside it, and one of the timing of a run
-        in real time.
+        The paths of the page and, with matplotlib, of its picture and of the timing of a run in
+        real time.
 
     Raises:
         InputError: The folder has no run, or the page cannot be written.

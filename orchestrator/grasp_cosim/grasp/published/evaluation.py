@@ -69,7 +69,7 @@ def evaluate(
         progress: True shows on standard error how far it is.
 
     Returns:
-        A dictionary: `rows`, each a published figure beside ours, `rms` of the differences in s,
+        A dictionary of `rows`, each a published figure beside ours, `rms` of the differences in s,
         `claims` of the paper and if they hold, `runs`, the metrics of each grasp, and `units`.
 
     Raises:
