@@ -29,9 +29,17 @@ SEED ?= $(shell date +%s)
 .PHONY: run test test-slow platforms interop explore check docs dist bench mutants cards pictures playground clean
 
 run: .venv/run
-	$(BIN)/grasp-cosim build
-	$(BIN)/grasp-cosim evaluate --out results
-	@echo 'and the playground, where each slider simulates the grasp anew: docs/playground.html'
+	$(BIN)/grasp-cosim build --quiet
+	$(BIN)/grasp-cosim evaluate --quiet --out results > results/evaluation.txt
+	$(BIN)/grasp-cosim run --quiet --out results/first_grasp --plot > results/first_grasp.txt
+	@echo
+	@echo 'The published table was reproduced: results/evaluation.html'
+	@echo 'The fingers closed on the object:   results/first_grasp/grasp.png'
+	@echo
+	@echo 'Next commands:'
+	@echo '  source .venv/bin/activate'
+	@echo '  grasp-cosim run --set plant.object_width=0.06 --out results/narrow --plot'
+	@echo '  grasp-cosim diff results/first_grasp results/narrow'
 
 test: .venv/dev
 	$(PYTEST) -m "not slow and not platforms and not interop"

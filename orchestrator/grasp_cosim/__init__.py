@@ -26,6 +26,7 @@ from .base.registry import Kind, register
 if TYPE_CHECKING:
     __version__: str
     from .base.quantity import Quantity
+    from .comparison.changes import diff
     from .comparison.compare import compare
     from .comparison.qualify import qualify
     from .grasp.identification.identification import identify
@@ -60,6 +61,7 @@ __all__ = [
     "StateSpace",
     "System",
     "compare",
+    "diff",
     "evaluate",
     "grasp_system",
     "hand_system",
@@ -86,6 +88,7 @@ _MODULES = {
     "StateSpace": "linearisation.state_space",
     "System": "system.description",
     "compare": "comparison.compare",
+    "diff": "comparison.changes",
     "evaluate": "grasp.published.evaluation",
     "grasp_system": "grasp.system",
     "hand_system": "hand.system",

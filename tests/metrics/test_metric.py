@@ -23,7 +23,7 @@ from grasp_cosim.report.terminal import run_json
 
 TIME = np.array([0.0, 0.5, 1.0])
 GAP = np.array([0.3, 0.2, 0.1])
-UNRECORDED = "; what is no output must be recorded: --record "
+UNRECORDED = "; a signal that is no output must be recorded, --record "
 
 FILE = '''"""My own."""
 
@@ -72,8 +72,16 @@ def test_a_signal_is_found_by_the_role_of_its_component_and_by_its_name():
 @pytest.mark.parametrize(
     ("name", "roles", "reason"),
     [
-        ("plant.force", {}, f"plant lacks force{UNRECORDED}plant.force"),
-        ("arm.force", {"arm": "plant"}, f"plant lacks force{UNRECORDED}plant.force"),
+        (
+            "plant.force",
+            {},
+            f"plant lacks force{UNRECORDED}plant.force; valid: plant.gap, plant.on",
+        ),
+        (
+            "arm.force",
+            {"arm": "plant"},
+            f"plant lacks force{UNRECORDED}plant.force; valid: plant.gap, plant.on",
+        ),
         ("arm.mass", {}, 'no component is the arm; name it under [roles]: arm = "..."'),
         ("arm.gap", {}, 'no component is the arm; name it under [roles]: arm = "plant"'),
         ("plan.gap", {}, 'no component is the plan; name it under [roles]: plan = "plant"'),
@@ -279,10 +287,10 @@ def test_a_metric_of_its_own_says_what_it_lacks():
     silent = made("tilt", lambda run: run["plant.tilt"][-1], needs=("plant.tilt",), optional=True)
     there = made("gap", lambda run: run["plant.gap"][-1])
     found = measure(signals(), [needing, trying, silent, there])
-    assert found.missing == (
-        "no speed: plant lacks speed",
-        f"no force: plant lacks force{UNRECORDED}plant.force",
-    )
+    assert found.missing[0] == "no speed: plant lacks speed"
+    line = "metric 'force': test_metric.py, line "
+    assert found.missing[1].startswith(line)
+    assert f": plant lacks force{UNRECORDED}plant.force; valid: " in found.missing[1]
     assert dict(found.values) == {"gap": 0.1}
     assert found.metrics == (there,)
 

@@ -145,7 +145,7 @@ METRICS = (
     Metric("b", lambda _: True),
     Metric("c_d", lambda _: [0.125, 0.25], unit="s", entries=("left", "right")),
     Metric("e", lambda _: [1.5, 2.5]),
-    Metric("lacking", lambda run: run["plant.nothing"][0]),
+    Metric("lacking", lambda run: run["plant.nothing"][0], group="own"),
 )  # fmt: skip
 """One with other entries has a row for each; one without, or a list, is across all."""
 

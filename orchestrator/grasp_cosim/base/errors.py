@@ -1,7 +1,8 @@
 """The two ways a simulation is refused or broken off."""
 
+import re
 import signal
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 
@@ -91,9 +92,10 @@ MAX_LISTED_IN_FULL, MAX_LISTED_OF_MANY = 8, 4
 
 
 def _alike(name: str, names: Sequence[str]) -> list[str]:
-    """At most three names: those spelt alike, else those that hold its last part.
+    """At most three names: those with all its words, else those spelt alike, else those that hold
+    its last part.
 
-    Behind a component or group that is known, "plant.", what follows must be alike.
+    Behind a component or group that is known, "plant.", the rest must be alike.
     """
     from difflib import SequenceMatcher, get_close_matches
 
@@ -104,12 +106,34 @@ def _alike(name: str, names: Sequence[str]) -> list[str]:
     cut = len(head + dot) if mates else 0
     lower = {candidate[cut:].lower(): candidate for candidate in mates or names}
     spelt = name.lower()[cut:]
+    if same_words := _with_all_words(spelt, lower):
+        return same_words
     if close := get_close_matches(spelt, lower, 3):
         ratios = {candidate: SequenceMatcher(None, candidate, spelt).ratio() for candidate in close}
         least = max(ratios.values()) - SIMILARITY_TOLERANCE
         return [name for candidate, name in lower.items() if ratios.get(candidate, 0.0) > least]
     return [candidate for candidate in names if last in candidate.lower()][:3]
 
+
+def _with_all_words(spelt: str, candidates: Mapping[str, str]) -> list[str]:
+    """The candidates with all words of a name of several words, whatever their order.
+
+    `contact_time` is `time_to_contact`. Those with the fewest words are the nearest.
+    """
+    words = set(_WORD.findall(spelt))
+    if len(words) < 2 or spelt in candidates:
+        return []
+    counts = {
+        name: len(_WORD.findall(candidate))
+        for candidate, name in candidates.items()
+        if words <= set(_WORD.findall(candidate))
+    }
+    fewest = min(counts.values(), default=0)
+    return [name for name, count in counts.items() if count == fewest][:3]
+
+
+_WORD = re.compile(r"[a-z]+")
+"""A word of a name such as time_to_contact[1]."""
 
 SIMILARITY_TOLERANCE = 0.05
 """How much less alike than the first the others may be, of 1."""

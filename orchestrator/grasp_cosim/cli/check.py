@@ -10,6 +10,7 @@ import click
 from ..base.files import check_file
 from ..comparison import summary
 from ..comparison.bands import read_bands
+from ..comparison.changes import diff as changes_between
 from ..comparison.compare import compare as compare_runs
 from ..comparison.qualify import component_of
 from ..comparison.qualify import qualify as run_qualification
@@ -163,6 +164,25 @@ def report(run: Path, out: Path | None, title: str | None, as_json: bool) -> int
     size, pictures = page.stat().st_size, [str(picture) for picture in drawn]
     written = {"page": str(page), "bytes": size, "pictures": pictures}
     show(as_json, written, "\n".join([f"{page}: {size / 1e6:.1f} MB", *pictures]))
+    return 0
+
+
+@click.command()
+@click.argument("before", type=PATH)
+@click.argument("after", type=PATH)
+@json_option
+def diff(before: Path, after: Path, as_json: bool) -> int:
+    """Show how settings and metrics changed from the run BEFORE to the run AFTER.
+
+    BEFORE and AFTER are folders that `run --out` wrote. The first table lists the settings that
+    differ, the second one the values of all metrics. The command gives no verdict and its exit code
+    is 0. Use compare to judge two runs by tolerance bands.
+
+    \b
+    Example: grasp-cosim diff before after
+    """
+    changes = changes_between(before, after)
+    show(as_json, changes.as_dict(), repr(changes))
     return 0
 
 

@@ -15,7 +15,7 @@ from .frame import EVERYWHERE, logging_at
 
 SECTIONS = {
     "Simulate": {"run": "run", "sweep": "sweep", "evaluate": "paper", "identify": "paper"},
-    "Look at recorded runs": {"report": "check", "compare": "check"},
+    "Look at recorded runs": {"report": "check", "diff": "check", "compare": "check"},
     "Make and check FMUs and systems": {
         "init": "systems", "build": "make", "inspect": "fmu", "qualify": "check",
         "ssp": "systems",

@@ -22,7 +22,7 @@ from ..recording.log_names import AS_THEY_ARE, LogNames
 from ..recording.read_back import load_run
 from ..recording.result import Result
 from ..recording.signals import LOGS, Log, read_log
-from ..system.settings import given_values
+from ..system.settings import given_units, given_values
 from .tube import FAR, ROUNDING, Curve
 
 AS_IT_STARTS, NONE = "as the FMU starts", "none"
@@ -252,7 +252,9 @@ def _facts(run: Result) -> Iterator[tuple[str, str]]:
                 yield from _nested(f"{key} of {name} ", entry)
             elif entry is not None:
                 yield f"{key} of {name}", _words(entry)
-    yield from _nested("", given_values(settings))
+    units = given_units(settings)
+    for name, value in given_values(settings).items():
+        yield name, f"{_words(value)} {units.get(name, '')}".strip()
     yield from _nested("role ", settings.get("roles", {}))
     for connection in settings["connections"]:
         factor, offset = connection["factor"], connection["offset"]

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..base.errors import InputError, nearest
 from ..base.registry import here, register_here, registered
-from .metric import Function, Metric, metric, reasons_against
+from .metric import Function, Metric, lacking, metric, names_of, reasons_against, resolved
 
 
 def no_notes(system: Any) -> tuple[str, ...]:
@@ -84,6 +84,17 @@ def check_groups(system: Any) -> list[str]:
     return [note for name in system.metrics for note in group_of(name).check(system)]
 
 
+def check_needs(own: Metric, signals: Collection[str], roles: Mapping[str, str]) -> None:
+    """InputError if a user's metric, unless it is optional, needs another signal than these."""
+    if own.group or own.optional:
+        return
+    sized = own.of(signals, roles)
+    for need in sized.needs:
+        if reason := lacking((need,), signals, roles, sized.needs):
+            first = resolved(names_of(need)[0], roles)
+            raise InputError(f"metric {own.name!r}: {reason}; {nearest(first, sorted(signals))}")
+
+
 def chosen(
     requested: Iterable[Metric | Function | str],
     groups: Iterable[str],
@@ -93,13 +104,15 @@ def chosen(
     """The requested metrics that are not in groups anyway: metrics, functions, names of metrics.
 
     A function is a metric of its own name, without a unit; a name is one of those in the groups.
-    InputError where there is none of that name, or `signals` of these names do not permit it.
+    InputError where there is none of that name, or `signals` of these names do not permit it. A
+    group is for many systems, which may lack signals; a user's own metric names what it needs.
     """
     by_name = {m.name: m for m in metrics_of(groups)}
     reasons = reasons_against(by_name.values(), signals, roles)
     beside_groups: list[Metric] = []
     for item in requested:
         if isinstance(item, Metric):
+            check_needs(item, signals, roles)
             beside_groups.append(item)
         elif callable(item):
             name = str(getattr(item, "__name__", type(item).__name__))

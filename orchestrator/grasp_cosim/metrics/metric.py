@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from ..base.by_name import ByName
 from ..base.checks import install_command
-from ..base.errors import InputError, choices
+from ..base.errors import InputError, choices, nearest
 from ..base.errors import reason as reason_of
 from ..base.pickles import as_bytes
 from ..base.registry import in_every_process, registered
@@ -103,7 +103,8 @@ class Signals(ByName[npt.NDArray[Any]]):
         if reason:
             component = own.partition(".")[0]
             if any(signal.startswith(f"{component}.") for signal in self.by_name):
-                reason += f"; what is no output must be recorded: --record {own}"
+                near = nearest(own, self.by_name)
+                reason += f"; a signal that is no output must be recorded, --record {own}; {near}"
             raise MissingSignalError(reason)
         if own not in self.to_si:
             return self.by_name[own]
@@ -437,7 +438,10 @@ def measure(signals: Signals, metrics: Iterable[Metric]) -> Measured:
             if not m.reason or any(v is not None for v in some):
                 values[m.name] = value
         except MissingSignalError as error:
-            missing.append(f"no {m.name}: {error}")
+            if m.group:
+                missing.append(f"no {m.name}: {error}")
+            else:
+                failures.append(f"metric {m.name!r}: {_place(m.function, error)}{error}")
         except Exception as error:  # a user's function may raise anything
             failures.append(f"metric {m.name!r}: {_place(m.function, error)}{_error_text(error)}")
     measured = tuple(m for m in permitted if m.name in values)

@@ -115,7 +115,7 @@ def _components_html(components: Mapping[str, Mapping[str, Any]]) -> str:
         cell(name)
         + cell(component["fmu"], data_head="FMU")
         + cell(
-            entries(component["values"]) or "as the FMU starts",
+            _values(component) or "as the FMU starts",
             class_="w",
             data_head="start values given",
         )
@@ -124,6 +124,15 @@ def _components_html(components: Mapping[str, Mapping[str, Any]]) -> str:
     ]
     heads = "<th>component</th><th>FMU</th><th>start values given</th><th></th>"
     return table(heads, rows, "cards")
+
+
+def _values(component: Mapping[str, Any]) -> str:
+    """The start values of a component with their units."""
+    units = component.get("value_units", {})
+    return "; ".join(
+        f"{entries({name: value})} {units.get(name, '')}".strip()
+        for name, value in component["values"].items()
+    )
 
 
 def _experiment_html(run: Mapping[str, Any], origin: Mapping[str, Any]) -> str:

@@ -59,6 +59,7 @@ def _component(component: Component) -> dict[str, Any]:
     entries: dict[str, Any] = {
         "fmu": component.fmu.name,
         "values": dict(component.values),
+        "value_units": _value_units(component),
         "step": None if step is None else in_seconds(step),
         "isolation": component.isolation,
         "rename": dict(component.rename),
@@ -68,6 +69,13 @@ def _component(component: Component) -> dict[str, Any]:
     if component.logging:
         entries["logging"] = component.logging
     return entries
+
+
+def _value_units(component: Component) -> dict[str, str]:
+    """The units of the start values of a component, of those that have one."""
+    variables = component.interface.by_name
+    units = {name: variables[name].unit for name in component.values if name in variables}
+    return {name: unit for name, unit in units.items() if unit}
 
 
 def _solver(component: Component) -> dict[str, Any]:
@@ -85,6 +93,15 @@ def given_values(settings: Mapping[str, Any]) -> dict[str, Any]:
         f"{name}.{variable}": value
         for name, component in settings["components"].items()
         for variable, value in component["values"].items()
+    }
+
+
+def given_units(settings: Mapping[str, Any]) -> dict[str, str]:
+    """The units of the start values in settings() by the same names; older runs have none."""
+    return {
+        f"{name}.{variable}": unit
+        for name, component in settings["components"].items()
+        for variable, unit in component.get("value_units", {}).items()
     }
 
 

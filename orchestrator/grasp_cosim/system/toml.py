@@ -33,6 +33,10 @@ TODO = re.compile(r"""(?:[^#"']|"(?!TODO\b)(?:[^"\\]|\\.)*"|'(?!TODO\b)[^']*')*[
 """A line with a value that is left to do; a # in quotes begins no comment."""
 
 
+FMU_ENTRY = re.compile(r"[^#]*\bfmu\s*=")
+"""A line of a system file that names an FMU."""
+
+
 def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[str, Any]:
     """The attributes of the system of a TOML file; fmus is where its FMUs are, by default beside.
 
@@ -47,8 +51,24 @@ def read_toml(path: Path, fmus: Path | None, stimuli: Stimuli | None) -> dict[st
         check_keys(label, as_table(label, table), ENTRIES_OF_COMPONENT)
         fmu = text(f"{label}.fmu", table.get("fmu"), "the path of an FMU, as a string")
         component = Component(name, (fmus or path.parent) / fmu, {})
+        check_is_there(component, path, fmu)
         components.append(with_entries(component, table, path.name))
     return described(file, path.name, components, path.parent, stimuli)
+
+
+def check_is_there(component: Component, path: Path, fmu: str) -> None:
+    """InputError with the line of a system file if the FMU that it names does not exist."""
+    if component.fmu.exists():
+        return
+    lines = path.read_text("utf-8").splitlines()
+    stated = [
+        number for number, line in enumerate(lines, 1) if FMU_ENTRY.match(line) and fmu in line
+    ]
+    number = stated[0] if stated else 1
+    raise InputError(
+        f"{path.name}: line {number}: components.{component.name}.fmu = {fmu!r}: there is no such "
+        f"FMU in {component.fmu.parent}; must be the path of a file, relative to the system file"
+    )
 
 
 def with_entries(component: Component, table: Mapping[str, Any], file: str) -> Component:

@@ -171,9 +171,12 @@ def test_the_page_has_the_published_figures_beside_ours(
         assert float(simulated) == pytest.approx(float(shown) + float(difference), abs=2e-3)
 
 
+CLAIM = {"text": "It.", "origin": "paper"}
+
+
 @pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
 def test_a_claim_that_fails_is_exit_1(command, monkeypatch, holds, code):
-    made = {"rows": [], "rms": {"contact_times": 0.28}, "claims": [{"text": "It.", "holds": holds}]}
+    made = {"rows": [], "rms": {"contact_times": 0.28}, "claims": [CLAIM | {"holds": holds}]}
 
     def evaluated(system, source, *_):
         assert system.start("sensor_1.noise.enabled") == 1.0
@@ -184,7 +187,7 @@ def test_a_claim_that_fails_is_exit_1(command, monkeypatch, holds, code):
     monkeypatch.setattr(evaluation, "write_evaluation", lambda *_: None)
     found, out, _ = command("evaluate", "--bench")
     assert found == code
-    assert out.startswith("holds  It.\n" if holds else "FAILS  It.\n")
+    assert out.startswith(f"The claims of the paper:\n{'holds' if holds else 'FAILS'}  It.\n")
     assert "contact times 0.280" in out
     assert out.splitlines()[-1].endswith("results/evaluation.html")
     found, out, _ = command("evaluate", "--bench", "--json")

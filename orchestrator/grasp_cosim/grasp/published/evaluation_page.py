@@ -68,6 +68,12 @@ NOTES: Mapping[Source, str] = {
     "friction was fitted; white on both sides is the row of 30 mm once more and counts once.",
 }
 
+CLAIM_TITLES = {
+    "paper": "The claims of the paper",
+    "reproduction": "Checks of this reproduction",
+}
+"""The headings of the claims by their origin."""
+
 TABLE_TITLES = {
     "position": "By the position of the object",
     "reflectance": "By the colours of the right and the left face, the object at 30 mm",
@@ -111,7 +117,10 @@ def _sections(
     contact_times, *_ = pictures
     tables = {row["table"] for row in evidence.rows}
     return {
-        "Claims of the paper": _claims_html(claims),
+        **{
+            title: _claims_html([claim for claim in claims if claim["origin"] == origin])
+            for origin, title in CLAIM_TITLES.items()
+        },
         "Deviations": _deviations_html(evidence.rms) + f'<p class="hint">{NOTES[source]}</p>',
         contact_times: pictures[contact_times],
         **{
