@@ -1,15 +1,18 @@
-# make run    the published grasp from FMUs: .venv, build, evaluate
-# make test   the quick tests; each test runs in one of this and the next three
-# make test-slow  what takes longer, campaigns in a tenth of their size
-# make platforms  other machines and compilers, FMI 3.0     make interop  other makers' tools
-# make explore    whole campaigns and properties, with new seeds; to repeat one: make explore SEED=...
-# make check  lint, format, types, import rules
-# make docs   the site of all pages in results/site; a warning is an error
-# make dist   a release in dist/: wheel, sdist, FMUs for all platforms, SSP archives, the playground
-# make bench  measurements     make cards    the variable tables of the equation cards
-# make mutants ROOM=plant/gripper_plant/contact.py  which changes of a module its tests let pass
-# make pictures   those in docs/, and what the notebook shows, in ten minutes; needs Chromium
-# make playground  docs/playground.html; needs zig where the C of the FMUs has changed
+# make run          set up .venv, build the FMUs, reproduce the published table
+# make shell        a shell in which the environment is active
+# make test         the quick tests; each test runs in one of this and the next three targets
+# make test-slow    the slow tests, with campaigns in a tenth of their size
+# make platforms    other machines and compilers, FMI 3.0
+# make interop      tools of other makers
+# make explore      whole campaigns and properties with new seeds; SEED=... repeats one
+# make check        lint, format, types, rules of imports and of the text
+# make docs         the site of all pages in results/site; a warning is an error
+# make dist         a release in dist/: wheel, sdist, FMUs, SSP archives, the playground
+# make bench        measurements of speed
+# make tables       the variable tables of the equation sheets
+# make mutants FILES=plant/gripper_plant/contact.py  changes of a module that its tests let pass
+# make pictures     the pictures in docs/ and in the notebook, in ten minutes; needs Chromium
+# make playground   docs/playground.html; needs zig if the C code of the FMUs has changed
 
 PYTHON ?= $(firstword $(foreach p,python3 python3.15 python3.14 python3.13 python3.12 python3.11,$(shell \
 	$(p) -c 'import sys; print("$(p)" if sys.version_info >= (3, 11) else "")' 2>/dev/null)))
@@ -26,12 +29,13 @@ ON_ARM := tests/fmi tests/master tests/grasp tests/fmus/native
 
 SEED ?= $(shell date +%s)
 
-.PHONY: run test test-slow platforms interop explore check docs dist bench mutants cards pictures playground clean
+.PHONY: run shell test test-slow platforms interop explore check docs dist bench mutants tables pictures playground clean
 
 run: .venv/run
-	$(BIN)/grasp-cosim build --quiet
-	$(BIN)/grasp-cosim evaluate --quiet --out results > results/evaluation.txt
-	$(BIN)/grasp-cosim run --quiet --out results/first_grasp --plot > results/first_grasp.txt
+	$(BIN)/grasp-cosim build
+	@mkdir -p results
+	$(BIN)/grasp-cosim evaluate --out results > results/evaluation.txt || (cat results/evaluation.txt; false)
+	$(BIN)/grasp-cosim run --out results/first_grasp --plot > results/first_grasp.txt
 	@echo
 	@echo 'The published table was reproduced: results/evaluation.html'
 	@echo 'The fingers closed on the object:   results/first_grasp/grasp.png'
@@ -40,6 +44,9 @@ run: .venv/run
 	@echo '  source .venv/bin/activate'
 	@echo '  grasp-cosim run --set plant.object_width=0.06 --out results/narrow --plot'
 	@echo '  grasp-cosim diff results/first_grasp results/narrow'
+
+shell: .venv/run
+	@PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/.venv" $${SHELL:-sh}
 
 test: .venv/dev
 	$(PYTEST) -m "not slow and not platforms and not interop"
@@ -75,14 +82,14 @@ bench: .venv/dev
 	$(BIN)/python -m benchmarks.masters
 
 mutants: .venv/mutants
-	$(BIN)/python -m benchmarks.mutants $(ROOM) $(MORE)
+	$(BIN)/python -m benchmarks.mutants $(FILES) $(MORE)
 
 dist: .venv/dev
 	@echo "zig, which compiles for all platforms, is installed first: 100 MB"
 	$(PIP) --editable '.[native]'
 	$(BIN)/python docs/release.py
 
-cards: .venv/run
+tables: .venv/run
 	$(BIN)/python -m grasp_cosim.fmu_export.page
 
 pictures: .venv/dev

@@ -1,4 +1,4 @@
-"""How many mutants of a package its tests kill: make mutants ROOM=plant/gripper_plant/contact.py.
+"""How many mutants of a package its tests kill: make mutants FILES=plant/gripper_plant/contact.py.
 
 A mutant is a module with one operator, number, name or condition changed, as cosmic-ray makes
 it, in a copy of the checkout. It meets the quick tests that reach the changed line until one fails:

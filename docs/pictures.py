@@ -52,6 +52,12 @@ def draw_hand(folder: Path) -> None:
     write_text(folder / "hand.svg", hand_svg(rows))
 
 
+def draw_first(folder: Path) -> None:
+    """first_grasp.png and first_grasp_case_1.png: the runs of docs/start/first_grasp.md."""
+    simulate(grasp_system()).plot(folder / "first_grasp.png")
+    simulate(with_case(grasp_system(), 1)).plot(folder / "first_grasp_case_1.png")
+
+
 def draw_three(folder: Path) -> None:
     """three_fingers.svg and .png: a hand closes on a disc with three colours, by both laws."""
     rows = []
@@ -154,6 +160,7 @@ def draw_layer_2(folder: Path) -> None:
 
 PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "hand": (draw_hand, ["hand.svg"]),
+    "first": (draw_first, ["first_grasp.png", "first_grasp_case_1.png"]),
     "three": (draw_three, ["three_fingers.svg", "three_fingers.png"]),
     "tandem": (draw_tandem, ["tandem.svg"]),
     "loop": (draw_loop, ["loop.svg"]),

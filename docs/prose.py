@@ -139,6 +139,9 @@ def long_sentences(path: Path, passage: Passage) -> Iterator[Finding]:
 
 # Pages
 
+VARIABLE_TABLES = re.compile(r"^<!-- variables -->.*<!-- end of variables -->$", re.DOTALL | re.M)
+"""Tables that `make tables` writes from the descriptions of variables."""
+
 MARKDOWN = MarkdownIt("commonmark").enable("table")
 
 
@@ -194,7 +197,7 @@ def begins_bold(token: Token) -> bool:
 
 def page_findings(path: Path, text: str) -> Iterator[Finding]:
     """All findings on one page of Markdown."""
-    tokens = MARKDOWN.parse(text)
+    tokens = MARKDOWN.parse(VARIABLE_TABLES.sub(lambda tables: "\n" * tables[0].count("\n"), text))
     yield from undefined_abbreviations(path, tokens)
     line, in_list = 1, 0
     for before, token in pairwise([Token("", "", 0), *tokens]):

@@ -37,12 +37,9 @@ NATIVE: dict[str, tuple[Version, Sequence[str]]] = {
 FOLDERS = (*NATIVE, "python")
 """Those of FMUs."""
 
-MADE_BY = """`make dist` makes the release in `dist/`; its `index.html` says what each file is.
-
-    make dist
-"""
-OF_THE_SOURCES = "Pages in brackets are in the sources, the `.tar.gz`.\n"
-"""In the place of MADE_BY, for who has the release."""
+OF_SOURCES = re.compile(r"## Get a release\n.*?(?=^## )", re.DOTALL | re.MULTILINE)
+OF_THE_SOURCES = "Pages in brackets are in the sources, the `.tar.gz`.\n\n"
+"""In the place of the section on releases, for those who have the release."""
 
 WHAT = {
     "fmi2": "FMUs as C, FMI 2.0, for Linux (x86-64), Windows and macOS: for Simulink, Dymola, "
@@ -187,7 +184,7 @@ def _link(out: Path, path: Path, text: str = "") -> str:
 def into_your_tool() -> str:
     """That page as HTML; of pages that it links to, which are in the sources, it says so."""
     text = (ROOT / "docs/how_to/your_tool.md").read_text("utf-8")
-    text = text.replace("# Into", "## Into", 1).replace(MADE_BY, OF_THE_SOURCES)
+    text = OF_SOURCES.sub(OF_THE_SOURCES, re.sub("^#", "##", text, count=1))
     alone = re.sub(r"\[([^]]*)\]\(([^)#]*)[^)]*\)", _in_the_sources, text)
     return str(MarkdownIt().enable("table").render(alone))
 

@@ -21,7 +21,7 @@ CARDS = blocks_by_card()
 )
 def test_a_card_follows_the_declarations(card, blocks):
     text = card.read_text("utf-8")
-    assert updated(text, blocks) == text, "run: make cards"
+    assert updated(text, blocks) == text, "run: make tables"
 
 
 def test_every_block_has_a_card():

@@ -1,7 +1,7 @@
 """Makes what an FMU holds for its reader: documentation/index.html, the licences, the icon.
 
 A page is Markdown, the card and then the sections that follow here; its frame is page.html.in. The
-tables of variables in the cards are made here as well: `make cards` brings them up to date.
+tables of variables in the cards are made here as well: `make tables` brings them up to date.
 """
 
 from collections.abc import Mapping, Sequence

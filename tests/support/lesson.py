@@ -1,0 +1,86 @@
+"""Does all that a page tells its reader to do, in order, and compares what it shows.
+
+A console block is commands behind "$ " and below each what it prints; a line of three dots stands
+for any lines. A Python or TOML block whose first line is a comment with a file name is saved as
+that file; other Python blocks are run, one after the other with the same names, and a text block
+that follows one is what it prints.
+"""
+
+import os
+import re
+import shlex
+import subprocess
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+from grasp_cosim import cli
+
+BLOCK = re.compile(r"^```(console|python|toml|text)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FILE_NAME = re.compile(r"# ([\w/]+\.(?:py|toml|csv))\b")
+CHANGING = [
+    (re.compile(r"[\d.]+ times as fast as real time"), "N times as fast as real time"),
+    (re.compile(r"\d{4}-\d\d-\d\d(T[\d:+]+)?"), "DATE"),
+    (re.compile(r"\b\d+\.\d MB"), "N MB"),
+]
+"""Parts of outputs that differ from run to run."""
+
+
+def do(page, monkeypatch, capsys):
+    """Do all that a page shows, in the current folder, which is like that of a checkout."""
+    names = {"__name__": "__main__"}
+    printed = ""
+    for kind, block in BLOCK.findall(page):
+        if kind == "console":
+            for command, shown in commands(block):
+                assert_shown(shown, output_of(command, monkeypatch, capsys), command)
+        elif kind == "text":
+            assert_shown(block, printed, "the Python block above")
+        elif name := FILE_NAME.match(block):
+            Path(name[1]).write_text(block, "utf-8")
+        elif kind == "python":
+            with redirect_stdout(StringIO()) as out:
+                exec(compile(block, "page", "exec"), names)
+            printed = out.getvalue()
+
+
+def commands(block):
+    """The commands of a console block, each with what is shown below it."""
+    whole = block.replace("\\\n", " ")
+    for part in re.findall(r"^\$ (.*?)(?=^\$ |\Z)", whole, re.MULTILINE | re.DOTALL):
+        command, _, shown = part.partition("\n")
+        yield command.partition("  #")[0].strip(), shown
+
+
+def output_of(command, monkeypatch, capsys):
+    """What a command prints on both streams; its exit code is 0 unless the page shows why not."""
+    words = shlex.split(command)
+    if words[0] == "python":
+        done = subprocess.run(
+            ["python", *words[1:]], capture_output=True, text=True, env=os.environ, check=False
+        )
+        return done.stdout + done.stderr
+    if words[0] != "grasp-cosim":
+        done = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
+        return done.stdout
+    capsys.readouterr()
+    cli.main(words[1:])
+    streams = capsys.readouterr()
+    return streams.out + streams.err
+
+
+def assert_shown(shown, printed, command):
+    """Compare what a page shows with what was printed."""
+    if not shown.strip():
+        return
+    expected, found = map(steady, (shown, printed))
+    pattern = "\n".join(
+        ".*?" if line.strip() == "..." else re.escape(line) for line in expected.splitlines()
+    )
+    assert re.search(f"^{pattern}", found, re.DOTALL | re.MULTILINE), f"{command}\n{printed}"
+
+
+def steady(text):
+    for pattern, instead in CHANGING:
+        text = pattern.sub(instead, text)
+    return "\n".join(line.rstrip() for line in text.splitlines())
