@@ -125,10 +125,18 @@ def draw_evaluation(folder: Path) -> None:
             save_figure(figure, folder / f"{name}.png")
 
 
+def draw_sweep_of_widths(folder: Path) -> None:
+    """sweep.png: the first example of docs/how_to/sweep.md."""
+    with TemporaryDirectory() as name:
+        rows = ("--vary", "plant.object_width=0.04:0.08:100", "--step", "1e-3", "--plot")
+        tutorials.done("sweep", *rows, "--out", str(Path(name, "sweep.csv")))
+        shutil.copyfile(Path(name, "sweep.png"), folder / "sweep.png")
+
+
 def draw_map(folder: Path) -> None:
     """The first example of docs/how_to/sweep.md."""
     page = (HERE / "how_to/sweep.md").read_text("utf-8")
-    example = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0]
+    example = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[1]
     exec(example.replace('"map.png"', repr(str(folder / "reflectance_map.png"))), {})  # noqa: S102
 
 
@@ -167,6 +175,7 @@ PICTURES: Mapping[str, tuple[Callable[[Path], None], Sequence[str]]] = {
     "evaluation": (draw_evaluation, ["contact_times.png", "contact_forces.png"]),
     "report": (draw_report, ["report.png"]),
     "timing": (draw_timing, ["timing.png"]),
+    "sweep": (draw_sweep_of_widths, ["sweep.png"]),
     "maps": (draw_map, ["reflectance_map.png"]),
     "layer_2": (draw_layer_2, ["layer_2_loop.png"]),
     "limits": (

@@ -30,6 +30,11 @@ MAX_WORDS = 25
 MAX_CODE_COLUMNS = 80
 """Of a line in a code block, so that it fits on a page without a scroll bar."""
 
+OUTPUT = ("", "console", "text")
+"""Kinds of fenced blocks with the output of commands, whose lines are as they are."""
+
+PROMPT = re.compile(r"\w*\$ ")
+
 HISTORY = ("CHANGELOG.md",)
 """Pages whose older parts stay as they were written."""
 
@@ -220,8 +225,12 @@ def page_findings(path: Path, text: str) -> Iterator[Finding]:
 def code_lines(path: Path, line: int, token: Token) -> Iterator[Finding]:
     """The lines of a code block that do not fit on a page."""
     first = line + (token.type == "fence")
+    kind = token.info if token.type == "fence" else "indented"
+    continued = False
     for number, code in enumerate(token.content.splitlines(), first):
-        if len(code) > MAX_CODE_COLUMNS:
+        is_code = kind not in OUTPUT or continued or bool(PROMPT.match(code))
+        continued = is_code and code.endswith("\\")
+        if is_code and len(code) > MAX_CODE_COLUMNS:
             rule = f"{len(code)} columns of code, at most {MAX_CODE_COLUMNS}"
             yield Finding(path, number, rule, code[:40].strip())
 

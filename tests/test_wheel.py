@@ -88,7 +88,8 @@ def test_the_page_on_a_plant_of_ones_own_runs_as_it_is_written(python, tmp_path)
         return python("-m", "grasp_cosim", *shlex.split(line)[1:], cwd=tmp_path, code=code)
 
     (folder,) = re.findall("Pages, examples and a notebook: (.*)", command("grasp-cosim --help"))
-    page = (Path(folder) / "how_to/foreign_fmu.md").read_text("utf-8")
+    pages = [Path(folder) / f"how_to/{name}.md" for name in ("python_block", "foreign_fmu")]
+    page = "".join(path.read_text("utf-8") for path in pages)
     assert "/env/lib/" in folder
     for line in INDENTED.findall(page):
         command(line)

@@ -1,9 +1,9 @@
 """Does all that a page tells its reader to do, in order, and compares what it shows.
 
-A console block is commands behind "$ " and below each what it prints; a line of three dots stands
-for any lines. A Python or TOML block whose first line is a comment with a file name is saved as
-that file; other Python blocks are run, one after the other with the same names, and a text block
-that follows one is what it prints.
+A console block has commands behind "$ ", and below each its output. A line of three dots stands for
+any lines. A Python or TOML block whose first line is a comment with a file name is saved as that
+file, or appended to it. Other Python blocks run one after the other with the same names, and a text
+block that follows one is its output.
 """
 
 import os
@@ -18,6 +18,7 @@ from grasp_cosim import cli
 
 BLOCK = re.compile(r"^```(console|python|toml|text)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 FILE_NAME = re.compile(r"# ([\w/]+\.(?:py|toml|csv))\b")
+APPENDED = re.compile(r"# append to ([\w/]+\.toml)\b")
 CHANGING = [
     (re.compile(r"[\d.]+ times as fast as real time"), "N times as fast as real time"),
     (re.compile(r"\d{4}-\d\d-\d\d(T[\d:+]+)?"), "DATE"),
@@ -36,6 +37,9 @@ def do(page, monkeypatch, capsys):
                 assert_shown(shown, output_of(command, monkeypatch, capsys), command)
         elif kind == "text":
             assert_shown(block, printed, "the Python block above")
+        elif name := APPENDED.match(block):
+            with Path(name[1]).open("a", encoding="utf-8") as file:
+                file.write(block)
         elif name := FILE_NAME.match(block):
             Path(name[1]).write_text(block, "utf-8")
         elif kind == "python":
@@ -60,6 +64,8 @@ def output_of(command, monkeypatch, capsys):
             ["python", *words[1:]], capture_output=True, text=True, env=os.environ, check=False
         )
         return done.stdout + done.stderr
+    if words == ["source", ".venv/bin/activate"]:
+        return ""  # the tests run in an environment
     if words[0] != "grasp-cosim":
         done = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
         return done.stdout
@@ -73,7 +79,7 @@ def assert_shown(shown, printed, command):
     """Compare what a page shows with what was printed."""
     if not shown.strip():
         return
-    expected, found = map(steady, (shown, printed))
+    expected, found = map(steady, (shown.removesuffix("...\n"), printed))
     pattern = "\n".join(
         ".*?" if line.strip() == "..." else re.escape(line) for line in expected.splitlines()
     )

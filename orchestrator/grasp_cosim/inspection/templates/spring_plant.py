@@ -48,7 +48,14 @@ class Params:
         float, Parameter("m, mass of the object", unit="kg", low=1e-3, high=1e3, tunable=True)
     ] = 0.1
     spring_stiffness: Annotated[
-        float, Parameter("k, stiffness of the spring", unit="N/m", low=0.0, high=1e6, tunable=True)
+        float,
+        Parameter(
+            "k, stiffness of the spring",
+            unit="N/m",
+            low=0.0,
+            high=1e6,
+            tunable=True,
+        ),
     ] = 100.0
     spring_damping: Annotated[
         float, Parameter("d, damping of the spring", unit="N.s/m", low=0.0, high=1e3, tunable=True)
