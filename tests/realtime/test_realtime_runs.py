@@ -177,6 +177,13 @@ def test_it_has_the_bits_of_a_free_run_in_its_folder_too(two, tmp_path, version,
     assert "recording" not in {*result.timing.culprits, *result.timing.parts}
 
 
+def test_steps_that_wait_for_the_clock_begin_when_they_should(two):
+    """In compiled code too: half of the steps at least, on a machine that stalls."""
+    start = simulate(two(), stop=0.4, realtime=True).timing.parts["start"]
+    assert start.median < 1e-3
+    assert start.worst_at < 0.4
+
+
 def test_rows_go_round_in_their_room(two, monkeypatch):
     system = two()
     monkeypatch.setattr(paced_master, "MAX_ROWS_ASIDE", 7)

@@ -256,7 +256,7 @@ def _constants() -> list[str]:
         loop: "COPY SCALE STORE LOAD LOAD_LONG DRIVE WATCH CALL STEP TOO_LONG EXACT WORST FULL "
         "HALTED OVERRUN WATCHED STALLED",
         shapes: "TRANSFER_2 TRANSFER_3 STEP_2 STEP_3 CLOCK PACE",
-        timing: "ARRIVED LATE DUE BEGIN",
+        timing: "ARRIVED LATE SCHEDULED BEGIN",
     }
     shared = {
         **{n: getattr(module, n) for module, names in names_of.items() for n in names.split()},

@@ -146,7 +146,7 @@ static int pace(Pace *p, int64_t step, double *head, const volatile int64_t *hal
     if (*halt) return HALTED;
     head[ARRIVED] = (double)p->arrived;
     head[LATE] = (double)p->late;
-    head[DUE] = (double)due;
+    head[SCHEDULED] = (double)due;
     head[BEGIN] = (double)now;
     return 0;
 }

@@ -26,7 +26,7 @@ from ..base.system_calls import NotPossible, cpus, lock_memory, pin, put_first
 from ..system.description import System
 from ..system.parts import Realtime
 from ..system.times import NANOSECONDS
-from .timing import ARRIVED, BEGIN, DUE, HEAD, LATE, Meter, Steps, Table
+from .timing import ARRIVED, BEGIN, HEAD, LATE, SCHEDULED, Meter, Steps, Table
 
 SPIN_NS = 200_000
 """Before the deadline the pacer does not sleep any more: it may be woken too late."""
@@ -196,7 +196,7 @@ class Pacer:
             state.slept = now_ns = self._clock() - origin
         while now_ns < due:
             now_ns = self._clock() - origin
-        head[DUE], head[BEGIN] = due, now_ns
+        head[SCHEDULED], head[BEGIN] = due, now_ns
 
     def finish(self, step: int, now_ns: int | None = None) -> None:
         """The last step has just ended, or did at now_ns; OverrunError where it stops at that."""

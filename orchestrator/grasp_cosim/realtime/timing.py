@@ -149,7 +149,7 @@ def _damaged(place: str, reason: str) -> InputError:
 
 
 HEAD = 4
-ARRIVED, LATE, DUE, BEGIN = range(HEAD)
+ARRIVED, LATE, SCHEDULED, BEGIN = range(HEAD)
 """Places of times in ns that the pacer writes: when the step before had ended, by how much that was
 after its deadline, when the step should begin, when it did. The ends of its segments follow.
 """
@@ -291,20 +291,20 @@ class Meter:
         if not (count := self._count):
             return 0.0
         first, last = self._table()[[0, count - 1]]
-        end = max(last[DUE] + self._period, last[-1])
-        return float(count * self._system.step_ns) / float(end - first[DUE])
+        end = max(last[SCHEDULED] + self._period, last[-1])
+        return float(count * self._system.step_ns) / float(end - first[SCHEDULED])
 
     def _judged(self) -> _Judged:
         """The steps that count: it is known when the next one arrived."""
         table, count = self._table(), self._count
-        next_arrivals = table[1:, :DUE]
+        next_arrivals = table[1:, :SCHEDULED]
         if self._arrival_after is not None:
             next_arrivals = np.vstack((next_arrivals, self._arrival_after))
         arrived, late = next_arrivals[:count].T
         rows = table[:count]
         recording = self._recording_after(count)
         begin, end = rows[:, BEGIN], rows[:, -1]
-        parts: dict[str, Table] = {STEP: end - begin, START: begin - rows[:, DUE]}
+        parts: dict[str, Table] = {STEP: end - begin, START: begin - rows[:, SCHEDULED]}
         segments, owners = np.diff(rows[:, BEGIN:]), np.array(self.segments)
         for owner, name in enumerate(self._names[:-1]):
             parts[name] = segments[:, owners == owner].sum(axis=1)
@@ -344,10 +344,10 @@ class Meter:
         """What each part took that may be to blame for a late step, in ns."""
         rows, parts = judged.rows, judged.parts
         # A step is ready to begin when it is due, or later, when the step before has ended.
-        ready = np.maximum(rows[:, DUE], rows[:, ARRIVED])
+        ready = np.maximum(rows[:, SCHEDULED], rows[:, ARRIVED])
         return {
             START: rows[:, BEGIN] - ready,
-            BACKLOG: ready - rows[:, DUE],
+            BACKLOG: ready - rows[:, SCHEDULED],
             **{name: parts[name] for name in (*self._names, BETWEEN, RECORDING)},
         }
 
