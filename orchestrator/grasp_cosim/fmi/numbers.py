@@ -1,4 +1,4 @@
-"""The state of a block as numbers, which may be read and moved one by one: fmus/README.md, States.
+"""The state of a block as numbers, which may be read and moved one by one: fmus/README.md.
 
 They are in the bytes of a state behind its head, the phase and the time, inputs and parameters.
 """

@@ -272,7 +272,7 @@ class Slave:
 
     @reported
     def state_to_bytes(self, snapshot: object) -> bytes:
-        """A state of this FMU, serialised: States in fmus/README.md."""
+        """A state of this FMU, serialised: Saved states in fmus/README.md."""
         numbers = [*_scalars(self._own_snapshot(snapshot))]
         head = MAGIC + self.maker.content.encode()
         return head + struct.pack(f"<{len(numbers)}d", *numbers)
