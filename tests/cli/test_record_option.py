@@ -34,8 +34,8 @@ def test_what_is_named_is_recorded_and_the_metrics_stay_the_same(command, tmp_pa
 
 
 def test_the_example_of_the_page_runs(command, tmp_path):
-    page = (Path(__file__).parents[2] / "docs/reference/system_file.md").read_text("utf-8")
-    (example,) = re.findall("\n    grasp-cosim (run --stop 0.1 --record .*)", page)
+    page = (Path(__file__).parents[2] / "docs/reference/signals.md").read_text("utf-8")
+    (example,) = re.findall("\n    grasp-cosim (run --stop 0.1 .*)", page.replace("\\\n", " "))
     assert command(*shlex.split(example))[0] == 0
     assert header(tmp_path / "results")[1:5] == [
         *("plant.position[1]", "plant.position[2]", "plant.velocity[1]", "plant.velocity[2]"),
