@@ -22,6 +22,7 @@ def rules(text):
         "- **step**: the communication step.\n",
         "The sensor sends over the Controller Area Network (CAN). CAN is a bus.\n",
         "```console\n$ grasp-cosim run\n```\n",
+        "<!-- variables -->\nGenerated; from the code.\n<!-- end of variables -->\n",
     ],
 )
 def test_plain_english_passes(text):

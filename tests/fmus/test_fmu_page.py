@@ -53,7 +53,7 @@ def test_the_page_is_well_formed_complete_and_stands_alone(name):
     rows = [(row[0], row[1].split()[-1], row[2], row[6]) for row in cells if len(row) == 7]
     for f in declared(BLOCKS[name]):
         assert (shown(f), f.causality, f.unit, f.description) in rows
-    equations = re.findall(r"^```math\n(.*)\n```$", card(BLOCKS[name]).read_text(), re.MULTILINE)
+    equations = re.findall(r"^```math$", card(BLOCKS[name]).read_text("utf-8"), re.MULTILINE)
     assert [e.get("class") for e in root.iter("div")].count("equation") == len(equations) > 0
     assert not {e.tag for e in root.iter()} & {"script", "link", "iframe", "img", "object", "a"}
     for foreign in ("http", "url(", "@import", str(ROOT), "<!--", "&lt;!--", "```", "$"):
@@ -102,6 +102,12 @@ def test_packages_that_the_host_must_have_are_named():
             "</mo><mfrac><mrow><mi>K</mi></mrow><mrow><msup><mi>l</mi><mi>n</mi></msup></mrow>"
             "</mfrac></mrow></math></div><span>(9)</span></div>",
         ),
+        (
+            "the mass $m_j$",
+            '<p>the mass <math display="inline"><mrow><msub><mi>m</mi><mi>j</mi></msub></mrow>'
+            "</math></p>",
+        ),
+        ("`$m$`, 5 $ or $$", "<p><code>$m$</code>, 5 $ or $$</p>"),
     ],
 )
 def test_what_a_card_comes_out_as(markdown, html):

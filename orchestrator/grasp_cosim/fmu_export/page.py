@@ -9,7 +9,7 @@ from functools import cache
 from html import escape
 from itertools import cycle
 from pathlib import Path
-from re import MULTILINE, search, sub
+from re import MULTILINE, match, search, sub
 from string import Template
 from typing import Any
 
@@ -145,13 +145,15 @@ def icon(name: str) -> bytes | None:
 def _rendered(text: str, down: int) -> str:
     """Return Markdown as HTML, headings some levels down: the page has its own title.
 
-    Equations in LaTeX, in ```math, come out as MathML. Each cell of a table knows its head, for
-    phones, where a row is shown as a list.
+    Equations in LaTeX, in ```math or between dollar signs, come out as MathML. Each cell of a table
+    knows its head, for phones, where a row is shown as a list.
     """
     from markdown_it import MarkdownIt  # takes time to load
 
     text = sub(r"^<!--.*-->$", "", text.replace(BEGIN, "## Variables\n\n"), flags=MULTILINE)
     markdown = MarkdownIt("commonmark", {"html": False, "xhtmlOut": True}).enable("table")
+    markdown.inline.ruler.before("escape", "symbol", _symbol)
+    markdown.add_render_rule("symbol", lambda _, tokens, index, *__: _math(tokens[index].content))
     for rule in ("link_open", "link_close"):
         markdown.add_render_rule(rule, lambda *_: "")
     markdown.add_render_rule("image", lambda _, tokens, index, *__: escape(tokens[index].content))
@@ -182,14 +184,28 @@ def _equation(tokens: Sequence[Any], index: int, *_: object) -> str:
     """Return the HTML of a fence with an equation and its number, if it has a tag; else nothing."""
     if tokens[index].info.strip() != "math":
         return ""
-    from latex2mathml.converter import convert  # takes time to load
-
     tag = r"\\tag\{(.*?)\}"
     number_tag = search(tag, tokens[index].content)
-    # An element of HTML: it needs no namespace.
-    math = sub(' xmlns="[^"]*"', "", convert(sub(tag, "", tokens[index].content), display="block"))
+    math = _math(sub(tag, "", tokens[index].content), "block")
     number = f"<span>({escape(number_tag[1])})</span>" if number_tag else ""
     return f'<div class="equation"><div>{math}</div>{number}</div>\n'
+
+
+def _math(latex: str, display: str = "inline") -> str:
+    """Return LaTeX as MathML, an element of HTML: it needs no namespace."""
+    from latex2mathml.converter import convert  # takes time to load
+
+    return sub(' xmlns="[^"]*"', "", convert(latex, display=display))
+
+
+def _symbol(state: Any, silent: bool) -> bool:
+    """Read a symbol between dollar signs, a rule of markdown-it; False if there is none."""
+    if not (found := match(r"\$(?!\s)([^$]+)(?<!\s)\$", state.src[state.pos :])):
+        return False
+    if not silent:
+        state.push("symbol", "", 0).content = found[1]
+    state.pos += found.end()
+    return True
 
 
 # The tables of variables in the cards
@@ -208,7 +224,7 @@ def updated(card: str, blocks: Mapping[str, Block]) -> str:
 
 
 def variable_tables(blocks: Mapping[str, Block]) -> str:
-    """The variables of a block as a Markdown table; of several, what all have, then what each adds.
+    """The variables of a block as a Markdown table; of several, the common ones, then the others.
 
     The blocks are given by name. Those of a gripper in tandem and of a hand follow by themselves. A
     row that stood before is named, and not shown again.
@@ -224,16 +240,16 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
         name: rows_of_block for name, rows_of_block in rows.items() if name not in tandems | hands
     }
     kinds = {
-        "all have": grippers,
-        "those of a gripper in tandem have": tandems,
-        "all of a hand of three fingers have": hands,
+        "Common variables, two fingers": grippers,
+        "Common variables, fingers in tandem": tandems,
+        "Common variables, hand of three fingers": hands,
     }
     parts: dict[str, list[str]] = {}
     for who, group in kinds.items():
         first, *remaining = group.values() or [[]]
         common = [row for row in first if all(row in rows_of_block for rows_of_block in remaining)]
         added = {
-            f"`{n}` adds": [r for r in rows_of_block if r not in common]
+            f"Further variables of `{n}`": [r for r in rows_of_block if r not in common]
             for n, rows_of_block in group.items()
         }
         parts |= {
@@ -247,11 +263,10 @@ def variable_tables(blocks: Mapping[str, Block]) -> str:
         names = (row.split("`")[1].partition("[")[0] for row in rows_of_block if row in shown_rows)
         groups = (f"`{name.partition('.')[0]}{'.*' if '.' in name else ''}`" for name in names)
         families = ", ".join(dict.fromkeys(groups))
-        again = f", besides {families} as above" if families else ""
+        again = f": {families} (as above)" if families else ""
         fresh = [row for row in rows_of_block if row not in shown_rows]
-        text.append(
-            f"What {title}{again}:\n\n{_table(fresh)}" if fresh else f"What {title}{again}.\n"
-        )
+        further = f"{', and' if again else ''}:\n\n{_table(fresh)}" if fresh else ".\n"
+        text.append(f"{title}{again}{further}")
         shown_rows |= {*rows_of_block}
     return "\n".join(text)
 
