@@ -175,22 +175,26 @@ def test_each_word_is_in_the_glossary_once():
     assert asked | {"preset", "native twin", "contact"} <= set(words)
 
 
-# Rooms
+# Packages
 
-ROOMS = sorted(p.parent.name for p in (ROOT / "orchestrator/grasp_cosim").glob("*/__init__.py"))
-
-
-@pytest.mark.parametrize("room", ROOMS)
-def test_a_card_says_what_comes_in_what_goes_out_and_what_to_read(room):
-    card = PAGES[f"orchestrator/grasp_cosim/{room}/README.md"]
-    says = r"- \*\*Comes in\*\*: .+\n- \*\*Goes out\*\*: .+\n- \*\*Read first\*\*: `(.+?)`"
-    assert (ROOT / f"orchestrator/grasp_cosim/{room}" / re.search(says, card)[1]).exists()
+PACKAGES = sorted(p.parent.name for p in (ROOT / "orchestrator/grasp_cosim").glob("*/__init__.py"))
 
 
-def test_the_map_has_all_rooms():
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_states_its_input_its_output_and_the_file_to_read_first(package):
+    folder = ROOT / "orchestrator/grasp_cosim" / package
+    page = PAGES[f"orchestrator/grasp_cosim/{package}/README.md"]
+    form = r"- \*\*Input\*\*: .+\n- \*\*Output\*\*: .+\n- \*\*Read first\*\*: `(.+?)`"
+    assert (folder / re.search(form, page)[1]).exists()
+    for cell in re.findall(r"^\| (`.*?`) \| ", page, re.MULTILINE):
+        for name in re.findall(r"`(.+?)`", cell):
+            assert (folder / name).exists()
+
+
+def test_the_page_of_the_orchestrator_has_all_packages():
     text = PAGES["orchestrator/README.md"]
     rows = [line.split("`")[1].rstrip("/") for line in text.splitlines() if line.startswith("| [`")]
-    assert sorted(rows) == ROOMS
+    assert sorted(rows) == PACKAGES
     assert names("groups") == ("grasp", "hand", "tandem")
 
 
