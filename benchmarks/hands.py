@@ -2,7 +2,7 @@
 
 Of each hand COUNT grasps (60) are run natively, with colours, places and seeds drawn at random from
 seed 5; printed is the worst of each figure. The faces reflect 0.3, 0.6 or 1.2, the object of 35 mm
-is up to 10 mm off the middle where nothing else is said.
+is up to 10 mm off the middle, unless a row states otherwise.
 """
 
 import math

@@ -6,7 +6,7 @@
 Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, everything
 recorded, on our Python FMUs and our native ones, in chunks, one master after the other. Prints the
 tables of README.md. A master that is not installed is skipped by name; cofmupy pins an FMPy and a
-matplotlib of its own, so it may be in an environment of its own.
+its own matplotlib, so it may be in its own environment.
 """
 
 import argparse
@@ -139,7 +139,7 @@ def chunk(worker: Program, steps: int) -> float:
 
 
 def report(title: str, times: dict[str, list[float]]) -> None:
-    """Print us per macro step as a table, and how many times ours that is.
+    """Print us per macro step as a table, and the ratio to our time.
 
     "times ours" is the median over the rounds, in which all masters meet the machine in the same
     mood.

@@ -2,16 +2,16 @@
 
 A mutant is a module with one operator, number, name or condition changed, as cosmic-ray makes
 it, in a copy of the checkout. It meets the quick tests that reach the changed line until one fails:
-those of the folder that mirrors the room come first, and of these the quickest. Which tests reach a
-line is known from one run of them all under coverage, which `--reach FOLDER` keeps. A line that
-runs only while its module is imported, or in another process, meets all tests of that folder.
+those of the folder that mirrors the package come first, and of these the quickest. Which tests
+reach a line is known from one run of them all under coverage, which `--reach FOLDER` keeps. A line
+that runs only while its module is imported, or in another process, meets all tests of that folder.
 
 Where a change is inside of functions, a fork of a pytest that has imported all tests and run none
 of them takes the changed code into these functions. Any other change is met by a new pytest.
 
-Printed are the mutants that survived, as they would stand in a change, and the score of each room.
-Of a large room a sample is drawn, the same one for the same seed. Type annotations are not run:
-changes of them are no mutants. Nor is a change that does not compile without a warning.
+The output has the mutants that survived, as they would stand in a change, and the score of each
+package. Of a large package a sample is drawn, the same one for the same seed. Type annotations are
+not run: changes of them are no mutants. Nor is a change that does not compile without a warning.
 """
 
 import argparse
@@ -70,7 +70,7 @@ IS_FUNCTION = 0x1
 class Mutant:
     """A changed module, and the tests that it meets."""
 
-    room: str
+    package: str
     module: Path
     source: str
     changed: str
@@ -95,9 +95,9 @@ class Mutant:
         return "\n".join(difflib.unified_diff(*lines, *names, "", "", 3, ""))
 
 
-def tests_of(room: str) -> str:
+def tests_of(package: str) -> str:
     """The folder of tests that mirrors a module's or a package's own: tests/plant, tests/ssp."""
-    parts = [p for p in Path(room).with_suffix("").parts if not p.startswith("grasp_")]
+    parts = [p for p in Path(package).with_suffix("").parts if not p.startswith("grasp_")]
     inner = [p for p in parts if p not in ("orchestrator", "gripper_plant", "proximity_sensor")]
     folder = Path("tests", *inner)
     while not (ROOT / folder).is_dir():
@@ -123,7 +123,7 @@ def enter(tree: Path) -> None:
 
 
 def run_tests(*arguments: str, seconds: float | None = None) -> int:
-    """The exit code of a pytest of its own; 1 where it takes longer than allowed."""
+    """The exit code of a separate pytest; 1 where it takes longer than allowed."""
     command = [sys.executable, "-m", "pytest", "-q", "-m", QUICK, *arguments]
     try:
         return subprocess.run(command, capture_output=True, timeout=seconds, check=False).returncode
@@ -206,9 +206,9 @@ def statement_lines(tree: ast.AST, line: int) -> range:
     return lines if line in lines else range(line, line + 1)
 
 
-def mutations(room: Path) -> list[MutationSpec]:
+def mutations(package: Path) -> list[MutationSpec]:
     """All mutations of a module, or of the modules of a package, that change code that runs."""
-    modules = [room] if room.is_file() else sorted(room.rglob("*.py"))
+    modules = [package] if package.is_file() else sorted(package.rglob("*.py"))
     spans = {m: annotations(ast.parse(m.read_text(encoding="utf-8"))) for m in modules}
     every = [mutation for item in _all_work_items(modules, {}) for mutation in item.mutations]
     return [
@@ -218,14 +218,14 @@ def mutations(room: Path) -> list[MutationSpec]:
     ]
 
 
-def mutant(room: str, mutation: MutationSpec, reach: Reach, folder: str) -> Mutant:
+def mutant(package: str, mutation: MutationSpec, reach: Reach, folder: str) -> Mutant:
     """The mutant that a mutation makes."""
     module = mutation.module_path
     source = module.read_text(encoding="utf-8")
     operator = get_operator(mutation.operator_name)(**(mutation.operator_args or {}))
     changed = mutate_code(source, operator, mutation.occurrence)
     lines = statement_lines(ast.parse(source), mutation.start_pos[0])
-    return Mutant(room, module, source, changed, reach.tests(module, lines, folder))
+    return Mutant(package, module, source, changed, reach.tests(module, lines, folder))
 
 
 def outer_functions(code: CodeType) -> list[CodeType]:
@@ -337,7 +337,7 @@ class Trial:
 
 
 def work(tree: Path, mutants: list[Mutant], results: Connection) -> None:
-    """Meet mutants, one after the other, in a process of its own."""
+    """Meet mutants, one after the other, in its own process."""
     enter(tree)
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
@@ -374,15 +374,17 @@ def outcomes(trees: list[Path], mutants: list[Mutant]) -> list[tuple[Mutant, boo
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rooms", nargs="+", help="modules or packages, by path in the checkout")
-    parser.add_argument("--tests", help="what to run first [the folder that mirrors the room]")
-    parser.add_argument("--sample", type=int, default=200, help="mutants of a room at most [200]")
+    parser.add_argument("packages", nargs="+", help="modules or packages, by path in the checkout")
+    parser.add_argument("--tests", help="what to run first [the folder that mirrors the package]")
+    parser.add_argument(
+        "--sample", type=int, default=200, help="mutants of a package at most [200]"
+    )
     parser.add_argument("--seed", type=int, default=1, help="which of them [1]")
     parser.add_argument("--reach", type=Path, help="keep there what the tests reach, or take it")
     arguments = parser.parse_args()
-    for room in arguments.rooms:
-        if not (ROOT / room).exists():
-            parser.error(f"{room}: must be a module or a package, like plant/gripper_plant")
+    for package in arguments.packages:
+        if not (ROOT / package).exists():
+            parser.error(f"{package}: must be a module or a package, like plant/gripper_plant")
     os.chdir(ROOT)
     with tempfile.TemporaryDirectory(prefix="grasp_mutants_") as name:
         trees = [Path(name, str(worker), "tree") for worker in range(WORKERS)]
@@ -394,19 +396,19 @@ def main() -> None:
             Reach(folder).measure()
             os.chdir(ROOT)
         reach = Reach(folder).read()
-        for room in arguments.rooms:
-            every = mutations(Path(room))
+        for package in arguments.packages:
+            every = mutations(Path(package))
             draw = random.Random(arguments.seed)  # noqa: S311 - no secret
             drawn = draw.sample(every, min(arguments.sample, len(every)))
-            first = arguments.tests or tests_of(room)
-            mutants = [mutant(room, mutation, reach, first) for mutation in drawn]
+            first = arguments.tests or tests_of(package)
+            mutants = [mutant(package, mutation, reach, first) for mutation in drawn]
             mutants = [mutant for mutant in mutants if mutant.compiles]
             results = outcomes(trees, mutants)
             survivors = [m for m, killed in results if not killed]
             print(*(m.difference for m in survivors), sep="\n")
             killed = len(results) - len(survivors)
             score = f"{killed} of {len(results)} mutants killed, {killed / len(results):.1%}"
-            print(f"{room}: {score} (of {len(every)} that could be made; seed {arguments.seed})")
+            print(f"{package}: {score} (of {len(every)} that could be made; seed {arguments.seed})")
             sys.stdout.flush()
 
 

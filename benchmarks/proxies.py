@@ -1,9 +1,9 @@
 """What a proxy costs, and how soon it notices that its peer is gone.
 
 Prints the cost of a step of the grasp with its plant here and behind a proxy (lockstep, loopback, a
-peer that serves the Python FMU in a process of its own); the same with native FMUs, the controller
+peer that serves the Python FMU in its own process); the same with native FMUs, the controller
 behind a proxy, and its peer in C; and for 200 peers killed at seeded moments the time until the
-outputs were at their failsafe values, beside what is declared: proxy.timeout for each miss that is
+outputs were at their failsafe values, and the declared time: proxy.timeout for each miss that is
 tolerated, and one step, which waits as long.
 """
 
@@ -34,7 +34,7 @@ TARGET = Path(__file__).parent.parent / "docs/controller_target.c"
 
 
 def _made(*command: str | Path) -> None:
-    """Do a command that prints nothing: figures alone are printed."""
+    """Do a command that prints nothing: only figures are printed."""
     with redirect_stdout(StringIO()):
         if code := cli.main([*map(str, command)]):
             raise RuntimeError(f"{command}: exit code {code}")
@@ -128,12 +128,12 @@ def kills(system: System, folder: Path) -> None:
     median, worst = statistics.median(took), max(took)
     print(
         f"{KILLS} peers killed: failsafe after {median:.1f} ms (median), {worst:.1f} ms (worst), "
-        f"declared {1e3 * TIMEOUT * (TOLERATED + 1):.0f} ms beside what the steps compute"
+        f"declared {1e3 * TIMEOUT * (TOLERATED + 1):.0f} ms plus the time of the steps"
     )
 
 
 def main() -> None:
-    """All of it, in a folder of its own."""
+    """All of it, in its own folder."""
     system = grasp_system(native=False)
     with tempfile.TemporaryDirectory() as folder:
         cost(system, Path(folder))

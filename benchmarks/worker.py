@@ -1,11 +1,11 @@
-"""One master in a process of its own; started by masters.py, with that master's interpreter.
+"""One master in its own process; started by masters.py, with that master's interpreter.
 
     worker.py MASTER FOLDER [CORE]
 
 runs the grasp with the FMUs of FOLDER, on one core if that is given. It answers every number of
 macro steps on standard input with the time they took, in s, and an empty line with the value of
 plant.position[1] reached.
-Masters are in processes of their own because their C++ libraries and their pins of FMPy collide.
+Masters are in their own processes because their C++ libraries and their pins of FMPy collide.
 
 Every master runs the Jacobi scheme, the one they share, and records every output its own way.
 """
@@ -113,7 +113,7 @@ def libcosimpy(folder: Path) -> Master:
     watched = references["plant"]["position[1]"]
 
     def position() -> float:
-        """From an observer of its own, so that it costs nothing before."""
+        """From its own observer, so that it costs nothing before."""
         execution.add_observer(last)
         execution.step(1)
         return float(last.last_real_values(index["plant"], [watched])[0])

@@ -72,7 +72,7 @@ PLANE, AROUND = 340, 1000.0
 
 
 def three_svg(hands: Sequence[tuple[str, Result]]) -> str:
-    """The animation of hands seen from above, beside each other, as SVG; runs of one length.
+    """The animation of hands seen from above, next to each other, as SVG; runs of one length.
 
     The object is a disc of 35 mm.
     """
@@ -108,13 +108,13 @@ def _plane(k: int, title: str, run: Result) -> Iterator[Part]:
 
 
 BESIDE, LOWER, BEAM, NARROW = 1080.0, 216, 46, 16
-"""px: of a m of two grippers beside each other, the height of their picture, where a beam is, and
+"""px: of a m of two grippers next to each other, the height of their picture, where a beam is, and
 of a finger.
 """
 
 
 def tandem_svg(grippers: Sequence[tuple[str, Result]]) -> str:
-    """The animation of grippers in tandem beside each other, as SVG; runs of one length.
+    """The animation of grippers in tandem next to each other, as SVG; runs of one length.
 
     A run needs the signals of a grasp and those of the wrist, RATE rows a second or more.
     """

@@ -1,7 +1,7 @@
 r"""Two-finger gripper and a box, fixed or on a floor, in MuJoCo.
 
 The fingers and the box of plant/README.md as bodies of [MuJoCo](https://mujoco.org): a contact
-solver that is none of ours, to check ours against. With `object_fixed` off the box stands free on
+solver of another maker, to check our plants. With `object_fixed` off the box stands free on
 the floor. Fingertips are smooth spheres of radius R on slides, at the height h; the gap is the
 shortest distance from the sphere to the box. `mujoco` is imported when the first state is made.
 
@@ -251,9 +251,9 @@ def _shape(p: Params) -> Shape:
 
 @lru_cache(maxsize=32)
 def _simulator(p: Params, thread: int) -> tuple[Any, Any, Any]:
-    """MuJoCo, the model of these parameters and its data, of a thread alone.
+    """MuJoCo, the model of these parameters and its data, for one thread only.
 
-    What an instance is stands in its State alone, so all of a thread go through the same data; but
+    What an instance is stands in its State only, so all of a thread go through the same data; but
     MuJoCo lets other threads run while it computes.
     """
     try:

@@ -68,13 +68,14 @@ WORDING: dict[str, re.Pattern[str]] = {
     "write 'next to', 'and' or 'in addition to'": re.compile(r"\bbesides?\b", re.I),
     "write 'only' or 'on its own'": re.compile(r"\balone\b", re.I),
     "write 'also' or 'and'": re.compile(r"\bas well\b(?! as\b)", re.I),
-    "name the thing instead of 'ours' or 'theirs'": re.compile(r"\b(?:ours|theirs)\b", re.I),
-    "write 'your own X' or name the owner": re.compile(r"\bof (?:your|one's|its|their|our) own\b"),
+    "write 'its own X' or name the owner": re.compile(
+        r"(?<!\bone )\bof (?:your|one's|its|their) own\b"
+    ),
     "a thing does not speak: write 'contains', 'shows', 'names' or 'states'": re.compile(
         rf"\b(?:{SPEAKERS})s? (?:says?|said|tells?|told)\b", re.I
     ),
     "name who reports it, and where": re.compile(
-        r"\b(?:is|are|be|was|were) (?:said|told)\b|\bwhich (?:says|tells)\b", re.I
+        r"\b(?:is|are|be|was|were) said\b|\bwhich (?:says|tells)\b", re.I
     ),
     "use the common word: package, level, README, equation sheet, structure": re.compile(
         r"\b(?:rooms?|equation cards?|Cards?:)(?!\w)"
@@ -89,6 +90,7 @@ PAGE_WORDING: dict[str, re.Pattern[str]] = {
     "name the thing instead of 'what'": re.compile(r"\bwhat\b(?![^.!?]*\?)", re.I),
     "write 'if' for a condition": re.compile(r"(?:^|(?<=[.!?] ))Where\b(?![^.!?]*\?)"),
     "make it two sentences instead of ';'": re.compile(r";"),
+    "name the thing instead of 'ours' or 'theirs'": re.compile(r"\b(?:ours|theirs)\b", re.I),
 }
 """The same, for pages."""
 

@@ -1,7 +1,7 @@
 """Makes the files of a release in dist/: make dist. The same sources give the same bytes.
 
 The wheel and the sdist, the FMUs in Python and as C for every platform, the grasps as SSP archives,
-the playground, SHA256SUMS, and index.html, which says what each is. zig (in the extra native)
+the playground, SHA256SUMS, and index.html, which describes each file. zig (in the extra native)
 compiles for all platforms, so that none of it depends on the machine. It takes a few minutes the
 first time, mostly for zig's own libraries of Windows; what is going on is told on the way.
 """
@@ -75,7 +75,7 @@ $rows
 $fmus
 </table>
 <h3>For the cross-check</h3>
-<p>Beside each FMU are the inputs that it can be tried with (<code>NAME_in.csv</code>), the results
+<p>Next to each FMU are the inputs that it can be tried with (<code>NAME_in.csv</code>), the results
 that are right for them (<code>NAME_ref.csv</code>) and the options of such a run
 (<code>NAME_ref.opt</code>), as the rules of the FMI cross-check have them.</p>
 $cross_checks
@@ -168,7 +168,7 @@ def _fmus(out: Path) -> Iterator[str]:
 
 
 def _cross_checks(out: Path) -> Iterator[str]:
-    """The files beside the FMUs of each folder."""
+    """The files next to the FMUs of each folder."""
     for folder in FOLDERS:
         files = sorted(path for path in (out / folder).iterdir() if path.suffix != ".fmu")
         links = ", ".join(_link(out, path, path.name) for path in files)
@@ -176,7 +176,7 @@ def _cross_checks(out: Path) -> Iterator[str]:
 
 
 def _link(out: Path, path: Path, text: str = "") -> str:
-    """A link to a file, or to what the page tells of the files of a folder."""
+    """A link to a file, or to the section of the page on the files of a folder."""
     place = _in(out, path)
     return f'<a href="{"#" if path.is_dir() else ""}{place}">{text or place}</a>'
 

@@ -49,7 +49,7 @@ def built(folder: Path) -> System:
 def boxes(count: int = BOXES, seed: int = SEED) -> Iterator[Values]:
     """Width, place, mass and the colours of both faces, each as likely within its range.
 
-    A box is up to 25 mm off the middle, as far as the open gripper has room for it.
+    A box is up to 25 mm off the middle, as far as the open gripper permits.
     """
     rng = Random(seed)  # noqa: S311 - no secret
     for _ in range(count):

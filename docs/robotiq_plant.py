@@ -3,7 +3,7 @@ r"""Robotiq 2F-85 and a free box on a floor, in MuJoCo, on a wrist that is posit
 The gripper is the MJCF in [robosuite](https://robosuite.ai) 1.5.2, its links, masses and meshes:
 `pip install --no-deps robosuite==1.5.2`. Nothing of robosuite is run. Its file leaves the linkage
 open, with fingertips on weak springs; here each side is a parallelogram and both move together, as
-in the real gripper, where gears hold them up besides: their weight does not close them.
+in the real gripper, where gears also hold them up: their weight does not close them.
 
 X is where the wrist is, w half the opening; the faces of the pads are at x_1 = X + w and
 x_2 = X - w. The drive pulls along w: its force F does the work F·dw, whatever the linkage makes of
@@ -333,9 +333,9 @@ def _tilt(seen: Numbers) -> float:
 
 @lru_cache(maxsize=32)
 def _simulator(p: Params, thread: int) -> tuple[Any, Any, Any]:
-    """MuJoCo, the model of these parameters and its data, of a thread alone.
+    """MuJoCo, the model of these parameters and its data, for one thread only.
 
-    What an instance is stands in its State alone, so all of a thread go through the same data; but
+    What an instance is stands in its State only, so all of a thread go through the same data; but
     MuJoCo lets other threads run while it computes.
     """
     try:

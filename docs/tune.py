@@ -140,7 +140,7 @@ SHOWN = {"grasp time, s": 1, "impact, mm/s": 1e3, "apart, s": 1, "overshoot, %":
 
 
 def main(generations: int = GENERATIONS) -> None:
-    """Search, and print what was found beside what is published."""
+    """Search, and print the gains next to the published ones."""
     best, search = tuned(generations)
     tried, published = len(search.known), np.zeros(len(GAINS))
     print(f"{tried} sets of gains, {tried * len(CONDITIONS)} runs, seed {SEED}")

@@ -215,7 +215,7 @@ COLUMNS: Mapping[str, tuple[str | Callable[[Result], float | list[float] | None]
 # Pictures
 
 _CASES = {"Case 0": ("-.", GREY), "Case 1": ("--", RED), "Case 2": ("-", BLUE)}
-_LAYERS = {"0": "force alone", "1": "+ impact reduction", "2": "+ simultaneous contact"}
+_LAYERS = {"0": "force only", "1": "+ impact reduction", "2": "+ simultaneous contact"}
 
 
 @contextmanager
@@ -372,7 +372,7 @@ BLOCKS = (TEMPLATE_FOLDER / "spring_plant.py", HERE / "moving_object.py")
 
 
 def update(name: str, pictures: Path) -> None:
-    """Work out a page anew, and draw its pictures into a folder."""
+    """Work out a page again, and draw its pictures into a folder."""
     for block in BLOCKS:
         done("build", str(block))
     with TemporaryDirectory() as folder:

@@ -132,7 +132,7 @@ def test_every_other_module_can_be_imported(python):
 def test_the_help_has_the_commands_of_any_system(command):
     listed = command("--help").partition("Simulate:\n")[2].splitlines()
     assert sorted(line.split()[0] for line in listed if line.startswith("  ")) == [
-        "build", "compare", "init", "inspect", "proxy", "qualify", "relay", "report",
+        "build", "compare", "diff", "init", "inspect", "proxy", "qualify", "relay", "report",
         "run", "serve", "ssp", "sweep",
     ]  # fmt: skip
     assert "Default: fmus/build" in command("build", "--help")

@@ -1,1 +1,1 @@
-"""Multiple impedance control of a two-finger gripper. Card: controller/README.md."""
+"""Multiple impedance control of a two-finger gripper. Equations: controller/README.md."""

@@ -1,6 +1,6 @@
 """Multiple impedance control of a hand of N fingers that close along rays from its wrist.
 
-Each finger has a target of its own, and balance weights n_k with sum n_k·e_k = 0 tie them together;
+Each finger has its own target, and balance weights n_k with sum n_k·e_k = 0 tie them together;
 the layers are those of series.py, s_k >= 0 being the way from the wrist along the ray:
 
     (2N) f_sk = K_s·(phi_k - <phi>),    phi_k = tanh((xi_k - m_k)/(xi_k + m_k))
@@ -8,7 +8,7 @@ the layers are those of series.py, s_k >= 0 being the way from the wrist along t
     (7N) u_k = n_k·[-D_i·(s_k' - s_vk') - K_i·(s_k - s_vk)]
 
 Eq. (3), (5), (6) hold for each finger. With N = 2 it is the published law, x_1 = s_1, x_2 = -s_2.
-Card: controller/README.md
+Equations: controller/README.md
 """
 
 from dataclasses import dataclass

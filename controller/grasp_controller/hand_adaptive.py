@@ -13,7 +13,7 @@ of ln alpha_k is N(mu, sigma_b^2/2), its mean unknown, as is K:
     t = min(1, beta_max/(largest less smallest a_k with a slope))
 
 With two fingers b_1 - b_2 is beta of reflectance_ratio.py, gain and limit included.
-Card: controller/README.md
+Equations: controller/README.md
 """
 
 from dataclasses import dataclass
@@ -78,7 +78,7 @@ class Outputs(NamedTuple):
     reflectance_ratio_standard_deviation: Annotated[
         PerFinger,
         Output(
-            "standard deviation of that ratio, by noise alone",
+            "standard deviation of that ratio, by noise only",
             unit="1",
             nominal=1.0,
             depends_on=set(),
@@ -179,7 +179,7 @@ def gain(p: reflectance_ratio.Params, line: Line) -> float:
 
 
 def deviation(p: reflectance_ratio.Params, line: Line) -> float:
-    """The standard deviation of b_k that is left, by noise alone."""
+    """The standard deviation of b_k that is left, by noise only."""
     return sqrt(_prior(p) * (1.0 - gain(p, line)))
 
 

@@ -1,6 +1,6 @@
 """Layer 2, impact reduction: the nearer the surface, the more the approach is slowed down.
 
-Each finger has a virtual object of its own, Eq. (5) and (6), which follows the target of layer 3.
+Each finger has its own virtual object, Eq. (5) and (6), which follows the target of layer 3.
 """
 
 from dataclasses import dataclass

@@ -31,7 +31,7 @@ Ratio: TypeAlias = Annotated[
 RatioDeviation: TypeAlias = Annotated[
     float,
     Output(
-        "standard deviation of that ratio, by noise alone",
+        "standard deviation of that ratio, by noise only",
         unit="1",
         nominal=1.0,
         depends_on=set(),
@@ -100,7 +100,7 @@ class Params(Group, name="reflectance"):
     gain: Annotated[
         float,
         Parameter(
-            "K of a white face, for the estimated gaps alone",
+            "K of a white face, for the estimated gaps only",
             unit="V.m^n",
             low=1e-9,
             high=1e6,
@@ -110,7 +110,7 @@ class Params(Group, name="reflectance"):
     offset_distance: Annotated[
         float,
         Parameter(
-            "l_0, from the face of the sensor to its element, for the estimated gaps alone",
+            "l_0, from the face of the sensor to its element, for the estimated gaps only",
             unit="m",
             low=0.0,
             high=1.0,

@@ -43,7 +43,7 @@ DISAGREEING = 10.0
 class Wrist(Group, name="wrist"):
     """What is known of the wrist: the same words as at the plant.
 
-    The speed limit is that of a robot beside people, ISO 10218-1.
+    The speed limit is that of a robot next to people, ISO 10218-1.
     """
 
     bandwidth: Annotated[

@@ -1,4 +1,4 @@
-// The simulation: the components in WebAssembly, set up, connected and run anew for each change.
+// The simulation: the components in WebAssembly, set up, connected and run again for each change.
 "use strict";
 
 const REAL = 0, BOOLEAN = 1;

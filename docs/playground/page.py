@@ -2,7 +2,7 @@
 
     PYTHONPATH=docs .venv/bin/python -m playground.page     # make playground
 
-makes the WebAssembly anew where the C of the FMUs has changed, and writes docs/playground.html.
+makes the WebAssembly again where the C of the FMUs has changed, and writes docs/playground.html.
 """
 
 from __future__ import annotations

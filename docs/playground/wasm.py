@@ -1,7 +1,7 @@
 """Makes play.wasm.z, which the page carries: the C of our native FMUs, and the loop over them.
 
 It takes the zig that ZIG names, which makes the same bytes on every machine. The file is kept
-beside its sources, so that the page needs no compiler, and it names what it was made from, so that
+next to its sources, so that the page needs no compiler, and it names what it was made from, so that
 it can be told without zig if these are the sources at hand.
 """
 
@@ -133,7 +133,7 @@ def made() -> bytes:
 
 
 def main() -> None:
-    """Write play.wasm.z anew where it is not of the sources at hand."""
+    """Write play.wasm.z again where it is not of the sources at hand."""
     if WASM.is_file() and made_from(zlib.decompress(shipped())) == hash_at_hand():
         return
     try:

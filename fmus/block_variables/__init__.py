@@ -1,4 +1,4 @@
-"""How a block declares its variables, and the one check of their ranges. Card: fmus/README.md.
+"""How a block declares its variables, and the one check of their ranges. Equations: fmus/README.md.
 
 Standard library only: blocks import this package, and every FMU brings it along.
 """

@@ -1,4 +1,4 @@
-"""Fixed-step co-simulation of FMUs, and the grasp of the paper. Card: orchestrator/README.md.
+"""Fixed-step co-simulation of FMUs, and the grasp of the paper. See orchestrator/README.md.
 
     from grasp_cosim import grasp_system, simulate
 
@@ -134,7 +134,7 @@ def __dir__() -> list[str]:
     return [*__all__, *(name for name in globals() if name.startswith("__")), "__version__"]
 
 
-if not TYPE_CHECKING:  # who checks types knows the names above, and none besides
+if not TYPE_CHECKING:  # who checks types knows the names above, and no others
 
     def __getattr__(name):
         if name == "__version__":

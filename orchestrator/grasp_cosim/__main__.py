@@ -17,7 +17,7 @@ def entry() -> NoReturn:
         from contextlib import suppress
         from importlib.metadata import version
 
-        with suppress(OSError):  # which is said in full below
+        with suppress(OSError):  # which the text below explains
             os.write(1, f"grasp-cosim, version {version('grasp-cosim')}\n".encode())
             sys.exit()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as after `&`

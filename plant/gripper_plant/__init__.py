@@ -1,1 +1,1 @@
-"""The gripper-object plant. Card: plant/README.md."""
+"""The gripper-object plant. Equations: plant/README.md."""

@@ -11,7 +11,7 @@ CELLS = 64
 """Values that are on their way, at most."""
 
 SHORTEST = 1.0 / (CELLS - 4)
-"""Of the delay, that of a value on its way: so all have room, the first and the last one besides.
+"""Of the delay, that of a value on its way: so all have space, even the first and the last one.
 """
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """Two-finger parallel gripper and a fixed object that gives, Eq. (1):  m_j·x_j'' = u_j + f_cj.
 
 Each side of the object gives by itself; its middle stays where it is. Signs as in fingers.py.
-Card: plant/README.md
+Equations: plant/README.md
 """
 
 from dataclasses import dataclass

@@ -26,7 +26,7 @@ class Rates(NamedTuple):
 
 
 MAX_FORCE_ITERATIONS = 8
-"""To find the contact force beside friction: each leaves 1/19 of the error, or less."""
+"""To find the contact force together with friction: each leaves 1/19 of the error, or less."""
 
 
 def fastest(rates: Rates) -> float:
@@ -80,7 +80,7 @@ def advance(side: Side, rates: Rates, s: float, v: float, f: float, h: float) ->
 def _advance_with_friction(
     side: Side, rates: Rates, s: float, v: float, f: float, h: float
 ) -> Finger:
-    """advance() of a finger with friction, which acts beside the contact force."""
+    """advance() of a finger with friction, which acts in addition to the contact force."""
     surface, m, friction_law = side
     n = fingers.substep_count(max(fastest(rates), friction.rate(friction_law, m)), h)
     if n > fingers.MAX_SUBSTEPS:
@@ -105,7 +105,7 @@ def _advance_with_friction(
 def _advance_contact_with_friction(
     side: Side, rates: Rates, s: float, v: float, f: float, d: float
 ) -> Finger:
-    """One step of the stabilised constraint beside friction; the contact force is held over it.
+    """One step of the stabilised constraint with friction; the contact force is held over it.
 
     The force is that of the mean rate and the mean gap, found by iteration. It takes the energy
     2·alpha·m·d·(mean velocity)^2 and gives none.

@@ -1,7 +1,7 @@
 """What a surface that gives does to a finger: Kelvin-Voigt or Hunt-Crossley, never a pull.
 
 Both are f_c = max(0, k·delta^n·(1 + lambda·delta') + c·delta') at the depth delta > 0, with
-lambda = 0 or c = 0. Card: plant/README.md
+lambda = 0 or c = 0. Equations: plant/README.md
 """
 
 from dataclasses import dataclass

@@ -5,7 +5,7 @@
 
 So a speed servo moves as the fingers would under F without friction; what holds them up, it works
 against up to its limit. v_r runs no further ahead of w' than that limit makes use of.
-Card: plant/README.md
+Equations: plant/README.md
 """
 
 from dataclasses import dataclass

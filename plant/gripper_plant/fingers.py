@@ -1,7 +1,8 @@
 """The two fingers, Eq. (1):  m_j·x_j'' = u_j + f_cj,  and what every plant has: outputs, sub-steps.
 
 The x axis is fixed to the wrist and points right. Finger 1 is the right one: it closes with
-u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Card: plant/README.md
+u_1 < 0 and the object pushes it back with f_c1 >= 0. Finger 2 mirrors it. Equations:
+plant/README.md
 """
 
 from dataclasses import dataclass, field

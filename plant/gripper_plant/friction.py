@@ -1,4 +1,4 @@
-"""A body that slides or sticks: Coulomb, viscous and Stribeck friction. Card: plant/README.md."""
+"""A body that slides or sticks: Coulomb, viscous, Stribeck friction. Equations: plant/README.md."""
 
 from dataclasses import dataclass
 from math import copysign, exp

@@ -1,6 +1,6 @@
 """A hand of N fingers on rays from the wrist and a rigid, fixed object: a prism or a disc.
 
-Each finger is that of rigid.py, with a surface of its own. Card: plant/README.md
+Each finger is that of rigid.py, with its own surface. Equations: plant/README.md
 """
 
 from dataclasses import dataclass

@@ -7,7 +7,7 @@ flat face under each finger, or a disc.
     prism: nu_k = Rot(theta)·e_k,      surface on the ray  (h_k + nu_k·c)/(nu_k·e_k)
     disc:  nu_k = (p_k - c)/|p_k - c|,  surface on the ray  c·e_k + sqrt(R^2 - q_k^2)
 
-nu_k is the outward normal where finger k is, q_k how far its ray passes beside the centre.
+nu_k is the outward normal where finger k is, q_k how far its ray passes next to the centre.
 Equations (H1) and card: plant/README.md
 """
 
@@ -25,7 +25,7 @@ MIN_FACING = 0.1
 """Cosine of a prism's turn below which its faces do not look to the rays any more."""
 
 FAR = 10.0
-"""m; as far is what is beside a finger."""
+"""m; as far is what is next to a finger."""
 
 
 class Shape(IntEnum):
@@ -147,7 +147,7 @@ class Params:
         for s, begins in zip(self.initial_position, self.surfaces, strict=True):
             if begins == -inf:
                 raise ValueError(
-                    f"object_radius = {self.object_radius!r} m: the disc is beside the ray of a "
+                    f"object_radius = {self.object_radius!r} m: the disc is next to the ray of a "
                     "finger, must be under all of them"
                 )
             if s < begins:
@@ -172,7 +172,7 @@ class Params:
 
     @cached_property
     def surfaces(self) -> PerFinger:
-        """Where the object begins on each ray at the start, m; -inf where it is beside."""
+        """Where the object begins on each ray at the start, m; -inf where it is next to the ray."""
         shape, radius, pose = self.shape, self.object_radius, self.first_pose
         return tuple(surface(shape, radius, ray, pose) for ray in self.rays)
 
@@ -192,7 +192,7 @@ def angles_between(angle: PerFinger) -> tuple[float, float]:
 
 
 def surface(shape: Shape, radius: float, ray: Ray, pose: Pose) -> float:
-    """Where the object begins on a ray, m from the wrist; -inf where it is beside the ray."""
+    """Where the object begins on a ray, m from the wrist; -inf where it is next to the ray."""
     if shape == Shape.PRISM:
         facing = cos(pose.angle)
         if facing < MIN_FACING:

@@ -4,7 +4,7 @@
     m·c'' = -sum f_k·nu_k + F,    m·r^2·theta'' = -sum (p_k - c) x f_k·nu_k + M            (H1)
 
 F and M are the friction of the floor. The fingertips are points without friction on stiff rails.
-Card: plant/README.md
+Equations: plant/README.md
 """
 
 from dataclasses import dataclass

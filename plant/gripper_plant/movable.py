@@ -1,7 +1,7 @@
 """Two-finger parallel gripper and a box that stands on a floor, Eq. (1):  m_j·x_j'' = u_j + f_cj.
 
 A push that the other finger does not answer shifts the box, or topples it. Signs as in fingers.py;
-tilt > 0 is over the right edge. Card: plant/README.md
+tilt > 0 is over the right edge. Equations: plant/README.md
 """
 
 from dataclasses import dataclass

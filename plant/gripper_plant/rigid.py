@@ -1,6 +1,6 @@
 """Two-finger parallel gripper and a rigid, fixed object, Eq. (1):  m_j·x_j'' = u_j + f_cj.
 
-Signs as in fingers.py. Card: plant/README.md
+Signs as in fingers.py. Equations: plant/README.md
 """
 
 from dataclasses import dataclass

@@ -6,7 +6,7 @@ X is where the wrist is, w half the opening:  x_1 = X + w,  x_2 = X - w,
 
 The wrist is positioned (wrist.py), the drive is commanded a force (drive.py). The object is fixed,
 or a box on a floor (box.py), and gives (contact_laws.py). Signs as in fingers.py: F < 0 closes.
-Card: plant/README.md
+Equations: plant/README.md
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
     X'' = omega^2·(X_c(t - tau) - X) - 2·zeta·omega·X' + omega^2·c·(f_c1 + f_c2)    (T2)
 
-Its acceleration and its speed stay within limits. Card: plant/README.md
+Its acceleration and its speed stay within limits. Equations: plant/README.md
 """
 
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""The optical proximity sensor. Card: sensor/README.md."""
+"""The optical proximity sensor. Equations: sensor/README.md."""

@@ -97,7 +97,7 @@ SILENT = Chain(0.0, (0.0,) * 6, 0.0, (0.0,) * 5, (0.0,) * 10)
 
 
 def initial_state(p: Params, u: Inputs) -> State:
-    """As after the first gap for a long time: filter and median have settled, on noise as well."""
+    """As after the first gap for a long time: filter and median have settled, on noise too."""
     return State(0.0, _settled(p, _light(p, u)) if p.sampled else SILENT)
 
 

@@ -1,7 +1,7 @@
 """The stages between the optics and the controller's input, each of which can be off.
 
 Ambient light, converter, low-pass, median, and the clock of their samples; noise has a file of its
-own. Card: sensor/README.md
+own. Equations: sensor/README.md
 """
 
 from dataclasses import dataclass
@@ -210,9 +210,9 @@ def samples(p: Sampling, wait: float, h: float) -> tuple[int, float]:
     """How many instants lie in a step of h s, its end excluded, and the wait at its end.
 
     wait is the time to the next instant in periods, so that nothing adds up over a run but the
-    rounding of the steps: a millionth of a period is room for ten thousand million of them. That of
-    a state from bytes which were damaged may be any: no instant is further behind than a period, or
-    the step would not end.
+    rounding of the steps: a millionth of a period leaves space for ten thousand million of them.
+    That of a state from bytes which were damaged may be any: no instant is further behind than a
+    period, or the step would not end.
     """
     periods = h * p.rate
     wait = max(wait, -1.0)

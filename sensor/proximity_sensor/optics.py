@@ -1,6 +1,6 @@
 """Reflected-light-intensity (O-RLI) proximity sensor, Eq. (9):  xi = K·alpha / (l + l_0)^n.
 
-The output is offset-compensated: zero when nothing is near. Card: sensor/README.md
+The output is offset-compensated: zero when nothing is near. Equations: sensor/README.md
 """
 
 from collections.abc import Mapping

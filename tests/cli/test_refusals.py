@@ -45,7 +45,7 @@ build --target linux64 :: --target linux64: needs --native
 build --native --c-only c --fmi 3 :: build: --c-only cannot be used with --target
 build file.toml :: file.toml: is a .toml file; must be a block, a Python file; `grasp-cosim
 build plant.fmu :: plant.fmu: is an FMU; must be a block, a Python file; `grasp-cosim inspect
-build GripperPlant :: GripperPlant is one of ours: --native builds it alone
+build GripperPlant :: GripperPlant is a built-in block: --native builds it on its own
 build --fingers 3 block.py :: build: --fingers 3 cannot be used with block.py
 inspect folder.toml :: folder.toml: is a folder; must be an FMU, a file
 init file.toml :: file.toml: is there already; give another name, or --force

@@ -125,7 +125,7 @@ def test_friction_from_a_log(command, recorded, grasp, kind):
     recorded.to_csv("signals.csv") if kind == "csv" else recorded.to_mdf("signals.mf4")
     code, out, err = command("identify", f"signals.{kind}", "--out", "identified", "--json")
     assert code == 0
-    note = "signals.csv: there is no run.json beside it; its values are taken to be in SI units\n"
+    note = "signals.csv: there is no run.json next to it; its values are taken to be in SI units\n"
     assert err == (note if kind == "csv" else "")
     found = json.loads(out)
     estimated = {p["name"]: p["value"] for p in found["parameters"]}

@@ -42,7 +42,7 @@ def test_each_picture_is_shown_somewhere():
 
 
 def test_a_name_that_is_none(pictures):
-    with pytest.raises(SystemExit, match=r"^hnad: must be of hand, three, tandem, loop, "):
+    with pytest.raises(SystemExit, match=r"^hnad: must be of hand, first, three, tandem, loop, "):
         pictures.main("hand", "hnad")
 
 

@@ -43,7 +43,7 @@ def test_plain_english_passes(text):
         ("The file says which step.", "a thing does not speak"),
         ("The reason is said there.", "name who reports it"),
         ("Fixed is the exponent.", "put the subject first"),
-        ("A metric of your own.", "write 'your own X'"),
+        ("A metric of your own.", "write 'its own X'"),
         ("A room imports another.", "use the common word"),
         ("**Isolation.** An FMU runs in a process.", "make the bold words a heading"),
         ("| word | is |\n|---|---|\n| a | b |\n", "name the column by a noun"),

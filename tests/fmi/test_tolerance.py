@@ -54,6 +54,8 @@ def test_an_fmu_of_both_kinds_is_integrated_with_it(tmp_path, version):
 @pytest.mark.parametrize("entry", ["absolute_tolerance", "maximum_step"])
 def test_a_solver_of_its_own_takes_no_more(tmp_path, entry):
     talker(tmp_path)
-    message = f"^t.toml: a: solver: {entry}: talker.fmu is for co-simulation alone, with a solver"
+    message = (
+        f"^t.toml: a: solver: {entry}: talker.fmu is for co-simulation only, with its own solver"
+    )
     with pytest.raises(InputError, match=message):
         system(tmp_path, f"solver = {{ {entry} = 1e-3 }}")

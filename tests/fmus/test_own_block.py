@@ -95,7 +95,7 @@ def test_packages_of_our_blocks_come_along(tmp_path):
 
 # fmt: off
 WRONG = [
-    (LAG.partition("\n\nfrom")[0], "", "must begin with a docstring; its first line says what"),
+    (LAG.partition("\n\nfrom")[0], "", "must begin with a docstring; its first line describes"),
     ("from math", "import numpy\nfrom math", "line 7: imports numpy; must be of the standard "),
     ("from math", "import numpy\nfrom math", 'REQUIRES = ("numpy",) names what is to be installed'),
     ("from math", "from  gripper_plant import fingers\nfrom math", "line 7: imports gripper_plant; "

@@ -313,7 +313,7 @@ def test_the_host_may_be_stopped():
     [
         (miss, 0, "1 missed in a row: no answer within 100 s;"),
         (fail, 3, "the peer failed: the motor is hot;"),
-        (forget, 3, "the peer does not know this session: it was started anew, or another proxy"),
+        (forget, 3, "the peer does not know this session: it was started again, or another proxy"),
         (tripped, 3, "its watchdog or a limit of its own tripped, it is in its safe state;"),
         (shifted(0.25), 3, "its clock is 0.25 s ahead: must be within 0.1 s (proxy.greatest_lead)"),
         (shifted(-0.25), 3, "its clock is 0.25 s behind; does the run keep to the clock: must be"),
@@ -545,7 +545,7 @@ def test_a_lost_peer_gets_no_command_before_its_host_initialises_it_anew():
             host.step()
         assert (host.state(), host.outputs()) == (4, ZEROS)
         assert host.log()[-1].endswith(
-            "the peer answers again; it gets no commands before the loop is initialised anew"
+            "the peer answers again; it gets no commands before the loop is initialised again"
         )
         kinds = peer.kinds()
         assert kinds.count(STEP) == 4

@@ -1,4 +1,4 @@
-"""A loop that is initialised anew: a peer was lost and is back, or the run has stalled."""
+"""A loop that is initialised again: a peer was lost and is back, or the run has stalled."""
 
 import time
 
@@ -80,7 +80,7 @@ def test_a_peer_that_is_started_anew(bench, resume, scheme):
         return
     (begun,) = result.initialised_anew
     assert 1.6 <= begun < anew
-    assert f"t = {begun:.9g} s: a lost peer is back: the loop was initialised anew" in result.log
+    assert f"t = {begun:.9g} s: a lost peer is back: the loop was initialised again" in result.log
     after = rows > begun
     undisturbed = simulate(system.swap("plant", bench.fmu))
     assert largest(result, after) < 1.5 * largest(undisturbed)

@@ -96,7 +96,7 @@ def test_text_is_one_line_each_with_the_fix_below():
         "problem  b c          broken",
         "                      fix: mend it",
     ]
-    said = "loads on this machine: yes, as far as the file says; --load tries"
+    said = "loads on this machine: yes, judged by the file; --load tries"
     assert loading.findings_text(findings[:1], tried=False).splitlines()[0] == said
 
 

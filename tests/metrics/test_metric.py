@@ -316,7 +316,7 @@ def test_what_every_run_prints_is_no_name_of_a_metric(grasp):
     assert "realtime" in told
     assert {*told} - {m.name for m in METRICS} <= RESERVED
     for name in RESERVED:
-        with pytest.raises(InputError, match=f"^metric '{name}': every run has this beside; must "):
+        with pytest.raises(InputError, match=f"^metric '{name}': is a figure of every run; must "):
             metric(name)
 
 
@@ -360,7 +360,7 @@ def test_a_file_has_its_metrics_in_its_order_and_not_those_it_imports(file):
         ),
         (
             "from grasp_cosim import metric\nmetric('step')\n",
-            "--metrics mine.py, line 2: metric 'step': every run has this beside; must have",
+            "--metrics mine.py, line 2: metric 'step': is a figure of every run; must have",
         ),
         (
             "from grasp_cosim import metric\n\nmetric('way', unit='furlong')\n",

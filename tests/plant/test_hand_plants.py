@@ -105,7 +105,7 @@ def test_a_finger_that_went_around_an_edge_touches_nothing():
         ({"angle": (0.0, 1.0, 2.0)}, "there is no finger within 4.28319 rad of another"),
         ({"angle": (0.0, math.pi / 2, math.pi)}, "there is no finger within 3.14159 rad"),
         ({"initial_position": (0.03, 0.11, 0.11)}, "must be at least 0.035 m, where the object"),
-        ({"shape": Shape.DISC, "initial_object_position": (0.0, 0.05)}, "the disc is beside"),
+        ({"shape": Shape.DISC, "initial_object_position": (0.0, 0.05)}, "the disc is next to"),
         ({"finger_mass": (0.5, 0.0, 0.5)}, "finger_mass = 0.0 kg: must be from"),
     ],
 )

@@ -407,5 +407,5 @@ def test_metrics_and_logs_get_si_as_run_json_says_and_signals_stay_as_recorded(t
     other.write_text(CSV, "utf-8")
     assert load_log(other, said.append)["a.x"][0] == 1.5
     assert said == [
-        f"{other}: there is no run.json beside it; its values are taken to be in SI units"
+        f"{other}: there is no run.json next to it; its values are taken to be in SI units"
     ]

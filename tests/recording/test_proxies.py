@@ -64,7 +64,7 @@ def test_a_loss_and_a_return_are_named():
         "meanwhile as proxy.on_loss says",
         "arm: the peer was lost at t = 0.5 s and did not come back; its outputs were meanwhile as "
         "proxy.on_loss says, and with proxy.resume = true it may come back",
-        "arm: the peer was started anew, and its model set up from the start: 2 sessions in this "
+        "arm: the peer was started again, and its model set up from the start: 2 sessions in this "
         "run",
         "arm: the peer put itself into its safe state 1 time",
         "arm: 5 commands beyond the limits of the proxy: clamped",

@@ -179,7 +179,9 @@ def test_a_solver_for_co_simulation_alone(tmp_path):
     """It gets the tolerance, and is not integrated here."""
     (component,) = solved(tmp_path, "solver = {}", "CoSimulation").components
     assert component.integrated is None
-    message = "x: solver: maximum_step: dahlquist.fmu is for co-simulation alone, with a solver of"
+    message = (
+        "x: solver: maximum_step: dahlquist.fmu is for co-simulation only, with its own solver"
+    )
     with pytest.raises(InputError, match=message):
         solved(tmp_path, "solver = { maximum_step = 0.1 }", "CoSimulation")
 

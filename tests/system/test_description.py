@@ -238,7 +238,7 @@ def test_another_fmu_may_not_take_a_number_for_another_item(grasp, fmus, tmp_pat
     same = other_sensor(fmus, tmp_path, black=7)
     assert brown.swap("sensor_1", same).component("sensor_1", "x").values["surface"] == 4
     assert grasp.swap("sensor_1", other_sensor(fmus, tmp_path, brown=7))
-    swapped = "surface = 4 is brown in ProximitySensor.fmu and {} in Other.fmu; must be set anew"
+    swapped = "surface = 4 is brown in ProximitySensor.fmu and {} in Other.fmu; must be set again"
     with pytest.raises(InputError, match=swapped.format("nothing")):
         brown.swap("sensor_1", other_sensor(fmus, tmp_path, brown=7))
     with pytest.raises(InputError, match=swapped.format("black")):
@@ -266,7 +266,7 @@ def test_a_name_of_several_variables_is_left_alone_and_refused_where_it_is_wante
     text = 'experiment = { step = 0.1, stop = 1.0 }\n[components.dp]\nfmu = "dp.fmu"\n'
     (tmp_path / "s.toml").write_text(text)
     system = System.load(tmp_path / "s.toml").with_values({"dp.a": 2.0})
-    assert "dp: several variables of dp.fmu are called b: they are left alone" in remarks(system)
+    assert "dp: several variables of dp.fmu are called b: they are left out" in remarks(system)
     with pytest.raises(InputError, match=r"dp\.fmu, where several are called b, has no "):
         system.with_values({"dp.b": 2.0})
 

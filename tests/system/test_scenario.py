@@ -84,12 +84,7 @@ ANY = {
 }
 
 
-def test_the_readme_has_a_row_for_each_kind_of_fault():
-    """A new kind touches faults.py and that row."""
-    text = (Path(__file__).parents[2] / "docs/reference/system_file.md").read_text("utf-8")
-    table = text.split("| kind | makes of a value | parameters |\n|---|---|---|\n")[1]
-    rows = [row.split(" | ") for row in table.split("\n\n")[0].splitlines()]
-    assert [row[0].removeprefix("| ") for row in rows] == [*KINDS]
+def test_each_kind_of_fault_is_tried():
     assert ANY.keys() == KINDS.keys()
 
 

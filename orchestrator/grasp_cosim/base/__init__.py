@@ -1,1 +1,1 @@
-"""What every room may use: failures, checks, files, numbers and text, the end of a run."""
+"""What every package may use: failures, checks, files, numbers and text, the end of a run."""

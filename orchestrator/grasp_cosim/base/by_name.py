@@ -12,7 +12,7 @@ FEW = 3
 
 
 class ByName(Mapping[str, V]):
-    """A mapping of names to arrays, equal to itself alone, so that it can be a key and in a set.
+    """A mapping of names to arrays, equal to itself only, so that it can be a key and in a set.
 
     To compare arrays gives arrays: whether two runs are alike says compare().
     """

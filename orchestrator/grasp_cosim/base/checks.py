@@ -160,7 +160,7 @@ def is_value(value: Any) -> bool:
 def extra_module(name: str, purpose: str, extra: str) -> Any:
     """Return the module `name`, which is optional; `purpose` says what it is for.
 
-    It is of an `extra` of ours, or where there is none, of the package of its name. InputError with
+    It belongs to one of our extras, or else to the package of its name. InputError with
     the command that installs it here where it is missing.
     """
     try:
@@ -173,7 +173,7 @@ def extra_module(name: str, purpose: str, extra: str) -> Any:
 
 
 def packages(extra: str) -> list[str]:
-    """Return what an extra of ours needs, like "matplotlib>=3.9".
+    """Return what our extra needs, like "matplotlib>=3.9".
 
     A package index may not have us, nor a folder that a command is given in: these are named.
     """

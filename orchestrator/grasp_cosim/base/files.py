@@ -79,7 +79,7 @@ _TAKEN = {
     "fmu": ("an FMU",), "system": ("a .toml file",), "run": (WANTED["run"], "a folder"),
     "block": ("a .py file",),
 }  # fmt: skip
-"""In the place of a run, what is missing in a folder is to be said."""
+"""In the place of a run, the missing files of a folder are to be named."""
 
 _OF_A_RUN = {"run.json", "signals.csv", "signals.arrow"}
 _OF_AN_ARCHIVE = {"modelDescription.xml": "an FMU", "SystemStructure.ssd": "an SSP archive"}
@@ -87,8 +87,8 @@ _ADVICE = {
     WANTED["run"]: "`grasp-cosim report {}` shows the run",
     "a file of a run": "`grasp-cosim report {}` shows the run",
     "an FMU": "`grasp-cosim inspect {}` shows it, `grasp-cosim init my_system.toml --fmu NAME={}` "
-    "makes a system of it alone, `--as COMPONENT={}` the grasp with it, `grasp-cosim run --swap "
-    "COMPONENT={}` runs that",
+    "makes a system of only this FMU, `--as COMPONENT={}` the grasp with it, "
+    "`grasp-cosim run --swap COMPONENT={}` runs that",
     "an SSP archive": "`grasp-cosim run {}` runs it; its FMUs are in it, below resources/, and "
     "its name must end in .ssp",
     "a .toml file": "`grasp-cosim run {}` runs it, if it is a system",
@@ -149,7 +149,7 @@ def write_json(path: Path, content: Any) -> None:
 def remove(folder: Path, *names: str) -> None:
     """Remove files of these names, as far as there are any, and parts of them: see remove_parts().
 
-    Before several files that belong together are written anew: so there are none of two works.
+    Before several files that belong together are written again: so there are none of two works.
     """
     for path in (folder / name for name in names):
         if not is_stream(path):  # nor a link, but the file that it names

@@ -167,7 +167,7 @@ def _noting_what_is_lost(
 def _follow_signals(reader: socket.socket) -> None:
     """End the process by a signal that does not come at once with the first.
 
-    Where the KeyboardInterrupt was lost, raise it anew in the main thread: later, as it would be
+    Where the KeyboardInterrupt was lost, raise it again in the main thread: later, as it would be
     lost again where that is still about the first. No signal tells of it, which would be a second.
     """
     reader.recv(1, socket.MSG_PEEK)

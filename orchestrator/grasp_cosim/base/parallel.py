@@ -3,7 +3,7 @@
 The processes are new ones: a fork of one that has loaded FMUs would share their state. One that
 dies takes its own job with it and no other, and a new one takes its place. Where we die, they die,
 whatever they are at. From the current folder they import nothing, and a user's script they do not
-run anew: it needs no `if __name__ == "__main__"`. What goes to them is as of `pickles.py`.
+run again: it needs no `if __name__ == "__main__"`. What goes to them is as of `pickles.py`.
 """
 
 import os

@@ -25,7 +25,7 @@ def as_bytes(value: Any) -> bytes:
     buffer = io.BytesIO()
     try:
         _Pickler(buffer).dump(value)
-    except Exception:  # it has one of its own for each reason
+    except Exception:  # it has one for each reason
         try:
             import cloudpickle
         except ModuleNotFoundError:

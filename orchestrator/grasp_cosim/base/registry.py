@@ -25,7 +25,7 @@ Kind = Literal["blocks", "groups", "html", "pictures", "readers", "twins"]
 """What is registered, under which names, and of which type it is:
 
 blocks    ".py"               function of the file of a block: the path of its FMU, built and kept
-groups    as files say        metrics.groups.Group: what is worked out and shown of a kind of system
+groups    as in files         metrics.groups.Group: what is worked out and shown of a kind of system
 html      name of a class     function of such an object: the HTML that a notebook shows
 pictures  name of a class     function of such an object and a path, or None: a figure of matplotlib
 readers   suffix of a file    function as ssp.from_archive.read_ssp: a System
@@ -33,7 +33,7 @@ twins     name of a class     function of a system and as of System.natively(): 
 """
 
 _LOADERS: dict[tuple[Kind, str], Callable[[], Any]] = {}
-"""By kind and name what imports and returns an object of ours."""
+"""By kind and name a function that imports and returns one of our objects."""
 
 _OBJECTS: dict[tuple[Kind, str], Any] = {}
 """What scripts registered in this process."""
@@ -45,7 +45,7 @@ def register(kind: Kind, name: str, load: Callable[[], Any]) -> None:
 
 
 def register_here(kind: Kind, name: str, item: Any) -> None:
-    """Register an object in this process alone, in the place of an older one that was, too.
+    """Register an object in this process only, in the place of an older one that was, too.
 
     InputError for a name that our own packages have.
     """
@@ -86,7 +86,7 @@ def in_every_process(kind: Kind, name: str) -> bool:
 
 
 def here(kind: Kind) -> Mapping[str, Any]:
-    """The objects of this process alone, by name."""
+    """The objects of this process only, by name."""
     return {name: item for (of, name), item in _OBJECTS.items() if of == kind}
 
 

@@ -1,7 +1,7 @@
 """What only some operating systems have, with what the others get in its place.
 
 No other module asks for it. On Windows there is no priority, no pinning, no locked memory, and no
-group of processes: what a process of ours has started lives on. macOS lacks the first three.
+group of processes: what our process has started lives on. macOS lacks the first three.
 """
 
 import ctypes
@@ -162,7 +162,7 @@ def listener(pipe: Any) -> Callable[[float], object]:
 
 
 def end_group(leader: int) -> None:
-    """End what a process, which began a session of its own, has started and left behind."""
+    """End what a process, which began its own session, has started and left behind."""
     with suppress(NotPossible, OSError):  # there are none, as a rule
         _os.killpg(leader, _signal.SIGKILL)
 

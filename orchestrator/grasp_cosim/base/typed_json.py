@@ -9,7 +9,7 @@ A type says what is valid, and how it is decoded:
     Sequence[float or int]         a list of numbers, which becomes an array of 8 bytes a number
     Mapping[K, X], dict[K, X]      an object of any names
     a TypedDict                    an object with its entries, and maybe others of later versions
-    a dataclass                    an object with its fields alone; those with defaults may lack
+    a dataclass                    an object with its fields only; those with defaults may lack
     a type of `texts`              a string that stands for a value of it
     Any                            anything
 """

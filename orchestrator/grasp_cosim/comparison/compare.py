@@ -28,7 +28,7 @@ FEWEST_STEPS = 2
 
 
 class Comparison(ComparisonData):
-    """Two runs beside each other: true where they are alike, `if compare(a, b):`.
+    """Two runs next to each other: true where they are alike, `if compare(a, b):`.
 
     What it has of them is as of a ComparisonData.
     """
@@ -61,8 +61,8 @@ def compare(
             of the two may be a system file: that is run, as long as the other run is.
         b: The other run, as `a`.
         bands: How far signals and metrics may be apart, as read_bands() has it from a file. What it
-            does not name is derived from `a` alone, as in a qualification.
-        metrics: Metrics to be compared beside those of the system.
+            does not name is derived from `a` only, as in a qualification.
+        metrics: Metrics to be compared in addition to those of the system.
         names: The names of the columns of a log from elsewhere, with the offset of its time in s,
             as read_log_names() has it from a file.
 
@@ -163,7 +163,7 @@ def _on_one_clock(a: Side, b: Side, names: LogNames) -> tuple[Side, Side, list[s
         return a, b, []
     log, run = (a, b) if b.result else (b, a)
     if run.result is None:
-        must = "one of the two must be a run of ours"
+        must = "one of the two must be a run of grasp-cosim"
         raise InputError(f"{names.file}: time.offset = 'fit': {must}")
     alike = log.like(run)
     changes = {name: run.change(name, alike) for name in alike.signals if name in run.signals}
@@ -217,7 +217,7 @@ def _changes(a: Side, b: Side) -> dict[str, Conversion | None]:
 
 
 def _metrics_of(side: Side, part: Side, extra: Sequence[Metric]) -> tuple[Metric, ...]:
-    """The metrics of a side, those of its own file as they were recorded if all of it counts."""
+    """The metrics of a side, those of its file as they were recorded if all of it counts."""
     taken, is_whole = {m.name for m in extra}, len(side.time) == len(part.time)
     recorded = side.result.more_metrics if side.result and is_whole else ()
     recorded_besides = [m for m in recorded if m.name not in taken]

@@ -17,7 +17,7 @@ from .side import Difference, Side
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ComparisonData:
-    """Two runs beside each other over the time that both have, in the units of the first.
+    """Two runs next to each other over the time that both have, in the units of the first.
 
     It is true where the two are alike: `if compare(a, b):`.
     """

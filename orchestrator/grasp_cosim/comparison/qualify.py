@@ -88,7 +88,7 @@ def qualify(
     """Find out whether an FMU may take the place of a component.
 
     Both are compared as they are declared, and as they run in the closed loop. The candidate runs
-    in a process of its own, so that its crash is a result. Bands that are not stated are derived
+    in its own process, so that its crash is a result. Bands that are not stated are derived
     from the original, which is run with other numerics for that.
 
     Args:
@@ -102,9 +102,9 @@ def qualify(
             the original, or of the one that has such a variable.
         bands: How far signals and metrics may be apart, as read_bands() has it from a file. What it
             does not name is derived from runs of the original.
-        isolation: "process" runs the candidate in a process of its own, "none" in this one.
+        isolation: "process" runs the candidate in its own process, "none" in this one.
         progress: True shows on standard error how far the runs are.
-        metrics: Metrics to be compared beside those of the system.
+        metrics: Metrics to be compared in addition to those of the system.
 
     Returns:
         The qualification, true where the candidate is qualified.
@@ -304,7 +304,7 @@ def _conversion_back(
 def component_of(origin: System, name: str, system: System) -> Component:
     """The component of that name in another system, as a candidate for the one in `system`.
 
-    It runs on the connections of `system`. InputError where one of its own passes on other values
+    It runs on the connections of `system`. InputError where one of them passes on other values
     than the same one does there, as by a factor: what the component puts out would be misread.
     """
     component = origin.component(name, origin.name)

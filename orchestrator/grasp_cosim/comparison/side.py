@@ -93,7 +93,7 @@ class Side:
         """InputError where a signal that the other has as numbers is none of finite ones here."""
         if name in self.texts:
             if self.log is not None:
-                self.log[name]  # which says what is no number, by its line
+                self.log[name]  # its error names the line that is no number
             raise InputError(
                 f"{self.name}: {name}: has texts; must be numbers, as in {counterpart.name}"
             )
@@ -124,7 +124,7 @@ class Side:
 
     def like(self, reference: Side) -> Side:
         """A log from elsewhere as one of the other's system: with its roles, its types where they
-        fit, and its units where the log tells of none.
+        fit, and its units where the log has none.
         """
         if self.result:
             return self

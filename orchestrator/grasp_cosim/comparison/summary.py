@@ -77,7 +77,7 @@ def kinds(c: ComparisonData) -> list[tuple[str, Sequence[Compared]]]:
 
 
 def notes(c: ComparisonData) -> list[str]:
-    """Where the bands are from, what only one has, which is not judged, and what the runs tell."""
+    """Where the bands are from, what only one has, which is not judged, and notes of the runs."""
     only = [
         f"{kind} only in {run}: {choices(names, 6)}"
         for kind, both in (("signals", c.only), ("metrics", c.only_metrics))

@@ -38,7 +38,7 @@ NEVER = np.nan
 
 
 def to_open_ends(system: System) -> frozenset[Port]:
-    """The outputs that go to inputs alone that take inf, as the distance to nothing in range."""
+    """The outputs that go only to inputs that take inf, as the distance to nothing in range."""
     sources: dict[Port, bool] = {}
     for connection in system.connections:
         target = connection.target

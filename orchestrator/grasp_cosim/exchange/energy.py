@@ -63,7 +63,7 @@ def bonds(system: System) -> tuple[Bond, ...]:
     """The bonds of a system, in the order of its components and their inputs.
 
     A component has one for each connected Real input force[j], or force, in a unit of force that
-    has beside it an output position[j], or position, in a unit of length.
+    has next to it an output position[j], or position, in a unit of length.
     """
     sources = {connection.target: connection.source for connection in system.connections}
     return tuple(
@@ -179,7 +179,7 @@ class _Ledger:
         last_moved, last_answered, sum_ = self.carried
         held_force, position = moved = _joined(last_moved, rows[:, self._mover].T)
         _add_last(earned, held_force[1:] * np.diff(position))
-        # A source with a step of its own answers for what it received at the ends of that step.
+        # A source with its own step answers for what it received at the ends of that step.
         ends = slice(-first % self._period, None, self._period)
         answers = self._in_units(rows[ends, self._answerer])
         force, received = answered = _joined(last_answered, answers)

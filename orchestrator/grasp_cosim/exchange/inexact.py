@@ -14,7 +14,7 @@ from .listener import Floats, Signal, Steps
 
 
 class InexactSignals:
-    """Looks at what is recorded besides the outputs, and says once where it is not as it was.
+    """Checks the recorded signals that are no outputs, and notes once which are inexact.
 
     That is a whole number of 64 bits which a float64 does not hold exactly, since nothing goes by
     it, or any number that is not finite.
@@ -36,7 +36,7 @@ class InexactSignals:
         self._log: dict[int, str] = {}
 
     def saved(self) -> dict[int, str]:
-        """What was said until now, for restore()."""
+        """The notes until now, for restore()."""
         return dict(self._log)
 
     def restore(self, saved: dict[int, str]) -> None:

@@ -155,7 +155,7 @@ def _signature(functions: type, name: str) -> tuple[Sequence[Argument], Sequence
 
 
 def _declared_kind(annotation: Any) -> Any:
-    """The type of ctypes of an argument, which FMPy declares alone or as the first of a union."""
+    """The type of ctypes of an argument, which FMPy declares, or the first type of its union."""
     alternatives = get_args(annotation)
     return alternatives[0] if alternatives else annotation
 

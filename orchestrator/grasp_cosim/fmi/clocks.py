@@ -16,7 +16,7 @@ from ..interface.variables import Clock, Variable
 from .instance import AT_POINT, OK, WARNING
 
 NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)
-"""What an FMU says of the interval of a clock."""
+"""The interval that an FMU gives of a clock."""
 
 ARGUMENTS = {
     "SetClock": (c_void_p,),
@@ -156,7 +156,7 @@ class Clocks:
         return interval
 
     def _present_interval(self, v: Variable, clock: Clock) -> tuple[int, Fraction]:
-        """What the FMU says of the interval of a clock now, and the interval in s."""
+        """The interval that the FMU gives of a clock now, and the interval in s."""
         failure, qualifier = f"does not say the interval of its clock {v.name!r}", c_int()
         counter, resolution, interval = c_uint64(), c_uint64(), c_double()
         reference = byref(c_uint(v.reference))

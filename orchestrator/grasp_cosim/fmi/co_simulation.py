@@ -2,7 +2,7 @@
 
 Of FMI 3.0 without intermediate update; event mode, and clocks, are in event_mode.py. Without event
 mode an FMU is not allowed to end a step early: it handles its events itself. Binaries are left
-alone.
+only.
 """
 
 import ctypes
@@ -77,7 +77,7 @@ _libraries: dict[tuple[Path, int], tuple[FMU2CoSimulation, ScratchFolder | None]
 
 
 class SharedInstance(FmuInstance):
-    """One instance of a native twin of ours: without global state, so all share one library.
+    """One instance of a native twin of our own: without global state, so all share one library.
 
     It stays loaded. That saves most of what loading takes where a process does many runs.
     """

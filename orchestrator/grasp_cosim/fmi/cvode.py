@@ -1,4 +1,4 @@
-"""CVode of SUNDIALS, as FMPy ships it, one step of its own at a time.
+"""CVode of SUNDIALS, as FMPy ships it, one of its steps at a time.
 
 FMPy's class for it integrates whole intervals, and beyond their ends. Here no evaluation is beyond
 the time that a step is told to stop at, where an input may jump.
@@ -87,7 +87,7 @@ class Cvode:
         _call(_CVODE, "CVodeSetNoInactiveRootWarn", memory)
 
     def restart(self, time: float, nominals: npt.NDArray[np.float64] | None = None) -> None:
-        """Begin anew at a time, in s, with the states in x; with nominals where these are new."""
+        """Begin again at a time, in s, with the states in x; with nominals where these are new."""
         if nominals is not None:
             self._tolerate(nominals)
         _call(_CVODE, "CVodeReInit", self._memory, c_double(time), self._x)

@@ -41,7 +41,7 @@ WORD, DOUBLE_REGISTER = 8, 16
 """Bytes of a register for whole numbers and addresses, and of one for doubles."""
 
 LONG_DOUBLE = re.compile(rb"%[^A-Za-z%]*L")
-"""In a format, a long double, which has registers of its own kind, or none."""
+"""In a format, a long double, which has registers of a separate kind, or none."""
 
 
 class Convention(NamedTuple):

@@ -38,7 +38,7 @@ it ends.
 
 
 def clock_of(begin: float, end: float) -> npt.NDArray[np.float64]:
-    """The clock of a step alone, from begin to end in s."""
+    """Only the clock of a step, from begin to end in s."""
     return np.array([begin, 0.0, end])
 
 
@@ -73,7 +73,7 @@ class Instance(Protocol):
         """Leave initialisation mode; one with interface.event_mode is then in event mode."""
 
     def enter_step_mode(self) -> None:
-        """Handle the event of the start; of an instance with interface.event_mode alone.
+        """Handle the event of the start; of an instance with interface.event_mode only.
 
         SimulationError where the FMU fails.
         """

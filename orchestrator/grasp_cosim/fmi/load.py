@@ -12,7 +12,7 @@ from .python_code import CodeInstance
 
 
 def load(component: Component) -> Instance:
-    """The instance of a component, in a process of its own where it wants one.
+    """The instance of a component, in its own process where it wants one.
 
     InputError where the FMU does not load. The caller closes it.
     """

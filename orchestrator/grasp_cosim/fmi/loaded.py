@@ -85,7 +85,7 @@ class LoadedInstance(ABC):
         """Extract and instantiate; InputError where the FMU does not load.
 
         The FMU is told the relative `tolerance`, unless that is None. `logging` is what it is to
-        log beside warnings and errors, `trace` the file to which its calls are appended.
+        log next to warnings and errors, `trace` the file to which its calls are appended.
         """
         self.name = name
         self.interface = interface
@@ -210,7 +210,7 @@ class LoadedInstance(ABC):
             if isinstance(error, OSError) and error.errno in FULL:
                 raise InputError(
                     f"{self.name}: {self.interface.called} cannot be extracted to {folder}: "
-                    f"{error.strerror}; must have room there, or TMPDIR must be another folder"
+                    f"{error.strerror}; must have space there, or TMPDIR must be another folder"
                 ) from error
             limit = not_its_fault(error)
             problem = f"cannot be read: {limit}" if limit else f"is damaged: {error}"
@@ -598,7 +598,7 @@ class LoadedInstance(ABC):
         return logged or without_scratch(" ".join(str(error).split()))
 
     def _advice(self, status: int) -> str:
-        """How to have an FMU say more that failed without a word; the end of a line."""
+        """How to get more messages of an FMU that failed without a word; the end of a line."""
         if status < ERROR or self._logs_at_once:
             return ""
         return f"; components.{self.name}.logging = true may have it say why"
@@ -613,7 +613,7 @@ def _let_go_of_python() -> None:
     """Have the binaries of pythonfmu that are still loaded let go of Python.
 
     By themselves they do it after the end of Python, in memory that was freed, which may end the
-    process by a signal. FMUs of ours see to it in any host.
+    process by a signal. Our FMUs see to it in any host.
     """
     if hasattr(os, "RTLD_NOLOAD"):  # on Windows there is no need
         for name in _binaries_of_pythonfmu:

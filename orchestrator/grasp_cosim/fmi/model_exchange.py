@@ -2,7 +2,7 @@
 communication points.
 
 At a communication point inputs may jump, so what was set is handed over in event mode and the
-solver begins anew; where nothing changed it goes on. It stops at each event, be it that an
+solver begins again; where nothing changed it goes on. It stops at each event, be it that an
 indicator leaves or enters z > 0, that the FMU has named the time, that a clock ticks, or that it
 wants one after a step of the solver; the discrete states are then iterated until they settle.
 """
@@ -236,7 +236,7 @@ class ModelInstance(LoadedInstance):
             self._begin(self._solver, first or settled.new_nominals)
 
     def _begin(self, solver: Cvode, nominals: bool) -> None:
-        """Have the solver begin anew with the states that the FMU has now."""
+        """Have the solver begin again with the states that the FMU has now."""
         new = None
         if self._states:
             self._check(self._get_states(self._states_address, self._states))

@@ -1,4 +1,4 @@
-"""An instance of a component in a process of its own, where it may crash or hang.
+"""An instance of a component in its own process, where it may crash or hang.
 
 This is the master's end; the other one is worker.py. A macro step is one round trip. The master
 puts inputs and the time into the shared memory, sends STEP and waits for the status; the
@@ -74,7 +74,7 @@ class _RemoteState:
 
 
 class ProcessInstance:
-    """One instance of an FMU in a process of its own, which ends with this one, however it ends."""
+    """One instance of an FMU in its own process, which ends with this one, however it ends."""
 
     def __init__(
         self,
@@ -115,7 +115,7 @@ class ProcessInstance:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             pass_fds=ends,
-            start_new_session=True,  # Ctrl-C is for the master alone
+            start_new_session=True,  # Ctrl-C is for the master only
             env={**os.environ, "PYTHONPATH": path, "TMPDIR": folder},
             text=True,
             errors="replace",

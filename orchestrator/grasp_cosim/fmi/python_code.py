@@ -1,7 +1,7 @@
 """An instance of a component that is Python code: the function that is called at each point.
 
 Its outputs are those of its inputs at the start, too, however often these are passed on in the
-initialisation: it then begins anew each time.
+initialisation: it then begins again each time.
 """
 
 from collections.abc import Mapping, Sequence

@@ -35,9 +35,9 @@ class SharedMemory:
     def add(
         self, interface: Interface, variables: Sequence[Variable]
     ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:
-        """A mark that values of the variables are pending, and room for them.
+        """A mark that values of the variables are pending, and space for them.
 
-        Both processes add the same variables in the same order and get the same room.
+        Both processes add the same variables in the same order and get the same space.
         """
         begin, count = self._used, len(variables)
         self._used += 8 + 8 * count
@@ -45,7 +45,7 @@ class SharedMemory:
         return self._view(np.bool_, 1, begin), self._view(element, count, begin + 8)
 
     def saved(self) -> bytes:
-        """What is in the room that was given out, for restore()."""
+        """The content of the space that was given out, for restore()."""
         return self._memory[: self._used]
 
     def clear(self) -> None:

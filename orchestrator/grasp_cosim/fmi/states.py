@@ -46,7 +46,7 @@ class States:
         return status, state if status <= WARNING else None
 
     def put(self, state: KeptState) -> int:
-        """Have the FMU go back to a state of its own; the FMI status."""
+        """Have the FMU go back to its own state; the FMI status."""
         return self._set(state.place)
 
     def close(self) -> None:

@@ -1,1 +1,3 @@
-"""From block to FMU: declaration, slave adapter, model description, build. Card: fmus/README.md."""
+"""From block to FMU: declaration, slave adapter, model description, build. Equations:
+fmus/README.md.
+"""

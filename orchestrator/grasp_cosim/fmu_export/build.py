@@ -42,7 +42,9 @@ HERE = Path(__file__).parent
 
 _OF_BASE = ("c_compilers", "platforms.py", "si_units.py", "zip_files.py")
 SOURCES = (HERE, *(HERE.parent / "base" / name for name in _OF_BASE))
-"""What decides what FMUs hold, besides the packages that a block may import: folders and files."""
+"""What decides what FMUs hold, in addition to the packages that a block may import: folders and
+files.
+"""
 
 VERSIONS = ("grasp_cosim-", "latex2mathml-", "markdown_it_py-", "pythonfmu-")
 """Of distributions whose versions are in FMUs, or decide what is: so their metadata is called."""
@@ -76,7 +78,7 @@ class Plan(NamedTuple):
     places: Mapping[Target, str]
     compilers: Mapping[Target, Compiler]
     note: str
-    """What is to be said of the folders, or ""."""
+    """The note on the folders, or ""."""
 
     @property
     def key(self) -> str:
@@ -105,7 +107,7 @@ def compiler_for(target: Target, requested: bool) -> Compiler:
 def build(out: Path) -> list[Built]:
     """Build the FMUs that Python runs into the folder `out`, with their cross-check files.
 
-    A file that is there with the same content is left alone.
+    A file that is there with the same content is left out.
     """
     return _brought(out, shipped_fmus())
 
@@ -150,10 +152,9 @@ def build_chosen(
 ) -> list[Built]:
     """Build the FMUs of all blocks that come with the package, or of one, into the folder `out`.
 
-    block is a Python file; with a plan, which makes them native, also the name of one of ours. With
-    `fingers` the FMUs are those of a hand that has so many.
-    ValueError, one line, where there is no such block, or a compiler is missing; CompilerError
-    where one fails.
+    block is a Python file; with a plan, which makes them native, also the name of one of our own.
+    With `fingers` the FMUs are those of a hand that has so many. ValueError, one line, where there
+    is no such block, or a compiler is missing; CompilerError where one fails.
     """
     if block and not (plan and names_ours(block)):
         return [build_block(block, out, plan)]
@@ -259,7 +260,7 @@ def job(
 
 
 def sources_key() -> str:
-    """Return a key of all that decides what the FMUs and the files beside them hold.
+    """Return a key of all that decides what the FMUs and the files next to them hold.
 
     That is our packages and cards, pythonfmu's binaries, versions, and that of Python.
     """
@@ -346,7 +347,7 @@ def _brought(out: Path, source: Path, names: Sequence[str] = ()) -> list[Built]:
 def shipped_fmus(fingers: int | None = None) -> Path:
     """The folder of the FMUs of the blocks that come with the package, built if need be.
 
-    With `fingers` those of a hand that has so many are beside them. Threads and processes may ask
+    With `fingers` those of a hand that has so many are next to them. Threads and processes may ask
     at the same time. ValueError for a number of fingers that there is not.
     """
     names = [*SHIPPED, *(of_fingers(fingers) if fingers is not None else ())]

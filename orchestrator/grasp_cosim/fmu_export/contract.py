@@ -31,7 +31,7 @@ class Enumeration(NamedTuple):
 class Variable:
     """A scalar variable; its value reference is its place among all.
 
-    limits are what a host may set, and infinite says that inf is a value as well; dependencies, by
+    limits are what a host may set, and infinite says that inf is a value too; dependencies, by
     name, what reaches an output without a step, and in initialisation mode. To a relative one the
     offset of its unit does not apply.
     """
@@ -150,7 +150,7 @@ def declared(block: Block) -> list[Field]:
 def variables(fields: list[Field]) -> list[Variable]:
     """The scalar variables of fields, in their order.
 
-    At the start outputs depend on all parameters, beside the inputs that are declared.
+    At the start outputs depend on all parameters, and on the inputs that are declared.
     """
     inputs = [f for f in fields if f.causality == "input"]
     parameters = [name for f in fields if f.causality == "parameter" for name in f.names]
@@ -201,7 +201,7 @@ def _shape(fields: list[Field], causality: Causality, name: str) -> tuple[str, s
 
 
 def _compiled(definition: str, **names: Any) -> Callable[[Any], Any]:
-    exec(f"def function{definition}", names)  # noqa: S102 - written here, from the shape alone
+    exec(f"def function{definition}", names)  # noqa: S102 - written here, from the shape only
     function: Callable[[Any], Any] = names["function"]
     return function
 

@@ -1,4 +1,4 @@
-"""Makes the files of the FMI cross-check beside an FMU: inputs, reference results, options.
+"""Makes the files of the FMI cross-check next to an FMU: inputs, reference results, options.
 
 Format: FMI cross-check rules 4.1, sections 9.1.4 and 10. Why they are as they are: fmus/README.md.
 """
@@ -66,7 +66,7 @@ def _options(start: float, stop: float) -> bytes:
 
 
 def _signal(v: Variable, number: int, t: float) -> float | bool:
-    """Return an input at a time: from its start a wave of its own frequency, then a jump in it.
+    """Return an input at a time: from its start its own wave frequency, then a jump in it.
 
     It is never further from the start than the nominal value, and stays on the side of zero on
     which it starts; neighbours begin in opposite directions. A boolean one changes at the jump.

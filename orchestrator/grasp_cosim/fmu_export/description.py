@@ -54,7 +54,7 @@ class Description:
     summary: str
     variables: Sequence[Variable]
     units: Mapping[str, Unit] | None = None
-    """The definitions of units, by default those known by their names; others are names alone."""
+    """The definitions of units, by default those known by their names; others are names only."""
     can_vary_step: bool = True
     has_states: bool = True
     experiment: Experiment = Experiment()
@@ -118,7 +118,7 @@ def model_description(
 def build_description(name: str, networked: bool = False) -> bytes:
     """Return sources/buildDescription.xml, which FMI 2.0 takes as FMI 3.0 defines it.
 
-    One that is networked has a configuration of its own for Windows, with the library of sockets;
+    One that is networked has its own configuration for Windows, with the library of sockets;
     hosts that read a single one take the first, which links everywhere else.
     """
     root = Element("fmiBuildDescription", fmiVersion="3.0")

@@ -1,4 +1,4 @@
-"""Reads a block that is a Python file of one's own, wherever that is, and checks that it is one.
+"""Reads a block that is a user's Python file, wherever that is, and checks that it is one.
 
 Its documentation is its docstring and the table of its variables.
 """
@@ -58,7 +58,7 @@ def own_model(file: Path) -> Iterator[Model]:
     with _run(file, tree) as block:
         summary, _, details = inspect.cleandoc(block.__doc__ or "").partition("\n")
         if not summary:
-            raise ValueError(f"{file}: must begin with a docstring; its first line says what it is")
+            raise ValueError(f"{file}: must begin with a docstring; its first line describes it")
         yield Model(
             Description(name, summary.rstrip("."), _variables(file, block)),
             f"{details.strip()}\n\n{BEGIN}{variable_tables({name: block})}",
@@ -77,7 +77,7 @@ def fmu_name(file: Path) -> str:
     is_identifier = file.stem.isascii() and file.stem.isidentifier()
     if file.suffix != ".py" or not is_identifier or file.stem.startswith("_"):
         is_ours = file.name == str(file) and together(file.name) is not None
-        native = f"; {file} is one of ours: --native builds it alone" if is_ours else ""
+        native = f"; {file} is a built-in block: --native builds it on its own" if is_ours else ""
         must = "must be NAME.py, NAME of letters, digits and _, a letter first"
         raise ValueError(f"{file}: {must}{native}")
     name = "".join(word[:1].upper() + word[1:] for word in file.stem.split("_"))

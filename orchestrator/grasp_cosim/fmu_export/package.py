@@ -39,7 +39,7 @@ BINARIES = {"so": "linux64/libpythonfmu-export.so", "dll": "win64/pythonfmu-expo
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """An FMU in its folder, and how it is beside what was there."""
+    """An FMU in its folder, and how it is next to what was there."""
 
     path: Path
     status: Literal["new", "changed", "unchanged"]
@@ -53,11 +53,11 @@ class Model:
     card: str
     """In Markdown."""
     sources: Mapping[str, bytes]
-    """Its script NAME.py, and modules beside it; what they import is packed with them."""
+    """Its script NAME.py, and modules next to it; what they import is packed with them."""
     block: Any = None
     """The module of the block; None for a proxy."""
     file: Path | None = None
-    """The source of a block that is a file of one's own."""
+    """The source of a block that is a user's file."""
     picture: bytes | None = None
     requires: tuple[str, ...] = ()
     """Packages that must be installed where it runs."""

@@ -1,7 +1,7 @@
 """Makes what an FMU holds for its reader: documentation/index.html, the licences, the icon.
 
 A page is Markdown, the card and then the sections that follow here; its frame is page.html.in. The
-tables of variables in the cards are made here as well: `make tables` brings them up to date.
+tables of variables in the cards are made here too: `make tables` brings them up to date.
 """
 
 from collections.abc import Mapping, Sequence
@@ -80,7 +80,7 @@ A step without an answer in time returns `fmi${{fmi}}OK`: `proxy.state` says wha
 the log that the peer is lost. With `proxy.on_loss = stop` the step in which it is lost returns
 `fmi${{fmi}}Error`, and so does every later one.
 """
-"""What is to be said of each kind of FMU, in Markdown."""
+"""The text on each kind of FMU, in Markdown."""
 
 _STATES = """Getting, setting, freeing and serialising the state are supported. A state can be
 exchanged between instances of the same FMU, its bytes also between the one in Python and the native
@@ -88,13 +88,13 @@ one."""
 
 
 def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages: str = "") -> str:
-    """Return documentation/index.html of an FMU, from its card and what is to be said of its kind.
+    """Return documentation/index.html of an FMU, from its equation sheet and the text on its kind.
 
-    Both are in Markdown; `about` is one of PYTHON, NATIVE, PROXY. The page stands alone: links and
-    pictures of the card point to nothing in an FMU and come out as their text, HTML in it as it is
-    written. The result is XML as well.
+    Both are in Markdown; `about` is one of PYTHON, NATIVE, PROXY. The page stands on its own: links
+    and pictures of the card point to nothing in an FMU and come out as their text, HTML in it as it
+    is written. The result is XML too.
     """
-    of_pythonfmu = ", the binary of pythonfmu as well: documentation/licenses/pythonfmu.txt"
+    of_pythonfmu = ", the binary of pythonfmu too: documentation/licenses/pythonfmu.txt"
     licence = f"MIT: documentation/licenses/license.txt{of_pythonfmu if about is PYTHON else ''}."
     states = "Not supported: the state is that of the peer." if about is PROXY else _STATES
     override = f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"

@@ -47,7 +47,7 @@ class Settings(NamedTuple):
         str, "", _TEXT, "hold: outputs stay; failsafe: proxy.failsafe.*; stop: fmi2Error"
     ] = "stop"
     resume: Annotated[
-        bool, "", None, "ask whether a lost peer is back: the loop may then be initialised anew"
+        bool, "", None, "ask whether a lost peer is back: the loop may then be initialised again"
     ] = False
     on_limit: Annotated[
         str, "", _TEXT, "clamp: a command beyond its limits is limited; trip: the peer is given up"
@@ -75,7 +75,7 @@ _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
     "state": (
         int, "",
         "0 not connected, 1 connected, 2 missing: outputs held, 3 lost: on_loss holds, "
-        "4 back: to be initialised anew",
+        "4 back: to be initialised again",
     ),
     "missed": (int, "", "steps without an answer in time"),
     "consecutive_missed": (int, "", "steps missed since the last answer in time"),
@@ -83,7 +83,7 @@ _DIAGNOSTICS: Mapping[str, tuple[type[Scalar], str, str]] = {
     "out_of_order": (int, "", "late answers after the answer to a newer step: dropped"),
     "duplicated": (int, "", "answers that had come already"),
     "rejected": (int, "", "datagrams that were malformed, foreign or not authentic"),
-    "sessions": (int, "", "sessions begun; more than 1: the peer's model was set up anew"),
+    "sessions": (int, "", "sessions begun; more than 1: the peer's model was set up again"),
     "trips": (int, "", "how often the peer put itself into its safe state in this session"),
     "limited": (int, "", "commands that were beyond their limits"),
     "implausible": (int, "", "answers with values that cannot have been measured: dropped"),
@@ -119,7 +119,7 @@ def build_proxy(
 
     `original` has the name of the FMU's file, and of its variables the inputs, parameters and
     outputs that are exchanged, in this order. A proxy that is there with the same content is left
-    alone. ValueError where the stem of `target` is no identifier of C, a setting is out of its
+    only. ValueError where the stem of `target` is no identifier of C, a setting is out of its
     range, or a name is taken; CompilerError where a compiler fails.
     """
     from .build import with_binaries  # only here, as below: they take time to load
@@ -159,7 +159,7 @@ def proxy_members(
 def own_variables(
     variables: Sequence[Variable], settings: Settings = DEFAULTS, limits: Limits = NO_LIMITS
 ) -> list[Variable]:
-    """Return what a proxy has besides the original: settings, hold, failsafe, limits, diagnostics.
+    """Return what only the proxy has: settings, hold, failsafe, limits, diagnostics.
 
     `variables` are those of the original; `settings` and `limits` are start values. ValueError
     where a limit is of none of its Real inputs and outputs.

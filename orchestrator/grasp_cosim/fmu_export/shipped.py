@@ -79,13 +79,13 @@ SHIPPED: Mapping[str, Shipped] = {
 """By the names of the FMUs, in alphabetical order."""
 
 PACKAGES = ("block_variables", *sorted({s.module.partition(".")[0] for s in SHIPPED.values()}))
-"""What a block of one's own may import besides the standard library."""
+"""The modules that a user's block may import, apart from the standard library."""
 
 FEWEST, MOST = 2, 8
 """Fingers of a hand."""
 
 HANDS = f"one of a hand with a number of fingers from {FEWEST} to {MOST} behind it"
-"""Names that are valid besides those of SHIPPED."""
+"""Names that are valid in addition to those of SHIPPED."""
 
 HAND_SIZE = "hand_size"
 """The module that says for how many fingers the blocks of a package are: FINGERS."""
@@ -113,7 +113,7 @@ def entry_of(name: str) -> tuple[Shipped, int | None]:
 
 
 def together(name: str) -> tuple[str, ...] | None:
-    """Return the names of the FMUs that are built together with one of ours; None for others."""
+    """Return the names of the FMUs that are built together with one of our own; None for others."""
     try:
         shipped, fingers = entry_of(name)
     except KeyError:
@@ -140,7 +140,7 @@ def _of_size(shipped: Shipped, fingers: int) -> Any:
     """Return a block of a hand with so many fingers.
 
     The types of its arrays are made when its modules are imported, and one process may have hands
-    of several sizes. So each size is a package of its own, made of the same files with another
+    of several sizes. So each size is its own package, made of the same files with another
     module HAND_SIZE.
     """
     package, _, module = shipped.module.partition(".")
@@ -164,7 +164,7 @@ def _of_size(shipped: Shipped, fingers: int) -> Any:
 def package_folder(package: str) -> Path:
     """Return the folder of a package, which is not imported for that; ImportError without one.
 
-    It is that which is installed: a foreign FMU may have imported a copy of its own, as one of
+    It is that which is installed: a foreign FMU may have imported its own copy, as one of
     pythonfmu does, whose files go with the FMU.
     """
     for finder in sys.meta_path:  # and not in sys.modules
@@ -175,7 +175,9 @@ def package_folder(package: str) -> Path:
 
 
 def card_file(package: str) -> Path:
-    """Return the equation card of a package: in it once it is installed, in the sources beside."""
+    """Return the equation sheet of a package: in it once it is installed, in the sources next to
+    it.
+    """
     inside = package_folder(package) / "README.md"
     return inside if inside.exists() else inside.parents[1] / "README.md"
 

@@ -239,7 +239,7 @@ class Slave:
     # The block
 
     def _refresh(self) -> None:
-        """Work out the outputs; before the end of initialisation the initial state as well."""
+        """Work out the outputs; before the end of initialisation the initial state too."""
         _, outputs, pack, check, unpack = self._functions
         params = self._read_params()
         self._inputs = inputs = pack(self._values)
@@ -397,7 +397,7 @@ def offer(block: Any, module: dict[str, Any]) -> None:
 _binaries: set[str] = set()
 """The paths of those that have made an instance, as hosts name them when they load them.
 
-The files may be gone at the end; the system then knows a library that is loaded by its name alone.
+The files may be gone at the end; the system then knows a library that is loaded by its name only.
 """
 
 

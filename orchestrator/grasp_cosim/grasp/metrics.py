@@ -383,7 +383,7 @@ def first_contact(signals: Signals, finger: int) -> FirstContact | None:
 
 
 def _first_contact(signals: Signals, finger: int) -> FirstContact | None:
-    """First contact of a finger, worked out anew."""
+    """First contact of a finger, worked out again."""
     time = signals.time
     rows = np.flatnonzero(touching(signals, finger))
     if not len(rows):
@@ -404,7 +404,7 @@ def _closing_speed(signals: Signals, finger: int, k: int) -> float:
 
     That of the finger less that of the object's surface, which is the mean over the last step of
     the plant: what the finger moved less what the gap shrank. Without a position and a velocity of
-    the finger it is the rate of the gap alone. 0 for a mean where there was no step.
+    the finger it is the rate of the gap only. 0 for a mean where there was no step.
     """
     step, gap = _last_step(signals, k), _gap(signals, finger)
     position, velocity = (f"plant.{name}[{finger}]" for name in ("position", "velocity"))

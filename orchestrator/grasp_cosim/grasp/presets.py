@@ -26,7 +26,7 @@ SYSTEM = Path(__file__).parent / "grasp.toml"
 """The built-in system: the published grasp."""
 
 CASES = (0, 1, 2)
-"""Case 0 is contact force control alone, 1 with impact reduction, 2 with simultaneous contact."""
+"""Case 0 is contact force control only, 1 with impact reduction, 2 with simultaneous contact."""
 
 
 def with_case(system: System, case: int) -> System:
@@ -35,7 +35,7 @@ def with_case(system: System, case: int) -> System:
 
 
 def with_preset(system: System, name: str) -> System:
-    """The system with a preset of its own, or else of the built-in grasp, case_0 to _2 or bench.
+    """The system with its own preset, or else of the built-in grasp, case_0 to _2 or bench.
 
     InputError where there is neither, or the system lacks what it sets.
     """

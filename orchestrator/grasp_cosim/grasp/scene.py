@@ -60,8 +60,8 @@ def scene_of_fingers(
         result: The run.
         title: The head of the section.
         description: What is seen in it.
-        extra_signals: Signals that are drawn besides those of the fingers.
-        extra_state: Data for the scripts besides those of the fingers.
+        extra_signals: Signals that are drawn in addition to those of the fingers.
+        extra_state: Data for the scripts in addition to those of the fingers.
     """
     fingers = fingers_of(result.by_role)
     signals = _signals(result)

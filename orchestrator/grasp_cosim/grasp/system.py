@@ -34,7 +34,7 @@ _TANDEM_FMU = re.compile(r"GraspControllerTandem(?:Published)?")
 def with_controller(system: System, law: str, swapped: Collection[str] = ()) -> System:
     """The system with the controller of that law in the place of the one that it has.
 
-    Its FMU is the one beside that of the component in the role "controller", else of the cache.
+    Its FMU is the one next to that of the component in the role "controller", else of the cache.
     `swapped` are the components that get another FMU. InputError where it is one of them, where no
     component has the role, and where that FMU does not fit.
     """

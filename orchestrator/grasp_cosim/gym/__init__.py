@@ -1,4 +1,4 @@
-"""A system as a gymnasium environment. Card: README.md."""
+"""A system as a gymnasium environment. See README.md."""
 
 from .environment import Environment
 

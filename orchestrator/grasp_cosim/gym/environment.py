@@ -1,4 +1,4 @@
-"""An environment of gymnasium over a session: its episodes are runs, reset without loading anew."""
+"""An environment of gymnasium over a session. Its episodes are runs, reset without loading."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Metrics of a hand: those of the grasp for all its fingers, and two of its own."""
+"""Metrics of a hand: those of the grasp for all its fingers, and two more."""
 
 from dataclasses import replace
 from itertools import count, takewhile
@@ -21,7 +21,7 @@ OBJECT_ANGLE = "plant.object_angle"
 """Which way the object is turned, in rad."""
 
 NOT_OF_A_HAND = ("target_position",)
-"""Metrics of the grasp that a hand has not: each of its fingers has a target of its own."""
+"""Metrics of the grasp that a hand has not: each of its fingers has its own target."""
 
 MAX_IMBALANCE = 1e-3
 """|sum n_k·e_k| from which a hand pushes its object aside, 3 mN of a usual grasp."""
@@ -76,7 +76,7 @@ def object_turn(signals: Signals) -> float:
 def check(system: Any) -> tuple[str, ...]:
     """No notes; InputError where the weights of a system's controller do not balance its fingers.
 
-    Nothing is said of a plant or a controller of others, which has other parameters.
+    No line is on a plant or a controller of others, which has other parameters.
     """
     plant = system.roles.get("plant", "plant")
     controller = system.roles.get("controller", "controller")

@@ -30,7 +30,7 @@ CONNECTIONS = (
 """Source and target of the connections of finger k."""
 
 ELECTRONICS = ("ambient", "noise", "adc", "filter", "median")
-"""What a sensor has besides its optics."""
+"""What a sensor has in addition to its optics."""
 
 
 def hand_system(
@@ -98,7 +98,7 @@ def directions_of(fingers: int | None, angles: Sequence[float] | None) -> tuple[
 
 
 def faint(directions: Sequence[float]) -> str:
-    """What is to be said of a finger that hardly takes part, or ""."""
+    """A warning on a finger that hardly takes part, or ""."""
     weights = balance_weights(directions)
     smallest = min(weights)
     if smallest >= MIN_WEIGHT:
@@ -134,7 +134,7 @@ def fmus_of(fingers: int) -> Path:
 
 
 def hand_text(directions: Sequence[float]) -> str:
-    """The text of the system file of a hand, whose FMUs are beside it; directions in degrees."""
+    """The text of the system file of a hand, whose FMUs are next to it; directions in degrees."""
     fingers = range(1, len(directions) + 1)
     values = hand_values(directions)
     template = Template(TEMPLATE.read_text("utf-8"))

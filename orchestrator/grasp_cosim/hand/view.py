@@ -51,7 +51,7 @@ Points = npt.NDArray[np.complex128]
 
 @np.errstate(over="ignore", invalid="ignore")  # of what is not drawn
 def draw_hand(run: Result, path: Path | None = None) -> Figure:
-    """Gaps, contact forces and closing speeds by finger; beside them the hand at the end.
+    """Gaps, contact forces and closing speeds by finger; next to them the hand at the end.
 
     With a `path` the figure is written there, see report.plot.save_figure().
     """

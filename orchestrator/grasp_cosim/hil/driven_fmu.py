@@ -28,7 +28,7 @@ SAME_STEP = 1e-3
 class DrivenFmu:
     """One FMU with at most one instance. Close it.
 
-    SimulationError or InputError where the FMU fails; it must then be set up anew.
+    SimulationError or InputError where the FMU fails; it must then be set up again.
     """
 
     def __init__(self, interface: Interface, signature: Signature) -> None:

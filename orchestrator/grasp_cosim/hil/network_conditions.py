@@ -61,7 +61,7 @@ class Outage:
 
     By requests: begins when the request of number start arrives and ends when that of number until
     does; the first one is 1. That repeats exactly, whatever the timing. By s: time since the first
-    datagram. What was under way before still arrives. With a direction it is of that alone.
+    datagram. What was under way before still arrives. With a direction it is of that only.
     InputError where there is no such window.
     """
 
@@ -81,10 +81,10 @@ class Outage:
 
     @classmethod
     def read(cls, text: str) -> "Outage":
-        """The outage that a text says; InputError for none.
+        """The outage that a text describes; InputError for none.
 
         100:200 is in requests, 0.5s:2s in s; without an end it does not end; answers:0.5s: is of
-        the answers alone.
+        the answers only.
         """
         end = r"([0-9]+(?:\.[0-9]+)?)"
         match = re.fullmatch(rf"(?:(requests|answers):)?{end}(s?):(?:{end}\3)?", text)
@@ -171,7 +171,7 @@ UNIFORMS = 6
 """Random numbers for a datagram."""
 
 WORD_BYTES = 8
-"""Bytes of a hash for each of them; a float64 has room for 53 of their bits."""
+"""Bytes of a hash for each of them; a float64 has space for 53 of their bits."""
 
 
 def _uniforms(seed: int, direction: Direction, number: int, purpose: str = "") -> list[float]:

@@ -146,10 +146,9 @@ def write_proxy(
     """Write the proxy of an FMU; return what was built, and notes on it.
 
     settings and limits are start values of its parameters; targets name the platforms that get a
-    binary, beside this machine. `during` makes of a line that says what is done the context to do
-    it in.
-    InputError where the FMU or a setting does not permit it, SimulationError where the compiler
-    fails.
+    binary, in addition to this machine. `during` makes of a line that says what is done the context
+    to do it in. InputError where the FMU or a setting does not permit it, SimulationError where the
+    compiler fails.
     """
     from ..base.c_compilers import CompilerError  # here, as below, what takes time to load
     from ..fmu_export.build import planned
@@ -206,7 +205,7 @@ def write_peer_header(
 ) -> list[str]:
     """Write the side of a proxy's peer as a C99 header; return notes on what is left out.
 
-    limits are of inputs, by name; those of outputs are the proxy's alone. name is that of the peer.
+    limits are of inputs, by name; those of outputs are the proxy's only. name is that of the peer.
 
     InputError where the FMU does not permit it.
     """

@@ -35,7 +35,7 @@ class Rehearsed:
 
     @classmethod
     def read(cls, text: str) -> Rehearsed:
-        """The failure that a text says, like mute@0.9; InputError where it says none."""
+        """The failure that a text describes, like mute@0.9; InputError where it says none."""
         name, _, seconds = text.partition("@")
         failure = next((failure for failure in FAILURES if failure == name), None)
         try:
@@ -85,7 +85,7 @@ class Rehearsal:
 
 
 def end_at_once() -> None:
-    """End this process as SIGKILL does: nothing is said to anybody."""
+    """End this process as SIGKILL does: nobody gets a message."""
     os._exit(KILLED)
 
 

@@ -1,6 +1,6 @@
 """A relay of UDP datagrams between clients and one peer, through a nasty network.
 
-The relay knows nothing of what is in a datagram. Every client has a socket of its own towards the
+The relay knows nothing of what is in a datagram. Every client has its own socket towards the
 peer, so that the peer can tell them apart; these are what the peer sees.
 """
 
@@ -123,7 +123,7 @@ def _send(via: socket.socket, client: Address | None, data: bytes) -> bool:
             # send this one then. Asked for the error before, it has forgotten it.
             via.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
             via.send(data)
-    except OSError:  # too large for the way, no route, no room; or its client was forgotten
+    except OSError:  # too large for the way, no route, no space; or its client was forgotten
         return False
     return True
 

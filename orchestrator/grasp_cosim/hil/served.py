@@ -201,7 +201,7 @@ class ServedFmu:
         self._fmu.set(self._values)
 
     def forget(self, name: str | None = None) -> None:
-        """Be as one that was started anew, which knows no session; what was counted stays so.
+        """Be as one that was started again, which knows no session; what was counted stays so.
 
         With a name it is another bench.
         """

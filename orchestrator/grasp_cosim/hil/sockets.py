@@ -91,7 +91,7 @@ def received(readable: socket.socket) -> tuple[bytes, Address] | None:
 
 
 def connected(peer: Address) -> socket.socket:
-    """Return a socket that receives from the peer alone; InputError where there is no way to it."""
+    """Return a socket that receives from the peer only; InputError where there is no way to it."""
     return _socket(socket.socket.connect, peer, "no way to the peer: {}")
 
 
@@ -143,7 +143,7 @@ def _address(socket_address: tuple[Any, ...]) -> Address:
 
 
 def read_address(place: str, address: str) -> Address:
-    """The address that a text says, HOST:PORT, [ADDRESS]:PORT, or PORT of this machine.
+    """The address that a text gives, HOST:PORT, [ADDRESS]:PORT, or PORT of this machine.
 
     place says whose. InputError where it is none.
     """

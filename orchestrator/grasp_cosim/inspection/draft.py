@@ -1,4 +1,4 @@
-"""System files to start from: a foreign FMU in the place of a component, or FMUs alone.
+"""System files to start from: a foreign FMU in the place of a component, or FMUs only.
 
 What is not known is marked as a TODO. The reader of system files refuses it as a value; a TODO in
 a comment is nothing that a run needs.
@@ -38,7 +38,7 @@ MAX_NAMES = 6
 """So many variables, or items of an enumeration, a comment names at most."""
 
 MAX_COMMENTS = 100
-"""So many parameters and outputs of an FMU alone are listed as comments."""
+"""So many parameters and outputs of a single FMU are listed as comments."""
 
 DEFAULT_STEPS = 1000
 """Communication steps of an experiment for which no FMU recommends a step size."""
@@ -277,7 +277,7 @@ def system_of_fmus(fmus: Mapping[str, tuple[Path, str]]) -> tuple[str, list[str]
 
 
 def _tables_of_fmu(name: str, interface: Interface, path: str) -> str:
-    """The tables of an FMU alone: its inputs, and in comments what else there is.
+    """The tables of a single FMU: its inputs, and in comments what else there is.
 
     These are its parameters, the values that others may start from, and its outputs.
     """
@@ -309,7 +309,7 @@ def _experiment(fmus: Collection[Interface]) -> tuple[Time, Time, Time, list[str
     """Step, start and stop time, and notes: the shortest step that an FMU recommends, from where
     the first one begins until the last one ends.
 
-    The step is as the FMU says, or where no system can have that, the next longer one.
+    The step is that of the FMU, or where no system can have that, the next longer one.
     """
     first_start = min(_declared_time(fmu, "start_time") for fmu in fmus)
     last_stop = max(_declared_time(fmu, "stop_time") for fmu in fmus)
@@ -356,10 +356,10 @@ def _line(key: str, value: str, comment: str = "") -> str:
 
 
 def _component_table(name: str, path: str, fmu: Interface) -> str:
-    """The first table of a component. An FMU that was made here needs no process of its own."""
+    """The first table of a component. An FMU that was made here needs no separate process."""
     lines = [_line("fmu", _quoted(path))]
     if not fmu.ours:
-        comment = "in a process of its own, until you trust its binary"
+        comment = "in its own process, until you trust its binary"
         lines.append(_line("isolation", '"process"', comment))
     return _table(f"[components.{name}]", lines)
 

@@ -1,4 +1,4 @@
-"""Checks whether this machine loads an FMU, by its file alone or by a trial; each names a fix."""
+"""Checks whether this machine loads an FMU, by its file only or by a trial; each names a fix."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Unpacked:
 
 
 def examine(fmu: Path, load: bool = False) -> list[Finding]:
-    """Check an FMU as far as its file says, which runs none of its code.
+    """Check an FMU as far as its file permits, which runs none of its code.
 
     With `load` it is loaded in a child process, too, and what it needs of this machine is checked.
 
@@ -107,7 +107,7 @@ def loads(findings: Iterable[Finding]) -> bool:
 
 def findings_text(findings: Sequence[Finding], tried: bool) -> str:
     """The verdict, then one line for each finding, a fix below it."""
-    reservation = "" if tried else ", as far as the file says; --load tries"
+    reservation = "" if tried else ", judged by the file; --load tries"
     lines = [f"loads on this machine: {'yes' if loads(findings) else 'no'}{reservation}"]
     for finding in findings:
         lines.append(f"{finding.status:8s} {finding.check:12s} {finding.text}")
@@ -174,7 +174,7 @@ def script(fmu: Unpacked) -> Verdict:
     if missing := [module for module in imported if not _is_installed(module)]:
         fix = install_command(*(_PACKAGE_OF_MODULE.get(module, module) for module in missing))
         return "problem", f"imports what is neither packed nor installed: {choices(missing)}", fix
-    text = f"resources/{name}.py imports, besides the standard library: {choices(imported)}"
+    text = f"resources/{name}.py imports, apart from the standard library: {choices(imported)}"
     return "ok", text, None
 
 
@@ -249,7 +249,7 @@ def host(fmu: Unpacked, linker_output: str) -> Verdict | None:
 _LINKER_ERRORS = {
     r"(\S+) => not found": (
         "not found",
-        "install the packages that hold them; of what is packed beside the binary: patchelf "
+        "install the packages that hold them; of what is packed next to the binary: patchelf "
         "--set-rpath '$ORIGIN' BINARY, and pack the FMU again",
     ),
     r"version `(\S+)' not found": ("not on this system", "build it again on this system"),

@@ -152,7 +152,7 @@ def from_text(text: str) -> Any:
 def flattened(value: Any, shape: Sequence[int]) -> list[Any]:
     """The elements row by row of nested lists of that shape, of a list of all, or of one for all.
 
-    ValueError, which says what it is, where it is none of these.
+    ValueError with its description, where it is none of these.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
     if not is_nested(value):

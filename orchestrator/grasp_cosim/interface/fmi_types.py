@@ -14,7 +14,7 @@ VARIABLE_KINDS: tuple[str, ...] = get_args(Kind)
 """What the system makes of the types of FMI; whole numbers and enumerations are Integer."""
 
 SUPPORTED_KINDS = ("Real", "Integer", "Boolean", "String")
-"""The kinds a master can set, connect and record; it leaves the others alone."""
+"""The kinds a master can set, connect and record; it leaves the others out."""
 
 _WHOLE_NUMBER_LIMITS = {
     **{f"Int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},

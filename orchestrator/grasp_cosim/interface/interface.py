@@ -212,7 +212,7 @@ class Interface:
 
     @property
     def inputs(self) -> list[Variable]:
-        """The inputs, each by its main name alone."""
+        """The inputs, each by its main name only."""
         return [v for v in self.of("input") if self.main_name(v.name) == v.name]
 
     def by_main_names(

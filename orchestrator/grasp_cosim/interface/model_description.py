@@ -92,7 +92,7 @@ def unreadable(path: Path, error: Exception | str) -> InputError:
 
 
 def parsed(text: bytes) -> ElementTree.Element:
-    """The root; of all at once, since expat reads a long name anew with each piece."""
+    """The root; of all at once, since expat reads a long name again with each piece."""
     if text.count(b"<") - text.count(b"</") > MAX_XML_ELEMENTS:  # as cheap as can be
         raise ValueError(f"{NAME} has more than {MAX_XML_ELEMENTS} elements")
     builder = ElementTree.TreeBuilder()

@@ -46,7 +46,7 @@ INFINITE = {
     "2": "VendorAnnotations/Tool[@name='grasp-cosim']/Infinite",
     "3": "Annotations/Annotation[@type='grasp-cosim']/Infinite",
 }
-"""Where FMUs of ours name the inputs of which inf is a value, by version of FMI."""
+"""Where our FMUs name the inputs of which inf is a value, by version of FMI."""
 BOUNDS = ("min", "max", "nominal")
 Names = tuple[str, ...] | None
 """The variables that one depends on; None where that is not declared."""

@@ -1,4 +1,4 @@
-"""Whether the C of an FMU can be compiled to a binary that hosts load, as far as its files say.
+"""Whether the C of an FMU can be compiled to a binary that hosts load, by its files.
 
 `fmpy compile` has CMake compile the files that the FMU lists. A host asks the binary for functions
 of their plain names; sources for static linking give them a prefix.
@@ -50,7 +50,7 @@ def why_not_compiled(fmu: Interface) -> str:
 
 
 def _lacking_header(texts: Mapping[str, str]) -> str:
-    """A file of its own that a source includes and that is not there; empty where there is none."""
+    """A file that a source includes and that is not there; empty where there is none."""
     packed = {PurePosixPath(name).name for name in texts}
     for name, text in texts.items():
         for header in _INCLUDE.findall(text):

@@ -13,7 +13,7 @@ SETTABLE = ("input", *PARAMETERS)
 """The causalities of parameters, and of all that can be set whatever their start value is."""
 
 MAX_ELEMENTS = 100_000
-"""Of all arrays of an FMU that are taken apart; what would be more is left alone."""
+"""Of all arrays of an FMU that are taken apart; what would be more is left out."""
 
 
 @dataclass(frozen=True, slots=True)

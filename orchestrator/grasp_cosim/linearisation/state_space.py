@@ -20,7 +20,9 @@ Matrix = npt.NDArray[np.float64]
 Response = npt.NDArray[np.complex128]
 
 FREQUENCIES = 4000
-"""How many frequencies are searched for the crossovers of a loop, besides those of its poles."""
+"""How many frequencies are searched for the crossovers of a loop, in addition to those of its
+poles.
+"""
 
 MIN_FREQUENCY = 1e-7
 """The lowest of them, as a share of the Nyquist frequency."""

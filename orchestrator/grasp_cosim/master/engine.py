@@ -57,7 +57,7 @@ ELEMENTS = (
 REMEDY = "engine python needs no compiler"
 
 PAUSE = 0.02
-"""s between two times that rows are handed on beside the loop."""
+"""s between two times that rows are handed on next to the loop."""
 
 _OVER = 0
 """Through the sockets of Aside comes the number of a signal, or this."""
@@ -75,7 +75,7 @@ class _Shared(ctypes.Structure):
 class CompiledLoop:
     """The compiled loop over a plan.
 
-    alone says that it makes no call of Python at all. It then may run while another thread looks
+    only says that it makes no call of Python at all. It then may run while another thread looks
     at shared.done, the number of the steps whose rows are there, sets shared.taken once it does
     not need the rows of so many any more, or sets shared.halt. shared.ended is the wall time in ns
     at which the last step ended.

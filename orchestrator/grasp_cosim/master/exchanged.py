@@ -12,7 +12,7 @@ from ..system.validity import driven_inputs
 
 @dataclass(frozen=True, slots=True)
 class Exchanged:
-    """The numbers that a run moves, of each component in groups of one FMI type; Strings beside.
+    """The numbers and Strings that a run moves, of each component in groups of one FMI type.
 
     passed are inputs that have a source, held those without, which keep what they were set to;
     fetched is all else that the run must know, and texts are the Strings of that.

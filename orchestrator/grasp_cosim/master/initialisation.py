@@ -155,7 +155,7 @@ class Propagation:
         faults: Mapping[Port, Callable[[float, int], float]],
         step: int = INITIAL,
     ) -> None:
-        """At the start, or at a communication point where the loop is initialised anew."""
+        """At the start, or at a communication point where the loop is initialised again."""
         self.system = system
         self._step = step
         self._ports, loops, self._measured = system.once(order_ports)
@@ -194,7 +194,7 @@ class Propagation:
                     f"only loops of Real values can be iterated; {ADVICE}"
                 )
         count, residual = self._solve(choice)
-        # Other values may solve a loop that its start values solve: that they were kept is said.
+        # Other values may solve a loop that its start values solve: the note tells that these stay.
         solution = f"solved in {counted(count, 'iteration')}"
         if not count:
             solution = "its start values solve it and are kept"
@@ -211,7 +211,7 @@ class Propagation:
         return [*notes, line, *self._check_dependencies()]
 
     def after_exit(self) -> list[str]:
-        """Read all outputs anew, out of initialisation mode, and pass on those that changed.
+        """Read all outputs again, out of initialisation mode, and pass on those that changed.
 
         An input at which a loop was cut is set in the first pass only: what comes back there later
         is in the values, and left to the first step. A line where inputs go on changing, as they do

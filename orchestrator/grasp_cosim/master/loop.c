@@ -314,7 +314,7 @@ static int operate(const Plan *plan, const Operation *operation, int64_t k, cons
     }
 }
 
-/* rows has room for so many, of which the first step takes the given one; then it begins anew. */
+/* rows has room for so many, of which the first step takes the given one; then it begins again. */
 int64_t run(const Plan *plan, double *rows, int64_t room, int64_t row, int64_t operation,
             int64_t start, int64_t stop, int64_t grid_start, int64_t grid_step,
             int64_t per_second, Shared *shared) {

@@ -28,7 +28,7 @@ RAISED = 101
 """The status of a Python call that raised; the exception waits in the plan."""
 
 FULL, HALTED, OVERRUN = 102, 103, 104
-"""Of the compiled loop alone: the rows have no room left; it was halted; a late step ends it."""
+"""Of the compiled loop only: the rows have no space left; it was halted; a late step ends it."""
 
 WATCHED, STALLED = 105, 106
 """A condition that is watched holds; a step begins so late that all that is measured is of old."""

@@ -43,7 +43,7 @@ MAX_BYTES = 1 << 26
 """Of memory for these rows; of a wide row there are fewer."""
 
 ENOUGH = 512
-"""The rows that advance() collects before it hands them on: one alone costs 100 steps."""
+"""The rows that advance() collects before it hands them on: a single one costs 100 steps."""
 
 MAX_SAVED_ROWS = 64
 """So many that wait are saved with a state; of more it is quicker to hand them on before."""
@@ -74,7 +74,7 @@ class Master:
             instances: Its loaded FMUs.
             receive: Gets the rows.
             engine: "python", "compiled" or "auto".
-            renew: Closes the instances and loads others, for a loop that is initialised anew.
+            renew: Closes the instances and loads others, for a loop that is initialised again.
             cuts: Functions by the input at which each opens a loop.
         """
         self.system = system
@@ -84,13 +84,13 @@ class Master:
         self.rejections: dict[str, Rejection] = {}
         self.log: list[str] = []
         self.renewed: list[float] = []
-        """The times in s at which the loop was initialised anew."""
+        """The times in s at which the loop was initialised again."""
         self.peers: dict[str, dict[str, str]] = {}
         """The name and the build of the peer of each proxy."""
         self._receive, self._engine, self._renew_instances = receive, engine, renew
         self._grid = system.time_grid
         self._earlier_warnings: list[str] = []
-        """Those of instances that were closed as the loop was initialised anew."""
+        """Those of instances that were closed as the loop was initialised again."""
         moved = system.once(exchanged)
         self.slots = moved.slots()
         self.texts = {port: Texts() for port in moved.texts}
@@ -107,7 +107,7 @@ class Master:
 
     _pacer: Pacer | None = None
     _extra_values = 0
-    """Values in a row besides those of the slots."""
+    """Values in a row in addition to those of the slots."""
 
     @property
     def _max_rows(self) -> int:
@@ -226,7 +226,7 @@ class Master:
                 self._begin_anew("a lost peer is back")
 
     def _run_chunk(self, stop: int) -> None:
-        """Run the loop until stop; hand the rows on where there is no room left, or it fails."""
+        """Run the loop until stop; hand the rows on where there is no space left, or it fails."""
         try:
             self._run_loop(min(self._rows.last_step, stop))
         except BaseException:
@@ -296,7 +296,7 @@ class Master:
         self.steps_done, log, rejections, parts, arrays, drives, compiled, rows = saved
         self.log, self.rejections = [*log], dict(rejections)
         for part, state in zip((self.end, self.watches, self.scenario), parts, strict=True):
-            part.restore(state)  # type: ignore[attr-defined]  # each has it, of its own state
+            part.restore(state)  # type: ignore[attr-defined]  # each has it, of its state
         for array, old in zip(self._state_arrays(), arrays, strict=True):
             array[:] = old
         for drive, row in zip(self.plan.drives, drives, strict=True):
@@ -336,11 +336,11 @@ class Master:
 
     @property
     def _common_period(self) -> int:
-        """Every how many steps all components are at a communication point of their own."""
+        """Every how many steps all components are at their own communication point."""
         return math.lcm(*(self.system.period(c.name) for c in self.system.components))
 
     def _note_watch(self, step: int, number: int) -> None:
-        """A condition holds at the end of a step: the run ends there, or the loop begins anew."""
+        """A condition holds at the end of a step: the run ends there, or the loop begins again."""
         if self.watches.entries[number].limit is None:
             period = self._common_period
             self.end.pause_after(-(-(step + 1) // period) * period)
@@ -363,11 +363,11 @@ class Master:
             self._make_loop()
             self._initialise_at(step)
         except InputError as error:
-            raise SimulationError(f"{error}; the loop was to be initialised anew") from error
+            raise SimulationError(f"{error}; the loop was to be initialised again") from error
         self.scenario.apply_again(step)
         self.watches.arm()
         self.renewed.append(in_seconds(time))
-        self.watches.log.append(f"t = {seconds(time)}: {reason}: the loop was initialised anew")
+        self.watches.log.append(f"t = {seconds(time)}: {reason}: the loop was initialised again")
 
     def _resolve(self, step: int, operation: int, status: int) -> None:
         """Finish a step that was rejected, or has events; any other bad status ends the run."""

@@ -14,7 +14,7 @@ class Occurrence:
     It happens at the first step from `first` on, before `end` and a multiple of `period`, at which
     the condition `when` holds. `happen` does it and returns lines for the log; `absence` is the
     line where it has not happened. Where it sets values (`sets`), these are to be set again in FMUs
-    that are loaded anew.
+    that are loaded again.
     """
 
     first: int

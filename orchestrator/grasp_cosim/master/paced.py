@@ -1,4 +1,4 @@
-"""The master of a run by the clock: its pacer, overruns, stalls, and a loop that runs alone.
+"""The master of a run by the clock: its pacer, overruns, stalls, and a loop that runs on its own.
 
 A loop that makes no call of Python runs without Python's lock, while another thread hands its rows
 on; any other calls the pacer at the beginning of each step, which hands rows on while it waits.
@@ -166,7 +166,7 @@ class PacedMaster(Master):
         return self.steps_done == self.total_steps or self._rows.seconds_since() > LONG
 
     def _after_stall(self, stall: StallError) -> None:
-        """A step would begin too late: where each peer may come back all begin anew, else it ends.
+        """A step would begin too late: where each peer may come back all begin again, else it ends.
 
         So no command is worked out from what was measured before a stall.
         """

@@ -3,7 +3,7 @@
 In the vector what is fetched comes first: the outputs, and whatever else is recorded, or named in a
 condition. Then come the inputs that have a source, which are passed. The Real values of a component
 stand together, so that one FMI call moves them all; values of another type have a buffer of their
-type beside the vector. Of a String that is fetched the vector has, at its end, the number of its
+type next to the vector. Of a String that is fetched the vector has, at its end, the number of its
 text in a table of those seen so far; a connection between Strings is a call.
 """
 
@@ -201,7 +201,7 @@ class Planner:
         self._call(CALL, Call(call), None, period, phase)
 
     def _step(self, name: str) -> None:
-        """Advance a component and fetch its values, at the end of its own step."""
+        """Advance a component and fetch its values, at the end of its step."""
         period = self.system.period(name)
         step = in_seconds(period * self.system.step_ns)
         instance = self.instances[name]

@@ -10,7 +10,7 @@ from ..system.parts import Component
 
 
 def leaves_process_alone(component: Component) -> bool:
-    """True for an FMU in a process of its own, or made of our own C.
+    """True for an FMU in its own process, or made of our own C.
 
     It neither catches Ctrl-C nor changes the current folder, so its calls need no guard.
     """

@@ -13,7 +13,7 @@ Piece = tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]
 class RowBuffer:
     """Rows of values, one for each step, that the loop fills from the first place on.
 
-    A loop that runs beside the thread which hands the rows on fills the places round and round.
+    A loop that runs next to the thread which hands the rows on fills the places round and round.
     """
 
     def __init__(self, width: int, capacity: int) -> None:

@@ -38,7 +38,7 @@ class RunRecord:
         """Choose the metrics. InputError, before any FMU is loaded, where they cannot be had."""
         self._system, self._every = system, every
         self.metrics = chosen(metrics, system.metrics, system.observed_names, system.roles)
-        """The metrics of this run beside those of the system."""
+        """The metrics of this run in addition to those of the system."""
         self._all_metrics = metrics_of(system.metrics, self.metrics)
         self.group_notes = check_groups(system)
         """Lines for the log on groups of metrics of the system that are not available."""

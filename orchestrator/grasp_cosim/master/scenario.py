@@ -77,7 +77,7 @@ def _written(value: float | str) -> str:
 
 
 class SettableNumber(NamedTuple):
-    """A number that can be set in the run, and where its value is besides, if anywhere."""
+    """A number that can be set in the run, and the other place of its value, if there is one."""
 
     port: Port
     variable: Variable
@@ -89,7 +89,7 @@ class SettableNumber(NamedTuple):
 class Scenario:
     """The events and faults of one run.
 
-    log says what happened, a line each, in order; what a session sets many times has one line.
+    log has the events, a line each, in order; what a session sets many times has one line.
     fault_functions are those of the connections that have faults, by target.
     """
 

@@ -120,7 +120,7 @@ class Session:
                 where that pays. The results have the same bits.
             realtime: True paces the run by the clock as the system says, a Realtime as it says
                 itself.
-            metrics: Metrics to be worked out beside those of the system: see simulate().
+            metrics: Metrics to be worked out in addition to those of the system: see simulate().
             diverging: "stop" or "continue": what follows on a signal that runs away, in place of
                 what the system says.
             note: Gets the lines of the log: see simulate().
@@ -214,7 +214,7 @@ class Session:
         self._instances.clear()
 
     def _renew_instances(self) -> Sequence[Instance]:
-        """Load new instances of the same FMUs, for a loop that is initialised anew."""
+        """Load new instances of the same FMUs, for a loop that is initialised again."""
         self._close_instances()
         self._load_instances()
         return self._instances
@@ -529,7 +529,7 @@ class Session:
             self._failed, self._failure = False, None
 
     def reset(self, values: Mapping[str, Given] | None = None) -> None:
-        """Go back to the start of the run, as a new session would begin, without loading anew.
+        """Go back to the start of the run, as a new session would begin, without loading again.
 
         It does so after a failure or an interruption, too, unless an FMU refuses any further call.
 
@@ -654,7 +654,7 @@ def _description(component: Component) -> str:
     """Which FMU runs as a component, and how, in words."""
     fmu = component.loaded
     kind = "Python" if fmu.python else "a binary"
-    process = ", in a process of its own" if component.isolation == "process" else ""
+    process = ", in its own process" if component.isolation == "process" else ""
     return f"{component.name}: {fmu.path}, FMI {fmu.version}, {kind}{process}"
 
 

@@ -86,7 +86,8 @@ def simulate(
             that pays. The results have the same bits.
         realtime: True paces the run by the clock as the system says, a Realtime as it says itself.
             The result then has a timing; its signals have the same bits.
-        metrics: Metrics to be worked out beside those of the system: from @metric, or functions of
+        metrics: Metrics to be worked out in addition to those of the system: from @metric, or
+        functions of
             a Signals, whose names they then have. The name of a metric demands that the result has
             it.
         diverging: "stop" or "continue": what follows on a signal that runs away, in place of what

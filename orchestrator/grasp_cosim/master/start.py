@@ -1,6 +1,6 @@
 """The start of a loop: all components are initialised at one communication point.
 
-That is the beginning of the run, or where a loop with a bench is initialised anew.
+That is the beginning of the run, or where a loop with a bench is initialised again.
 """
 
 from collections.abc import Mapping, Sequence

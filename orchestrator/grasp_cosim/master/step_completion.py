@@ -44,7 +44,7 @@ def finish_step(instance: Instance, status: int, begin: float, end: float) -> fl
         The time in s at which the FMU asked for the end of the simulation, or None.
 
     Raises:
-        SimulationError: That does not help, or an FMU of ours refuses a step.
+        SimulationError: That does not help, or our FMU refuses a step.
     """
     clock, length = clock_of(begin, end), end - begin
     smallest = length / SMALLEST
@@ -83,8 +83,8 @@ def with_failures_beside(
     """The error of a component that failed in a step, with those of the others that do so, too.
 
     In Jacobi's scheme all components step from the same values: those behind the one that failed
-    are stepped as well, so that one line names all that fail. In the sequential scheme they would
-    step from values of the one that failed, and say nothing of their own.
+    are stepped too, so that one line names all that fail. In the sequential scheme they would
+    step from values of the one that failed, and add no message.
 
     Args:
         error: What the component failed with.

@@ -39,7 +39,7 @@ def register_group(name: str, group: Group) -> None:
     """Let system files ask for a group by that name, in this process and those of its sweeps.
 
     A group of an installed package needs no call: it is an entry point of `grasp_cosim.groups`.
-    InputError for a name that a group of ours has, or where it is no Group.
+    InputError for a name that our group has, or where it is no Group.
     """
     register_here("groups", name, _checked(name, group))
 
@@ -103,7 +103,7 @@ def chosen(
 ) -> tuple[Metric, ...]:
     """The requested metrics that are not in groups anyway: metrics, functions, names of metrics.
 
-    A function is a metric of its own name, without a unit; a name is one of those in the groups.
+    A function is a metric with its name, without a unit; a name is one of those in the groups.
     InputError where there is none of that name, or `signals` of these names do not permit it. A
     group is for many systems, which may lack signals; a user's own metric names what it needs.
     """

@@ -38,7 +38,7 @@ RESERVED = frozenset((
     "real_time_factor", "realtime", "scheme", "step", "steps", "stop", "units", "verdict",
     "wall_time",
 ))  # fmt: skip
-"""Names beside metrics in what `run --json` prints, and in the table of a sweep."""
+"""Names next to metrics in what `run --json` prints, and in the table of a sweep."""
 
 
 ALL = "[*]"
@@ -72,7 +72,7 @@ Needs = Collection[Need] | Mapping[Need, str | None]
 
 
 class MissingSignalError(KeyError):
-    """A signal that a metric needs was not recorded; its text says which and why."""
+    """A signal that a metric needs was not recorded; its text names the signal and the reason."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -94,7 +94,7 @@ class Signals(ByName[npt.NDArray[Any]]):
     to_si: Mapping[str, Conversion] = field(default_factory=dict)
     start_values: Mapping[str, Any] = field(default_factory=dict)
     worked_out: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
-    """What one metric leaves for the next, by keys of their own; signals in SI units by name."""
+    """What one metric leaves for the next, by their own keys; signals in SI units by name."""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """The signal; MissingSignalError where it was not recorded."""
@@ -135,7 +135,7 @@ class Metric:
     """A function of recorded signals and how its value is named and shown.
 
     A metric of a system has a value where the signals that it needs are recorded, whatever others
-    of its group lack; why it has none is said once for all that lack the same. As an argument or an
+    of its group lack; the reason is given once for all that lack the same. As an argument or an
     entry, `plant.gap[*]` stands for all elements of an array, and `finger *` for one name each.
 
     Args:
@@ -151,7 +151,7 @@ class Metric:
         needs: The signals without which it has no value, AnyOf where one of several will do. A
             mapping gives the SI unit in which each is expected, or None, so that one of another
             quantity is refused before a run.
-        uses: The signals that it reads besides, where they are recorded; as `needs`.
+        uses: The signals that it reads in addition, where they are recorded; as `needs`.
         group: The package of the group that it is of; "" for a user's own.
         optional: True leaves it out in silence where it has no value.
         reason: True says why other metrics have no value. It is left out where it has none itself,
@@ -345,7 +345,7 @@ def metric(name: str, **more: Any) -> Callable[[Function], Metric]:
     if not name.isidentifier():
         raise InputError(f"metric {name!r}: must be a name of letters, digits and _")
     if name in RESERVED:
-        raise InputError(f"metric {name!r}: every run has this beside; must have another name")
+        raise InputError(f"metric {name!r}: is a figure of every run; must have another name")
     for unit in (more.get("unit"), more.get("shown_unit")):
         if unit and (reason := refusal(unit)):
             raise InputError(f"metric {name!r}: {reason}")
@@ -393,7 +393,7 @@ def check_portable(metrics: Iterable[Metric]) -> None:
     for m in metrics:
         try:
             as_bytes(m)
-        except Exception as error:  # pickle has one of its own for each reason
+        except Exception as error:  # pickle has one for each reason
             raise InputError(
                 f"metric {m.name!r}: cannot go to another process ({_error_text(error)}); must be "
                 "a function in a module or in a file of metrics, or cloudpickle be there: "

@@ -283,7 +283,7 @@ def privileges(realtime: Realtime) -> Iterator[Privileges]:
     """Ask for the privileges of a run in real time, and keep the garbage collector away.
 
     All is put back at the end. Priority and CPU are those of the calling thread. Of a priority the
-    line says what part of the time the kernel permits it.
+    line names the part of the time the kernel permits it.
     """
     answers = Privileges()
     with ExitStack() as stack:

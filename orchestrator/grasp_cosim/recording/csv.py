@@ -21,7 +21,7 @@ PIECE = 1024
 class CsvListener:
     """Writes time and signals with full precision, a line per recorded communication point.
 
-    The file has a temporary name beside path until the run ends, in whatever way: what was
+    The file has a temporary name next to path until the run ends, in whatever way: what was
     recorded is kept, in whole lines. There is no file where nothing was. A Real is the shortest
     text that reads back as the same number, a Boolean is 0 or 1, names and Strings are quoted texts
     as base.text.to_cell() makes them.

@@ -1,4 +1,4 @@
-"""The folder of a run, on disk while it runs, its rows and run.json beside them."""
+"""The folder of a run, on disk while it runs, its rows and run.json next to them."""
 
 import os
 import platform
@@ -34,10 +34,10 @@ SIGNALS, ARROW, SETTINGS = "signals.csv", "signals.arrow", "run.json"
 """The files of a run's folder, of which it has one of the former two."""
 
 ANY_PICTURE = "signals"
-"""The stem of the picture of a result that is of no group of metrics with one of its own."""
+"""The stem of the picture of a result that is of no group of metrics with one more."""
 
 DRAWN = ("report.html", "signals.mf4", *of_any_format("timing"))
-"""The files that may be made of a run in its folder, beside its picture."""
+"""The files that may be made of a run in its folder, next to its picture."""
 
 Form = Literal["csv", "arrow"]
 FORMS: tuple[str, ...] = get_args(Form)

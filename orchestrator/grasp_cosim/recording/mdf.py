@@ -35,8 +35,8 @@ class MdfListener:
 
     A String is recorded as the numbers of its texts, which its channel has as a conversion, so that
     readers show them. The header has the settings of the run: all of them as JSON in its comment,
-    and the main ones as properties, with "complete" besides. The rows are kept until the run ends,
-    in whatever way. There is no file where nothing was recorded.
+    and the main ones as properties, with "complete" in addition. The rows are kept until the run
+    ends, in whatever way. There is no file where nothing was recorded.
     """
 
     def __init__(self, path: str | Path, place: Path | None = None) -> None:

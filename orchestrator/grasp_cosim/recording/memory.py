@@ -73,7 +73,7 @@ class _Storage(Generic[Medium]):
 
 
 class MemoryListener:
-    """Copies the rows, each n-th of a run, into a table with room for the whole run from the start.
+    """Copies each n-th row of a run into a table that has space for the whole run.
 
     Only what is filled of it takes up memory.
     """
@@ -83,10 +83,10 @@ class MemoryListener:
         self._rows = 0
 
     def begin(self, experiment: Experiment, signals: Sequence[Signal]) -> None:
-        """Make room; InputError where the run does not fit into memory."""
+        """Make space; InputError where the run does not fit into memory."""
         self._experiment, self._signals = experiment, tuple(signals)
         total = experiment.total_steps
-        rows = total // self._every + 2  # t = 0, and the last one besides every n-th
+        rows = total // self._every + 2  # t = 0, and the last one in addition to every n-th
         try:
             self._steps, shape = np.empty(rows, np.int64), (len(signals), rows)
             in_shared_memory = self._paced and signals

@@ -21,7 +21,7 @@ COUNTS = (
 )
 
 NEEDED = (*COUNTS, "sessions", "consecutive_missed", "round_trip_time", "age", "lead")
-"""The diagnostics that figures are made of, beside the state."""
+"""The diagnostics that figures are made of, next to the state."""
 
 MAX_LISTED_LOSSES, MAX_STEPS_AHEAD = 5, 10
 """The most losses that are named; steps that a peer's clock may be ahead without a word."""
@@ -66,7 +66,7 @@ def _figures(time: Times, signals: Signals, prefix: str) -> dict[str, Any]:
     figures: dict[str, Any] = {name: _total(diagnostics[name]) for name in COUNTS}
     is_lost = diagnostics["state"] >= LOST
     turns = np.diff(is_lost.astype(np.int8), prepend=0)  # 1 at a loss, -1 where it is back
-    # a proxy that is initialised anew, as one whose peer is back, begins at session 1 again
+    # a proxy that is initialised again, as one whose peer is back, begins at session 1 again
     figures["sessions"] = int(diagnostics["sessions"].max()) + int((turns < 0).sum())
     figures["most_in_a_row"] = int(diagnostics["consecutive_missed"].max())
     figures["round_trip_median"] = float(np.median(diagnostics["round_trip_time"]))
@@ -79,7 +79,7 @@ def _figures(time: Times, signals: Signals, prefix: str) -> dict[str, Any]:
 
 
 def _total(counter: npt.NDArray[Any]) -> int:
-    """What a counter came to, which begins anew with the loop."""
+    """What a counter came to, which begins again with the loop."""
     counts = counter.astype(np.int64)
     previous = np.append(0, counts[:-1])
     increments = np.where(counts < previous, counts, counts - previous)
@@ -92,7 +92,7 @@ def _lines(figures: Mapping[str, Any], steps: int, step: float) -> Iterator[str]
         yield _loss(moment, figures["back"])
     if figures["sessions"] > 1:
         yield (
-            "the peer was started anew, and its model set up from the start: "
+            "the peer was started again, and its model set up from the start: "
             f"{figures['sessions']} sessions in this run"
         )
     if figures["trips"]:

@@ -35,7 +35,7 @@ TYPES = ("float64", "int32", "int64", "bool", TEXT)
 
 
 def run_folder(path: Path) -> Path:
-    """The folder of a run, which one of its files names as well; InputError where it is none."""
+    """The folder of a run, which one of its files names too; InputError where it is none."""
     if path.name in (SIGNALS, ARROW, SETTINGS) and path.is_file():
         return path.parent
     check_nature(path, "run")
@@ -45,8 +45,8 @@ def run_folder(path: Path) -> Path:
 def load_run(folder: str | Path) -> Result:
     """Read the result in a folder that `run --out` wrote, or is writing: then as far as it got.
 
-    Metrics are worked out anew from the signals; those of a user's file, and of a run that recorded
-    only some of its steps or its signals, are as they were recorded.
+    Metrics are worked out again from the signals; those of a user's file, and of a run that
+    recorded only some of its steps or its signals, are as they were recorded.
 
     Args:
         folder: The folder, or one of its files.
@@ -203,7 +203,7 @@ def load_log(
 ) -> Signals:
     """The numbers in a log of any tool, by the names of its columns, or by others for these.
 
-    They come in SI units where the run.json of the run beside it, or the units in the log, tell of
+    They come in SI units where the run.json of the run next to it, or the units in the log, tell of
     others; else they are taken to be in SI, which `note` is told. InputError where it is missing,
     damaged or of another kind, or where what reads it is not installed; where a column is in a unit
     of something else than it is expected in; at a cell that is no number once its column is asked
@@ -239,7 +239,7 @@ def _units_to_si(log: "Log", note: Callable[[str], None]) -> dict[str, Conversio
     if log.path.suffix.lower() == ".mf4":
         silent = []  # in which Booleans have no unit either
     elif not units:
-        missing = f"there is no {SETTINGS} beside it"
+        missing = f"there is no {SETTINGS} next to it"
         note(f"{log.path}: {missing}; its values are taken to be in SI units")
     elif silent:
         note(f"{log.path}: {choices(silent, 6)}: no unit; taken to be in SI units")

@@ -36,7 +36,7 @@ UNITS: Mapping[str, str | None] = {
     "wall_time": "s", "real_time_factor": "1", "steps": "1", "scheme": None, "step": "s",
     "stop": "s", "complete": None,
 }  # fmt: skip
-"""Figures of every run beside its metrics, and their units."""
+"""Figures of every run next to its metrics, and their units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     """The recorded signals of a run by name, like result["plant.gap[1]"], on result.time in s.
 
     It is the same whether it was just run or read back from a folder. A result is equal to itself
-    alone: whether two are alike says compare().
+    only: whether two are alike says compare().
     """
 
     settings: Mapping[str, Any]
@@ -133,7 +133,7 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     timing: Timing | None = None
     """How the run kept to the clock; None where it was not paced."""
     more_metrics: tuple[Metric, ...] = ()
-    """The metrics of this run beside those of the system."""
+    """The metrics of this run in addition to those of the system."""
     origin: Mapping[str, Any] = field(default_factory=dict)
     """The date, versions, command and title of a run with a folder: see recording.folder."""
     to_si: Mapping[str, Conversion] = field(default_factory=dict)
@@ -151,7 +151,7 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     limits: tuple[Trip, ...] = ()
     """The limits of the system that were exceeded."""
     initialised_anew: tuple[float, ...] = ()
-    """The times in s at which the whole loop was initialised anew, as a lost peer was back."""
+    """The times in s at which the whole loop was initialised again, as a lost peer was back."""
     peers: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """By component that is a proxy, the name and the build of its last peer."""
 
@@ -178,7 +178,7 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         return len(self.signals)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The data alone: what was worked out from it does not travel to other processes."""
+        """Only the data: what was worked out from it does not travel to other processes."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @property
@@ -286,7 +286,7 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
         return {**self.measured.units, **UNITS, **early}
 
     def to_json(self, path: str | Path) -> None:
-        """Write what is known of the run beside its signals as JSON: the run.json of its folder.
+        """Write what is known of the run next to its signals as JSON: the run.json of its folder.
 
         These are the figures of the run and its settings, as "measured" the metrics, how many rows
         there are, what is known by signal (units, conversions to SI, types, descriptions), the

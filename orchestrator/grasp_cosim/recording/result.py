@@ -33,8 +33,8 @@ class View(NamedTuple):
     """How a result is shown beyond its numbers: a picture, which is drawn and may be written to a
     path, by the stem of its file, and whether it fits a result.
 
-    `scene` makes what the page of such a result has besides (`report.page.Scene`), or None;
-    `traits` are what such a result is beside its settings, in words, like {"case": "2"}; `words`
+    `scene` makes what the page of such a result has in addition (`report.page.Scene`), or None;
+    `traits` are what such a result is next to its settings, in words, like {"case": "2"}; `words`
     are those that a title has of it, like "case 2".
     """
 

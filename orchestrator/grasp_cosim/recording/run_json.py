@@ -57,7 +57,7 @@ MetricValue = Annotated[Any, Valid("a number, a boolean or null, or a list of su
 
 
 class SolverEntry(TypedDict):
-    """The tolerance of a solver; further ones may stand beside it."""
+    """The tolerance of a solver; further ones may stand next to it."""
 
     relative_tolerance: Number
 
@@ -96,7 +96,7 @@ FaultEntry = TypedDict(
     },
     total=False,
 )
-"""A fault, and when it is; the parameters of its kind stand beside these."""
+"""A fault, and when it is; the parameters of its kind stand next to these."""
 
 
 SpreadEntry = TypedDict(
@@ -255,7 +255,7 @@ class ExceededEntry(TypedDict):
 
 
 class Beside(TypedDict, total=False):
-    """What is known of that besides; all of it may be missing."""
+    """More that is known of it; all of it may be missing."""
 
     metric_units: Mapping[str, str | None]
     missing_metrics: list[str]

@@ -1,4 +1,4 @@
-"""The signals that a run of ours has recorded, and logs of others, read from their files."""
+"""The signals that our run has recorded, and logs of others, read from their files."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
@@ -57,7 +57,7 @@ class Log(ByName[npt.NDArray[np.float64] | npt.NDArray[np.bool_]]):
     """Signals that any tool has recorded, numbers or Booleans by name, on `time` in s.
 
     A column is read when it is asked for, so that one that nobody uses may hold whatever it likes;
-    `units` are as the file tells them, None where it does not.
+    `units` are as in the file, None where it does not.
     """
 
     def __init__(self, path: Path, time: npt.NDArray[np.float64], columns: Collection[Column]):
@@ -94,11 +94,11 @@ class Log(ByName[npt.NDArray[np.float64] | npt.NDArray[np.bool_]]):
 
     @property
     def numeric(self) -> list[str]:
-        """The names of the columns that hold numbers alone."""
+        """The names of the columns that hold numbers only."""
         return [name for name, column in self._columns.items() if column.values is not None]
 
     def readable(self, name: str) -> bool:
-        """True for a column of numbers or Booleans alone, the only one of its name."""
+        """True for a column of numbers or Booleans only, the only one of its name."""
         try:
             self[name]
         except InputError:

@@ -66,7 +66,7 @@ def judge(
     criteria: list[tuple[str, str, float, str]] = []
     if proxies:
         criteria += _of_proxies([*proxies.values()], max(steps, 1))
-        criteria.append(("initialised_anew", "times that the loop was initialised anew",
+        criteria.append(("initialised_anew", "times that the loop was initialised again",
                       initialised_anew, ""))  # fmt: skip
     if timing and proxies:
         share = timing.overruns / max(timing.steps, 1)

@@ -3,7 +3,7 @@
 A connection goes forward where its source is listed before its target, in the order of execution;
 the others are feedback. The column of a component is one more than the furthest of those it gets
 forward connections from. A connection to the next column is a curve; one that passes columns goes
-around above all boxes, feedback, dashed, below them, each in a lane of its own.
+around above all boxes, feedback, dashed, below them, each in its own lane.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def _inner_first(route: _Route) -> tuple[float, float]:
 
 
 def _place(boxes: Sequence[_Box], routes: Sequence[_Route], top: float) -> tuple[float, float]:
-    """Place the boxes, each column about a common middle, with room for connections and labels.
+    """Place the boxes, each column about a common middle, with space for connections and labels.
 
     Ports are in the order of the boxes they are connected to, those of feedback lowest. Returned
     are the bottom and the right end in px.

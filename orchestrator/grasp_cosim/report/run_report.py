@@ -90,7 +90,7 @@ def write_page(
 ) -> None:
     """Write the page of a result, under its title: see wording.caption().
 
-    Of more than `max_values` values the signals are thinned, and the page says so.
+    Of more than `max_values` values the signals are thinned, and the page has a note.
     """
     write_text(path, page_html(result, scene=scene, max_values=max_values))
 

@@ -81,7 +81,7 @@ def _advice(timing: Timing) -> list[str]:
     while_waiting = counts.get("start", 0) + counts.get("between", 0)
     if 2 * while_waiting >= sum(counts.values()) and not timing.granted:
         return [
-            "  mostly the machine let us wait: give the run a priority and a CPU of its own, "
+            "  mostly the machine let us wait: give the run a priority and its own CPU, "
             "--set realtime.priority=80 --set realtime.cpu=1, on an idle machine"
         ]
     return []

@@ -1,8 +1,8 @@
 """The timing of a paced run: a chart, a sentence and a section of the page. Times are in s.
 
 A curve is the share of the steps that took longer than a time, over that time, both logarithmic:
-the tail, which decides whether a loop keeps its period, takes as much room as the bulk. A histogram
-would show one step in a million as nothing.
+the tail, which decides whether a loop keeps its period, takes as much space as the bulk. A
+histogram would show one step in a million as nothing.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def exceedance(spread: Spread, histogram: Histogram) -> list[tuple[float, float]
 
 
 def decade_limits(times: Iterable[float]) -> tuple[float, float]:
-    """Powers of ten that hold the times in s, with some room above; 0 s is SHORTEST_TIME."""
+    """Powers of ten that hold the times in s, with some space above; 0 s is SHORTEST_TIME."""
     logs = [log10(max(time, SHORTEST_TIME)) for time in times if time]
     low = floor(min(logs, default=log10(SHORTEST_TIME)))
     high = max(ceil(max(logs, default=low) + 0.05), low + 1)
@@ -208,7 +208,7 @@ def _draw_overruns(axes: Axes, timing: Timing, end: float) -> None:
 
 
 def _finish_logarithmic(axes: Axes, label: str) -> None:
-    """Finish axes without minor ticks, and with a legend beside them if they have lines."""
+    """Finish axes without minor ticks, and with a legend next to them if they have lines."""
     axes.minorticks_off()
     finish_axes(axes, label, legend=False)
     if axes.get_legend_handles_labels()[0]:
@@ -218,7 +218,7 @@ def _finish_logarithmic(axes: Axes, label: str) -> None:
 def timing_html(timing: Timing, end: float) -> str:
     """The content of the section; `end` is the simulated time in s at the end of the run.
 
-    Without matplotlib a line says that the chart needs it.
+    Without matplotlib a line asks for it.
     """
     kind = "warn" if timing.overruns else "sum"
     rate = number(timing.real_time_factor)

@@ -198,7 +198,7 @@ def write_steps(experiment: Any, system: Any, step_ns: Time) -> None:
 
 
 def write_hint(component: Any, step_ns: Time) -> None:
-    """Name the step of a component of its own."""
+    """Name the step of the component of this archive."""
     annotation = add(add(component, "ssd:Annotations"), "ssc:Annotation", type=_OSP_TYPE)
     _add(annotation, _OSP, "StepSizeHint", value=repr(in_seconds(step_ns)))
 

@@ -59,8 +59,8 @@ def flow_order(
 def loops(forward: Graph, backward: Graph) -> list[int]:
     """The loop that each node is in, by the number of one of its nodes.
 
-    Nodes that reach one another are in one loop, others alone. backward has the edges of forward
-    the other way round. By Kosaraju's algorithm, linear in nodes and edges.
+    Nodes that reach one another are in one loop, every other node is on its own. backward has the
+    edges of forward the other way round. By Kosaraju's algorithm, linear in nodes and edges.
     """
     loop_of = [0] * len(forward)
     placed: set[int] = set()

@@ -64,7 +64,7 @@ def read_ssp(
 ) -> System:
     """The system of an archive; stimuli go before those that it names.
 
-    So do the times, start, step and stop in s, but for an archive of ours, which names all of them:
+    So do the times, start, step and stop in s, but for our archive, which names all of them:
     System.with_overrides() changes them together.
     Its structure is the variant of that name, by default SystemStructure.ssd, or the only one.
     """

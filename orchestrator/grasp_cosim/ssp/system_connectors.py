@@ -100,7 +100,7 @@ def _system_connectors(
 ) -> Iterator[tuple[str, Node, str]]:
     """Yield the connectors of systems of these kinds, by the names that they have in the run.
 
-    One that has the name of something else is left out, which is said.
+    One that has the name of something else is left out, with a note.
     """
     taken = {
         str(port_of(Node(path, variable.name)))

@@ -87,7 +87,7 @@ def write_ssp(system: System | str | Path, path: str | Path) -> Written:
 def _notes(system: System) -> Iterable[str]:
     yield (
         f"SSP has no form for the step, {written(system.step_ns)} s: OSP and OMSimulator "
-        "read it from annotations of their own"
+        "read it from their own annotations"
     )
     if system.scheme != "jacobi":
         yield (

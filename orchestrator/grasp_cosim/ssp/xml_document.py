@@ -117,7 +117,7 @@ def _parser(recover: bool = False) -> Any:
 def checked(place: str, root: Any, form: str, notes: Notes) -> Any:
     """The root, valid by the schema of its form; InputError with the line where it is not.
 
-    What SSP 2.0 shares with 1.0 is valid as well, and what is in another order or an empty list.
+    What SSP 2.0 shares with 1.0 is valid too, and what is in another order or an empty list.
     """
     expected, actual = etree.QName(qualified(ROOTS[form])), etree.QName(root)
     if actual.localname == expected.localname and actual.namespace != expected.namespace:

@@ -1,4 +1,4 @@
-"""The runs of a sweep that are done, kept beside its table until all are: a line of JSON each."""
+"""The runs of a sweep that are done, kept next to its table until all are: a line of JSON each."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def keep(file: FileIO, outcome: Outcome) -> None:
         write_line(file, json.dumps(asdict(outcome)).encode() + b"\n")  # columns in their order
     except OSError as error:
         raise SimulationError(
-            f"{file.name!r}: {error.strerror}; with room for it the same command goes on"
+            f"{file.name!r}: {error.strerror}; with more space the same command goes on"
         ) from error
 
 
@@ -55,7 +55,7 @@ def as_line(content: Any) -> bytes:
 
 
 def write_line(file: FileIO, line: bytes) -> None:
-    """Write a line at the end of a file; OSError where there is no room for all of it."""
+    """Write a line at the end of a file; OSError where there is no space for all of it."""
     end = file.seek(0, os.SEEK_END)
     if file.write(line) < len(line):  # which is no error to it
         file.truncate(end)
@@ -113,7 +113,7 @@ def _outcome(path: Path, number: int, line: bytes) -> Outcome:
 
 
 def _difference(head: bytes, identity: Mapping[str, str]) -> str:
-    """What the runs that the first line of a file tells of differ in."""
+    """What the runs in the first line of a file differ in."""
     try:
         earlier = _DECODER.decoded(Head, "head", json_in("head", head))["runs of"]
     except InputError:

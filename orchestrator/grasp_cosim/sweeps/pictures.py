@@ -137,7 +137,7 @@ def _norm(values: Any) -> Any:
 
 
 def _grid(count: int) -> tuple[Figure, list[Axes]]:
-    """A figure with so many panels, two beside each other."""
+    """A figure with so many panels, two next to each other."""
     columns = 1 if count == 1 else 2
     rows = ceil(count / columns)
     figure = new_figure(MARGIN + PANEL_WIDTH * columns, PANEL_HEIGHT * rows)

@@ -94,7 +94,7 @@ def as_rows(source: Any, alike: bool = False) -> list[dict[str, Any]]:
     """The rows of a table, read or in a file, of columns by place, of a data frame, or of rows.
 
     A data frame is one of pandas or polars, a table of pyarrow, a structured array of NumPy, or a
-    Dataset of xarray. Beside columns a single value is that of each row. A cell that is None, NaN
+    Dataset of xarray. Next to columns a single value is that of each row. A cell that is None, NaN
     or empty leaves that place as the system has it. InputError where these are no rows, nothing
     varies, unless they may be `alike`, or there are more than MAX_RUNS.
     """
@@ -117,7 +117,7 @@ def _entries(source: Any) -> Iterable[Any]:
     """The entries of a table, a data frame or the like, each of which should be a row."""
     if isinstance(source, FileTable):
         return _rows_in(source)
-    if hasattr(source, "to_dataframe"):  # a Dataset of xarray, whose coordinates vary as well
+    if hasattr(source, "to_dataframe"):  # a Dataset of xarray, whose coordinates vary too
         source = source.to_dataframe().reset_index()
     if hasattr(source, "to_dicts"):
         return source.to_dicts()  # type: ignore[no-any-return]  # of polars
@@ -201,14 +201,14 @@ def read_rows(path: Path) -> FileTable:
 
 
 def _rows_in(table: FileTable) -> list[dict[str, Any]]:
-    """The rows of a table whose head has places, with a unit in brackets where that is said.
+    """The rows of a table whose head has places, with a unit in brackets if it has one.
 
     A cell that is empty has no value. InputError at the first one that is not as it must be.
     """
     rows: list[dict[str, Any]] = [{} for _ in range(table.row_count)]
     columns = [column for column in table.columns if column.name]
     for column in columns:
-        table.column(column.name)  # there is one alone
+        table.column(column.name)  # there is only one
         for row, cell in enumerate(column.texts()):
             text = cell.strip()
             if not text:

@@ -83,7 +83,7 @@ def packed(task: Task, with_fmus: bool) -> Packed:
     fmus = tuple(c.native.read_bytes() if c.native else c.content for c in components)
     try:
         content = as_bytes(replace(task, groups=script_groups(task.system.metrics)))
-    except Exception as error:  # pickle has one of its own for each reason
+    except Exception as error:  # pickle has one for each reason
         raise InputError(
             f"{task.system.name}: cannot go to another process: {error}; must have Python code of "
             f"a module, or cloudpickle installed: {install_command('cloudpickle')}"
@@ -107,7 +107,7 @@ def run_packed(shared: Packed, job: Job) -> Outcome:
 
 
 def run_there(shared: Packed, job: Job) -> tuple[Outcome, dict[str, bytes]]:
-    """Do a run in this process, on a machine of its own: its signals come along."""
+    """Do a run in this process, on its own machine: its signals come along."""
     outcome = run_packed(shared, job)
     signals = _unpacked[shared.key][0].signals
     return outcome, signals.taken(job[0]) if signals else {}

@@ -1,4 +1,4 @@
-"""A seed of its own for all that is random in each run of a sweep.
+"""A seed for everything random in each run of a sweep.
 
 The seed of run i at the k-th place, both counted from 0, is the first word of NumPy's
 SeedSequence((s, i, k)) modulo a milliard, where s is the seed that the system has there. So it
@@ -21,7 +21,7 @@ from ..system.overrides import as_overrides
 from .rows import Row
 
 OF_A_RUN = "run"
-"""What is asked for where each run has seeds of its own."""
+"""What is asked for where each run has its own seeds."""
 
 SEED_LIMIT = 10**9
 """Seeds are smaller than this."""

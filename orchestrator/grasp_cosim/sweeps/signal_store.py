@@ -262,7 +262,7 @@ def begin(
 
 
 def _key(folder: Path) -> str:
-    """The hash of what the runs of a store are of; InputError where it is none of ours."""
+    """The hash of what the runs of a store are of; InputError where it is none of our own."""
     try:
         content = json_in(str(folder / HEAD), (folder / HEAD).read_bytes())
         head = Decoder().decoded(GroupHead, str(folder / HEAD), content)

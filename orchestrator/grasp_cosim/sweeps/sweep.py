@@ -52,15 +52,15 @@ def sweep(
             one, "plant.object_width [mm]", and so may a value, (50, "mm"): the result has all in
             that of the variable. The index of a pandas DataFrame is that of the result's
             to_pandas().
-        metrics: Metrics to be worked out beside those of the system: see simulate().
+        metrics: Metrics to be worked out in addition to those of the system: see simulate().
         signals: Signals to be kept of each run, named as for System.with_record(): to_xarray() of
             the result has them over run, time and finger. Each run writes its own to disk, into the
-            Zarr store beside `out`, which ends in .zarr, else into a temporary folder.
+            Zarr store next to `out`, which ends in .zarr, else into a temporary folder.
         every: Every how many communication points of the signals are kept.
         seed: "run" gives all that is random another seed in each run, see seeds.py, so that rows
             may be alike: [{}] * 100. None leaves the seeds as they are.
         out: The file of the table, .csv or .parquet. Until all are done, finished runs are kept
-            beside it, and the same call goes on.
+            next to it, and the same call goes on.
         workers: How many runs at a time, by default one for each processor: in threads where the
             FMUs are native and made here and the runs few, else in processes. A script needs no
             guard for these, and what it defines goes there: see as_bytes().
@@ -158,8 +158,8 @@ def _check_written(signals: Store | None, outcome: Outcome) -> None:
     """SimulationError where the signals of a run that came to its end are not there."""
     if signals and outcome.error is None and not signals.has(outcome.index):
         raise SimulationError(
-            f"{signals.folder}: the signals of run {outcome.index} were not written; with room for "
-            "them the same call goes on"
+            f"{signals.folder}: the signals of run {outcome.index} were not written; with more "
+            "space the same call goes on"
         )
 
 
@@ -171,7 +171,7 @@ def _recorded(
     metrics: Sequence[Metric],
     out: Path | None,
 ) -> Recorded:
-    """What is kept of the signals, and where: beside the table, else in a temporary folder."""
+    """What is kept of the signals, and where: next to the table, else in a temporary folder."""
     time = times(system, rows, every)
     observing, signal_names = recording(system, signals)
     coordinates = {place for row in rows for place in row}

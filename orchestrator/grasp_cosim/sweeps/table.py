@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 STATISTICS = ("least", "p5", "median", "p95", "greatest", "mean")
-"""The statistics of a metric, besides how many runs have one."""
+"""The statistics of a metric, and how many runs have one."""
 
 MAX_VARIED_NAMES = 4
 """Places that vary which the repr() of a table names."""
@@ -62,7 +62,7 @@ class Outcome:
 class Table:
     """The table of a sweep: columns of equal length by name, a row for each run, in order.
 
-    Beside what varied and what came out there are the columns `index`, `error`, one line where a
+    Next to what varied and what came out there are the columns `index`, `error`, one line where a
     run failed, and ENDED_AT, the time in s where an FMU ended a run before its stop time.
     """
 

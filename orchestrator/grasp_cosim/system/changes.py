@@ -91,7 +91,7 @@ def _check_remaining(
         array = next(name for name, array in old.arrays.items() if element in array.names)
         raise InputError(
             f"{label} = {size.value!r}: there is then no {element}, which has a value; {array} "
-            "must be given anew, too"
+            "must be given again, too"
         )
 
 
@@ -169,8 +169,8 @@ def with_old_values(
     """The new component, which has another FMU, with the values of the old one; and notes.
 
     The values are in the units of the new FMU. Those of overridden variables or arrays are not
-    looked at: they get others. A value of a variable that the new FMU lacks is left out, which a
-    note says, as does one where the new FMU has other start values. InputError where a value, or
+    looked at: they get others. A value of a variable that the new FMU lacks is left out, as a
+    note states, as does one where the new FMU has other start values. InputError where a value, or
     another number that the system states, has no meaning in the new unit.
     """
     old_fmu, new_fmu = old.interface, new.interface
@@ -228,7 +228,7 @@ def _check_item(old: Component, new: Component, name: str, value: Value, place: 
     if old_item != new_item:
         raise InputError(
             f"{place}: {name} = {value!r} is {old_item} in {old.fmu.name} and "
-            f"{new_item or 'nothing'} in {new.fmu.name}; must be set anew, as one of "
+            f"{new_item or 'nothing'} in {new.fmu.name}; must be set again, as one of "
             f"{choices(new_items)}"
         )
 
@@ -252,7 +252,7 @@ def _other_start_values(
 
 
 def _may_start_itself(variable: Variable) -> bool:
-    """True for what an FMU may have a value of its own for: not what the system has to feed."""
+    """True for what an FMU may have its own value for: not what the system has to feed."""
     return variable.causality not in ("input", "structuralParameter")
 
 
@@ -302,7 +302,7 @@ def _check_ends(system: Structure, old: Component, new: Interface, place: str) -
 
 
 def stated(system: Structure, name: str) -> frozenset[str]:
-    """The variables of a component for which the system states numbers, beside its values."""
+    """The variables of a component for which the system states numbers, next to its values."""
     faulty = {fault.target for fault in system.faults}
     ports = [
         port
@@ -354,7 +354,7 @@ def _meaningless(old: Interface, new: Interface, name: str, is_value: bool) -> s
     if change is None:
         return (
             f"is in {new_variable.unit}, which {old_variable.unit} cannot be converted to; must be "
-            "set anew"
+            "set again"
         )
     if change != IDENTITY and not is_value:
         return (

@@ -5,7 +5,7 @@ gets to a communication point only where the step that is asked is a whole numbe
 canHandleVariableCommunicationStepSize = false says that all steps have to be equally long, but not
 how long. stepSize of the default experiment recommends a length; of an FMU that cannot vary its
 step it may be the only one: some take it whatever they are asked, and nothing shows it. Where it
-can vary them, a step is worth a word that is no whole number of those. Only the FMUs of ours divide
+can vary them, a step is worth a word that is no whole number of those. Only our FMUs divide
 any step by themselves.
 """
 

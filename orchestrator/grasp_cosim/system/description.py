@@ -108,7 +108,7 @@ class System(Structure):
         Args:
             name: The name of the system.
             components: What each component is, by its name; they step in this order. It is the path
-                of an FMU, the file of a block of ours, NAME.py, which is built, a Component, or for
+                of an FMU, the file of our block, NAME.py, which is built, a Component, or for
                 trials Python code: a function (t, inputs), or a class with step(t, inputs), see
                 system.python_code. Or it is a mapping with that as "fmu" and the other entries of a
                 component in a file, such as "values" and "step".
@@ -309,7 +309,7 @@ class System(Structure):
                 "components.plant.rename.gap[1]"; "plant.object_width" is short for
                 "components.plant.values.object_width". A text stands for a number or a boolean
                 where there must be one. An FMU takes the place of another as by swap(), and values
-                beside it are in its units.
+                next to it are in its units.
 
         Returns:
             The changed system.
@@ -549,7 +549,7 @@ def _of_experiment(entries: Mapping[str, Any]) -> list[Override]:
 
 
 def _are_of_parameters(system: System, overrides: Overrides) -> bool:
-    """True if overrides of components are of parameters alone, and none of these in an array."""
+    """True if overrides of components are of parameters only, and none of these in an array."""
     for name, of_component in overrides.components.items():
         if of_component.entries or [*of_component.tables] != ["values"]:
             return False

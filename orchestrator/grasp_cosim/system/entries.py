@@ -166,7 +166,7 @@ def _with_names(
         rename={**component.rename, **rename},
         units={**component.units, **units},
     )
-    read_interface(component.fmu)  # what is wrong in the FMU has a place of its own
+    read_interface(component.fmu)  # what is wrong in the FMU has its own place
     try:
         component.interface  # noqa: B018 - it is worked out
     except InputError as error:

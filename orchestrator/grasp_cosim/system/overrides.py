@@ -1,7 +1,7 @@
 """Overrides: values that change a system, each by its place in a system file.
 
 A text of the command line, a Python value, an entry of a file and a cell of a sweep all become an
-Override once, with what a message says of where it comes from. grouped() reads their places against
+Override once, with the origin for messages. grouped() reads their places against
 a system; what they make of it: entries.py for the sections, changes.py for a component.
 """
 
@@ -25,7 +25,7 @@ SECTIONS = (
 """The entries of a system file, which are no names of components."""
 
 RECORD = "record"
-"""Another entry: a list alone, which no --set changes, so a component may have its name."""
+"""Another entry: a list only, which no --set changes, so a component may have its name."""
 
 ENTRIES_OF_SECTIONS: Mapping[str, Sequence[str]] = {
     "experiment": ("step", "stop", "scheme", "diverging", "start", "variant"),

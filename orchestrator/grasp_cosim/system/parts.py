@@ -34,13 +34,13 @@ Then = Literal["abort", "warn"]
 THENS: tuple[str, ...] = get_args(Then)
 Loops = Literal["iterate", "refuse"]
 Logging = bool | tuple[str, ...]
-"""What an FMU is to log beside warnings and errors: all, nothing, or some of its categories."""
+"""What an FMU is to log next to warnings and errors: all, nothing, or some of its categories."""
 
 PROXY_STATE = "proxy.state"
 """The output that tells a proxy from other FMUs, and what state its connection is in."""
 
 FINEST, COARSEST = 1e-13, 0.1
-"""Relative tolerances of a solver: beyond the first one there is rounding alone."""
+"""Relative tolerances of a solver: beyond the first one there is only rounding."""
 
 
 def literal(value: Given) -> str:
@@ -65,7 +65,7 @@ def as_lists(value: Given) -> Any:
 class Solver:
     """The tolerances that CVode keeps to where it integrates an FMU of model exchange.
 
-    An FMU for co-simulation alone has a solver of its own, which gets relative_tolerance.
+    An FMU that is only for co-simulation has its own solver, which gets relative_tolerance.
 
     The local error of a state in a step of the solver is below relative_tolerance times the state
     plus absolute_tolerance times its nominal value, by default a hundredth of the former.
@@ -94,7 +94,7 @@ class Component:
     goes by the system's. step_ns is its own communication step, None for the system's. units are of
     variables that the FMU declares without one, or wrongly. native is the FMU that runs in the
     place of fmu, its twin with the same bits. With a solver the equations of an FMU that is for
-    model exchange, too, are integrated here, though it may have a co-simulation of its own. With
+    model exchange, too, are integrated here, though it may have its own co-simulation. With
     code there is no FMU: fmu is what that is called. trace is the file that each call of the FMU is
     written to.
     """
@@ -172,7 +172,7 @@ class Component:
         return hash((self.name, self.fmu, self.native, frozenset(self.values.items())))
 
     def __getstate__(self) -> dict[str, Any]:
-        """What it was made of alone: other processes read the FMUs themselves."""
+        """Only the things that it was made of: other processes read the FMUs themselves."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @property
@@ -300,7 +300,7 @@ class Event:
     """Sets tunable parameters or unconnected inputs, also whole arrays, once, before a step.
 
     The step begins at the first communication point at or after at_ns, or the first one where the
-    condition holds; exactly one of the two is given. Of components with a step of their own only
+    condition holds; exactly one of the two is given. Of components with their own step only
     their own points count.
     """
 

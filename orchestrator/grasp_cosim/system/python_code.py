@@ -10,9 +10,9 @@
 
 step() is called once at each communication point of the component, that of the start included: `t`
 is its time in s, and inputs are the values there, by name. What it returns are the outputs from
-then on, by name; of a single one the value alone will do. A function (t, inputs) is the same
+then on, by name; of a single one the value is enough. A function (t, inputs) is the same
 without a state. What is not declared is as the connections have it: their variables, in the types
-and units of their other ends. A class is made anew for each run, and an object is copied;
+and units of their other ends. A class is made again for each run, and an object is copied;
 parameters are its attributes, which go before what is declared.
 """
 

@@ -133,7 +133,7 @@ class Record:
         return is_taken_in and not any(p.matches([name]) for p in left_out)
 
     def with_outputs(self, components: Sequence[Component]) -> Record:
-        """The record that has all outputs besides, but for those that are left out."""
+        """The record that has all outputs in addition, but for those that are left out."""
         outputs = [str(port) for port in self.watched(components)] if self.takes_in else []
         return Record((*self.signals, *outputs))
 

@@ -128,7 +128,7 @@ def fault_entry(fault: Fault) -> dict[str, Any]:
 
 
 def _entries_of_kind(kind: Any) -> list[str]:
-    """The entries of a fault of a kind, besides its parameters."""
+    """The entries of a fault of a kind, in addition to its parameters."""
     seed = ["seed"] if kind in RANDOM else []
     return ["connection", "kind", "from", "until", "when", *seed]
 
@@ -146,7 +146,7 @@ def _time(place: str, entry: Mapping[str, Any], key: str, zero: bool = False) ->
 
 
 def _target_port(place: str, text: Any, connections: Sequence[Connection]) -> Port:
-    """The target of the connection that the text names, by both of its ends or the target alone."""
+    """The target of the connection that the text names, by both of its ends or the target only."""
     ends = [part.strip() for part in text.split("->")] if isinstance(text, str) else [text]
     if len(ends) == 1:
         return as_port(f"{place}: connection", ends[0], "'component.output -> component.input'")

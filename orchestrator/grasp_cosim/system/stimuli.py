@@ -47,7 +47,7 @@ class RecordedConnections(TypedDict):
 
 
 RECORDED_STEM, RUN_FILE = "signals", "run.json"
-"""The stem of a file that a run records, and the file beside it that has its connections."""
+"""The stem of a file that a run records, and the file next to it that has its connections."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def recorded_connections(path: Path) -> tuple[Connection, ...] | None:
 
 
 def _finite_ones(ports: Mapping[Port, Column]) -> dict[Port, Stimulus]:
-    """The columns that can be stimuli: a run records others as well."""
+    """The columns that can be stimuli: a run records others too."""
     stimuli: dict[Port, Stimulus] = {}
     for port, column in ports.items():
         with suppress(InputError):

@@ -188,7 +188,7 @@ class Structure:
         """What a function makes of the system but for values of parameters, worked out once.
 
         Args:
-            work: A function of the system alone.
+            work: A function of the system only.
 
         Returns:
             What the function returned the first time.
@@ -203,7 +203,7 @@ class Structure:
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What it was made of alone: other processes work out the rest themselves."""
+        """Only the things that it was made of: other processes work out the rest themselves."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def step_of(self, component: Component) -> Time:

@@ -120,7 +120,7 @@ def _check_own_solver(place: str, fmu: Interface, solver: Solver) -> None:
             kinds = choices(FMU_KINDS[kind] for kind in fmu.kinds)
             raise InputError(
                 f"{place}: {entry}: {fmu.path.name} is for {kinds} "
-                "alone, with a solver of its own, which gets relative_tolerance; must be left out"
+                "only, with its own solver, which gets relative_tolerance; must be left out"
             )
 
 
@@ -332,7 +332,7 @@ def _remarks_on_components(system: Structure) -> Iterator[str]:
         if names := c.interface.ambiguous:
             yield (
                 f"{c.name}: several variables of {c.fmu.name} are called {choices(names)}: they "
-                "are left alone"
+                "are left out"
             )
         for v in c.interface.of("input", "output"):
             if v.clock and v.causality == "input":
@@ -366,7 +366,7 @@ def _ticks_in_words(clock: Clock) -> str:
     if clock.variability in ("constant", "fixed") and clock.interval is not None:
         shift = f", the first {float(clock.shift):g} s after the start" if clock.shift else ""
         return f"every {float(clock.interval):g} s{shift}"
-    return f"when the FMU says ({clock.variability})"
+    return f"when the FMU requests it ({clock.variability})"
 
 
 def _remarks_on_connections(system: Structure) -> Iterator[str]:

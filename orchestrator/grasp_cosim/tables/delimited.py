@@ -119,7 +119,7 @@ class TextFile:
         """The separator that the lines show; InputError where they fit several."""
         widths: dict[str, list[int]] = {}
         for separator in SEPARATORS:
-            with suppress(InputError):  # where it does not separate; else it is said later
+            with suppress(InputError):  # where it does not separate; else the error comes later
                 rows = islice(self._split(separator), LINES_FOR_SEPARATOR)
                 widths[separator] = [len(row) for _, row in rows]
         candidates = [s for s, of_lines in widths.items() if of_lines and of_lines[0] > 1]

@@ -64,7 +64,7 @@ class WristParameters(NamedTuple):
 def check(system: Any) -> tuple[str, ...]:
     """What is to be noted of a system's wrist: where the law counts on another one, or it is slow.
 
-    Nothing is said of a plant or a controller of others, which has other parameters.
+    No line is on a plant or a controller of others, which has other parameters.
     """
     names = {role: system.roles.get(role, role) for role in ("plant", "controller")}
     plant, controller = names.values()

@@ -24,7 +24,7 @@ HOW_IT_IS_SEEN = (
 )
 
 CARRIER = Line(WRIST, "wrist", "#2e8b57", "-.")
-"""How the wrist is drawn beside the target."""
+"""How the wrist is drawn next to the target."""
 
 
 def draw_tandem(run: Result, path: Path | None = None) -> Figure:

@@ -90,7 +90,7 @@ def _missing_binary(component: Component) -> str:
 
 
 def _users_twins(component: Component) -> list[Path]:
-    """Where a twin may be that the user has built; nowhere of an FMU that is no block of ours."""
+    """The paths where a user may have built a twin; none for an FMU of another maker."""
     if not _is_ours(component):
         return []
     folders = NATIVE_FOLDER, component.fmu.parent.parent / NATIVE_FOLDER.name
@@ -135,6 +135,6 @@ def _twins(components: Iterable[Component]) -> Twins:
 
 
 def _is_ours(component: Component) -> bool:
-    """True for an FMU that runs a block of ours in Python."""
+    """True for an FMU that runs our block in Python."""
     interface = component.interface
     return interface.python and (interface.tool or "").startswith("grasp-cosim ")

@@ -181,7 +181,7 @@ def test_masses_gains_and_the_delay_of_the_drives_come_back(grasp, known, groups
 def test_mass_and_gain_cannot_be_told_apart(grasp, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time,plant.velocity[1]\n0,0\n")
-    with pytest.raises(InputError, match="the ratio of the two alone; must be one of them"):
+    with pytest.raises(InputError, match="only the ratio of the two; must be one of them"):
         identify(path, fit=("mass", "gain"), system=grasp)
 
 

@@ -37,7 +37,7 @@ LIBM = (
 """Functions whose calls no compiler may work out by itself: it rounds otherwise than libm."""
 
 BITS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
-"""What decides the bits, besides -fno-builtin-NAME for the functions in LIBM.
+"""What decides the bits, in addition to -fno-builtin-NAME for the functions in LIBM.
 
 The last two leave them as they are: nobody reads errno, nor the flags of exceptions.
 """

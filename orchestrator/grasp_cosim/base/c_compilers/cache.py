@@ -63,7 +63,7 @@ def keep(made: Path, name: str) -> Path:
     try:
         (shutil.copytree if made.is_dir() else shutil.copyfile)(made, part)
         part.rename(place)
-    except OSError:  # no room, or another process was faster
+    except OSError:  # no space, or another process was faster
         shutil.rmtree(part, ignore_errors=True)
         part.unlink(missing_ok=True)
     return place if place.exists() else made

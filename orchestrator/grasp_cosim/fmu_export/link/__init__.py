@@ -160,7 +160,7 @@ PORT = 5501
 LARGEST_HANDSHAKE = 1200
 """Bytes of a HELLO and of its answer, at most: no network takes these apart."""
 HELLO_SIZE = LARGEST_HANDSHAKE - HEAD.size - TAG_SIZE
-"""Bytes of the body of a HELLO, always, so that there is room for the reason in its answer."""
+"""Bytes of the body of a HELLO, always, so that there is space for the reason in its answer."""
 NAME_SIZE, BUILD_SIZE = 64, 128
 """Bytes that a name and a build have in a body, of which one NUL or more is the end."""
 HELLO_HEAD = struct.Struct(f"<{NAME_SIZE}sIIII")
@@ -376,7 +376,7 @@ class PeerCounters:
 class Request(NamedTuple):
     """A request to carry out: INITIALISE, STEP or END; times in s.
 
-    `values` are inputs, then parameters. With `fresh` a session begins: set the model up anew.
+    `values` are inputs, then parameters. With `fresh` a session begins: set the model up again.
     """
 
     kind: int

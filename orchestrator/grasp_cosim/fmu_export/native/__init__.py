@@ -1,1 +1,1 @@
-"""Native FMUs: a block as C, which needs no Python. Card: README.md."""
+"""Native FMUs: a block as C, which needs no Python. See README.md."""

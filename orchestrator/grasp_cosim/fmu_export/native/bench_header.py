@@ -41,7 +41,7 @@ _TYPES = {"Real": "double", "Integer": "int32_t", "Boolean": "bool"}
 _ZEROS: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Boolean": False}
 _MEANINGS: dict[Causality, str] = {
     "input": "What the proxy sends with every request",
-    "parameter": "What the proxy sends with every request as well; only tunable ones change",
+    "parameter": "What the proxy sends with every request too; only tunable ones change",
     "output": "What it gets",
 }
 

@@ -26,7 +26,7 @@ PXU = "const BlockParams *p, const BlockState *x, const BlockInputs *u"
 
 
 def translated(name: str, block: Any, file: Path | None = None) -> str:
-    """The text of block.h; `file` is the source of a block of one's own.
+    """The text of block.h; `file` is the source of a user's block.
 
     UntranslatableError, one line with the file and the line in it, for what is not in the subset.
     """

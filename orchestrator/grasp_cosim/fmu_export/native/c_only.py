@@ -1,4 +1,4 @@
-"""Writes the C of a block alone, for real-time targets: no FMI, no allocation, no stdio.
+"""Writes the C of a single block, for real-time targets: no FMI, no allocation, no stdio.
 
 c_only*.in are its header and its code, for a block called Model; here they get the name and the
 variables. Members are called as in the C header of a proxy (bench_header.py), so that
@@ -43,9 +43,9 @@ _KINDS: dict[type[Scalar], Kind] = {float: "Real", int: "Integer", bool: "Boolea
 
 
 def c_only(model: Model) -> dict[str, bytes]:
-    """Return the files of a block alone in C, by name.
+    """Return the files of a single block in C, by name.
 
-    NAME.h and NAME.c; NAME_text.c, which tells in words why something is refused; main.c, an
+    NAME.h and NAME.c; NAME_text.c, with the words for why something is refused; main.c, an
     example; and what they include.
 
     UntranslatableError, one line, where the block holds what cannot be translated.

@@ -373,7 +373,7 @@ class Expressions:
     def _matched(self, function: Any, positional: Any, keywords: Any, node: ast.AST) -> list[Value]:
         signature = inspect.signature(function)
         if any(p.kind != p.POSITIONAL_OR_KEYWORD for p in signature.parameters.values()):
-            self.refuse(node, "*args, **kwargs and keywords alone are not in the subset")
+            self.refuse(node, "*args, **kwargs and keywords only are not in the subset")
         bound = signature.bind(*positional, **keywords)
         bound.apply_defaults()
         return [v if isinstance(v, Value) else self._number_of(v) for v in bound.arguments.values()]

@@ -23,7 +23,7 @@ _MAIN = """\
    The functions are called ${name}_fmi${fmi}DoStep and so on. FMI${fmi}_FUNCTION_PREFIX may be \
 defined
    otherwise. For a shared library, where they are called fmi${fmi}DoStep, define
-   FMI${fmi}_OVERRIDE_FUNCTION_PREFIX, as the standard says; CMake's ${name}_EXPORTS does as well.
+   FMI${fmi}_OVERRIDE_FUNCTION_PREFIX, as the standard says; CMake's ${name}_EXPORTS does too.
 
 $how */
 
@@ -32,7 +32,7 @@ $how */
 #endif
 
 #if defined(_MSC_VER) && !defined(_CRT_SECURE_NO_WARNINGS)
-#define _CRT_SECURE_NO_WARNINGS /* strcpy is given room for what it writes */
+#define _CRT_SECURE_NO_WARNINGS /* strcpy is given space for what it writes */
 #endif
 $system
 #define TOKEN "$guid"

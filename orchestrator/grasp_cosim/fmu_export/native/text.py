@@ -85,7 +85,7 @@ def wrapped(line: str, begin: str = "") -> str:
 
 
 class Source:
-    """A Python file: its functions by their first line, its comments, what is said of members."""
+    """A Python file: its functions by their first line, its comments, the notes on members."""
 
     def __init__(self, file: str, label: str) -> None:
         self.shown, self.text = label, Path(file).read_text("utf-8")

@@ -102,7 +102,7 @@ class Function(NamedTuple):
 
 
 class Program:
-    """The definitions of one block; `file` is the source of a block of one's own."""
+    """The definitions of one block; `file` is the source of a user's block."""
 
     def __init__(self, params: type[Any], file: Path | None = None) -> None:
         self.params, self.file = params, file

@@ -2,7 +2,7 @@
 
 The grasps run through the FMUs at STEP. With the sensors' electronics off, a contact time at STEP
 is within 2 ms of that at 0.1 ms, a hundredth of what the published times scatter by; the
-reflectances matter by their ratio alone, so that surfaces of equal colours are one grasp.
+reflectances matter by their ratio only, so that surfaces of equal colours are one grasp.
 """
 
 import logging
@@ -84,7 +84,7 @@ def published_contacts() -> list[Contact]:
 
 
 def is_contacts(path: Path) -> bool:
-    """True for a table of contact times, which its columns say; False for any other file."""
+    """True for a table of contact times, known by its columns; False for any other file."""
     return {*COLUMNS[1:3]} <= {*names_in(path)}
 
 

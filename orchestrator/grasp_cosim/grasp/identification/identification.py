@@ -210,7 +210,7 @@ def _identify_from_signals(
     signals = load_log(log, LOGGER.warning, units, names)
     if "mass" in groups and "gain" in groups:
         raise InputError(
-            f"{log}: mass and gain: a log tells the ratio of the two alone; must be one of them"
+            f"{log}: mass and gain: a log determines only the ratio of the two; must be one of them"
         )
     parameters = parameters_of(groups, GROUPS_OF_A_LOG, str(log))
     windows, fit = identify_from_log(system, signals, parameters, str(log))

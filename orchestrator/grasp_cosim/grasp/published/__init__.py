@@ -1,1 +1,1 @@
-"""The tables and figures of the paper beside ours, and its claims."""
+"""The tables and figures of the paper next to the simulated ones, and its claims."""

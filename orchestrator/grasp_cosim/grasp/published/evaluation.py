@@ -82,8 +82,9 @@ def evaluate(
         progress: True shows on standard error how far it is.
 
     Returns:
-        A dictionary of `rows`, each a published figure beside ours, `rms` of the differences in s,
-        `claims` of the paper and if they hold, `runs`, the metrics of each grasp, and `units`.
+        A dictionary of `rows`, each a published figure next to the simulated one, `rms` of the
+        differences in s, `claims` of the paper and if they hold, `runs`, the metrics of each grasp,
+        and `units`.
 
     Raises:
         InputError: Before anything runs, `out` cannot be written to, or matplotlib is not installed

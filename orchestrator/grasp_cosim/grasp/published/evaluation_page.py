@@ -61,7 +61,7 @@ INTRODUCTION: Mapping[Source, str] = {
 }
 
 NOTES: Mapping[Source, str] = {
-    "simulation": "A finger touches where its gap is zero. The last column would be ours if "
+    "simulation": "A finger touches where its gap is zero. The last column has the times if "
     "contact were declared at a gap of 0.37 mm, which is fitted to the published times and used "
     "nowhere else; evaluation.csv has those times, too.",
     "experiment": "Contact times are those of the positions and of equal colours, to which the "
@@ -148,7 +148,7 @@ def _claims_html(claims: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _deviations_html(rms: Mapping[str, float]) -> str:
-    """The root mean squares; those of contacts declared at 0.37 mm in a column of their own."""
+    """The root mean squares; those of contacts declared at 0.37 mm in their own column."""
     names = [name for name in rms if not name.endswith(AT_SENSOR_CONTACT)]
     heads = ["root mean square of simulated less published, s", ""]
     suffixes = [""]

@@ -196,7 +196,9 @@ def _run(job: Job) -> GraspRun:
 
 
 def _report_row(figure: PublishedFigure, run: GraspRun, source: Source) -> dict[str, Any]:
-    """The published figure with ours beside it and the difference, simulated less published."""
+    """The published figure with the simulated one next to it and the difference, simulated less
+    published.
+    """
     row = figure._asdict()
     del row["setting"]
     times = {"": run.times}

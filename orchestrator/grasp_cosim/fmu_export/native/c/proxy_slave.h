@@ -103,7 +103,7 @@ static void proxy_put_refusal(const Channel *c, Text *said)
         text_put(said, "the peer is busy with another proxy");
         break;
     case WIRE_UNKNOWN:
-        text_put(said, "the peer does not know this session: it was started anew, or another proxy "
+        text_put(said, "the peer does not know this session: it was started again, or another proxy "
                        "has taken over");
         break;
     case WIRE_OTHER_NAME:
@@ -614,7 +614,7 @@ static void proxy_look_for(Slave *s)
     if (channel_probe(&s->model.channel, proxy_deadline(s, PROXY_TIMEOUT))) {
         s->model.state = BACK;
         text_put(proxy_put_peer(s, slave_say(s)),
-                 ": the peer answers again; it gets no commands before the loop is initialised anew");
+                 ": the peer answers again; it gets no commands before the loop is initialised again");
         slave_log(s, SLAVE_WARNING);
     }
 }
