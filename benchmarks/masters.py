@@ -3,11 +3,10 @@
     grasp-cosim build --native
     python -m benchmarks.masters [--cofmupy-python PYTHON] [--native FOLDER] [--only CASE]
 
-Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, everything
-recorded, on our Python FMUs and our native ones, in chunks, one master after the other. Prints the
-tables of README.md. A master that is not installed is skipped by name; cofmupy pins an FMPy and a
-its own matplotlib, so it may be in its own environment.
-"""
+Runs the loop of four instances and ten connections at 10 kHz with the Jacobi scheme, and records
+everything. The masters take turns in chunks, with our Python FMUs and with our native ones. Prints
+the tables of README.md. A master that is not installed is skipped by name; cofmupy pins an FMPy and
+a matplotlib, so it may be in its own environment."""
 
 import argparse
 import os

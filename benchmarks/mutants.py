@@ -6,8 +6,8 @@ those of the folder that mirrors the package come first, and of these the quicke
 reach a line is known from one run of them all under coverage, which `--reach FOLDER` keeps. A line
 that runs only while its module is imported, or in another process, meets all tests of that folder.
 
-Where a change is inside of functions, a fork of a pytest that has imported all tests and run none
-of them takes the changed code into these functions. Any other change is met by a new pytest.
+A change inside of functions goes into a fork of a pytest that has imported all tests and run none
+of them. Any other change is met by a new pytest.
 
 The output has the mutants that survived, as they would stand in a change, and the score of each
 package. Of a large package a sample is drawn, the same one for the same seed. Type annotations are

@@ -1,11 +1,10 @@
 """What a proxy costs, and how soon it notices that its peer is gone.
 
-Prints the cost of a step of the grasp with its plant here and behind a proxy (lockstep, loopback, a
-peer that serves the Python FMU in its own process); the same with native FMUs, the controller
-behind a proxy, and its peer in C; and for 200 peers killed at seeded moments the time until the
-outputs were at their failsafe values, and the declared time: proxy.timeout for each miss that is
-tolerated, and one step, which waits as long.
-"""
+Prints the cost of a step of the grasp with its plant here and behind a proxy. The proxy is in
+lockstep on the loopback; its peer serves the Python FMU in its own process; the same with native
+FMUs, the controller behind a proxy, and its peer in C; and for 200 peers killed at seeded moments
+the time until the outputs were at their failsafe values, and the declared time: proxy.timeout for
+each miss that is tolerated, and one step, which waits as long."""
 
 import random
 import statistics

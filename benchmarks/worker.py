@@ -3,9 +3,9 @@
     worker.py MASTER FOLDER [CORE]
 
 runs the grasp with the FMUs of FOLDER, on one core if that is given. It answers every number of
-macro steps on standard input with the time they took, in s, and an empty line with the value of
-plant.position[1] reached.
-Masters are in their own processes because their C++ libraries and their pins of FMPy collide.
+macro steps on standard input with the time they took, in s. It answers an empty line with the value
+of plant.position[1]. Masters are in their own processes because their C++ libraries and their pins
+of FMPy collide.
 
 Every master runs the Jacobi scheme, the one they share, and records every output its own way.
 """

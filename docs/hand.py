@@ -3,8 +3,8 @@ docs/three_fingers.svg, two hands of three fingers seen from above; and docs/tan
 on an arm whose wrist stays, and one whose wrist goes to the middle.
 
 CSS moves each part from keyframe to keyframe along what was recorded. So the picture is sharp at
-any size, moves where a page shows it as an image, and stands still, at the end of the grasp, for
-those who want no motion.
+any size, and moves on a page that shows it as an image. It stands still at the end of the grasp for
+readers who want no motion.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

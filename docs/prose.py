@@ -3,11 +3,12 @@
     .venv/bin/python docs/prose.py [FILE ...]     # by default every tracked .md and .py file
 
 Each finding is a line: file, line, rule, and the words. CONTRIBUTING.md explains the rules. vale
-does the same for other languages of markup, but its package fetches a program from a server when it
+does the same for other languages of markup. Its package fetches a program from a server when it
 first runs, and its rules cannot see docstrings of Python as sentences.
 """
 
 import ast
+import inspect
 import io
 import re
 import subprocess
@@ -34,9 +35,6 @@ OUTPUT = ("", "console", "text")
 """Kinds of fenced blocks with the output of commands, whose lines are as they are."""
 
 PROMPT = re.compile(r"\w*\$ ")
-
-HISTORY = ("CHANGELOG.md",)
-"""Pages whose older parts stay as they were written."""
 
 
 class Finding(NamedTuple):
@@ -270,6 +268,32 @@ def comments(source: str) -> Iterator[Passage]:
         yield Passage(first, " ".join(lines))
 
 
+def clauses(docstring: str) -> Iterator[str]:
+    """The clauses of a docstring, without examples, equations and other indented blocks.
+
+    A clause ends at a full stop, a semicolon or a colon; an entry such as "name: text" begins one.
+    """
+    lines = inspect.cleandoc(docstring.partition("Example:\n")[0]).splitlines()
+    plain_lines: list[str] = []
+    in_section = False
+    for line in lines:
+        if SECTION.fullmatch(line):
+            in_section = True
+            plain_lines.append("")
+        elif ENTRY.match(line) and in_section:
+            plain_lines += ["", line.partition(": ")[2]]
+        elif line.startswith("    ") and not in_section:
+            plain_lines.append("")  # an equation, a table or code
+        else:
+            plain_lines.append(line.strip())
+    for paragraph in re.split(r"\n\n+|\n- ", "\n".join(plain_lines)):
+        yield from re.split(r"[.;:] ", " ".join(paragraph.split()))
+
+
+SECTION = re.compile(r"(Args|Returns|Raises|Yields|Attributes):")
+ENTRY = re.compile(r"    \*{0,2}\w+: ")
+
+
 def code_findings(path: Path, source: str) -> Iterator[Finding]:
     """All findings in the docstrings, comments and texts of one module."""
     tree = ast.parse(source)
@@ -281,8 +305,8 @@ def code_findings(path: Path, source: str) -> Iterator[Finding]:
     for passage in [*texts, *comments(source)]:
         yield from wording(path, passage, WORDING)
     for passage in docstrings(tree):
-        for paragraph in re.split(r"\n\s*\n|\n\s*\b\w+:\n|\n\s*- ", passage.text):
-            yield from long_sentences(path, Passage(passage.line, " ".join(paragraph.split())))
+        for clause in clauses(passage.text):
+            yield from long_sentences(path, Passage(passage.line, clause))
 
 
 def findings(path: Path) -> Iterator[Finding]:
@@ -290,16 +314,28 @@ def findings(path: Path) -> Iterator[Finding]:
     text = path.read_text("utf-8")
     name = path.resolve().relative_to(ROOT)
     if path.suffix == ".md":
-        if name.name in HISTORY:
-            text = text.partition("\n## ")[2].partition("\n## ")[0]
         yield from page_findings(name, text)
     else:
         yield from code_findings(name, text)
 
 
+EXEMPT = (":!tests", ":!CHANGELOG.md", ":!docs/prose.py")
+"""Texts that stay as they were written, and the words that this file looks for."""
+
+
 def tracked() -> list[Path]:
     """The pages and the modules that are in the repository, without the tests."""
-    command = ["git", "-C", str(ROOT), "ls-files", "--", "*.md", "*.py", ":!tests"]
+    command = [
+        "git",
+        "-C",
+        str(ROOT),
+        "ls-files",
+        "--",
+        "*.md",
+        "*.py",
+        ":!tests",
+        ":!docs/prose.py",
+    ]
     listed = subprocess.run(command, capture_output=True, text=True, check=True)  # noqa: S603
     return [ROOT / name for name in listed.stdout.splitlines()]
 

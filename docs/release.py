@@ -1,9 +1,9 @@
 """Makes the files of a release in dist/: make dist. The same sources give the same bytes.
 
-The wheel and the sdist, the FMUs in Python and as C for every platform, the grasps as SSP archives,
-the playground, SHA256SUMS, and index.html, which describes each file. zig (in the extra native)
-compiles for all platforms, so that none of it depends on the machine. It takes a few minutes the
-first time, mostly for zig's own libraries of Windows; what is going on is told on the way.
+They are the wheel, the sdist, the FMUs in Python and as C for every platform, and the SSP archives.
+The playground, SHA256SUMS and index.html with a description of each file come with them.
+zig (in the extra native) compiles for all platforms, so that none of it depends on the machine. It
+takes a few minutes the first time, mostly for zig's own libraries of Windows, and shows progress.
 """
 
 import hashlib

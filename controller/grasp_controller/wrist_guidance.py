@@ -28,8 +28,8 @@ SHORTEST_LAG = 0.06
 """s; a faster command gains nothing, as the grip takes 2 s, and follows every error of T."""
 
 STEADY = 3.0
-"""Closing speed over the wrist's from which on both fingers move alike, as far as light and
-positions that are not in time with each other are concerned.
+"""Closing speed over the wrist's from which on both fingers move alike. It allows for light and
+positions that do not agree in time.
 """
 
 FAINT = 4.0

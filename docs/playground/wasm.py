@@ -1,8 +1,8 @@
 """Makes play.wasm.z, which the page carries: the C of our native FMUs, and the loop over them.
 
-It takes the zig that ZIG names, which makes the same bytes on every machine. The file is kept
-next to its sources, so that the page needs no compiler, and it names what it was made from, so that
-it can be told without zig if these are the sources at hand.
+It takes the zig that ZIG names, which makes the same bytes on every machine. The file is kept next
+to its sources, so that the page needs no compiler. It names its sources, so that a test finds
+without zig whether these are the sources at hand.
 """
 
 import re

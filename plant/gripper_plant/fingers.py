@@ -93,9 +93,8 @@ class Side(NamedTuple):
 class Params(Place):
     """Parameters of every plant; a value outside its declared range raises ValueError.
 
-    The paper's gripper and object: fingers 110 mm to either side, an object of 70 mm 30 mm off the
-    middle, so that one finger arrives first unless layer 3 sees to it. It names no friction, no
-    limit.
+    The paper's gripper and object: fingers 110 mm to either side, and an object of 70 mm that is 30
+    mm off the middle. So one finger arrives first without layer 3. It names no friction, no limit.
     """
 
     finger_mass: Annotated[

@@ -14,8 +14,8 @@ class Native(NamedTuple):
     TRANSFER_2: f(instance, references, size, data). TRANSFER_3: the same and, last, how many values
     there are: more than references where some are of arrays.
     STEP_2: f(instance, time, step, 1). STEP_3: f(instance, time, step, 1, &event, &terminate,
-    &early, &last), where flags is the address of three bytes for the first three, last that of a
-    double for the last; no call where the end of the step is not before the time in s at the
+    &early, &last). flags is the address of three bytes for the first three, last that of a double
+    for the last; no call where the end of the step is not before the time in s at the
     address limit. CLOCK: time.monotonic_ns(), less size, goes to data, a double. PACE: wait
     for the beginning of a step; instance is what realtime/pacer.py keeps for it, data its times.
     """

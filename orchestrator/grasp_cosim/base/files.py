@@ -16,8 +16,8 @@ from .errors import InputError
 from .one_piece import in_one_piece, is_stream
 
 CURRENT_FOLDER = threading.RLock()
-"""Held by who changes the current folder for a moment, as FMPy does to load a library, and by who
-asks for it to go back there: all threads have the same one.
+"""Held by code that changes the current folder for a moment, as FMPy does to load a library, and by
+code that goes back there: all threads have the same one.
 """
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -2,8 +2,8 @@
 
 SIGTERM, with which systemd and Docker stop a command, does there what Ctrl-C does.
 
-A KeyboardInterrupt that is raised where nothing can take it, in the callback of a weak reference, a
-`__del__` or a callback from C, is only printed by Python. The command then raises it once more.
+Nothing can take a KeyboardInterrupt in the callback of a weak reference, a `__del__` or a callback
+from C: Python only prints it. The command then raises it once more.
 """
 
 import ctypes

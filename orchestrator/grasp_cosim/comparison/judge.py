@@ -38,8 +38,8 @@ class Judge:
     nominals: Mapping[str, float | None] = field(default_factory=dict)
     """The declared nominal values of signals."""
     required: Collection[str] = ()
-    """A metric of these that is not optional is out of its band where only one run has a value, and
-    so is a signal that is a finite number in one of them only.
+    """A metric of these that is not optional is out of its band if only one run has a value. So is
+    a signal that is a finite number in only one of them.
     """
 
     def signals(self, references: Curves, candidates: Curves) -> list[Compared]:

@@ -1,7 +1,7 @@
 """Swap qualification: whether an FMU may take the place of another in the closed loop.
 
-First what the candidate declares otherwise. Where nothing of that blocks, the closed loop runs with
-the original and with the candidate, and each signal and metric of the two is compared in its band.
+First what the candidate declares otherwise. If nothing of that blocks, the closed loop runs with
+the original and with the candidate. Each signal and metric of the two is compared in its band.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
     E_k = sum of F_held (x_k - x_k-1)  -  sum of 1/2 (F_k + F_k-1) (s_k - s_k-1)
 
-F_held is the input of the component after its step, x its position, F the output of the source and
-s the position the source has received. Positive: energy was created, and the loop is that much less
-damped than its equations; negative: lost. The reasons, the sources and the limits are in
-docs/how_to/sweep.md.
+F_held is the input of the component after its step, and x is its position. F is the output of the
+source, and s is the position that the source has received. Positive: energy was created, and the
+loop is that much less damped than its equations; negative: lost. The reasons, the sources and the
+limits are in docs/explanation/co_simulation.md.
 """
 
 import re
@@ -62,8 +62,8 @@ class Bond:
 def bonds(system: System) -> tuple[Bond, ...]:
     """The bonds of a system, in the order of its components and their inputs.
 
-    A component has one for each connected Real input force[j], or force, in a unit of force that
-    has next to it an output position[j], or position, in a unit of length.
+    A component has one for each connected Real input force[j], or force, in a unit of force. It
+    must also have an output position[j], or position, in a unit of length.
     """
     sources = {connection.target: connection.source for connection in system.connections}
     return tuple(

@@ -16,8 +16,8 @@ from .listener import Floats, Signal, Steps
 class InexactSignals:
     """Checks the recorded signals that are no outputs, and notes once which are inexact.
 
-    That is a whole number of 64 bits which a float64 does not hold exactly, since nothing goes by
-    it, or any number that is not finite.
+    That is any number that is not finite. It is also a whole number of 64 bits which a float64 does
+    not hold exactly and on which nothing depends.
     """
 
     def __init__(self, system: System, observed: Mapping[Port, Signal]) -> None:

@@ -21,9 +21,10 @@ DENSE, MAX_DENSE_EVENTS = 0.01, 1000
 """So many events, each within this part of a communication step after the one before, end a run."""
 
 Update = Callable[[], tuple[bool, bool, bool, bool, bool, float]]
-"""Updates the discrete states once. Whether it wants another update, asks for the end of the
-simulation, has changed nominal values or states, or has named a next event, and the time of that
-in s.
+"""Updates the discrete states once, and returns five answers and a time in s.
+
+They are whether it wants another update, asks for the end of the simulation, or has changed nominal
+values. The last two are whether it has changed states, or named a next event at that time.
 """
 
 Arrive = Callable[[Collection[int]], None]

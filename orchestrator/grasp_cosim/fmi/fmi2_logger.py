@@ -3,8 +3,8 @@
 The logger is called like printf: a format, then arguments. Python cannot define such a function. On
 Linux, with the processors below, the arguments lie where those of a function would that has fixed
 ones: first in registers, of whole numbers and addresses or of doubles, then on the stack. So the
-logger takes as many as these hold and some from the stack, wanted or not, and puts them where C's
-vsnprintf looks for them: in a va_list.
+logger takes as many as these hold and some from the stack, wanted or not. It puts them into the
+places that C's vsnprintf reads: in a va_list.
 """
 
 import ctypes

@@ -1,13 +1,13 @@
 """All that is private in FMPy and used here, or written into its classes, with a reason for each.
 
-A new version of FMPy may change any of it without a word, so pyproject.toml names the last version
-that was tried, and tests/fmi/test_fmpy_private.py says what has changed in the one that is there.
+A new version of FMPy may change any of it without notice. Therefore pyproject.toml names the last
+version that was tried, and tests/fmi/test_fmpy_private.py finds the changes.
 
 - _call and _functions: each call of a function of FMI goes through the former, which looks it up in
   the latter. Only there a warning that a call returns is seen, and a call is traced. FMPy has a
   logger of calls, which rounds nothing either, but is told of a call only after it.
-- _loadFunctions: FMPy takes the functions to load from dir() of an instance, tells the version of
-  FMI by the first letters of the name of its class, and raises where a binary lacks one. So dir()
+- _loadFunctions: FMPy takes the functions to load from dir() of an instance. It finds the version
+  of FMI by the name of its class, and raises where a binary lacks a function. So dir()
   leaves out what is lacking, and the names of the classes here begin as theirs.
 - __signature__ of its methods: it is worked out at each instance, which takes 3 of the 4 ms that
   one takes; so it is written into the methods once.

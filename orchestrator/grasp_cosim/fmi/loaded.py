@@ -1,8 +1,8 @@
 """An instance of an FMU in this process: the parts that FMI 2.0 and 3.0 have in common.
 
 FMPy loads the binary and runs the life cycle. In the loop its wrappers would allocate and convert
-at every call (2.5 us instead of 0.5 us), so the loop calls the FMI functions directly, on buffers
-that are parts of the master's vectors.
+at every call (2.5 us instead of 0.5 us). So the loop calls the FMI functions directly, on parts of
+the master's vectors.
 """
 
 import atexit

@@ -2,9 +2,9 @@
 communication points.
 
 At a communication point inputs may jump, so what was set is handed over in event mode and the
-solver begins again; where nothing changed it goes on. It stops at each event, be it that an
-indicator leaves or enters z > 0, that the FMU has named the time, that a clock ticks, or that it
-wants one after a step of the solver; the discrete states are then iterated until they settle.
+solver begins again; where nothing changed it goes on. It stops at each event: an indicator leaves
+or enters z > 0, the time that the FMU has named comes, or a clock ticks. The FMU may also want an
+event after a step of the solver; the discrete states are then iterated until they settle.
 """
 
 import ctypes

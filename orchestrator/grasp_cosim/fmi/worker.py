@@ -1,7 +1,7 @@
 """The process of a component: python -m grasp_cosim.fmi.worker serves one instance of an FMU.
 
 Its arguments are the descriptors of the connection for commands, of the shared memory, and of a
-pipe that is closed when the master's process ends, whereupon this one ends, too. Commands, and what
+pipe. The pipe is closed when the master's process ends; this one ends then, too. Commands, and what
 comes of them: process.py.
 """
 

@@ -1,8 +1,8 @@
 """Builds FMUs, those that Python runs and native ones, and brings folders of them up to date.
 
-What was built of the blocks that come with the package is kept in the user's cache, under a key
-made of all that decides it: the sources, and of native FMUs the platforms, compilers and flags. A
-folder is brought up to date by copying what differs, and that takes no import of what builds.
+The FMUs of the blocks that come with the package are kept in the user's cache, under a key made of
+all that decides them: the sources, and of native FMUs the platforms, compilers and flags. A folder
+is brought up to date by copying what differs, and that takes no import of what builds.
 """
 
 from __future__ import annotations

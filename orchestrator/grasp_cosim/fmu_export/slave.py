@@ -378,7 +378,7 @@ class Maker:
 def offer(block: Any, module: dict[str, Any]) -> None:
     """Called by the script of an FMU: have pythonfmu find a Maker in the names of its module.
 
-    Two faults upstream are in `findClass` in PySlaveInstance.cpp, which imports the script, runs it
+    Two faults upstream are in `findClass` in PySlaveInstance.cpp. It imports the script, runs it
     again at every instantiation, and looks at the bases of all classes that this makes. It is in
     0.6.4 to 0.7.0, the newest, and not in 0.6.3.
 
@@ -405,11 +405,11 @@ The files may be gone at the end; the system then knows a library that is loaded
 def let_go() -> None:
     """Have pythonfmu's binaries let go of Python while they can.
 
-    The fault upstream: `finalizePythonInterpreter` in PySlaveInstance.cpp is called by the
-    destructor of the library, and sets a static `shared_ptr` that may have been destroyed by then,
-    as the process ends. It shows as a crash at the end of a host that did not unload the FMU. The
-    function is in 0.6.4 to 0.7.0, the newest, and not in 0.6.3. To find out whether this may go
-    with a later version, have this function do nothing, and run tests/fmus/test_hard_times.py.
+    The fault upstream: The destructor of the library calls `finalizePythonInterpreter` in
+    PySlaveInstance.cpp. It sets a static `shared_ptr` that may have been destroyed by then, as the
+    process ends. It shows as a crash at the end of a host that did not unload the FMU. The function
+    is in 0.6.4 to 0.7.0, the newest, and not in 0.6.3. To find out whether this may go with a later
+    version, have this function do nothing, and run tests/fmus/test_hard_times.py.
     """
     for binary in _binaries:
         if hasattr(os, "RTLD_NOLOAD"):  # on Windows there is no need

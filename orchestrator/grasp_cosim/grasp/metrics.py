@@ -371,8 +371,8 @@ def touching(signals: Signals, finger: int) -> Flags:
 def first_contact(signals: Signals, finger: int) -> FirstContact | None:
     """First contact of a finger; None if it never touches. Most metrics ask for it.
 
-    Between the last free communication point and the first one in contact, the moment is where
-    the gap runs out at the rate of the last free point. Without a gap it is the first point in
+    Between the last free communication point and the first one in contact, the gap runs out at the
+    rate of the last free point. Without a gap it is the first point in
     contact: late by a step at most, but recorded, as are all later contacts.
     """
     key = first_contact, finger

@@ -1,7 +1,7 @@
 """A nasty network: what becomes of each datagram in either direction.
 
-The fate of a datagram is a pure function of seed, direction and number, so the same seed gives the
-same fates on every machine, however fast the datagrams come.
+The fate of a datagram is a pure function of seed, direction and number. So the same seed gives the
+same fates on every machine, at any rate of the datagrams.
 """
 
 import hashlib

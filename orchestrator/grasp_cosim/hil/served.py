@@ -48,8 +48,8 @@ class Service:
 
 
 COUNTS = ("sessions", "own_steps", "skipped", "watchdog", "failures")
-"""The events that the peer of the protocol does not count: steps by the own clock, those that it
-left out, being too late, how often the inputs were put to their failsafe values, and what failed.
+"""The events that the peer of the protocol does not count: steps by the own clock, steps that were
+left out as late, changes of the inputs to their failsafe values, and failures.
 """
 
 DROPPED = {

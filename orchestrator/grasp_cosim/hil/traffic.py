@@ -18,8 +18,9 @@ class Counters:
     """One direction, exact at any time: received + duplicated = delivered + dropped + held.
 
     Copies are delivered, too; reordered is what is delivered after a later one, corrupted what is
-    delivered with another bit; lost or in an outage what does not get through, overflow what finds
-    MAX_HELD under way, unsent what this machine refuses to send, held what is still under way.
+    delivered with another bit; lost or in an outage are those that do not get through; overflow
+    those that find MAX_HELD under way; unsent those that this machine refuses to send; held those
+    still under way.
     """
 
     received: int = 0

@@ -67,7 +67,7 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 class Draft:
     """The tables of a component with a foreign FMU, as far as they are filled in.
 
-    `matches` are its variables by the system's names, `old` the interface of the FMU that the
+    `matches` are its variables by the system's names. `old` is the interface of the FMU that the
     component had, `foreign` that of the foreign one under the same names. `unit_todos` say of
     variables, by name, that the user has to give their unit.
     """

@@ -20,8 +20,7 @@ def expanded(interface: Interface, lengths: Mapping[str, Value | None]) -> Inter
     """An interface of arrays with elements in the place of arrays of numbers.
 
     lengths are values of the variables of sized_by; where one is None, its start counts. An array
-    is left as it is where it would be too many elements, or where the FMU has a variable by the
-    name of one.
+    is left as it is if it has too many elements, or if a variable has the name of an element.
     """
     known = {n: v for n, v in lengths.items() if isinstance(v, int) and v >= 0}
     return interface.variant(("sizes", *known.items()), lambda: _expanded(interface, known))

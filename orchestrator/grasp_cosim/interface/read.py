@@ -459,7 +459,7 @@ class _Reader:
         return values
 
     def initial(self, element: Element, causality: str, variability: str) -> str | None:
-        """How the value at the start comes about, by the tables of the standard where it is not
+        """How the value at the start comes about. The tables of the standard decide if it is not
         declared (2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0); None where these have none.
         """
         declared = element.get("initial")

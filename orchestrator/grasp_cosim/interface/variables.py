@@ -84,10 +84,10 @@ class Variable:
     same in initialisation mode. shape is () but for an array, and sizes then names by dimension the
     variable that holds its length, None where that is fixed. element is its place in an array that
     was taken apart. relative says that it is a difference, to which the offset of a unit does not
-    apply. enumeration is the type of an Enumeration. alias says that it is another name of a
-    variable that comes before, infinite that inf is a value of it, as of a distance to nothing.
-    clock is there for a Clock, and clocks are the references of those with which the variable
-    changes, where that is declared.
+    apply. enumeration is the type of an Enumeration. alias marks another name of a variable that
+    comes before, infinite a variable that may be inf, as a distance to nothing. clock is there for
+    a Clock, and clocks are the references of those with which the variable changes, where that is
+    declared.
     """
 
     name: str

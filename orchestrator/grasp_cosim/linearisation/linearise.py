@@ -1,7 +1,7 @@
 """A system as the linear model of one macro step, by finite differences over saved states.
 
-Each state and each input of the step is moved a little either way, the step is done, and what has
-changed at its end is a column of the model.
+Each state and each input of the step is moved a little either way, and the step is done. The change
+at its end is a column of the model.
 """
 
 from __future__ import annotations
@@ -46,8 +46,9 @@ def linearise(
         inputs: Names like "plant.force[1]". An input without a connection, or a tunable parameter,
             is moved as it is. At an input with a connection the loop is opened.
         outputs: Names of outputs; None for all of the components. y[k] is what the run has at point
-            k. At an input where the loop is opened, and of the output that is connected to it, y[k]
-            is what the connection would bring in step k: with u = y the loop is closed again.
+            k. At an input where the loop is opened, y[k] is the value that the connection would
+            bring in step k. The same holds for the output that is connected to it: with u = y the
+            loop is closed again.
         step: The communication step in s, in place of that of the system.
         scheme: "sequential" or "jacobi", in place of that of the system.
 

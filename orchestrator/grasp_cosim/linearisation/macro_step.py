@@ -1,7 +1,7 @@
 """A macro step of a session as a function of its states and inputs, and its derivatives.
 
-The states of a macro step are those of the FMUs, and the signals that the master holds for a
-component that steps before their source.
+The states of a macro step are those of the FMUs, and signals that the master holds for a component.
+These are of components that step before their source.
 """
 
 from __future__ import annotations

@@ -75,10 +75,10 @@ class _Shared(ctypes.Structure):
 class CompiledLoop:
     """The compiled loop over a plan.
 
-    only says that it makes no call of Python at all. It then may run while another thread looks
-    at shared.done, the number of the steps whose rows are there, sets shared.taken once it does
-    not need the rows of so many any more, or sets shared.halt. shared.ended is the wall time in ns
-    at which the last step ended.
+    only says that it makes no call of Python at all. It then may run while another thread looks at
+    shared.done, the number of the steps whose rows are there. The thread sets shared.taken to give
+    rows back, or sets shared.halt. shared.ended is the wall time in ns at which the last step
+    ended.
     """
 
     def __init__(self, plan: Plan) -> None:

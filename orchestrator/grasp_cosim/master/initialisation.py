@@ -1,7 +1,7 @@
 """Values at t = 0: passed on along the dependencies, algebraic loops found and solved.
 
-The ports and what depends on what make a graph. Where it has a loop, the loop is cut at the input
-it is entered by, and the values of the inputs that were cut are found by Newton's method.
+The ports and what depends on what make a graph. A loop is cut at the input by which it is entered.
+The values of the inputs that were cut are found by Newton's method.
 
 What a proxy puts out was measured: it is taken once its inputs are set, and held until the first
 step. A loop through one is cut there.
@@ -85,8 +85,8 @@ def _measured_in_loops(
 def cut_loops(graph: dict[Port, list[Port]], inputs: Container[Port]) -> list[tuple[Port, ...]]:
     """Cut the loops of a graph: the inputs at which they are cut depend on nothing any more.
 
-    A depth-first search follows the values. Where it comes back to a port of its path, it notes the
-    loop, cuts it at its first input and goes on from before that: many loops take one search.
+    A depth-first search follows the values. If it comes back to a port of its path, it notes the
+    loop, cuts it at its first input and continues from before that: many loops take one search.
     """
     users: dict[Port, list[Port]] = {port: [] for port in graph}
     for port, needed in graph.items():
@@ -194,7 +194,7 @@ class Propagation:
                     f"only loops of Real values can be iterated; {ADVICE}"
                 )
         count, residual = self._solve(choice)
-        # Other values may solve a loop that its start values solve: the note tells that these stay.
+        # Other values may solve a loop that its start values solve: a note reports these.
         solution = f"solved in {counted(count, 'iteration')}"
         if not count:
             solution = "its start values solve it and are kept"

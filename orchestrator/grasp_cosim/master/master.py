@@ -1,7 +1,7 @@
 """The fixed-step master: initialise, then run the loop in chunks and hand its rows on.
 
-Stepping is here; a run by the clock is in paced.py, the start in start.py, a step that an FMU
-rejects or has events in in step_completion.py, where a run ends in end.py.
+Stepping is here; a run by the clock is in paced.py, the start in start.py, the end in end.py; a
+step that an FMU rejects or has events in is in step_completion.py.
 
 The schemes, components with a longer step and time are in docs/reference/system_file.md.
 """

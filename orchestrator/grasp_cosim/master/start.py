@@ -159,7 +159,7 @@ class Starter:
 def told_stop(system: System, component: Component) -> float:
     """The stop time in s that a component is told: no step that is asked of it ends later.
 
-    An FMU finds the end of a step as the sum of its begin and its length, two floats, which may
+    An FMU finds the end of a step as the sum of its begin and its length. The sum of two floats may
     round to more than the stop time: 0.2 + 0.1 > 0.3. Then it is told that sum, a few units in the
     last place later, so that its last step has the length of all others.
     """

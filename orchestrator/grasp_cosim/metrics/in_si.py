@@ -28,8 +28,8 @@ class InSi(NamedTuple):
 def in_si(system: Structure, metrics: Iterable[Metric]) -> InSi:
     """How `metrics` get the signals of a system.
 
-    InputError where a signal that one of those interprets which the system permits is of another
-    quantity than it expects, or its unit is not defined. Signals without any unit are in SI.
+    InputError if a signal that one of the permitted metrics interprets is of another quantity than
+    expected, or its unit is not defined. Signals without any unit are in SI.
     """
     chosen, of_system = tuple(metrics), system.once(taps)
     observed: dict[str, Variable | Tap] = {str(port): v for port, v in system.observed.items()}

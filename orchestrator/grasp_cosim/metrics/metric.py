@@ -140,7 +140,7 @@ class Metric:
 
     Args:
         name: An identifier, the name of its column.
-        function: Gets the Signals of a run, in SI base units, and returns a number, True or False,
+        function: Gets the Signals of a run, in SI base units. It returns a number, True or False,
             None where the moment never comes, or a list of these.
         unit: The unit of the value, an SI one; "1" for a share, None for true or false.
         description: What it is, in a line.

@@ -104,8 +104,8 @@ class Pacer:
         halted: Callable[[], bool] = lambda: False,
         clock: tuple[Callable[[], int], Callable[[float], None]] | None = None,
     ) -> None:
-        """InputError as of Realtime.period() and Meter, where there is no such CPU, or where steps
-        would be caught up with although a component is a proxy.
+        """InputError as of Realtime.period() and Meter, or if there is no such CPU. Another is that
+        steps would be caught up with although a component is a proxy.
         """
         processors = os.cpu_count() or 1  # None where that is not known
         last_cpu = max(processors - 1, *cpus(), 0)

@@ -61,11 +61,11 @@ SPREAD_KEYS = ("median", "p99", "p99.9", "worst", "worst_at")
 class Timing:
     """The timing of a run: how well it kept to the clock.
 
-    factor is what was asked for, real_time_factor what came of it. overruns and culprits, by
-    name, count all of them; listed are the first ones. parts and histograms are by name: step (the
-    time it computes), start (how late it begins), each component, exchange (the rest of the step),
-    recording (handing rows on), between (what else is between two steps: the loop, the progress,
-    the caller of Session.step). A part that never happened is in neither.
+    factor is what was asked for, real_time_factor what came of it. overruns and culprits, by name,
+    count all of them; listed are the first ones. parts and histograms are by name: step (the time
+    it computes), start (how late it begins), each component, exchange (the rest of the step) and
+    recording (handing rows on). The last one is between, the rest between two steps: the loop, the
+    progress, the caller of Session.step. A part that never happened is in neither.
     """
 
     factor: float

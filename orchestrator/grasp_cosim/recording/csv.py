@@ -23,7 +23,7 @@ class CsvListener:
 
     The file has a temporary name next to path until the run ends, in whatever way: what was
     recorded is kept, in whole lines. There is no file where nothing was. A Real is the shortest
-    text that reads back as the same number, a Boolean is 0 or 1, names and Strings are quoted texts
+    text that reads back as the same number. A Boolean is 0 or 1. Names and Strings are quoted texts
     as base.text.to_cell() makes them.
     """
 

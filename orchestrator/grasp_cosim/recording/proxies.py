@@ -35,9 +35,9 @@ def of_proxies(names: Iterable[object]) -> frozenset[str]:
 def proxy_figures(time: Times, signals: Signals) -> dict[str, dict[str, Any]]:
     """The figures of each proxy of which all diagnostics are there: counts in all, times in s.
 
-    lost and back are the communication points at which the peer was lost, and answered again;
-    ahead is how far its outputs were from the future at most, lead by how much an answer in time
-    was ahead of its step, or behind.
+    lost and back are the communication points at which the peer was lost, and answered again; ahead
+    is the most that its outputs were from the future. lead is the most that an answer in time was
+    ahead of its step, or behind.
     """
     names = [
         name

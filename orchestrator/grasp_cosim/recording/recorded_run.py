@@ -227,8 +227,8 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     def metrics(self) -> Figures:
         """The metrics by name, then the figures of UNITS, then those of any proxies.
 
-        A metric is a number in its unit in `metric_units`, True or False, None where it has no
-        value, or a list of these, one for each finger, say.
+        A metric is a number in its unit in `metric_units`, True or False, or None where it has no
+        value. It may be a list of these, one for each finger for example.
 
         Raises:
             InputError: The function of a metric fails.
@@ -288,11 +288,10 @@ class RecordedRun(ByName[npt.NDArray[Any]]):
     def to_json(self, path: str | Path) -> None:
         """Write what is known of the run next to its signals as JSON: the run.json of its folder.
 
-        These are the figures of the run and its settings, as "measured" the metrics, how many rows
-        there are, what is known by signal (units, conversions to SI, types, descriptions), the
-        units of the metrics, the log, the rejections by component, the timing of a paced run, and
-        its origin. A metric that fails is a line among the missing ones: the rest of the run is
-        kept.
+        These are the figures and the settings of the run, the metrics as "measured", and the number
+        of rows; units, conversions to SI, types and descriptions by signal; the units of the
+        metrics, the log, the rejections by component, the timing of a paced run, and its origin. A
+        metric that fails is a line among the missing ones: the rest of the run is kept.
 
         Args:
             path: The file.

@@ -1,10 +1,9 @@
 """The annotations of an archive: ours, and those in which other tools keep the step.
 
 Ours has all that SSP 1.0 has no form for, so that our run is the same: the communication step, the
-scheme, the components' own steps, processes, renamed variables and units, the initialisation,
-events, faults, roles, presets, stimuli, what is recorded and the pacing. Where it is, the elements
-are in the order of execution. Its content is JSON: the dataclasses of the system as objects, a port
-as a string.
+scheme, own steps, processes, renamed variables and units; the initialisation, events, faults,
+roles, presets, stimuli, recorded signals and the pacing. Where it is, the elements are in the order
+of execution. Its content is JSON: the dataclasses of the system as objects, a port as a string.
 
 Those of others are read, and written for them to run our archives. OSP (libcosim):
 com.opensimulationplatform in the default experiment, and a hint on components with a step of their

@@ -150,7 +150,7 @@ def linear(element: Any) -> tuple[float, float]:
 
 
 def _by_name(parts: Iterable[Part], twice: str) -> dict[str, Part]:
-    """The parts by their names; InputError, in which `twice` is said of them, if two are alike."""
+    """The parts by their names; InputError, in which `twice` names them, if two are alike."""
     by_name: dict[str, Part] = {}
     for part in parts:
         if part.name in by_name:

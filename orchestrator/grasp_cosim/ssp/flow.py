@@ -14,7 +14,7 @@ def flow_order(
 ) -> tuple[Component, ...]:
     """The components such that who gives goes before who takes; within a loop, and else, as given.
 
-    The elements of an SSD are in no order of execution, often sorted by name, and a sequential
+    The elements of an SSD are in no order of execution, and often sorted by name. A sequential
     scheme against the flow delays a value by a step. Inside a loop no order is better than that of
     the file.
     """

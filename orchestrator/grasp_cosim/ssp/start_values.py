@@ -1,15 +1,15 @@
 """Start values: parameter sets (SSV), mapped (SSM) and bound to a system or component.
 
-As the standard has it: names in the sets are those of variables, after those of the elements they
-are in and a dot, or those of connectors of a system, from which the value follows the connections.
-With a mapping only what is mapped is applied. Later bindings go before earlier ones, those of an
-outer system before those of an inner one. What fits nothing is not applied, and said; so is a value
-for what an FMU calculates itself, or for a constant.
+As the standard has it: names in the sets are those of variables, behind a dot after those of their
+elements; or those of connectors of a system, from which the value follows the connections. With a
+mapping only what is mapped is applied. Later bindings go before earlier ones, those of an outer
+system before those of an inner one. What fits nothing is not applied, and said; so is a value for
+what an FMU calculates itself, or for a constant.
 
-A connection that brings a value goes before all bindings at where it leads to. SSP 1.0.1 says that
-bindings set start values (5.2.3, ParameterBindings), and that of the data flow along connections
-there must be one source at most (5.3.2, Connections): it ranks bindings among each other only, and
-a connector has the value of what it is connected to. OMSimulator does the same.
+A connection that brings a value goes before all bindings at where it leads to. By SSP 1.0.1
+bindings set start values (5.2.3, ParameterBindings). The data flow along connections has one source
+at most (5.3.2, Connections): it ranks bindings among each other only, and a connector has the value
+of what it is connected to. OMSimulator does the same.
 
 A value is converted to the unit of its target, then transformed, as on a connection. Types must be
 the same, but a whole number may be given to a Real, and an enumeration by number.

@@ -1,8 +1,8 @@
 """A seed for everything random in each run of a sweep.
 
 The seed of run i at the k-th place, both counted from 0, is the first word of NumPy's
-SeedSequence((s, i, k)) modulo a milliard, where s is the seed that the system has there. So it
-is the same on any machine, in any order of the runs, and no two places share their noise.
+SeedSequence((s, i, k)) modulo a milliard. s is the seed of the system there. So it is the same on
+any machine, in any order of the runs, and no two places share their noise.
 """
 
 from __future__ import annotations

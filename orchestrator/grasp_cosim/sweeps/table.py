@@ -62,8 +62,9 @@ class Outcome:
 class Table:
     """The table of a sweep: columns of equal length by name, a row for each run, in order.
 
-    Next to what varied and what came out there are the columns `index`, `error`, one line where a
-    run failed, and ENDED_AT, the time in s where an FMU ended a run before its stop time.
+    In addition to the varied values and the metrics there are the columns `index`, `error`, and
+    ENDED_AT. `error` is one line of a run that failed; ENDED_AT is the time in s at which an FMU
+    ended a run before its stop time.
     """
 
     columns: Mapping[str, Sequence[Any]] = field(hash=False)

@@ -169,9 +169,9 @@ def with_old_values(
     """The new component, which has another FMU, with the values of the old one; and notes.
 
     The values are in the units of the new FMU. Those of overridden variables or arrays are not
-    looked at: they get others. A value of a variable that the new FMU lacks is left out, as a
-    note states, as does one where the new FMU has other start values. InputError where a value, or
-    another number that the system states, has no meaning in the new unit.
+    looked at: they get others. A value of a variable that the new FMU lacks is left out with a
+    note. So is one where the new FMU has other start values. InputError where a value, or another
+    number that the system states, has no meaning in the new unit.
     """
     old_fmu, new_fmu = old.interface, new.interface
     _check_ends(system, old, new_fmu, place)

@@ -1,8 +1,8 @@
 """The inputs and outputs of a system itself: what is given to them, and what they show.
 
-An archive has them: Alt is an output of the system, aircraft.Alt that of a component behind it.
-What is given to an input of the system, as a value or as a column of a file, goes to each variable
-behind it, in the unit of that.
+An archive has them: Alt is an output of the system, aircraft.Alt that of a component behind it. A
+value for an input of the system, or a column of a file, goes to each variable behind it. It is in
+the unit of that variable.
 """
 
 from __future__ import annotations

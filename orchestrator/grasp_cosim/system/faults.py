@@ -2,11 +2,11 @@
 
 FAULTS is the one table of them; what a kind makes of a value: docs/reference/system_file.md.
 
-At run time a fault gets each value that its connection passes, units converted, with the number of
-the base step in which it does so, INITIAL in initialisation mode, and whether the fault acts in it.
-Step numbers never fall. Within a step it may be asked several times, as initialisation and
-iteration do: only what came last counts for later steps, so that the same value at the same step
-number always has the same result.
+At run time a fault gets each value that its connection passes, with units converted. It also gets
+the number of the base step, INITIAL in initialisation mode, and whether the fault acts in it. Step
+numbers never fall. Within a step it may be asked several times, as initialisation and iteration do:
+only what came last counts for later steps, so that the same value at the same step number always
+has the same result.
 
 It never raises, since a compiled loop could not pass that on: what is not finite goes through and
 is found where it is recorded.

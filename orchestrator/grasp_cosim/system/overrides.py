@@ -1,8 +1,8 @@
 """Overrides: values that change a system, each by its place in a system file.
 
 A text of the command line, a Python value, an entry of a file and a cell of a sweep all become an
-Override once, with the origin for messages. grouped() reads their places against
-a system; what they make of it: entries.py for the sections, changes.py for a component.
+Override once. It keeps the origin for messages. grouped() reads their places against a system; what
+they make of it: entries.py for the sections, changes.py for a component.
 """
 
 from __future__ import annotations

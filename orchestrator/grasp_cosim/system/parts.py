@@ -68,8 +68,8 @@ class Solver:
     An FMU that is only for co-simulation has its own solver, which gets relative_tolerance.
 
     The local error of a state in a step of the solver is below relative_tolerance times the state
-    plus absolute_tolerance times its nominal value, by default a hundredth of the former.
-    maximum_step is in s; no step of the solver goes beyond a communication point.
+    plus absolute_tolerance times its nominal value. absolute_tolerance is a hundredth of the former
+    by default. maximum_step is in s; no step of the solver goes beyond a communication point.
     """
 
     relative_tolerance: float = 1e-10

@@ -1,5 +1,5 @@
-"""The settings of a run as plain data, for run.json and the header of an MDF file, and what of them
-was changed since the system was read.
+"""The settings of a run as plain data, for run.json and the header of an MDF file. The changes
+since the system was read are among them.
 """
 
 from collections.abc import Mapping

@@ -56,9 +56,9 @@ class Structure:
     name plays it. presets are values under a name, like {"bench": {"sensor_1.noise.seed": 1}}.
     input drives inputs without a connection, and tunable parameters. metrics are names of groups of
     ours. record says what is recorded. inputs and outputs are those of the system itself, which an
-    archive may have, by name. limits are conditions that must not hold, and verdict is what such a
-    run, or one with a bench or in real time, may come to. as_read is settings.summary() when it was
-    read. steered says that a session has it, which may set any input without a source.
+    archive may have, by name. limits are conditions that must not hold. verdict has the limits of a
+    run with limits, with a bench or in real time. as_read is settings.summary() when it was read.
+    steered says that a session has it, which may set any input without a source.
     """
 
     name: str

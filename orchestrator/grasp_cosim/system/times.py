@@ -1,8 +1,8 @@
 """Times: exact, from the file to the loop.
 
-A time is a number of nanoseconds: a whole one, or a fraction where a step is 1/30 s or 1/1024 s.
-So every float of seconds that a file, an FMU or a run.json holds means one time, and the nearest
-float of that time is what it was. A run counts in whole numbers only: see TimeGrid.
+A time is a number of nanoseconds: a whole one, or a fraction where a step is 1/30 s or 1/1024 s. So
+every float of seconds in a file, an FMU or a run.json means one time. The nearest float of that
+time is the original. A run counts in whole numbers only: see TimeGrid.
 """
 
 from __future__ import annotations

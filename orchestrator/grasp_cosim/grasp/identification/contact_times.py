@@ -1,7 +1,7 @@
 """Friction from contact times: grasps with the sensors ideal, as the fit has them.
 
 The grasps run through the FMUs at STEP. With the sensors' electronics off, a contact time at STEP
-is within 2 ms of that at 0.1 ms, a hundredth of what the published times scatter by; the
+is within 2 ms of that at 0.1 ms. This is a hundredth of the scatter of the published times; the
 reflectances matter by their ratio only, so that surfaces of equal colours are one grasp.
 """
 

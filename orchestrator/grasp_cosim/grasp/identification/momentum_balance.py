@@ -7,10 +7,10 @@ length T
     F(v) = F_C + (F_S - F_C)·exp(-(v/v_s)^2) + B·v
 
 is zero but for noise, in N. No signal is differentiated: noise of the velocity enters by its two
-ends over T. Only where a log has no velocity is it that of the position, by the slope of a parabola
-through SLOPE_WINDOW of its samples around each (Savitzky and Golay 1964), which shifts nothing in
-time. A window counts where the finger moves one way throughout, nothing touches it and no sample is
-missing; none belongs to two windows, so that white noise leaves them independent.
+ends over T. If a log has no velocity, it is the slope of a parabola through SLOPE_WINDOW samples of
+the position around each. This shifts nothing in time (Savitzky and Golay 1964). A window counts
+where the finger moves one way throughout, nothing touches it and no sample is missing; none belongs
+to two windows, so that white noise leaves them independent.
 """
 
 from __future__ import annotations
@@ -89,9 +89,9 @@ def identify_from_log(
 ) -> tuple[list[Windows], Fit]:
     """Fit friction to a log; what is not fitted is as in the system, whose masses count.
 
-    The residuals are those of the windows in their order, of the right finger first.
-    InputError, naming the place, where a signal is missing or has what is no number, the time does
-    not grow, or a finger does not move freely.
+    The residuals are those of the windows in their order, of the right finger first. InputError
+    with the place if a signal is missing or has a cell that is no number. Other reasons are a time
+    that does not grow, and a finger that does not move freely.
     """
     # What was commanded before the log began is not known: such windows do not count.
     max_delay = max((p.high for p in parameters if p.name == DELAY), default=0.0)

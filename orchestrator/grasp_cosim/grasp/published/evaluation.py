@@ -82,9 +82,9 @@ def evaluate(
         progress: True shows on standard error how far it is.
 
     Returns:
-        A dictionary of `rows`, each a published figure next to the simulated one, `rms` of the
-        differences in s, `claims` of the paper and if they hold, `runs`, the metrics of each grasp,
-        and `units`.
+        A dictionary with `rows`, each a published figure next to the simulated one, and `rms` of
+        the differences in s. `claims` tells which claims hold, `runs` has the metrics of each
+        grasp, `units` the units.
 
     Raises:
         InputError: Before anything runs, `out` cannot be written to, or matplotlib is not installed
