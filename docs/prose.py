@@ -181,6 +181,21 @@ def undefined_abbreviations(path: Path, tokens: Sequence[Token]) -> Iterator[Fin
                 yield Finding(path, token.map[0] + 1, rule, word)
 
 
+def inactive_commands(path: Path, tokens: Sequence[Token], text: str) -> Iterator[Finding]:
+    """The first command of a page that does not name the environment to activate."""
+    if ACTIVATE in text:
+        return
+    for token in tokens:
+        is_code = token.type in ("fence", "code_block")
+        if is_code and token.map and COMMAND.search(token.content):
+            yield Finding(path, token.map[0] + 1, f"name `{ACTIVATE}` once on the page", "")
+            return
+
+
+ACTIVATE = "source .venv/bin/activate"
+COMMAND = re.compile(r"^(?:\w*\$ )?grasp-cosim (?!\d)", re.MULTILINE)
+
+
 def plain(token: Token) -> str:
     """The text of an inline token without pictures; code keeps its backticks."""
     parts = []
@@ -204,6 +219,7 @@ def page_findings(path: Path, text: str) -> Iterator[Finding]:
     """All findings on one page of Markdown."""
     tokens = MARKDOWN.parse(VARIABLE_TABLES.sub(lambda tables: "\n" * tables[0].count("\n"), text))
     yield from undefined_abbreviations(path, tokens)
+    yield from inactive_commands(path, tokens, text)
     line, in_list = 1, 0
     for before, token in pairwise([Token("", "", 0), *tokens]):
         line = token.map[0] + 1 if token.map else line

@@ -226,6 +226,7 @@ def settings() -> Mapping[str, Any]:
         "myst_enable_extensions": ["dollarmath"],
         "myst_fence_as_directive": ["math"],
         "myst_heading_anchors": 5,
+        "suppress_warnings": ["myst.header"],  # equation sheets go from level 1 to 3
         "html_math_renderer": "mathml",
         "default_role": "code",
         "smartquotes": False,

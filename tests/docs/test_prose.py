@@ -21,7 +21,7 @@ def rules(text):
         "What does a step cost? Section 3 gives the numbers.\n",
         "- **step**: the communication step.\n",
         "The sensor sends over the Controller Area Network (CAN). CAN is a bus.\n",
-        "```console\n$ grasp-cosim run\n```\n",
+        "Run `source .venv/bin/activate`.\n\n```console\n$ grasp-cosim run\n```\n",
         "<!-- variables -->\nGenerated; from the code.\n<!-- end of variables -->\n",
     ],
 )
@@ -48,6 +48,7 @@ def test_plain_english_passes(text):
         ("**Isolation.** An FMU runs in a process.", "make the bold words a heading"),
         ("| word | is |\n|---|---|\n| a | b |\n", "name the column by a noun"),
         ("The sensor sends over CAN.", "explain the abbreviation"),
+        ("    grasp-cosim run\n", "name `source .venv/bin/activate` once"),
         (f"    {'x' * 81}\n", "81 columns of code, at most 80"),
     ],
 )
