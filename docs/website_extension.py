@@ -76,7 +76,8 @@ def words_of(glossary: nodes.document) -> dict[str, str]:
     for section in glossary.findall(nodes.section):
         if "the-code" in section["ids"]:
             continue
-        for row in section.findall(nodes.row):
+        tables = [child for child in section.children if isinstance(child, nodes.table)]
+        for row in (row for table in tables for row in table.findall(nodes.row)):
             cell = next(row.findall(nodes.entry), None)
             if cell is None or row.parent is None or isinstance(row.parent, nodes.thead):
                 continue
