@@ -14,6 +14,7 @@ LESSONS = [
     "docs/how_to/metric.md",
     "docs/how_to/events_and_faults.md",
     "docs/how_to/python_system.md",
+    "docs/explanation/co_simulation.md",
     "docs/results/accuracy.md",
 ]
 
