@@ -73,19 +73,20 @@ def words_of(glossary: nodes.document) -> dict[str, str]:
     The code has words with a meaning among its authors: that section is left out.
     """
     anchors: dict[str, str] = {}
-    for section in glossary.findall(nodes.section):
-        if "the-code" in section["ids"]:
+    of_code = {
+        id(row)
+        for section in glossary.findall(nodes.section)
+        if "the-code" in section["ids"]
+        for row in section.findall(nodes.row)
+    }
+    for row in glossary.findall(nodes.row):
+        if isinstance(row.parent, nodes.thead) or id(row) in of_code:
             continue
-        tables = [child for child in section.children if isinstance(child, nodes.table)]
-        for row in (row for table in tables for row in table.findall(nodes.row)):
-            cell = next(row.findall(nodes.entry), None)
-            if cell is None or row.parent is None or isinstance(row.parent, nodes.thead):
-                continue
-            words = [word.strip() for word in cell.astext().split(",")]
-            anchor = f"word-{nodes.make_id(words[0])}"
-            if cell.children and anchor not in cell.children[0]["ids"]:
-                cell.children[0].insert(0, nodes.target("", "", ids=[anchor]))
-            anchors |= dict.fromkeys(words, anchor)
+        cell: Any = next(row.findall(nodes.entry))
+        words = [word.strip() for word in cell.astext().split(",")]
+        anchor = f"word-{nodes.make_id(words[0])}"
+        cell.children[0]["ids"].append(anchor)
+        anchors |= dict.fromkeys(words, anchor)
     return anchors
 
 
