@@ -13,7 +13,7 @@ run --step 7e-4 :: does not divide stop = 3 s; stop could be 3.0002 s
 run --stop 1e9 :: do not fit into memory; must have a longer step
 run --case 3 :: 3 is not in the range 0<=x<=2
 run --scheme euler :: 'euler' is not one of 'sequential', 'jacobi'
-run --set plant.object_width :: --set 'plant.object_width': must be PLACE=VALUE
+run --set plant.object_width :: --set 'plant.object_width': must be KEY=VALUE
 run --set plant.object_width=0.5 :: object_width = 0.5 m
 run --set plant.finger_mass[1]=-0.5 :: '-0.5': must be a finite number from 0.001 to 1000 kg
 run --set plant.mass=1 :: no input, parameter or initial value 'mass'; did you mean finger_mass[1]
@@ -74,7 +74,7 @@ qualify plant.fmu --as hand :: --as hand: no component 'hand'; valid: plant, se
 qualify plant.fmu --as plant --set components.plant.rename.a=b :: 'a' = 'b': plant.fmu has
 qualify plant.fmu --as plant --bands no.toml :: no.toml: no such file of bands
 sweep :: needs --vary or --table, one of them
-sweep --vary plant.object_width :: --vary 'plant.object_width': must be PLACE=START:END
+sweep --vary plant.object_width :: --vary 'plant.object_width': must be KEY=START:END
 sweep --vary plant.a=1,2 --scheduler tcp://x --workers 1 :: --workers: cannot be used with
 sweep --vary plant.a=1,2 --out t.xlsx :: t.xlsx: must end in .csv or .parquet
 sweep --table none.csv :: --table none.csv:

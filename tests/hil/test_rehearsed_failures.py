@@ -41,7 +41,9 @@ def test_what_needs_a_session_waits_for_one(failure):
     "text", ["mute", "mute@1000001", "sulk@1", "mute@", "mute@-1", "mute@1.2.3", "@1"]
 )
 def test_failures_that_are_none(text):
-    with pytest.raises(InputError, match=rf"--fault '{text}': must be WHAT@S, of kill, stop"):
+    with pytest.raises(
+        InputError, match=rf"--fault '{text}': must be FAILURE@SECONDS, of kill, stop"
+    ):
         Rehearsed.read(text)
 
 
@@ -110,7 +112,7 @@ def test_one_that_is_killed(grasp, tmp_path):
 
 
 def test_the_help_says_what_each_is():
-    assert [part.partition(":")[0] for part in MEANINGS.split("; ")] == [*FAILURES]
+    assert [part.partition(":")[0] for part in MEANINGS.split(". ")] == [*FAILURES]
 
 
 def test_a_bench_that_was_replaced_gets_no_commands(grasp, tmp_path):

@@ -21,36 +21,45 @@ from .frame import INTERRUPTED, PATH, fail, json_option, pair, say, show
 
 @click.command()
 @click.argument("fmu", type=PATH)
-@click.option("--host", default=DEFAULT_ADDRESS[0], help="Address to listen at.")
+@click.option(
+    "--host", metavar="ADDRESS", default=DEFAULT_ADDRESS[0], help="Network address to listen on."
+)
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
     default=DEFAULT_ADDRESS[1],
-    help="UDP port to listen at; 0 takes one that is free.",
+    help="UDP port to listen on. 0 takes a free port.",
 )
-@click.option("--lockstep", is_flag=True, help="Step when asked, not by the clock.")
+@click.option("--lockstep", is_flag=True, help="Step on request, not by the clock.")
 @click.option(
     "--watchdog",
     type=float,
     default=0.1,
-    help="Longest silence in s; after it the inputs are safe values.",
+    help="Time in s without a request that confirms a new answer. After it the "
+    "inputs get their safe values.",
 )
 @click.option(
     "--failsafe",
     multiple=True,
     metavar="INPUT=VALUE",
-    help="Safe value of an input. Default: its start value.",
+    help="Safe value of an input. Default: the start value.",
 )
-@click.option("--key-file", type=PATH, help="A file with a key that the proxy has, too.")
-@click.option("--name", default="", help="Take only a proxy that wants this name: proxy.name.")
-@click.option("--sessions", type=click.IntRange(1), help="End after so many sessions.")
+@click.option("--key-file", type=PATH, help="File with the key that the proxy has, too.")
+@click.option(
+    "--name", default="", help="Accept only proxies whose parameter proxy.name has this value."
+)
+@click.option("--sessions", type=click.IntRange(1), help="End after so many link sessions.")
 @click.option(
     "--silence",
     type=float,
     default=30.0,
-    help="s without anything new after which a session is over.",
+    help="Time in s without a new request, after which a link session ends.",
 )
-@click.option("--fault", metavar="WHAT@S", help=f"Fail so many s after the first step. {MEANINGS}.")
+@click.option(
+    "--fault",
+    metavar="FAILURE@SECONDS",
+    help=f"Rehearse a failure at a time after the first step. {MEANINGS}.",
+)
 @json_option
 def serve(
     fmu: Path,
@@ -66,15 +75,19 @@ def serve(
     fault: str | None,
     as_json: bool,
 ) -> int:
-    """Serve FMU to a proxy, as a bench would, until interrupted.
+    """Serve an FMU to a proxy, in the place of a test bench.
 
-    It runs in real time, or with --lockstep one step at a request: then a loop over the proxy gives
-    the same values as one without. At the end it prints how much came. The exit code is 0, also
-    after Ctrl-C, but 130 where that came before --sessions were served.
+    The command simulates FMU in real time and answers the requests of a proxy over UDP. With
+    --lockstep it makes one step per request. A closed loop then gives the same values as without a
+    proxy.
+
+    The command runs until Ctrl-C. At the end it prints the numbers of link sessions, steps,
+    requests and failures. The exit code is 130 if Ctrl-C arrives before the --sessions have ended,
+    else 0.
 
     \b
     Example: grasp-cosim serve fmus/build/GripperPlant.fmu --lockstep
-    A failure rehearsed: grasp-cosim serve fmus/build/GripperPlant.fmu --fault mute@0.9
+    Rehearse a failure: grasp-cosim serve plant.fmu --fault mute@0.9
     """
     service = Service(
         lockstep,
@@ -148,29 +161,34 @@ def _of_one_way(option: str, entries: str | None, both: Conditions) -> Condition
 @click.option(
     "--delay",
     default="0",
-    metavar="S|FROM:TO",
-    help="Time that a datagram takes in s; anything from one to the other, or always as long.",
+    metavar="SECONDS|FROM:TO",
+    help="Delay of each datagram in s, constant or random in a range.",
 )
-@click.option("--loss", type=float, default=0.0, help="Probability that a datagram is lost.")
-@click.option("--duplicate", type=float, default=0.0, help="Probability that it comes twice.")
-@click.option("--reorder", type=float, default=0.0, help="Probability that it takes 20 ms more.")
-@click.option("--corrupt", type=float, default=0.0, help="Probability that a bit of it changes.")
-@click.option("--requests", metavar="KEY=VALUE,...", help="Other values for requests alone.")
-@click.option("--answers", metavar="KEY=VALUE,...", help="Other values for answers alone.")
+@click.option("--loss", type=float, default=0.0, help="Probability of a lost datagram.")
+@click.option("--duplicate", type=float, default=0.0, help="Probability of a second copy.")
+@click.option("--reorder", type=float, default=0.0, help="Probability of 20 ms more delay.")
+@click.option("--corrupt", type=float, default=0.0, help="Probability of a wrong bit.")
+@click.option(
+    "--requests",
+    metavar="OPTION=VALUE,...",
+    help="Values of these options only for requests, such as loss=0.05,delay=0.002.",
+)
+@click.option("--answers", metavar="OPTION=VALUE,...", help="The same only for answers.")
 @click.option(
     "--outage",
     "outages",
     multiple=True,
     metavar="[requests:|answers:]FROM:[UNTIL]",
-    help="Nothing gets through: numbers of requests, or s since the first as in 0.5s:2s.",
+    help="Drop all datagrams in a range of numbers of requests, or of times since the first one: "
+    "0.5s:2s.",
 )
 @click.option(
     "--seed",
     type=click.IntRange(0),
     default=0,
-    help="Another number has other datagrams lost, late or doubled.",
+    help="Seed of the random numbers. The same seed gives the same losses and delays.",
 )
-@click.option("--log", type=PATH, help="CSV to write with the fate of each datagram.")
+@click.option("--log", type=PATH, help="CSV file to write, with a row for each datagram.")
 @json_option
 def relay(
     listen: str,
@@ -184,16 +202,17 @@ def relay(
     as_json: bool,
     **chances: float,
 ) -> int:
-    """Relay UDP datagrams through a bad network, until Ctrl-C.
+    """Relay UDP datagrams like a bad network.
 
-    They go from LISTEN to TO and back, both ways under the same conditions but for what --requests
-    and --answers say of one. Each of the two is HOST:PORT, or PORT of this machine; LISTEN may be
-    0, for one that is free. The n-th datagram of a direction has the same fate whenever the seed is
-    the same. Counts are printed at the end.
+    The command receives requests at LISTEN, sends them to TO, and sends the answers back. LISTEN
+    and TO are ADDRESS:PORT, or PORT of this machine. If LISTEN is 0, the command takes a free port.
+
+    Both directions have the same conditions, except the values in --requests and --answers. The
+    command runs until Ctrl-C. At the end it prints the numbers of datagrams.
 
     \b
-    Example: grasp-cosim relay 5600 127.0.0.1:5501 --delay 0.001 --loss 0.01 --seed 1
-    Half a link: grasp-cosim relay 5600 5501 --outage answers:0.9s: --requests loss=0.05
+    Example: grasp-cosim relay 5600 127.0.0.1:5501 --delay 0.001 --loss 0.01
+    Lose the answers: grasp-cosim relay 5600 5501 --outage answers:0.9s:
     """
     low, high = _span("--delay", delay)
     both = Conditions(low, high - low, **chances)

@@ -49,10 +49,8 @@ OF_CANDIDATE = ("rename", "units", "isolation")
 
 @click.command()
 @click.argument("candidate", type=PATH)
-@click.option(
-    "--as", "component", required=True, metavar="COMPONENT", help="The component it replaces."
-)
-@click.option("--system", type=PATH, help="The system to run. Default: the built-in grasp.")
+@click.option("--as", "component", required=True, metavar="COMPONENT", help="Component to replace.")
+@click.option("--system", type=PATH, help="System file. Default: the built-in grasp.")
 @preset_option
 @set_option
 @step_option
@@ -60,11 +58,12 @@ OF_CANDIDATE = ("rename", "units", "isolation")
 @click.option(
     "--bands",
     type=PATH,
-    help="TOML file with bands, or the JSON of a qualification. Default: derived.",
+    help="TOML file with bands, or the JSON of a qualification. Default: bands that are derived "
+    "from runs of the original.",
 )
 @many_runs_option
 @metrics_option
-@click.option("-o", "--out", type=PATH, help="Page to write, like qualification.html.")
+@click.option("-o", "--out", type=PATH, help="Page to write, such as qualification.html.")
 @json_option
 def qualify(
     candidate: Path,
@@ -77,16 +76,19 @@ def qualify(
     overrides: Sequence[Override],
     **system_options: Any,
 ) -> int:
-    """Find out whether CANDIDATE may take the place of a component.
+    """Judge whether CANDIDATE may replace a component.
 
-    It is an FMU, or a system file: then the FMU of the component of that name, as it is there. The
-    command compares the interfaces, then the closed loops with the original and with the candidate,
-    signal by signal and metric by metric. `--set components.COMPONENT.rename.VARIABLE=NAME` says
-    what the candidate calls a variable, and `units.VARIABLE=UNIT` its unit. The candidate runs in a
-    process of its own, unless `isolation=none`. The exit code is 1 where it is not qualified.
+    CANDIDATE is an FMU or a system file. From a system file the command takes the component with
+    the same name. The command compares the two interfaces. Then it runs the closed loop with the
+    original and with the candidate, and judges each signal and each metric by a band. The exit
+    code is 1 if the candidate is not qualified.
+
+    These keys of --set begin with components.COMPONENT: rename.VARIABLE=NAME maps a variable to its
+    name in the candidate, and units.VARIABLE=UNIT corrects a unit. The candidate runs in a separate
+    process, except with isolation=none.
 
     \b
-    Example: grasp-cosim qualify vendor_plant.fmu --as plant -o qualification.html
+    Example: grasp-cosim qualify vendor.fmu --as plant -o qualification.html
     """
     if out:
         check_file(out)
@@ -144,15 +146,15 @@ def _sorted_overrides(
 
 @click.command()
 @click.argument("run", type=PATH)
-@click.option("-o", "--out", type=PATH, help="Page to write. Default: RUN/report.html")
+@click.option("-o", "--out", type=PATH, help="Page to write. Default: RUN/report.html.")
 @click.option("--title", help="Title of the page. Default: system, case and controller.")
 @json_option
 def report(run: Path, out: Path | None, title: str | None, as_json: bool) -> int:
-    """Make a page of RUN, a folder that `run --out` wrote.
+    """Write a page about a recorded run.
 
-    The page is one file that needs nothing else, with traces, metrics, connections and settings.
-    Where matplotlib is installed, the extra plot, a picture is drawn beside it, and a second one of
-    the timing of a run in real time.
+    RUN is a folder that `run --out` wrote. The page is one file with traces, metrics, connections
+    and settings. It needs no network. With the extra `plot` the command also draws grasp.png next
+    to the page, and timing.png for a run in real time.
 
     \b
     Example: grasp-cosim report results
@@ -172,11 +174,11 @@ def report(run: Path, out: Path | None, title: str | None, as_json: bool) -> int
 @click.argument("after", type=PATH)
 @json_option
 def diff(before: Path, after: Path, as_json: bool) -> int:
-    """Show how settings and metrics changed from the run BEFORE to the run AFTER.
+    """Show the changes of settings and metrics between two runs.
 
     BEFORE and AFTER are folders that `run --out` wrote. The first table lists the settings that
-    differ, the second one the values of all metrics. The command gives no verdict and its exit code
-    is 0. Use compare to judge two runs by tolerance bands.
+    differ. The second table lists the values of all metrics. The command gives no verdict, and its
+    exit code is 0. Use `compare` to judge two runs by tolerance bands.
 
     \b
     Example: grasp-cosim diff before after
@@ -189,11 +191,9 @@ def diff(before: Path, after: Path, as_json: bool) -> int:
 @click.command()
 @click.argument("a", type=PATH)
 @click.argument("b", type=PATH)
+@click.option("-o", "--out", type=PATH, help="Page to write, such as compare.html, with both runs.")
 @click.option(
-    "-o", "--out", type=PATH, help="Page to write, with one run over the other, like compare.html."
-)
-@click.option(
-    "--bands", type=PATH, help="TOML file with bands, as qualify takes it. Default: derived from A."
+    "--bands", type=PATH, help="TOML file with bands. Default: bands that are derived from A."
 )
 @map_option
 @metrics_option
@@ -207,18 +207,19 @@ def compare(
     metric_files: tuple[Path, ...],
     as_json: bool,
 ) -> int:
-    """Compare two recorded runs, or a system and a run.
+    """Judge the differences of two runs by tolerance bands.
 
-    It compares signals, metrics and settings, over the time that both have. A and B are folders
-    that `run --out` wrote; systems (.toml or .ssp), which run as long as the other one; or files of
-    signals from elsewhere: ASAM MDF (.mf4), or tables with the column time and names like
-    plant.gap[1], with a unit in brackets where it is not the usual one: "plant.gap[1] [mm]". Of a
-    log with other names --map says which is which, and how far its clock is off. The exit code is 1
-    where anything is out of its band, or a run did not come to its end.
+    A and B are folders that `run --out` wrote, system files, or logs from other tools. A system
+    file (.toml or .ssp) runs as long as the other run. A log is an ASAM MDF file (.mf4) or a table
+    with the column time and names such as plant.gap[1]. A head may contain a unit: "plant.gap[1]
+    [mm]". For other names use --map.
+
+    The command compares signals, metrics and settings over the common time. The exit code is 1 if a
+    signal or metric is out of its band, or if a run did not reach its end.
 
     \b
     Example: grasp-cosim compare results_a results_b -o compare.html
-    With the log of a bench: grasp-cosim compare results bench.csv --map names.toml
+    Compare with a log: grasp-cosim compare results bench.csv --map names.toml
     """
     if out:
         check_file(out)

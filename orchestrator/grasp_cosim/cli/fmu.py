@@ -15,14 +15,14 @@ from .frame import NEGATIVE, PATH, json_option, show, waiting
 
 @click.command()
 @click.argument("fmu", type=PATH)
-@click.option("--load", is_flag=True, help="Try whether it loads, in a process of its own.")
+@click.option("--load", is_flag=True, help="Load the FMU in a separate process, as a test.")
 @json_option
 def inspect(fmu: Path, load: bool, as_json: bool) -> int:
-    """Show the interface of any FMU, and whether it loads here.
+    """Show the interface of an FMU, and check whether it loads here.
 
-    The command prints the capabilities and the variables, with units, ranges and dependencies. It
-    says whether this machine loads the FMU, as far as the file tells, why not, and the fix. None of
-    the FMU's code runs, unless --load tries. The exit code is 1 where it does not load.
+    The command prints the capabilities and the variables of FMU, with units, ranges and
+    dependencies. If this machine cannot load FMU, the command prints the reason and the remedy. No
+    code of FMU runs, except with --load. The exit code is 1 if FMU does not load.
 
     \b
     Example: grasp-cosim inspect vendor.fmu --load

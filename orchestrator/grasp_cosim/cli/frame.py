@@ -28,14 +28,16 @@ PATH = click.Path(path_type=Path)
 """The type of an option or argument that is a path."""
 
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print the results as one JSON object."
+)
 
 metrics_option = click.option(
     "--metrics",
     "metric_files",
     multiple=True,
     type=PATH,
-    help="Work out metrics of your own, from a Python file.",
+    help="Add the metrics that a Python file defines.",
 )
 
 
@@ -129,12 +131,12 @@ EVERYWHERE = (
     _flag(
         ["-q", "--quiet"],
         callback=_set_quiet,
-        help="Print no progress and no notes, only errors, on standard error.",
+        help="Print neither progress nor notes, only errors.",
     ),
     _flag(
         ["-v", "--verbose"],
         callback=_set_verbose,
-        help="Say which FMUs and engine run, how long each phase takes, and what FMUs warn of.",
+        help="Print the FMUs, the engine, the time of each phase and the warnings of the FMUs.",
     ),
 )
 """Options that stand before a command as well as on it."""

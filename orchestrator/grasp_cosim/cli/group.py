@@ -15,8 +15,8 @@ from .frame import EVERYWHERE, logging_at
 
 SECTIONS = {
     "Simulate": {"run": "run", "sweep": "sweep", "evaluate": "paper", "identify": "paper"},
-    "Look at recorded runs": {"report": "check", "diff": "check", "compare": "check"},
-    "Make and check FMUs and systems": {
+    "Show and compare recorded runs": {"report": "check", "diff": "check", "compare": "check"},
+    "Build and check FMUs and systems": {
         "init": "systems", "build": "make", "inspect": "fmu", "qualify": "check",
         "ssp": "systems",
     },
@@ -53,7 +53,7 @@ class Commands(click.Group):
         """Write where the pages are."""
         super().format_epilog(ctx, formatter)
         formatter.write_paragraph()
-        formatter.write(f"Pages, examples and a notebook: {pages()}\n")
+        formatter.write(f"Documentation: {pages()}\n")
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -87,9 +87,9 @@ HELP_SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True}
 @click.group(cls=Commands, context_settings=HELP_SETTINGS)
 @click.version_option(package_name="grasp-cosim")
 def cli() -> None:
-    """FMI co-simulation of a delicate grasp.
+    """Simulate a delicate grasp as a co-simulation of FMUs.
 
-    grasp-cosim COMMAND --help shows the options of a command and an example.
+    Run grasp-cosim COMMAND --help to see the options of a command and an example.
     """
     try:
         os.getcwd()  # noqa: PTH109

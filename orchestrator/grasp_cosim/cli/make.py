@@ -16,29 +16,32 @@ FIRST = "; zig makes its libraries first, once, which takes a minute or two"
 
 target_option = click.option(
     "--target",
-    metavar="NAMES",
-    help="Build for other platforms, too: linux64,win64,darwin64,aarch64-linux. Needs ziglang.",
+    metavar="PLATFORM,...",
+    help="Build for these platforms, too: linux64,win64,darwin64,aarch64-linux. Needs the package "
+    "ziglang.",
 )
 
 
 @click.command()
 @click.argument("block", required=False, type=PATH)
-@click.option("-o", "--out", type=PATH, help=f"Folder for the FMUs. Default: {FMU_FOLDER}")
+@click.option("-o", "--out", type=PATH, help=f"Folder for the FMUs. Default: {FMU_FOLDER}.")
 @click.option(
     "--native",
     is_flag=True,
-    help=f"Build them as C, which needs no Python. Default of --out: {NATIVE_FOLDER}",
+    help=f"Build FMUs in C, which run without Python. Default of --out: {NATIVE_FOLDER}.",
 )
 @target_option
-@click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of native FMUs. Default: 2")
 @click.option(
-    "--fingers", type=int, help="Build those of a hand with so many fingers alone, from 2 to 8."
+    "--fmi", type=click.Choice(["2", "3"]), help="FMI version of native FMUs. Default: 2."
+)
+@click.option(
+    "--fingers", type=int, help="Build only the FMUs of a hand with so many fingers, 2 to 8."
 )
 @click.option(
     "--c-only",
     type=PATH,
     metavar="DIR",
-    help="Write the C of the blocks alone, for real-time targets.",
+    help="Write only the C code of the blocks to a folder, for real-time platforms.",
 )
 @json_option
 def build(
@@ -51,22 +54,22 @@ def build(
     c_only: Path | None,
     as_json: bool,
 ) -> int:
-    """Build the FMUs, in Python or as C.
+    """Build the FMUs of the blocks, in Python or in C.
 
-    These are the plants, GripperPlant*, TandemPlant and HandPlant*, ProximitySensor,
-    GraspController* and HandController*; the hand has three fingers, with --fingers as many as
-    that, and the FMUs have the number in their names. With BLOCK, a Python file, the FMU of that
-    block alone is built: my_plant.py becomes MyPlant.fmu; `init` writes one to start from. With
-    --native, which translates the blocks to C and compiles them, BLOCK may also be the name of one
-    of ours.
+    Without BLOCK the command builds all FMUs of this project: plants, sensor and controllers, also
+    of the tandem and of a hand with three fingers. With BLOCK, a Python file, it builds one FMU:
+    my_plant.py becomes MyPlant.fmu. `init --template` writes such a file.
 
-    It prints whether each file is new, changed or unchanged. Where pythonfmu has no binary for this
-    machine, native FMUs are built beside them, too.
+    With --native the command translates the blocks to C and compiles them. BLOCK may then also be
+    the name of a block of this project, such as GripperPlant.
+
+    The command prints whether each file is new, changed or unchanged. If pythonfmu has no binary
+    for this machine, the command builds native FMUs, too.
 
     \b
     Example: grasp-cosim build --out my_fmus
-    Your own: grasp-cosim build my_plant.py
-    Native: grasp-cosim build --native --target linux64,win64
+    Build one block: grasp-cosim build my_plant.py
+    Build native FMUs: grasp-cosim build --native --target linux64,win64
     """
     from ..base.c_compilers import CompilerError  # only here: they take time to load
     from ..fmu_export.build import build_chosen, planned, write_c_only
@@ -117,23 +120,27 @@ def build(
 
 @click.command()
 @click.argument("fmu", type=PATH)
-@click.option("-o", "--out", type=PATH, help="File to write, an .fmu.")
-@click.option("--host", default=DEFAULTS.host, help="Address of its peer.")
+@click.option("-o", "--out", type=PATH, help="FMU to write.")
+@click.option(
+    "--host", metavar="ADDRESS", default=DEFAULTS.host, help="Network address of the peer."
+)
 @click.option(
     "--port", type=click.IntRange(1, 65535), default=DEFAULTS.port, help="UDP port of the peer."
 )
-@click.option("--timeout", type=float, default=DEFAULTS.timeout, help="Longest wait per step in s.")
-@click.option("--name", default="", help="Name of the peer. Default: that of the component.")
+@click.option(
+    "--timeout", type=float, default=DEFAULTS.timeout, help="Longest wait for an answer, in s."
+)
+@click.option("--name", default="", help="Name of the peer. Default: the name of the component.")
 @click.option(
     "--limit",
     "limits",
     multiple=True,
-    metavar="NAME=LOW:HIGH[:RATE]",
-    help="Of an input, what is sent at most; of an output, what is plausible; the rate is per s.",
+    metavar="VARIABLE=LOW:HIGH[:RATE]",
+    help="Permitted range of an input or output, and its greatest change per s.",
 )
 @target_option
-@click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of the proxy. Default: 2")
-@click.option("--c-header", type=PATH, help="Write the peer's side as a C99 header.")
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="FMI version of the proxy. Default: 2.")
+@click.option("--c-header", type=PATH, help="C99 header to write, for the program of a peer.")
 @json_option
 def proxy(
     fmu: Path,
@@ -148,17 +155,18 @@ def proxy(
     c_header: Path | None,
     as_json: bool,
 ) -> int:
-    """Make a proxy of FMU, whose outputs come from a peer.
+    """Build a proxy FMU, which gets its outputs from a peer.
 
-    It is an FMU with the same variables. It sends inputs and parameters in one UDP datagram per
-    step and waits --timeout for the outputs. What happens without an answer is up to its parameters
-    proxy.*, where --host, --port and --timeout are start values. The peer is grasp-cosim serve or a
-    bench with the header of --c-header. A proxy is C and needs a compiler: gcc, or ziglang of
-    grasp-cosim[native].
+    The proxy has the variables of FMU. In each step it sends inputs and parameters to the peer in
+    one UDP datagram, and waits for the outputs. Its parameters proxy.* determine the reaction to a
+    missing answer. --host, --port and --timeout are start values of such parameters.
+
+    The peer is `grasp-cosim serve`, or a program with the header of --c-header. The proxy is
+    compiled from C: install gcc, or the extra `native`.
 
     \b
-    Example: grasp-cosim proxy fmus/build/GripperPlant.fmu -o GripperPlantProxy.fmu --timeout 0.001
-    For others: grasp-cosim proxy vendor.fmu -o Bench.fmu --target linux64,win64
+    Example: grasp-cosim proxy vendor.fmu -o Bench.fmu --timeout 0.001
+    Build for Windows: grasp-cosim proxy vendor.fmu -o Bench.fmu --target win64
     """
     from ..hil.proxy_of_fmu import (  # it takes time to load
         read_limits,

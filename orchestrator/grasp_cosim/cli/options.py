@@ -28,11 +28,12 @@ def native_option(default: str) -> Command:
     return click.option(
         "--native/--python",
         default=None,
-        help=f"Run native twins of Python FMUs, or these, bit for bit. Default: {default}",
+        help="Run native twins in the place of Python FMUs, or the Python FMUs. Both give the same "
+        f"bits. Default: {default}",
     )
 
 
-many_runs_option = native_option("native, where there is a C compiler.")
+many_runs_option = native_option("native, if there is a C compiler.")
 """The option of commands that do many runs."""
 
 
@@ -43,8 +44,8 @@ def natively(system: System, native: bool | None) -> System:
 
 
 def set_overrides(texts: Iterable[str]) -> list[Override]:
-    """The overrides that texts of --set are, PLACE=VALUE; InputError where two have one place."""
-    pairs = (pair("--set", text, "PLACE=VALUE") for text in texts)
+    """The overrides that texts of --set are, KEY=VALUE; InputError where two have one place."""
+    pairs = (pair("--set", text, "KEY=VALUE") for text in texts)
     return each_once(Override(place, value, "--set {place}") for place, value in pairs)
 
 
@@ -66,17 +67,17 @@ set_option = click.option(
     "overrides",
     multiple=True,
     callback=lambda _, __, texts: set_overrides(texts),
-    metavar="PLACE=VALUE",
-    help="Change a value of the system file, by its place there: plant.object_width=0.06, in the "
-    "unit of the variable, or 'plant.object_width=60 mm'; experiment.scheme=jacobi, "
-    "components.plant.isolation=process.",
+    metavar="KEY=VALUE",
+    help="Set a key of the system file, such as experiment.scheme=jacobi. The short form "
+    "plant.object_width=0.06 sets a start value in the unit of the variable. A value may have a "
+    "unit: 'plant.object_width=60 mm'.",
 )
 
 values_option = click.option(
     "--values",
     "fitted",
     type=PATH,
-    help="TOML file with [values] by name, and [drives], as identify -o writes it.",
+    help="TOML file with the tables [values] and [drives]. `identify -o` writes one.",
 )
 
 map_option = click.option(
@@ -84,8 +85,8 @@ map_option = click.option(
     "names",
     type=PATH,
     callback=lambda _, __, path: read_log_names(path) if path else AS_THEY_ARE,
-    help="TOML file: which column of a log from elsewhere is which signal, in which unit, and the "
-    "offset of its time.",
+    help="TOML file that maps the columns of a log to signals, with their units and the offset of "
+    "the time.",
 )
 
 SWAP_OPTIONS = (
@@ -94,12 +95,12 @@ SWAP_OPTIONS = (
         "swaps",
         multiple=True,
         metavar="COMPONENT=FMU",
-        help="Put another FMU in the place of a component.",
+        help="Replace a component by another FMU.",
     ),
     click.option(
         "--own-values",
         is_flag=True,
-        help="With --swap: take the start values of the new FMU, not those that the system sets.",
+        help="With --swap: use the start values of the new FMU, not the values in the system.",
     ),
 )
 
@@ -112,32 +113,34 @@ def swap_options(command: Command) -> Command:
 controller_option = click.option(
     "--controller",
     type=click.Choice(("published", "adaptive")),
-    help="Take the published controller or the adaptive one in the place of the system's.",
+    help="Replace the controller of the system by the published or the adaptive controller.",
 )
 
 preset_option = click.option(
-    "--preset", "presets", multiple=True, metavar="NAME", help="Take a preset of the system file."
+    "--preset", "presets", multiple=True, metavar="NAME", help="Apply a preset of the system file."
 )
 
 record_option = click.option(
     "--record",
     multiple=True,
     metavar="NAME,NAME,...",
-    help="Record these signals, be they outputs, inputs, parameters or locals: "
-    "plant.*,controller.force[1]; '!plant.clock' leaves one out. Default: what SYSTEM says, or "
-    "else the outputs.",
+    help="Record these outputs, inputs, parameters or local variables, such as "
+    "plant.*,controller.force[1]. '!plant.clock' leaves a signal out. Default: the signals that "
+    "SYSTEM names, or all outputs.",
 )
 
 step_option = click.option(
-    "--step", metavar="S", help="Communication step in s, like 1e-3 or 1/30."
+    "--step", metavar="SECONDS", help="Communication step in s, such as 1e-3 or 1/30."
 )
 
-stop_option = click.option("--stop", metavar="S", help="Stop time in s.")
+stop_option = click.option("--stop", metavar="SECONDS", help="Stop time in s.")
 
 SYSTEM_OPTIONS = (
     controller_option,
     preset_option,
-    click.option("--case", type=click.IntRange(0, 2), help="Short for --preset case_0, ..._2."),
+    click.option(
+        "--case", type=click.IntRange(0, 2), help="Apply the preset case_0, case_1 or case_2."
+    ),
     set_option,
     step_option,
     stop_option,

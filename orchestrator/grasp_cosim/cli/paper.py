@@ -18,24 +18,26 @@ from .options import controller_option, many_runs_option, map_option, set_option
 
 
 @click.command()
-@click.option("--bench", is_flag=True, help="Take the experiments, with friction and electronics.")
+@click.option(
+    "--bench", is_flag=True, help="Repeat the experiments, with friction and sensor electronics."
+)
 @controller_option
 @click.option(
     "-o",
     "--out",
     type=PATH,
     default=Path("results"),
-    help="Folder for the page, evaluation.html, and the numbers.",
+    help="Folder for the page evaluation.html and the numbers.",
 )
 @many_runs_option
 @json_option
 def evaluate(
     bench: bool, controller: str | None, out: Path, native: bool | None, as_json: bool
 ) -> int:
-    """Run the published tables and figures again, and compare.
+    """Repeat the results of the paper, and check its claims.
 
-    They are those of the simulations, or with --bench of the experiments. The exit code is 1 where
-    a claim of the paper does not hold.
+    The command repeats the tables and figures of the simulations, or of the experiments with
+    --bench. The exit code is 1 if a claim of the paper does not hold.
 
     \b
     Example: grasp-cosim evaluate --out results
@@ -59,11 +61,11 @@ def evaluate(
     multiple=True,
     default=DEFAULT_GROUPS,
     metavar="|".join(GROUPS),
-    help="Fit this; may be given several times.",
+    help="Group of values to fit. Repeat the option to fit several groups.",
 )
 @map_option
 @set_option
-@click.option("-o", "--out", type=PATH, help="Folder for the values and the residuals.")
+@click.option("-o", "--out", type=PATH, help="Folder for the fitted values and the residuals.")
 @json_option
 def identify(
     log: Path | None,
@@ -73,17 +75,17 @@ def identify(
     out: Path | None,
     as_json: bool,
 ) -> int:
-    """Fit friction, masses and drives of the fingers to a LOG.
+    """Fit friction, masses and drives of the fingers to measurements.
 
-    It is a run or the log of a bench, as a table or .mf4, or a table of contact times, with the
-    columns x_m, case, finger, time. Tables are .csv, .arrow or .parquet files. Without LOG it is
-    the contact times of the published experiments. What was fitted goes into a run by --values.
+    LOG contains the signals of a run or of a test bench (.csv, .arrow, .parquet or .mf4). LOG may
+    also be a table of contact times with the columns x_m, case, finger and time. The default is
+    the contact times of the published experiments. `run --values` uses the fitted values.
 
     \b
-    Example: grasp-cosim identify --fit coulomb --fit viscous --out identified
-    From a run: grasp-cosim identify results/signals.csv --fit coulomb
-    From a bench: grasp-cosim identify bench.csv --map names.toml --fit mass --fit delay -o fitted
-    and with that: grasp-cosim run --preset bench --values fitted/values.toml
+    Example: grasp-cosim identify --fit coulomb --fit viscous --out fitted
+    Fit to a run: grasp-cosim identify results/signals.csv --fit coulomb
+    Fit to a log of a bench: grasp-cosim identify bench.csv --map names.toml
+    Use the values: grasp-cosim run --preset bench --values fitted/values.toml
     """
     if out:
         check_folder(out)

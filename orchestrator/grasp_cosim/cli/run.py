@@ -45,36 +45,38 @@ from .options import (
 @click.option(
     "--scheme",
     type=click.Choice(SCHEMES),
-    help="Step the components one after the other (by default), or all at once.",
+    help="Step the components one after the other (sequential) or all at once (jacobi). "
+    "Default: the scheme of SYSTEM, or sequential.",
 )
 @swap_options
 @click.option(
     "--input",
     type=PATH,
-    help="Drive inputs and tunable parameters by a table: time, then columns like plant.force.",
+    help="Drive inputs and tunable parameters by a table with the column time and columns such as "
+    "plant.force.",
 )
 @record_option
 @values_option
 @metrics_option
-@native_option("as SYSTEM names them, but native for the built-in grasp.")
+@native_option("the FMUs that SYSTEM names; native for the built-in grasp.")
 @click.option("--realtime", is_flag=True, help="Pace the run by the clock, and print its timing.")
 @click.option(
-    "--every", type=click.IntRange(1), default=1, metavar="N", help="Record each N-th step only."
+    "--every", type=click.IntRange(1), default=1, metavar="N", help="Record only every N-th step."
 )
-@click.option("-o", "--out", type=PATH, help="Write the signals and run.json into a folder.")
+@click.option("-o", "--out", type=PATH, help="Folder for the signals and run.json.")
 @click.option(
     "--format",
     "form",
     type=click.Choice(FORMS),
     default="csv",
-    help="Write the signals in --out in this format: arrow is for long runs.",
+    help="Format of the signals in --out. Use arrow for long runs.",
 )
 @click.option(
     "--plot",
     is_flag=True,
-    help="Draw grasp.png, and timing.png with --realtime, in --out or the current folder.",
+    help="Draw grasp.png in --out or in the current folder. With --realtime, draw timing.png, too.",
 )
-@click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) too; needs --out.")
+@click.option("--mdf", is_flag=True, help="Write signals.mf4 (ASAM MDF 4) to --out, too.")
 @json_option
 def run(
     metric_files: tuple[Path, ...],
@@ -88,12 +90,16 @@ def run(
     as_json: bool,
     **system_options: Any,
 ) -> int:
-    """Run SYSTEM, a .toml or .ssp file; by default the built-in grasp.
+    """Run a system once.
+
+    SYSTEM is a .toml or .ssp file. The default is the built-in grasp. The command prints the
+    metrics. The exit code is 1 if the verdict of the system fails or no signal is recorded.
 
     \b
-    Example: grasp-cosim run --case 1 --set plant.initial_object_position=0.02 --out results --plot
-    Other signals than outputs: grasp-cosim run --record 'plant.*,controller.force[1]' --out results
-    In real time: grasp-cosim run --realtime --step 1e-3 --set realtime.priority=80 --out results
+    Example: grasp-cosim run --case 1 --out results --plot
+    Change a value: grasp-cosim run --set plant.initial_object_position=0.02
+    Record other signals: grasp-cosim run --record 'plant.*,controller.force[1]'
+    Run in real time: grasp-cosim run --realtime --step 1e-3 --out results
     """
     if mdf and not out:
         raise InputError("--mdf: needs --out, the folder for signals.mf4")

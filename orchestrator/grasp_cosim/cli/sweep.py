@@ -47,12 +47,12 @@ TABLE = Path("sweep.csv")
 @click.option(
     "--vary",
     multiple=True,
-    metavar="PLACE=START:END:COUNT",
-    help="Vary a value: plant.object_width=0.05:0.07:11, or a list as in "
-    "sensor_1.reflectance=0.3,0.57,1.2, in the unit of its variable, or as in "
-    "'plant.object_width [mm]=50:70:11'. Several make every combination.",
+    metavar="KEY=START:END:COUNT",
+    help="Vary a key of the system: plant.object_width=0.05:0.07:11, or a list: "
+    "sensor_1.reflectance=0.3,0.57,1.2. The key may have a unit: "
+    "'plant.object_width [mm]=50:70:11'. Several --vary make all combinations.",
 )
-@click.option("--table", type=PATH, help="Take the rows of a table, with a column for each place.")
+@click.option("--table", type=PATH, help="Table with a row for each run and a column for each key.")
 @system_options
 @swap_options
 @metrics_option
@@ -62,13 +62,17 @@ TABLE = Path("sweep.csv")
     "--out",
     type=PATH,
     default=TABLE,
-    help="Table to write, a .csv or .parquet file, or a folder for it.",
+    help="Table of results, a .csv or .parquet file, or a folder for it.",
 )
 @click.option(
-    "--workers", type=click.IntRange(1), help="Do so many runs at a time. Default: one per core."
+    "--workers", type=click.IntRange(1), help="Number of runs at a time. Default: one per core."
 )
-@click.option("--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, like tcp://host:8786.")
-@click.option("--plot", is_flag=True, help="Draw the metrics over what varies, beside the table.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://10.0.0.1:8786."
+)
+@click.option(
+    "--plot", is_flag=True, help="Draw the metrics over the varied keys, as .png next to the table."
+)
 @json_option
 def sweep(
     vary: tuple[str, ...],
@@ -84,14 +88,14 @@ def sweep(
 ) -> int:
     """Run a system for each row of a table.
 
-    It writes a table of the metrics of each run. SYSTEM is a .toml or .ssp file, by default the
-    built-in grasp. A sweep of experiment.step alone shows the error against the finest step, and
-    its order. Finished runs are kept beside the table until all are done: the same command goes on
-    where it was ended.
+    SYSTEM is a .toml or .ssp file. The default is the built-in grasp. The command writes a table
+    with the metrics of each run. If only experiment.step varies, the command also prints the error
+    against the finest step and the order of convergence. If a sweep is interrupted, the same
+    command continues it.
 
     \b
-    Example: grasp-cosim sweep --vary plant.initial_object_position=0:0.05:11 --case 1 --plot
-    Step size: grasp-cosim sweep --vary experiment.step=1e-4,2e-4,4e-4
+    Example: grasp-cosim sweep --vary plant.initial_object_position=0:0.05:11
+    Vary the step: grasp-cosim sweep --vary experiment.step=1e-4,2e-4,4e-4
     """
     if scheduler and workers:
         raise InputError("--workers: cannot be used with --scheduler, which has its own")
@@ -121,7 +125,7 @@ def sweep(
                 progress=not is_quiet(),
             )
     except KeyboardInterrupt:
-        message = f"interrupted; finished runs are kept beside {out}, the same command goes on"
+        message = f"interrupted; finished runs are kept next to {out}; the same command continues"
         return fail(message, INTERRUPTED)
     if plot:
         picture = out.with_suffix(".png")

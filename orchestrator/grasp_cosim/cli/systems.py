@@ -31,24 +31,24 @@ NAME = re.compile(r"[A-Za-z0-9_-]+")
     "candidates",
     multiple=True,
     metavar="COMPONENT=FMU",
-    help="Put a foreign FMU in the place of a component, with its names, units and values.",
+    help="Replace a component by a foreign FMU, with its names, units and values.",
 )
 @click.option(
-    "--fmu", "fmus", multiple=True, metavar="NAME=FMU", help="Make a system of these FMUs alone."
+    "--fmu", "fmus", multiple=True, metavar="NAME=FMU", help="Write a system of only these FMUs."
 )
 @click.option(
-    "--fingers", type=int, help="Make a system of a hand with so many fingers, from 2 to 8."
+    "--fingers", type=int, help="Write the system of a hand with so many fingers, 2 to 8."
 )
-@click.option("--angles", metavar="A,B,...", help="The directions of a hand's fingers in degrees.")
+@click.option("--angles", metavar="A,B,...", help="Directions of the fingers of a hand in degrees.")
 @click.option(
-    "--tandem", is_flag=True, help="Make a system of a gripper in tandem, on the wrist of an arm."
+    "--tandem", is_flag=True, help="Write the system of a gripper in tandem on the wrist of an arm."
 )
 @click.option(
     "--template",
     type=click.Choice([*BLOCK_TEMPLATES]),
-    help="Write a block in Python, to build an FMU of, and its test.",
+    help="Write a block in Python and its test. `build` makes an FMU from the block.",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is there already.")
+@click.option("--force", is_flag=True, help="Overwrite an existing file.")
 @json_option
 def init(
     file: Path,
@@ -61,18 +61,18 @@ def init(
     force: bool,
     as_json: bool,
 ) -> int:
-    """Write FILE, a system file to start from.
+    """Write a system file, or a block in Python, to start from.
 
-    It describes the grasp, with its FMUs in fmus/build beside FILE. With --as, the entries of one
-    component are filled in for an FMU of another vendor; what cannot be told is marked as TODO.
-    With --template, FILE is a block in Python instead, beside its test.
+    FILE describes the built-in grasp. The command builds the FMUs in fmus/build next to FILE. With
+    --as the command fills in the entries of a component for a foreign FMU. The word TODO marks the
+    entries that you must complete. With --template, FILE is a block in Python with a test.
 
     \b
     Example: grasp-cosim init my_system.toml --as plant=vendor.fmu
-    An FMU alone: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
-    A hand: grasp-cosim init hand.toml --fingers 3 --angles 0,90,225
-    A gripper on an arm: grasp-cosim init tandem.toml --tandem
-    A plant of your own: grasp-cosim init my_plant.py --template plant
+    Use only one FMU: grasp-cosim init my_system.toml --fmu ball=BouncingBall.fmu
+    Describe a hand: grasp-cosim init hand.toml --fingers 3 --angles 0,90,225
+    Describe a gripper on an arm: grasp-cosim init tandem.toml --tandem
+    Write a plant in Python: grasp-cosim init my_plant.py --template plant
     """
     if template:
         of_systems = {
@@ -270,14 +270,14 @@ def _report_lines(
 
 @click.command()
 @click.argument("system", required=False, type=PATH)
-@click.option("-o", "--out", type=PATH, required=True, help="Archive to write, an .ssp.")
+@click.option("-o", "--out", type=PATH, required=True, help="Archive to write (.ssp).")
 @set_option
 @json_option
 def ssp(system: Path | None, out: Path, overrides: Sequence[Override], as_json: bool) -> int:
-    """Write SYSTEM as an SSP 1.0 archive.
+    """Write a system as an SSP 1.0 archive.
 
-    SYSTEM is a .toml or .ssp file, by default the built-in grasp. An .ssp without a step gets one
-    by --set experiment.step=1e-3.
+    SYSTEM is a .toml or .ssp file. The default is the built-in grasp. If an .ssp file contains no
+    communication step, set it: --set experiment.step=1e-3.
 
     \b
     Example: grasp-cosim ssp my_system.toml -o my_system.ssp

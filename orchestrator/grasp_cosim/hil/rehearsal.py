@@ -20,9 +20,10 @@ FAILURES_OF_A_SESSION: tuple[Failure, ...] = ("fail", "trip")
 """Those that need a session to happen in."""
 
 MEANINGS = (
-    "kill: the process ends at once; stop: it stands still; mute: it answers no more; deaf: it "
-    "hears no more; restart: it is as new, and knows no session; replace: another bench, of "
-    "another name, takes its place; fail: its model fails; trip: it puts its inputs to safe values"
+    "kill: the process ends at once. stop: the process stands still. mute: the server sends no "
+    "more answers. deaf: the server receives no more requests. restart: the server starts again "
+    "and knows no link session. replace: a server with another name takes over. fail: the model "
+    "fails. trip: the inputs get their safe values"
 )
 
 
@@ -44,8 +45,8 @@ class Rehearsed:
             at = math.nan
         if failure is None or not at <= MAX_DELAY:
             must = (
-                f"must be WHAT@S, of {choices(FAILURES)}, up to {MAX_DELAY:g} s after the first "
-                "step"
+                f"must be FAILURE@SECONDS, of {choices(FAILURES)}, up to {MAX_DELAY:g} s after "
+                "the first step"
             )
             raise InputError(f"--fault {text!r}: {must}")
         return cls(failure, at)

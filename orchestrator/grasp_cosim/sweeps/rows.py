@@ -44,7 +44,7 @@ MAX_SHOWN = 60
 
 ROWS_MUST = "must be rows, mappings of places to values, or columns by place, or a data frame"
 
-FORM = "PLACE=START:END:COUNT or PLACE=VALUE,VALUE,..., and PLACE may be like 'a.b [mm]'"
+FORM = "KEY=START:END:COUNT or KEY=VALUE,VALUE,..., and KEY may have a unit: 'a.b [mm]'"
 
 
 def grid(varied: Mapping[str, Any]) -> list[dict[str, Any]]:
