@@ -221,6 +221,13 @@ def test_a_title_is_the_one_asked_for_else_that_of_the_run_else_what_it_is(tmp_p
     assert caption(kept, "After").title == caption(kept.titled("After")).title == "After"
 
 
+def test_a_change_has_its_unit():
+    changed = {"step": 2e-3, "plant.width": 0.06, "scheme": "jacobi"}
+    assert changes(changed, {"plant.width": "m"}) == (
+        "step = 0.002 s, plant.width = 0.06 m, scheme = jacobi"
+    )
+
+
 def test_many_changes_are_counted():
     assert changes({}) == "as in the system file"
     assert changes({"a": True, "b": 0.1, "c": "x.fmu"}) == "a = true, b = 0.1, c = x.fmu"

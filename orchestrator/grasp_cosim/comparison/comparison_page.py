@@ -26,6 +26,7 @@ from ..report.traces_page import (
     traces_page,
 )
 from ..report.wording import Caption, about, caption, changes, number, scaled
+from ..system.settings import given_units
 from .bands import Compared, plain
 from .outcome import ComparisonData, QualificationData
 from .side import Side
@@ -249,7 +250,9 @@ def _about_html(side: Side) -> dict[str, str]:
         first, last = number(float(side.time[0])), number(float(side.time[-1]))
         rows = f"{grouped(len(side.time))} rows, {first} to {last} s"
         return {"from": escape(side.name), "what": "", "changed": "", "run": rows}
-    changed = changes(run.settings["changed"]) if "changed" in run.settings else ""
+    settings, changed = run.settings, ""
+    if "changed" in settings:
+        changed = changes(settings["changed"], given_units(settings))
     return {
         "from": escape(side.name),
         "what": escape(caption(run).title),

@@ -134,7 +134,7 @@ def _missing(old: Variable, use: Use, candidate: Interface) -> Difference:
     severity: Severity = "warns" if causality == "output" else "notes"
     text = f"{causality} is missing"
     if name in use.values and name not in use.stated:
-        value = literal(use.values[name])
+        value = f"{literal(use.values[name])} {old.unit or ''}".rstrip()
         severity = "warns"
         text = f"{causality} is set to {value} in the system, but missing: left out"
     elif use.uses(name):

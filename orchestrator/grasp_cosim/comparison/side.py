@@ -251,7 +251,7 @@ def _facts(run: Result) -> Iterator[tuple[str, str]]:
             if isinstance(entry := component.get(key), Mapping):
                 yield from _nested(f"{key} of {name} ", entry)
             elif entry is not None:
-                yield f"{key} of {name}", _words(entry)
+                yield f"{key} of {name}", _words(entry) + (" s" if key == "step" else "")
     units = given_units(settings)
     for name, value in given_values(settings).items():
         yield name, f"{_words(value)} {units.get(name, '')}".strip()

@@ -68,11 +68,19 @@ def about(
     return " · ".join(part for part in parts if part)
 
 
-def changes(changed: Mapping[str, Any]) -> str:
-    """Return what was changed of a system, each as name = value; see system.settings."""
+TIMES = dict.fromkeys(("start", "step", "stop"), "s")
+"""The units of times among the changes of a system."""
+
+
+def changes(changed: Mapping[str, Any], units: Mapping[str, str] = {}) -> str:
+    """Return the changes of a system, each as name = value unit; see system.settings."""
     if not changed:
         return DEFAULTS
-    texts = [f"{name} = {_changed_value(value)}" for name, value in changed.items()]
+    units = {**TIMES, **units}
+    texts = [
+        f"{name} = {_changed_value(value)} {units.get(name, '')}".rstrip()
+        for name, value in changed.items()
+    ]
     if len(texts) > MAX_CHANGES:
         texts = [*texts[:MAX_CHANGES], f"{len(texts) - MAX_CHANGES} more"]
     return ", ".join(texts)
