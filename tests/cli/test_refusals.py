@@ -18,11 +18,11 @@ run --set plant.object_width=0.5 :: object_width = 0.5 m
 run --set plant.finger_mass[1]=-0.5 :: '-0.5': must be a finite number from 0.001 to 1000 kg
 run --set plant.mass=1 :: no input, parameter or initial value 'mass'; did you mean finger_mass[1]
 run --set sensor_1.gap=0.01 :: sensor_1.gap has two sources, the connection and a value
-run --set scheme=jacobi :: --set scheme: no place in a system file; did you mean
+run --set scheme=jacobi :: --set scheme: no key of a system file; did you mean
 run --set components.plant.isolation=full :: isolation = 'full': must be one of none, process
 run --step 1e-3 --set experiment.step=1e-4 :: experiment.step is given by --step, too; must be
 run --swap plant=x --set components.plant.fmu=y :: components.plant.fmu is given by --swap plant
-run --set plant.a=1 --set components.plant.values.a=1 :: values.a: this place is given twice
+run --set plant.a=1 --set components.plant.values.a=1 :: values.a: this key is set twice
 run --set components.plant.rename.gap[1]=Gap :: no variable 'Gap'; did you mean gap
 run --set components.plant.units.gap[1]=quux :: 'gap[1]' = 'quux': no unit that GripperPlant.fmu
 run --swap plant=missing.fmu :: missing.fmu: no such FMU file

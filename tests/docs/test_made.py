@@ -9,24 +9,26 @@ from pathlib import Path
 import grasp_cosim
 import pytest
 from grasp_cosim.cli.group import MODULE_OF_COMMAND
-from grasp_cosim.fmu_export.page import blocks_by_card, updated
+from grasp_cosim.fmu_export.page import blocks_by_sheet, updated
 from grasp_cosim.fmu_export.shipped import SHIPPED
 
 ROOT = Path(__file__).parents[2]
-CARDS = blocks_by_card()
+SHEETS = blocks_by_sheet()
 
 
 @pytest.mark.parametrize(
-    ("card", "blocks"), CARDS.items(), ids=lambda of: of.parent.name if isinstance(of, Path) else ""
+    ("sheet", "blocks"),
+    SHEETS.items(),
+    ids=lambda of: of.parent.name if isinstance(of, Path) else "",
 )
-def test_a_card_follows_the_declarations(card, blocks):
-    text = card.read_text("utf-8")
+def test_a_card_follows_the_declarations(sheet, blocks):
+    text = sheet.read_text("utf-8")
     assert updated(text, blocks) == text, "run: make tables"
 
 
 def test_every_block_has_a_card():
-    assert set(CARDS) == {ROOT / room / "README.md" for room in ("plant", "sensor", "controller")}
-    assert sum(len(blocks) for blocks in CARDS.values()) == len(SHIPPED)
+    assert set(SHEETS) == {ROOT / room / "README.md" for room in ("plant", "sensor", "controller")}
+    assert sum(len(blocks) for blocks in SHEETS.values()) == len(SHIPPED)
 
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -173,7 +173,7 @@ def test_every_source_is_in_the_key(tmp_path, monkeypatch):
     monkeypatch.setattr(builds, "SOURCES", [tmp_path / source.name for source in builds.SOURCES])
     shutil.copy(package_folder("gripper_plant").parent / "README.md", tmp_path)
     monkeypatch.setattr(builds, "package_folder", lambda package: tmp_path / package)
-    monkeypatch.setattr(builds, "card_file", lambda package: tmp_path / "README.md")
+    monkeypatch.setattr(builds, "sheet_file", lambda package: tmp_path / "README.md")
     keys = [sources_key()]
     for name in SOURCES:
         with (tmp_path / name).open("ab") as file:

@@ -422,7 +422,7 @@ def test_its_log_is_that_of_the_fates_and_its_counters_are_those_of_the_log(
         ("0 x", "TO 'x': must be HOST:PORT, as in 127.0.0.1:5501 or [::1]:5501, or PORT"),
         ("65536 1", "127.0.0.1:65536: port must be from 0 to 65535"),
         ("0 127.0.0.1:65536", "127.0.0.1:65536: port must be from 1 to 65535"),
-        ("0 256.0.0.1:1", "256.0.0.1:1: no such host; must be an address or a name that has"),
+        ("0 256.0.0.1:1", "256.0.0.1:1: no such address; must be an IP address or a name that has"),
         ("0 1 --seed -1", "Invalid value for '--seed': -1"),
     ],
 )

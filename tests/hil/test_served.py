@@ -332,7 +332,7 @@ def test_a_session_over_udp(plant, lockstep):
         ),
         ("--key-file {}", "key of 5 bytes: must have 16 or more"),
         ("--host 192.0.2.1", "192.0.2.1:5501: cannot listen there"),
-        ("--host=", ":5501: no such host; must be an address or a name that has one"),
+        ("--host=", ":5501: no such address; must be an IP address or a name that has one"),
     ],
 )
 def test_wrong_input_is_one_line(sensor, tmp_path, capsys, arguments, message):

@@ -94,7 +94,9 @@ def test_a_port_is_in_its_range(port, lowest, good):
 
 @pytest.mark.parametrize("host", ["", "[]", "a b", "x" * 300])
 def test_what_is_no_host_is_said(host):
-    with pytest.raises(InputError, match="no such host; must be an address or a name that has on"):
+    with pytest.raises(
+        InputError, match="no such address; must be an IP address or a name that has on"
+    ):
         resolved(host, 1)
 
 

@@ -323,7 +323,7 @@ def test_what_cannot_go_back_is_refused(tmp_path, natives):
     for system, options, line in (
         (exchanged, {}, why + must),
         (unable, {}, without + must),
-        (grasp, {"listeners": [Deaf()]}, "what listeners have got cannot be taken back; must be"),
+        (grasp, {"listeners": [Deaf()]}, "listeners cannot give rows back; must be"),
         (grasp, {"realtime": Realtime()}, realtime),
     ):
         with simulate.session(system, **options) as session:

@@ -145,7 +145,7 @@ def test_numbers_become_pythons_own(value, plain):
         (1.0, ("a", "b"), "returned 1.0; must be a value for each of a, b"),
         ([1.0], ("a", "b"), "returned [1.0]; must be a value for each of a, b"),
         (None, ("a", "b"), "returned None; must be a value for each of a, b"),
-        (float("nan"), (), "returned nan; must be finite, None where there is no value"),
+        (float("nan"), (), "returned nan; must be finite, or None if there is no value"),
         ([1.0, np.float64("-inf")], (), "returned [1.0, "),
     ],
 )

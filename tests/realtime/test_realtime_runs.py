@@ -91,7 +91,7 @@ def test_a_timing_is_plain_data_and_what_is_damaged_is_refused_in_one_line():
         else:
             name = damaged.pop("name", "step")
             wrong["histograms"][name] = {**histogram, **damaged}
-        line = f"here: is damaged ({reason}); must be what `grasp-cosim run --realtime --out` wrote"
+        line = f"here: is damaged ({reason}); must be a file of `grasp-cosim run --realtime --out`"
         with pytest.raises(InputError, match=f"^{re.escape(line)}$"):
             Timing.from_dict("here", wrong)
 

@@ -152,7 +152,7 @@ def test_a_value_goes_to_all_that_an_input_or_parameter_leads_to(load):
     [
         ({"Height": "high"}, "Height = 'high': must be a number"),
         ({"Height": 1.0, "sub_b.u_Real": 2.0}, "both give sub_b.u_Real a value"),
-        ({"Hight": 1.0}, "no place in a system file; did you mean Height?"),
+        ({"Hight": 1.0}, "no key of a system file; did you mean Height?"),
     ],
 )
 def test_a_mistake_in_a_value_is_one_line(load, values, said):

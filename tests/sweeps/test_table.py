@@ -380,7 +380,7 @@ def test_a_value_beside_lists_is_that_of_each_row(one):
         (np.zeros((2, 2)), r"row 0 = array\(\[0\., 0\.\]\): must be rows"),
         (1.0, r"rows = 1.0: must be rows"),
         (None, r"rows = None: must be rows"),
-        (pd.DataFrame([[1.0]]), "0: must be a place in the system, a text"),
+        (pd.DataFrame([[1.0]]), "0: must be a key of the system, a text"),
         (pd.Series({"a": 1.0}), "a Series; must be a DataFrame"),
     ],
 )

@@ -86,8 +86,8 @@ def test_an_fmu_comes_with_its_names_and_units(grasp, fmus, tmp_path):
             ": GripperPlant.fmu has no input, parameter or initial value 'object_widt'; did",
         ),
         ("plont.object_width", 1, ": no component 'plont'; did you mean plant?"),
-        ("object_width", 1, ": no place in a system file; did you mean plant.object_width?"),
-        ("scheme", "jacobi", ": no place in a system file; did you mean experiment.scheme?"),
+        ("object_width", 1, ": no key of a system file; did you mean plant.object_width?"),
+        ("scheme", "jacobi", ": no key of a system file; did you mean experiment.scheme?"),
         ("experimnt.step", 1, ": no component 'experimnt'; did you mean experiment?"),
         ("experiment.schem", "x", ": no entry 'schem' of [experiment]; did you mean scheme?"),
         ("experiment.scheme", "x", " = 'x': must be one of sequential, jacobi"),
@@ -118,7 +118,7 @@ def test_a_mistake_is_one_line(grasp, key, value, said):
 
 def test_a_place_is_given_once(grasp):
     twice = {"plant.object_width": 0.06, "components.plant.values.object_width": 0.06}
-    with pytest.raises(InputError, match=r"^with_settings components.plant.* is given twice"):
+    with pytest.raises(InputError, match=r"^with_settings components.plant.* is set twice"):
         grasp.with_settings(twice)
 
 

@@ -254,9 +254,7 @@ def test_what_it_returns_are_numbers(grasp, value):
 
 @pytest.mark.parametrize("values", [None, [1.0], {3: 1.0}])
 def test_values_are_by_place(grasp, values):
-    with pytest.raises(
-        InputError, match=r"^with_values .*: must be a (mapping of places|place in)"
-    ):
+    with pytest.raises(InputError, match=r"^with_values .*: must be a (mapping of keys|key of)"):
         grasp.with_values(values)
 
 

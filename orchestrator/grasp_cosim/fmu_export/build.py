@@ -26,7 +26,7 @@ from ..base.c_compilers import Compiler, CompilerError, Job, cache, compile_all,
 from ..base.platforms import elf_processor, python_processor
 from .native.targets import Target, Version, folders, this_target, universal
 from .package import Built, write_file
-from .shipped import HANDS, PACKAGES, SHIPPED, card_file, of_fingers, package_folder, together
+from .shipped import HANDS, PACKAGES, SHIPPED, of_fingers, package_folder, sheet_file, together
 
 if TYPE_CHECKING:
     import zipfile
@@ -265,7 +265,7 @@ def sources_key() -> str:
     That is our packages and cards, pythonfmu's binaries, versions, and that of Python.
     """
     site = package_folder("pythonfmu")
-    files = [*_below(site / "resources" / "binaries"), *map(card_file, PACKAGES)]
+    files = [*_below(site / "resources" / "binaries"), *map(sheet_file, PACKAGES)]
     for source in (*map(package_folder, PACKAGES), *SOURCES):
         files += _below(source) if source.is_dir() else [source]
     versions = sorted(name for name in os.listdir(site.parent) if name.startswith(VERSIONS))  # noqa: PTH208

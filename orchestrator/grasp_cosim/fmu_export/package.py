@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..base.one_piece import in_one_piece
-from .shipped import block_of, card_file, entry_of, package_folder, sized_source
+from .shipped import block_of, entry_of, package_folder, sheet_file, sized_source
 
 if TYPE_CHECKING:
     from .description import Description
@@ -76,7 +76,7 @@ def shipped_model(name: str) -> Model:
     imports = script(f"from {package} import {module} as block")
     return Model(
         Description(name, summary, variables(declared(block))),
-        card_file(package).read_text("utf-8"),
+        sheet_file(package).read_text("utf-8"),
         {f"{name}.py": imports, **sized_source(name)},
         block,
         picture=icon(name),

@@ -1,7 +1,7 @@
 """Makes what an FMU holds for its reader: documentation/index.html, the licences, the icon.
 
-A page is Markdown, the card and then the sections that follow here; its frame is page.html.in. The
-tables of variables in the cards are made here too: `make tables` brings them up to date.
+A page is Markdown: the equation sheet, and the sections below. Its frame is page.html.in. The
+tables of variables in the equation sheets are made here too: `make tables` brings them up to date.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,13 +15,13 @@ from typing import Any
 
 from .contract import Block, Field, declared
 from .description import version
-from .shipped import blocks, card_file
+from .shipped import blocks, sheet_file
 
 ICONS = Path(__file__).parent / "icons"
 FRAME = Path(__file__).with_name("page.html.in")
 
 BEGIN, END = "<!-- variables -->\n", "<!-- end of variables -->\n"
-"""In a card, around the tables of the variables."""
+"""In an equation sheet, around the tables of the variables."""
 
 PYTHON = """\
 ## What the host needs
@@ -87,12 +87,12 @@ exchanged between instances of the same FMU, its bytes also between the one in P
 one."""
 
 
-def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages: str = "") -> str:
+def page(name: str, summary: str, sheet: str, about: str, fmi: int = 2, packages: str = "") -> str:
     """Return documentation/index.html of an FMU, from its equation sheet and the text on its kind.
 
     Both are in Markdown; `about` is one of PYTHON, NATIVE, PROXY. The page stands on its own: links
-    and pictures of the card point to nothing in an FMU and come out as their text, HTML in it as it
-    is written. The result is XML too.
+    and pictures of the equation sheet point to nothing in an FMU and come out as their text. HTML
+    in it stays as it is. The result is XML too.
     """
     of_pythonfmu = ", the binary of pythonfmu too: documentation/licenses/pythonfmu.txt"
     licence = f"MIT: documentation/licenses/license.txt{of_pythonfmu if about is PYTHON else ''}."
@@ -106,7 +106,7 @@ def page(name: str, summary: str, card: str, about: str, fmi: int = 2, packages:
         summary=escape(summary.rstrip(".")),
         version=escape(version()),
         fmi=f"{fmi}.0",
-        card=_rendered(card, 1),
+        sheet=_rendered(sheet, 1),
         sections=_rendered(sections, 0),
     )
 
@@ -208,18 +208,18 @@ def _symbol(state: Any, silent: bool) -> bool:
     return True
 
 
-# The tables of variables in the cards
+# The tables of variables in the equation sheets
 
 
-def updated(card: str, blocks: Mapping[str, Block]) -> str:
-    """The text of the card of these blocks, by name, with its variables up to date.
+def updated(sheet: str, blocks: Mapping[str, Block]) -> str:
+    """The text of the equation sheet of these blocks, by name, with its variables up to date.
 
     ValueError without the marks.
     """
-    head, begin, remainder = card.partition(BEGIN)
+    head, begin, remainder = sheet.partition(BEGIN)
     _, end, tail = remainder.partition(END)
     if not (begin and end):
-        raise ValueError(f"a card must have {BEGIN.strip()} and {END.strip()} around its table")
+        raise ValueError(f"a sheet must have {BEGIN.strip()} and {END.strip()} around its table")
     return f"{head}{BEGIN}{variable_tables(blocks)}{END}{tail}"
 
 
@@ -293,19 +293,19 @@ def _row(f: Field) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def blocks_by_card() -> dict[Path, dict[str, Block]]:
-    """Return the blocks that have a script, by the names of their modules, card by card."""
-    cards: dict[Path, dict[str, Block]] = {}
+def blocks_by_sheet() -> dict[Path, dict[str, Block]]:
+    """Return the blocks that have a script, by the names of their modules, sheet by sheet."""
+    sheets: dict[Path, dict[str, Block]] = {}
     for block in blocks().values():
         package, _, name = block.__name__.partition(".")
-        cards.setdefault(card_file(package), {})[name] = block
-    return cards
+        sheets.setdefault(sheet_file(package), {})[name] = block
+    return sheets
 
 
 def main() -> None:
-    """Bring the cards up to date."""
-    for card, described in blocks_by_card().items():
-        card.write_text(updated(card.read_text("utf-8"), described), "utf-8")
+    """Bring the equation sheets up to date."""
+    for sheet, described in blocks_by_sheet().items():
+        sheet.write_text(updated(sheet.read_text("utf-8"), described), "utf-8")
 
 
 if __name__ == "__main__":

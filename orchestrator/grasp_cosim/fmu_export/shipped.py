@@ -174,7 +174,7 @@ def package_folder(package: str) -> Path:
     raise ImportError(f"{package}: no such package; must be installed")
 
 
-def card_file(package: str) -> Path:
+def sheet_file(package: str) -> Path:
     """Return the equation sheet of a package: in it once it is installed, in the sources next to
     it.
     """

@@ -127,7 +127,7 @@ def resolved(host: str, port: int, lowest_port: int = 0) -> Address:
         candidates = socket.getaddrinfo(name, port, socket.AF_UNSPEC, socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:
         raise InputError(
-            f"{text((host, port))}: no such host; must be an address or a name that has one"
+            f"{text((host, port))}: no such address; must be an IP address or a name that has one"
         ) from error
     of_ipv4 = (entry for entry in candidates if entry[0] == socket.AF_INET)
     *_, socket_address = next(of_ipv4, candidates[0])

@@ -178,7 +178,7 @@ class PacedMaster(Master):
                 f"{self.system.name}: the run stalled at t = "
                 f"{seconds(self.system.time_ns(self.steps_done))}: a step would begin "
                 f"{stall.late:.3g} s late, and {choices(c.name for c in proxies)} would get "
-                "commands from what was measured before; must be at most realtime.stall, or "
+                "commands from old measurements; must be at most realtime.stall, or "
                 "proxy.resume = true"
             ) from None
         self._begin_anew(f"the run stalled for {stall.late:.3g} s")

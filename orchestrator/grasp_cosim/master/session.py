@@ -494,8 +494,7 @@ class Session:
             raise InputError(f"{self.system.name}: a run in real time cannot go back")
         if self._has_listeners:
             raise InputError(
-                f"{self.system.name}: what listeners have got cannot be taken back; must be a "
-                "session without"
+                f"{self.system.name}: listeners cannot give rows back; must be a session without"
             )
 
     def restore(self, state: State) -> None:

@@ -577,7 +577,7 @@ def _plain(m: Metric, value: Any) -> Any:
     if not all(v is None or isinstance(v, bool | int | float) for v in values):
         raise InputError(f"returned {value!r}; must be a number, True, False, None or a list of it")
     if any(isinstance(v, float) and not isfinite(v) for v in values):
-        raise InputError(f"returned {plain!r}; must be finite, None where there is no value")
+        raise InputError(f"returned {plain!r}; must be finite, or None if there is no value")
     if m.entries and not (several and len(values) == len(m.entries)):
         raise InputError(f"returned {value!r}; must be a value for each of {choices(m.entries)}")
     return values if several else values[0]

@@ -116,7 +116,7 @@ class Pacer:
         if proxies and realtime.overrun == "catch-up":
             raise InputError(
                 f"realtime: overrun = 'catch-up': a burst of steps would go to the hardware behind "
-                f"{choices(proxies)}; must be 'continue' or 'stop' where a component is a proxy"
+                f"{choices(proxies)}; must be 'continue' or 'stop' with a proxy"
             )
         realtime = resolved(realtime, bool(proxies))
         period = realtime.period(system.step_ns)

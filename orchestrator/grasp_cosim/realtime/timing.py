@@ -144,7 +144,7 @@ class Timing:
 
 def _damaged(place: str, reason: str) -> InputError:
     return InputError(
-        f"{place}: is damaged ({reason}); must be what `grasp-cosim run --realtime --out` wrote"
+        f"{place}: is damaged ({reason}); must be a file of `grasp-cosim run --realtime --out`"
     )
 
 

@@ -193,7 +193,7 @@ def _check_connectors(part: Part) -> None:
             part.element.origin.notes.add(place, OTHERWISE.format(variable.unit))
         else:
             raise InputError(
-                f"{place}: unit {connector.unit.name} is not what the FMU declares, "
+                f"{place}: unit {connector.unit.name} is not the one that the FMU declares, "
                 f"{declared.name}; must mean the same"
             )
 

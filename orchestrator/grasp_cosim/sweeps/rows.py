@@ -125,7 +125,7 @@ def _entries(source: Any) -> Iterable[Any]:
         return source.to_pylist()  # type: ignore[no-any-return]  # of pyarrow
     if hasattr(source, "iloc"):  # of pandas
         if source.ndim == 1:
-            raise InputError("sweep: a Series; must be a DataFrame, with a column for each place")
+            raise InputError("sweep: a Series; must be a DataFrame, with a column for each key")
         return source.to_dict("records")  # type: ignore[no-any-return]
     dtype = getattr(source, "dtype", None)
     names = getattr(dtype, "names", None)  # of a structured array of NumPy
@@ -178,7 +178,7 @@ def _row(number: int, entry: Any) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for head, cell in entry.items():
         if not isinstance(head, str):
-            raise InputError(f"sweep: {head!r}: must be a place in the system, a text")
+            raise InputError(f"sweep: {head!r}: must be a key of the system, a text")
         place, unit = split_head(head)
         value = _plain(place, cell)
         if value is None:

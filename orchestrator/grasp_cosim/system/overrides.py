@@ -120,12 +120,12 @@ def as_overrides(values: Mapping[str, Any], origin: str) -> list[Override]:
     """Values by place as overrides of one origin; InputError where they are none."""
     if not isinstance(values, Mapping):
         label = Override(repr(values), None, origin).label
-        raise InputError(f"{label}: must be a mapping of places to values")
+        raise InputError(f"{label}: must be a mapping of keys to values")
     overrides = [Override(place, value, origin) for place, value in values.items()]
     for override in overrides:
         if not isinstance(override.place, str):
             label = override.label_of(repr(override.place))
-            raise InputError(f"{label}: must be a place in the system, a text")
+            raise InputError(f"{label}: must be a key of the system, a text")
     return overrides
 
 
@@ -140,12 +140,12 @@ def grouped(system: Structure, overrides: Iterable[Override]) -> Overrides:
     for override in overrides:
         if "." not in override.place:
             near = nearest(override.place, _all_places(system))
-            raise InputError(f"{override.label}: no place in a system file; {near}")
+            raise InputError(f"{override.label}: no key of a system file; {near}")
         place = parse_place(components, override.place, override.label)
         table = groups.table_of(place)
         name = place.name or place.entry
         if name in table:
-            raise InputError(f"{override.label}: this place is given twice; must be given once")
+            raise InputError(f"{override.label}: this key is set twice; must be set once")
         if not _takes_texts(place):
             override = Override(override.place, plain(override.value), override.origin)
         table[name] = override

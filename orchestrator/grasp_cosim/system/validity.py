@@ -161,7 +161,7 @@ def check_connections(system: Structure) -> None:
         raise InputError(
             f"{system.name}: no source for {choices(missing, MAX_NAMED)}; must have a connection "
             f"from one of {choices(outputs, MAX_NAMED)}, or a value in the system file, "
-            f"or --set {missing[0]}=VALUE where another FMU brings it; or drive it with --input"
+            f"or --set {missing[0]}=VALUE if another FMU has it; or drive it with --input"
         )
 
 

@@ -30,7 +30,7 @@ class Hand extends Grasp {
       this.fingerOn(pen, at([s * e[0], s * e[1]]), face);
     }
     for (const { j, e, s } of faces) {
-      const tip = at([s * e[0], s * e[1]]), side = [e[1] * 8, e[0] * 8]; // beside the finger
+      const tip = at([s * e[0], s * e[1]]), side = [e[1] * 8, e[0] * 8]; // next to the finger
       if (plan.actuator[j]) {
         this.force(pen, [tip[0] + LONG * e[0], tip[1] - LONG * e[1]], e,
           this.at(plan.actuator[j], t), `--finger${j}`, true);

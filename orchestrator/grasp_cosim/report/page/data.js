@@ -56,7 +56,7 @@ function pyramid(values) {
 }
 
 // Lowest and highest value of the rows between neighbouring edges, from blocks of at most a quarter
-// of a column: what is one such block beside a column may count to it.
+// of a column: what is one such block next to a column may count to it.
 function envelope(levels, edges) {
   const columns = edges.length - 1, perColumn = (edges[columns] - edges[0]) / columns;
   let level = 0;

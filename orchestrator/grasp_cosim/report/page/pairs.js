@@ -1,5 +1,5 @@
 // The panels of two runs: A solid, B dashed over it, the band as a tube around A; below each panel how
-// far the two are apart, beside the widths of the bands.
+// far the two are apart, next to the widths of the bands.
 "use strict";
 
 const parts = new Map();
