@@ -62,7 +62,7 @@ init a.toml --as plant=none.fmu :: none.fmu: no such FMU file
 init a.toml --fmu a=vendor.fmu --fmu a=vendor.fmu :: must be a name of its own
 init a.toml --fmu a=vendor.fmu --as plant=vendor.fmu :: --as puts one into the grasp
 init a.toml --fingers 3 --as plant=vendor.fmu :: `grasp-cosim run a.toml --swap plant=vendor.fmu`
-init a.toml --fmu a=vendor.fmu --tandem :: each makes a system of its own; must be one of them
+init a.toml --fmu a=vendor.fmu --tandem :: each makes another system; must be one of them
 init a.toml --angles 0,x :: --angles '0,x': must be numbers in degrees, as 0,90,225
 identify a.csv :: a.csv: no such log; must be a .csv, .tsv, .mf4, .arrow, .feather, .parquet file
 identify --fit mass :: the published experiments: 'mass' cannot be fitted; valid: coulomb

@@ -94,7 +94,7 @@ def _exit_code_of_command(arguments: list[str]) -> int:
 def _end_at_exit(_: object) -> None:
     """A run that an FMU ends by exit() would look like one that is done; we end by leave()."""
     if os.getpid() == _OWNER:  # and not a fork
-        remedy = "with isolation = 'process' that ends it alone"
+        remedy = "with isolation = 'process' that ends only the process of the FMU"
         message = f"the binary of an FMU called exit(); {remedy}"
         os._exit(fail(message, FAILED))
 
@@ -158,7 +158,7 @@ def harmless_streams() -> Iterator[None]:
 
 
 def keep_output_for_us() -> None:
-    """What the binary of an FMU prints goes to standard error: with --json, we alone may print.
+    """What the binary of an FMU prints goes to standard error: with --json, only the result may be there.
 
     In the place of a standard file that is closed comes one that cannot be written. Else the next
     file that is opened would get its number, and what an FMU prints.

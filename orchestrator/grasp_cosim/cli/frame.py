@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..metrics.metric import Metric
 
 NEGATIVE, WRONG, FAILED, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
-"""Exit codes beside 0: result negative, input wrong, failure on the way, Ctrl-C, SIGTERM."""
+"""Exit codes other than 0: result negative, input wrong, failure on the way, Ctrl-C, SIGTERM."""
 
 PATH = click.Path(path_type=Path)
 """The type of an option or argument that is a path."""

@@ -22,7 +22,7 @@ SECTIONS = {
     },
     "Hardware in the loop": {"proxy": "make", "serve": "bench", "relay": "bench"},
 }  # fmt: skip
-"""Where the help lists a command, and the module that has it; paper.py needs the room grasp/."""
+"""Where the help lists a command, and the module that has it; paper.py needs the package grasp/."""
 
 WITH_GRASP = find_spec("..grasp", __package__) is not None
 
@@ -76,7 +76,7 @@ class Commands(click.Group):
 
 
 def pages() -> Path:
-    """The folder of the pages: in the package once it is installed, in the sources beside it."""
+    """The folder of the pages: in the package once it is installed, in the sources next to it."""
     inside = Path(__file__).parents[1] / "docs"
     return inside if inside.is_dir() else Path(__file__).parents[3] / "docs"
 

@@ -12,7 +12,7 @@ from ..interface.read import describe
 from .frame import PATH, json_option, say, show, waiting
 
 FIRST = "; zig makes its libraries first, once, which takes a minute or two"
-"""What is said of a first build for other platforms."""
+"""The note on a first build for other platforms."""
 
 target_option = click.option(
     "--target",

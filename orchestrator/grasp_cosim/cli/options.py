@@ -158,7 +158,7 @@ PLACES = {
     "scheme": "experiment.scheme",
     "input": "input.file",
 }
-"""The places of a system file that have an option of their own."""
+"""The places of a system file that have a separate option."""
 
 TIMES = ("experiment.start", "experiment.step", "experiment.stop")
 """The places that an archive of another tool may leave open until it is read."""
@@ -166,7 +166,7 @@ TIMES = ("experiment.start", "experiment.step", "experiment.stop")
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SystemOptions:
-    """What the options of a command say of its system, by the names that click gives them.
+    """The options of a command on its system, by the names that click gives them.
 
     overrides are those of --set, swaps the texts of --swap, record those of --record. fitted is the
     file of --values. input is the table that drives inputs. Times are texts, in s.
@@ -193,7 +193,7 @@ class SystemOptions:
 
 
 def overrides_of(options: SystemOptions) -> list[Override]:
-    """The overrides that options are: those of places with an option of their own, swaps, --set.
+    """The overrides that options are: those of places with a separate option, swaps, --set.
 
     InputError where two have one place.
     """
@@ -234,7 +234,7 @@ def load_system(
 
 
 def chosen_system(options: SystemOptions) -> System:
-    """The system of a command, as its options have it; notes tell what is left out of it.
+    """The system of a command, as its options have it; notes name the parts that are left out.
 
     These are its controller, then presets, that of the case last, then what was fitted, then
     overrides of single values, and what is recorded.
@@ -296,7 +296,7 @@ def _check_not_driven(system: System, places: Iterable[str]) -> None:
 
 
 def _with_preset(system: System, name: str) -> System:
-    """The system with a preset of its own, or else with one of the built-in grasp."""
+    """The system with its own preset, or else with one of the built-in grasp."""
     if name in system.presets:
         return system.with_presets(name)
     from ..grasp.presets import with_preset

@@ -155,32 +155,32 @@ def _write_block(file: Path, kind: str, force: bool, as_json: bool) -> int:
 def _check_together(
     file: Path, foreign: Mapping[str, Path], alone: bool, hand: bool, tandem: bool
 ) -> None:
-    """InputError where options name two systems: one of FMUs alone, of a hand, a tandem, a grasp.
+    """InputError where options name two systems: one of only FMUs, of a hand, a tandem, a grasp.
 
     Foreign FMUs may be in the place of components of the last two.
     """
     if hand and foreign:
         fmus = " ".join(f"--swap {name}={quote(str(fmu))}" for name, fmu in foreign.items())
         raise InputError(
-            "--fingers and --angles cannot be used with --as; write the hand alone, then "
+            "--fingers and --angles cannot be used with --as; write the system of the hand, then "
             f"`grasp-cosim run {quote(str(file))} {fmus}`"
         )
     if alone and foreign:
         raise InputError(
-            "--fmu cannot be used with --as; --fmu makes a system of FMUs alone, "
+            "--fmu cannot be used with --as; --fmu makes a system of only these FMUs, "
             "--as puts one into the grasp"
         )
     kinds = {"--fmu": alone, "--fingers and --angles": hand, "--tandem": tandem}
     requested = [option for option, is_requested in kinds.items() if is_requested]
     if len(requested) > 1:
         raise InputError(
-            f"{requested[0]} cannot be used with {requested[1]}; each makes a system of its own; "
+            f"{requested[0]} cannot be used with {requested[1]}; each makes another system; "
             "must be one of them"
         )
 
 
 def path_from(folder: Path, fmu: Path) -> str:
-    """The path of an FMU in a file of a folder: relative to that where it is below or beside it.
+    """The path of an FMU in a file of a folder: relative to that where it is below or next to it.
 
     So the two can be moved together; one from elsewhere has an absolute path.
     """
@@ -199,14 +199,14 @@ def _fmus_by_component(option: str, texts: tuple[str, ...]) -> dict[str, Path]:
     for text in texts:
         name, path = pair(option, text, "COMPONENT=FMU")
         if not NAME.fullmatch(name) or name in fmus:
-            raise InputError(f"{option} {text!r}: must be a name of its own, letters, digits, _, -")
+            raise InputError(f"{option} {text!r}: must be a new name of letters, digits, _, -")
         fmus[name] = Path(path)
         read_interface(fmus[name])  # before any of ours is built
     return fmus
 
 
 def _hand_text(folder: Path, fingers: int | None, angles: str | None) -> tuple[str, list[str]]:
-    """The text of a hand, and what is to be said of it."""
+    """The text of a hand, and the notes on it."""
     from ..grasp.system import built
     from ..hand.system import directions_of, faint, hand_text, sized
 
