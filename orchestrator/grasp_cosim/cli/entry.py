@@ -158,7 +158,7 @@ def harmless_streams() -> Iterator[None]:
 
 
 def keep_output_for_us() -> None:
-    """What the binary of an FMU prints goes to standard error: with --json, only the result may be there.
+    """The prints of the binary of an FMU go to standard error: with --json only the result is printed.
 
     In the place of a standard file that is closed comes one that cannot be written. Else the next
     file that is opened would get its number, and what an FMU prints.
